@@ -1,0 +1,1 @@
+//! One attempt of the probe to touch a scene.

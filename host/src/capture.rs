@@ -1,0 +1,1 @@
+//! Virtual touches of objects, as many as wanted.

@@ -1,0 +1,71 @@
+//! One file a command: its arguments, its help, and the call into the library.
+
+use clap::{Parser, Subcommand};
+use palpate::Result;
+
+/// Declares the commands' modules, the enum that clap parses and the dispatch, from one list.
+macro_rules! commands {
+    ($($(#[$meta:meta])* $name:ident => $module:ident,)*) => {
+        $(mod $module;)*
+
+        #[derive(Subcommand)]
+        enum Command {
+            $($(#[$meta])* $name($module::Arguments),)*
+        }
+
+        impl Command {
+            fn run(self) -> Result<()> {
+                match self {
+                    $(Self::$name(arguments) => $module::run(arguments),)*
+                }
+            }
+        }
+    };
+}
+
+commands! {
+    /// Do all of it: capture, train, export, recognise, report (the default)
+    Run => run,
+    /// Write the ten built-in objects as OBJ files
+    Objects => objects,
+    /// Touch objects with the virtual probe
+    Capture => capture,
+    /// Train an ensemble on captured touches
+    Train => train,
+    /// Compile an ensemble to the bytes that the chip reads
+    Export => export,
+    /// Say what is in a compiled model
+    Inspect => inspect,
+    /// Recognise objects from a stream of touches
+    Recognize => recognize,
+    /// Measure how often a model is right, and after how many touches
+    Evaluate => evaluate,
+    /// Hold a compiled model against its ensemble
+    Parity => parity,
+}
+
+/// Recognise objects by touch: virtual touches, boosted trees, a model of a few kilobytes for a microcontroller.
+#[derive(Parser)]
+#[command(
+    name = "palpate",
+    version,
+    about,
+    arg_required_else_help = false,
+    after_help = "\
+Examples:
+  palpate                            touch, learn, pack and recognise ten built-in objects
+  palpate run meshes/ -o out         the same for your own OBJ files
+  palpate help capture               what a command does, with examples"
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+impl Cli {
+    pub(crate) fn run(self) -> Result<()> {
+        self.command
+            .unwrap_or_else(|| Self::parse_from(["palpate", "run"]).command.unwrap_or_else(|| unreachable!()))
+            .run()
+    }
+}

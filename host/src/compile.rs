@@ -1,0 +1,1 @@
+//! From an ensemble to the bytes that the chip reads.

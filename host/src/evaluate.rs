@@ -1,0 +1,1 @@
+//! How often, and after how many touches, a model is right.

@@ -1,0 +1,33 @@
+//! Recognise objects by touch: simulate a three-fingered probe, train, compile and evaluate.
+//!
+//! The data's way through this crate:
+//!
+//! ```text
+//! mesh ──► scene ──► approach ──► contact times ──► touch ──► ensemble ──► compiled model ──► verdicts
+//! ```
+//!
+//! A touch's features come from [`palpate_shared`], verdicts from [`palpate_onboard`]: the same lines of code that run
+//! on the chip.
+
+pub mod approach;
+pub mod capture;
+pub mod compile;
+pub mod dataset;
+pub mod ensemble;
+pub mod error;
+pub mod evaluate;
+pub mod mesh;
+pub mod obj;
+pub mod objects;
+pub mod output;
+pub mod parity;
+pub mod progress;
+pub mod render;
+pub mod report;
+pub mod run;
+pub mod scene;
+pub mod source;
+pub mod sweep;
+pub mod train;
+
+pub use error::{Error, Result};

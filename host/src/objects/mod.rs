@@ -1,0 +1,1 @@
+//! The ten built-in objects, made from implicit functions.

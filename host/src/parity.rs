@@ -1,0 +1,1 @@
+//! Whether the compiled model decides as the full model does.

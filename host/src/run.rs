@@ -1,0 +1,1 @@
+//! The whole way: capture, train, export, recognise, report.

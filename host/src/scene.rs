@@ -1,0 +1,1 @@
+//! An object scaled and centred, ready to be touched.

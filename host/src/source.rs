@@ -1,0 +1,1 @@
+//! Where objects come from: built in, an OBJ file, a directory of them.

@@ -1,0 +1,1 @@
+//! First contact of a moving sphere with a triangle mesh.

@@ -1,0 +1,1 @@
+//! From touches to an ensemble.

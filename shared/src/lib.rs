@@ -1,0 +1,25 @@
+//! What Palpate's host and chip both speak.
+//!
+//! A probe with three fingers moves towards an object; each finger reports when it makes contact. The path of one such
+//! [`Touch`] through this crate:
+//!
+//! ```text
+//! contact times ──► Touch ──► Descriptor ──► Features (whole numbers)
+//! ```
+//!
+//! The trainer on the host and the recogniser on the chip compute a feature with the same lines of code, here, so that
+//! neither rounds where the other did not: times are whole microseconds, direction cosines are Q15 integers.
+//!
+//! `no_std`, without a heap and without `unsafe`.
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+#[cfg(test)]
+extern crate std;
+
+mod descriptor;
+mod touch;
+
+pub use descriptor::{Descriptor, FEATURE_LIMIT, Features, MAX_FEATURES, MISSING_FEATURE};
+pub use touch::{ContactTime, Pose, Q15_ONE, Touch};
