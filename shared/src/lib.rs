@@ -10,6 +10,13 @@
 //! The trainer on the host and the recogniser on the chip compute a feature with the same lines of code, here, so that
 //! neither rounds where the other did not: times are whole microseconds, direction cosines are Q15 integers.
 //!
+//! ```
+//! use palpate_shared::{Descriptor, Touch};
+//!
+//! let touch = Touch::from_micros([30_000, 0, 50_000]);
+//! assert_eq!(Descriptor::Curvature.features(&touch).as_slice(), [80_000, 20_000]);
+//! ```
+//!
 //! `no_std`, without a heap and without `unsafe`.
 #![no_std]
 #![forbid(unsafe_code)]
