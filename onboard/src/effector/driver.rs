@@ -1,0 +1,266 @@
+//! Edges in, touches and faults out.
+
+use super::debounce::{Change, Debounce, after};
+use super::{Edge, Fault, Finger, Settings};
+use palpate_shared::{ContactTime, Touch};
+
+/// Where the effector is in a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum State {
+    /// All fingers are open; the next contact begins a touch.
+    Waiting,
+    /// At least one finger has touched.
+    Touching,
+    /// All three have touched; some are still closed.
+    Complete,
+    /// Time ran out before all three touched; some are still closed.
+    TimedOut,
+    /// The touch is over, and the fingers have to be open for [`Settings::rest`]. Also the state at power-up.
+    Released,
+}
+
+/// More than the timers that can run out at one moment: three for each finger and two for the touch.
+const MOST_TIMERS: usize = 16;
+
+/// The driver without pins or a clock: edges and the time go in, touches and faults come out.
+///
+/// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
+/// with a missing finger, and faults, are only seen at the first call after they are due.
+///
+/// RAM: 172 bytes. Cannot fail or panic, whatever the edges.
+#[derive(Clone, Debug)]
+pub struct Effector {
+    settings: Settings,
+    fingers: [Debounce; 3],
+    /// First contacts of the touch in progress.
+    contacts: [Option<u32>; 3],
+    missing_in_a_row: [u16; 3],
+    state: State,
+    now: Option<u32>,
+    /// Since when all fingers have been open, while the state is [`State::Released`].
+    open_since: Option<u32>,
+    touch: Option<Touch>,
+    faults: Faults,
+}
+
+/// Faults that have not been told yet, one of each kind and finger.
+#[derive(Clone, Copy, Debug, Default)]
+struct Faults {
+    stuck: [bool; 3],
+    bouncing: [bool; 3],
+    silent: [bool; 3],
+    unreadable: [bool; 3],
+    overrun: bool,
+}
+
+impl Faults {
+    fn take(&mut self) -> Option<Fault> {
+        if core::mem::take(&mut self.overrun) {
+            return Some(Fault::Overrun);
+        }
+        Finger::ALL.into_iter().find_map(|finger| {
+            let told = |flags: &mut [bool; 3], fault: Fault| core::mem::take(finger.of(flags)).then_some(fault);
+            told(&mut self.bouncing, Fault::Bouncing(finger))
+                .or_else(|| told(&mut self.stuck, Fault::Stuck(finger)))
+                .or_else(|| told(&mut self.silent, Fault::Silent(finger)))
+                .or_else(|| told(&mut self.unreadable, Fault::Unreadable(finger)))
+        })
+    }
+}
+
+impl Effector {
+    /// A driver whose fingers are open, as far as it knows.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings: settings.in_range(),
+            fingers: [Debounce::new(); 3],
+            contacts: [None; 3],
+            missing_in_a_row: [0; 3],
+            state: State::Released,
+            now: None,
+            open_since: None,
+            touch: None,
+            faults: Faults::default(),
+        }
+    }
+
+    /// Where the effector is in a touch, as of the last call.
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// The level of each finger as of its last edge: whether it is closed.
+    pub fn levels(&self) -> [bool; 3] {
+        self.fingers.map(|finger| finger.level())
+    }
+
+    /// Takes in an edge. An edge older than the last one, or than the last poll, counts as now.
+    ///
+    /// Returns a touch that was over before the edge, if there was one.
+    ///
+    /// # Errors
+    /// A [`Fault`]. The edge has been taken in nevertheless; [`Effector::poll`] tells what else there is.
+    pub fn edge(&mut self, edge: Edge) -> Result<Option<Touch>, Fault> {
+        self.advance(edge.at);
+        if edge.after_loss {
+            self.faults.overrun = true;
+            self.abandon();
+        }
+        let at = self.now.unwrap_or(edge.at);
+        edge.finger.of(&mut self.fingers).edge(edge.closed, at);
+        self.open_since = None;
+        self.result()
+    }
+
+    /// Lets time pass until `now`. Call it until it returns `Ok(None)`, at least every 35 minutes (2³¹ µs) unless the
+    /// state is [`State::Waiting`]: then the time may pass unnoticed.
+    ///
+    /// # Errors
+    /// A [`Fault`].
+    pub fn poll(&mut self, now: u32) -> Result<Option<Touch>, Fault> {
+        self.advance(now);
+        self.result()
+    }
+
+    /// A pin of this finger cannot be read.
+    pub(super) fn unreadable(&mut self, finger: Finger) {
+        *finger.of(&mut self.faults.unreadable) = true;
+    }
+
+    fn result(&mut self) -> Result<Option<Touch>, Fault> {
+        match self.touch.take() {
+            Some(touch) => Ok(Some(touch)),
+            None => self.faults.take().map_or(Ok(None), Err),
+        }
+    }
+
+    /// Fires the timers that run out until `now`, in their order.
+    fn advance(&mut self, now: u32) {
+        let Some(mut at) = self.now else {
+            self.fingers.iter_mut().for_each(|finger| finger.start(now));
+            self.now = Some(now);
+            self.open_since = Some(now);
+            return;
+        };
+        // While no timer runs any amount of time may have passed.
+        let mut left = if self.due(at).is_none() { now.wrapping_sub(at) } else { after(now, at) };
+        for _ in 0..MOST_TIMERS {
+            let Some(due) = self.due(at).filter(|&due| due <= left) else { break };
+            at = at.wrapping_add(due);
+            left -= due;
+            self.fire(at);
+        }
+        self.now = Some(at.wrapping_add(left));
+    }
+
+    /// Microseconds until the next timer runs out.
+    fn due(&self, now: u32) -> Option<u32> {
+        let settings = &self.settings;
+        let fingers = self.fingers.iter().filter_map(|finger| finger.due(now, settings));
+        let state = match self.state {
+            State::Waiting => None,
+            State::Touching => self.deadline().filter(|&d| !self.awaits_contact(d)).map(|d| after(d, now)),
+            State::Complete | State::TimedOut => self.all_open().then_some(0),
+            State::Released if self.all_open() => {
+                Some(self.open_since.map_or(0, |since| after(since.wrapping_add(self.settings.rest), now)))
+            }
+            State::Released => None,
+        };
+        fingers.chain(state).min()
+    }
+
+    fn fire(&mut self, now: u32) {
+        for finger in Finger::ALL {
+            while let Some(change) = finger.of(&mut self.fingers).fire(now, &self.settings) {
+                self.change(finger, change);
+            }
+        }
+        let state = self.state;
+        match state {
+            State::Touching => {
+                let timed_out = self.deadline().is_some_and(|d| !self.awaits_contact(d) && is_past(d, now));
+                if timed_out || self.contacts.iter().all(Option::is_some) {
+                    self.finish();
+                }
+            }
+            State::Complete | State::TimedOut if self.all_open() => self.state = State::Released,
+            State::Released if self.all_open() && self.rested(now) => self.state = State::Waiting,
+            _ => {}
+        }
+    }
+
+    fn change(&mut self, finger: Finger, change: Change) {
+        match change {
+            Change::Closed(at) if matches!(self.state, State::Waiting | State::Touching) => {
+                self.state = State::Touching;
+                finger.of(&mut self.contacts).get_or_insert(at);
+            }
+            Change::Closed(_) | Change::Opened => {}
+            Change::Stuck => *finger.of(&mut self.faults.stuck) = true,
+            Change::Bouncing => {
+                *finger.of(&mut self.faults.bouncing) = true;
+                self.abandon();
+            }
+        }
+    }
+
+    /// Drops the touch in progress, if there is one; the fingers have to open before the next.
+    fn abandon(&mut self) {
+        if matches!(self.state, State::Waiting | State::Touching) {
+            self.contacts = [None; 3];
+            self.state = State::Released;
+        }
+    }
+
+    fn all_open(&self) -> bool {
+        self.fingers.iter().all(Debounce::is_open)
+    }
+
+    /// Whether the open fingers have rested for long enough, counted from the first time that this is asked.
+    fn rested(&mut self, now: u32) -> bool {
+        after(now, *self.open_since.get_or_insert(now)) >= self.settings.rest
+    }
+
+    /// The first contact of the touch in progress.
+    fn origin(&self) -> Option<u32> {
+        self.contacts.iter().flatten().copied().reduce(|a, b| if is_past(a, b) { a } else { b })
+    }
+
+    /// When the touch in progress times out.
+    fn deadline(&self) -> Option<u32> {
+        self.origin().map(|origin| origin.wrapping_add(self.settings.timeout))
+    }
+
+    /// Whether a finger that has not touched yet began to close before the deadline and has not settled.
+    fn awaits_contact(&self, deadline: u32) -> bool {
+        let awaited = |(finger, contact): (&Debounce, &Option<u32>)| {
+            contact.is_none() && finger.closing_since().is_some_and(|since| !is_past(deadline, since))
+        };
+        self.fingers.iter().zip(&self.contacts).any(awaited)
+    }
+
+    fn finish(&mut self) {
+        let Some(origin) = self.origin() else { return };
+        let times = self.contacts.map(|contact| match contact.map(|at| after(at, origin)) {
+            Some(time) if time < self.settings.timeout => ContactTime::from_micros(time),
+            _ => ContactTime::MISSING,
+        });
+        self.contacts = [None; 3];
+        let touch = Touch::new(times);
+        self.state = if touch.is_full() { State::Complete } else { State::TimedOut };
+        for (finger, time) in Finger::ALL.into_iter().zip(times) {
+            let missing = finger.of(&mut self.missing_in_a_row);
+            *missing = if time.is_missing() { missing.saturating_add(1) } else { 0 };
+            if self.settings.silent_after > 0 && *missing >= self.settings.silent_after {
+                *missing = 0;
+                *finger.of(&mut self.faults.silent) = true;
+            }
+        }
+        self.touch = Some(touch);
+    }
+}
+
+/// Whether `at` is not after `now`, for times less than 2³¹ apart.
+const fn is_past(at: u32, now: u32) -> bool {
+    now.wrapping_sub(at) >> 31 == 0
+}

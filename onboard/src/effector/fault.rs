@@ -1,0 +1,52 @@
+//! What can go wrong with three switches.
+
+use super::Finger;
+use core::fmt;
+
+/// A fault of the effector, and which finger has it. The driver goes on: every other touch is still reported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The finger has been closed for longer than [`Settings::stuck`](super::Settings::stuck). Reported once each time;
+    /// no touch can begin before it opens.
+    Stuck(Finger),
+    /// The finger opened and closed for longer than [`Settings::settle`](super::Settings::settle). The touch, if there
+    /// was one, is dropped.
+    Bouncing(Finger),
+    /// The finger was missing in [`Settings::silent_after`](super::Settings::silent_after) touches in a row.
+    Silent(Finger),
+    /// The finger's pin cannot be read. Reported once, until it can be read again.
+    Unreadable(Finger),
+    /// Edges came faster than the main loop drained them, and some were lost. The touch, if there was one, is dropped.
+    Overrun,
+}
+
+impl Fault {
+    /// The finger that has the fault, if it is one finger's.
+    pub const fn finger(self) -> Option<Finger> {
+        match self {
+            Self::Stuck(finger) | Self::Bouncing(finger) | Self::Silent(finger) | Self::Unreadable(finger) => {
+                Some(finger)
+            }
+            Self::Overrun => None,
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stuck(finger) => {
+                write!(f, "{finger} stays closed: free the switch, or check its wiring and active level")
+            }
+            Self::Bouncing(finger) => {
+                write!(f, "{finger} does not settle: check for a loose contact, or raise the settle time")
+            }
+            Self::Silent(finger) => write!(f, "{finger} has not touched for many touches: check its wiring"),
+            Self::Unreadable(finger) => write!(f, "the pin of {finger} cannot be read: check the port"),
+            Self::Overrun => f.write_str("edges were lost: drain the queue more often, or make it longer"),
+        }
+    }
+}
+
+impl core::error::Error for Fault {}

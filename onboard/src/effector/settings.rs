@@ -1,0 +1,41 @@
+//! How long the driver waits for what.
+
+/// The longest duration of any setting: 2³⁰ µs, 18 minutes, so that differences of wrapping times keep their sign.
+const LONGEST: u32 = 1 << 30;
+
+/// How long the driver waits for what, in microseconds. Anything above 2³⁰ (18 minutes) counts as 2³⁰.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// A switch has settled when its level has held for so long: longer than the longest pause in its bouncing.
+    pub debounce: u32,
+    /// A switch that has not settled after so long is bouncing. More than `debounce`.
+    pub settle: u32,
+    /// After the first contact, fingers that have not touched within this time are missing.
+    pub timeout: u32,
+    /// After a touch all fingers have to be open for so long before the next touch can begin.
+    pub rest: u32,
+    /// A finger that stays closed for so long is stuck. More than `timeout` and the time that a touch is held.
+    pub stuck: u32,
+    /// A finger that is missing in so many touches in a row does not report. 0 never says so.
+    pub silent_after: u16,
+}
+
+impl Default for Settings {
+    /// For micro-switches (which bounce for 1 to 5 ms) and the paper's probe: 5 ms to debounce, 25 ms to settle, 400 ms
+    /// for the other fingers (4 units of length at 10 units a second), 10 ms rest, 5 s until stuck, silent after 100
+    /// touches.
+    fn default() -> Self {
+        Self { debounce: 5_000, settle: 25_000, timeout: 400_000, rest: 10_000, stuck: 5_000_000, silent_after: 100 }
+    }
+}
+
+impl Settings {
+    /// The same with every duration in range, and `settle` and `stuck` long enough to make sense.
+    pub(super) fn in_range(self) -> Self {
+        let [debounce, settle, timeout, rest, stuck] =
+            [self.debounce, self.settle, self.timeout, self.rest, self.stuck].map(|d| d.min(LONGEST));
+        let settle = settle.max(debounce.saturating_add(1));
+        let stuck = stuck.max(timeout.saturating_add(1)).max(settle.saturating_add(1));
+        Self { debounce, settle, timeout, rest, stuck, silent_after: self.silent_after }
+    }
+}

@@ -1,0 +1,573 @@
+use super::*;
+use core::cell::Cell;
+use embedded_hal_mock::eh1::MockError;
+use embedded_hal_mock::eh1::digital::{Mock, State as Level, Transaction};
+use heapless::spsc::Queue;
+use palpate_shared::{ContactTime, Touch};
+use proptest::prelude::*;
+use std::{vec, vec::Vec};
+
+const SETTINGS: Settings =
+    Settings { debounce: 5_000, settle: 25_000, timeout: 400_000, rest: 10_000, stuck: 5_000_000, silent_after: 4 };
+
+/// What came out of a run: a touch or a fault, in order.
+type Outcomes = Vec<Result<Touch, Fault>>;
+
+fn poll(effector: &mut Effector, now: u32, outcomes: &mut Outcomes) {
+    while let Some(outcome) = effector.poll(now).transpose() {
+        outcomes.push(outcome);
+    }
+}
+
+/// Plays edges (finger, closed, time) from power-up at `start`, polling at the given times after it as well.
+fn play(start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (Outcomes, Effector) {
+    let mut effector = Effector::new(SETTINGS);
+    let mut outcomes = Outcomes::new();
+    poll(&mut effector, start, &mut outcomes);
+    let mut moments: Vec<(u32, Option<(Finger, bool)>)> =
+        edges.iter().map(|&(finger, closed, at)| (at, Some((finger, closed)))).collect();
+    moments.extend(polls.iter().filter(|&&at| at < end).map(|&at| (at, None)));
+    moments.push((end, None));
+    moments.sort_by_key(|&(at, _)| at);
+    for (at, edge) in moments {
+        let now = start.wrapping_add(at);
+        if let Some((finger, closed)) = edge {
+            let outcome = effector.edge(Edge::new(finger, closed, now)).transpose();
+            outcomes.extend(outcome);
+        }
+        poll(&mut effector, now, &mut outcomes);
+    }
+    (outcomes, effector)
+}
+
+use Finger::{First, Last, Middle};
+
+#[test]
+fn three_contacts_make_a_touch_of_the_first_closing_edges() {
+    let edges = [(Middle, true, 100_000), (Last, true, 150_000), (First, true, 130_000)];
+    let (outcomes, effector) = play(0, &edges, &[], 160_000);
+    assert_eq!(outcomes, [Ok(Touch::from_micros([30_000, 0, 50_000]))]);
+    assert_eq!(effector.state(), State::Complete);
+}
+
+#[test]
+fn states_follow_a_touch_from_waiting_to_waiting() {
+    let mut effector = Effector::new(SETTINGS);
+    let mut state_at = |at: u32, edges: &[(Finger, bool)]| {
+        let mut outcomes = Outcomes::new();
+        for &(finger, closed) in edges {
+            outcomes.extend(effector.edge(Edge::new(finger, closed, at)).transpose());
+        }
+        poll(&mut effector, at, &mut outcomes);
+        effector.state()
+    };
+    assert_eq!(state_at(0, &[]), State::Released, "at power-up the fingers have to rest first");
+    assert_eq!(state_at(10_000, &[]), State::Waiting);
+    assert_eq!(state_at(20_000, &[(First, true)]), State::Waiting, "not settled yet");
+    assert_eq!(state_at(25_000, &[]), State::Touching);
+    assert_eq!(state_at(30_000, &[(Middle, true), (Last, true)]), State::Touching);
+    assert_eq!(state_at(35_000, &[]), State::Complete);
+    assert_eq!(state_at(50_000, &[(First, false), (Middle, false), (Last, false)]), State::Complete);
+    assert_eq!(state_at(55_000, &[]), State::Released);
+    assert_eq!(state_at(64_999, &[]), State::Released);
+    assert_eq!(state_at(65_000, &[]), State::Waiting);
+    assert_eq!(state_at(70_000, &[(First, true)]), State::Waiting);
+    assert_eq!(state_at(470_000, &[]), State::TimedOut);
+}
+
+#[test]
+fn a_missing_finger_is_a_missing_contact_after_the_timeout_and_not_before() {
+    let edges = [(First, true, 100_000), (Last, true, 180_000)];
+    assert_eq!(play(0, &edges, &[], 499_999).0, []);
+    let touch = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(80_000)]);
+    let (outcomes, effector) = play(0, &edges, &[], 500_000);
+    assert_eq!(outcomes, [Ok(touch)]);
+    assert_eq!(effector.state(), State::TimedOut);
+}
+
+#[test]
+fn a_contact_that_began_before_the_timeout_counts_and_a_later_one_does_not() {
+    let last_moment = [(First, true, 100_000), (Middle, true, 200_000), (Last, true, 499_999)];
+    assert_eq!(play(0, &last_moment, &[], 510_000).0, [Ok(Touch::from_micros([0, 100_000, 399_999]))]);
+    let too_late = [(First, true, 100_000), (Middle, true, 200_000), (Last, true, 500_000)];
+    let (outcomes, effector) = play(0, &too_late, &[], 510_000);
+    assert_eq!(
+        outcomes,
+        [Ok(Touch::new([ContactTime::FIRST, ContactTime::from_micros(100_000), ContactTime::MISSING]))]
+    );
+    assert_eq!(effector.state(), State::TimedOut);
+}
+
+#[test]
+fn a_finger_that_lets_go_before_the_others_touch_keeps_its_first_contact() {
+    let edges = [
+        (First, true, 50_000),
+        (First, false, 90_000),
+        (First, true, 120_000),
+        (Middle, true, 130_000),
+        (Last, true, 140_000),
+    ];
+    assert_eq!(play(0, &edges, &[], 200_000).0, [Ok(Touch::from_micros([0, 80_000, 90_000]))]);
+}
+
+#[test]
+fn a_glitch_shorter_than_the_debounce_is_no_contact() {
+    let edges = [(First, true, 50_000), (First, false, 54_000), (Last, true, 70_000), (Last, false, 74_999)];
+    let (outcomes, effector) = play(0, &edges, &[], 2_000_000);
+    assert_eq!((outcomes, effector.state()), (Vec::new(), State::Waiting));
+}
+
+#[test]
+fn a_probe_that_rests_too_shortly_after_a_touch_has_to_open_again() {
+    let mut edges: Vec<_> = Finger::ALL.map(|f| (f, true, 50_000)).to_vec();
+    edges.extend(Finger::ALL.map(|f| (f, false, 100_000)));
+    // The fingers have settled at 105 ms and rested at 115 ms.
+    edges.extend(Finger::ALL.map(|f| (f, true, 114_999)));
+    edges.extend(Finger::ALL.map(|f| (f, false, 150_000)));
+    edges.extend(Finger::ALL.map(|f| (f, true, 165_000)));
+    assert_eq!(play(0, &edges, &[], 200_000).0, [Ok(Touch::from_micros([0; 3])); 2]);
+}
+
+#[test]
+fn fault_stuck_names_the_finger_once_and_the_others_go_on_when_it_opens() {
+    let mut edges = vec![(First, true, 50_000), (Middle, true, 50_000), (Last, true, 50_000)];
+    edges.extend([(First, false, 100_000), (Last, false, 100_000)]);
+    let (outcomes, effector) = play(0, &edges, &[], 60_000_000);
+    assert_eq!(outcomes, [Ok(Touch::from_micros([0; 3])), Err(Fault::Stuck(Middle))]);
+    assert_eq!(effector.state(), State::Complete);
+    edges.push((Middle, false, 60_000_000));
+    edges.extend(Finger::ALL.map(|f| (f, true, 61_000_000)));
+    let (outcomes, _) = play(0, &edges, &[], 61_010_000);
+    assert_eq!(outcomes.last(), Some(&Ok(Touch::from_micros([0; 3]))));
+    assert_eq!(outcomes.len(), 3);
+}
+
+#[test]
+fn fault_stuck_is_seen_at_power_up() {
+    let (outcomes, effector) = play(0, &[(Last, true, 0)], &[], 5_000_000);
+    assert_eq!(outcomes, [Err(Fault::Stuck(Last))]);
+    assert_eq!(effector.state(), State::Released);
+}
+
+#[test]
+fn a_finger_stuck_for_longer_than_the_clock_goes_round_still_opens() {
+    let (mut outcomes, mut effector) = play(0, &[(Last, true, 0)], &[], 5_000_000);
+    for (closed, at) in [(false, 3_000_000_000), (true, 3_001_000_000)] {
+        for finger in Finger::ALL {
+            outcomes.extend(effector.edge(Edge::new(finger, closed, at)).transpose());
+        }
+        poll(&mut effector, at + 900_000, &mut outcomes);
+    }
+    assert_eq!(outcomes, [Err(Fault::Stuck(Last)), Ok(Touch::from_micros([0; 3]))]);
+}
+
+#[test]
+fn fault_bouncing_names_the_finger_and_drops_the_touch() {
+    let mut edges = vec![(First, true, 50_000), (Last, true, 60_000)];
+    edges.extend((0..20).map(|i| (Middle, i % 2 == 0, 70_000 + i * 2_000)));
+    let (outcomes, effector) = play(0, &edges, &[], 2_000_000);
+    assert_eq!(outcomes, [Err(Fault::Bouncing(Middle))]);
+    assert_eq!(effector.state(), State::Released);
+}
+
+#[test]
+fn bouncing_for_an_hour_is_told_once_and_ends() {
+    let mut effector = Effector::new(SETTINGS);
+    let mut outcomes = Outcomes::new();
+    let step = 4_000;
+    let mut now = 0_u32;
+    let mut closed = false;
+    // Ends closed, more than half a turn of the clock after the bouncing began.
+    for _ in 0..750_001 {
+        now = now.wrapping_add(step);
+        closed = !closed;
+        outcomes.extend(effector.edge(Edge::new(First, closed, now)).transpose());
+    }
+    assert_eq!(outcomes, [Err(Fault::Bouncing(First))]);
+    now = now.wrapping_add(6_000_000);
+    poll(&mut effector, now, &mut outcomes);
+    assert_eq!(outcomes, [Err(Fault::Bouncing(First)), Err(Fault::Stuck(First))]);
+    for settled in [false, true] {
+        for finger in Finger::ALL {
+            outcomes.extend(effector.edge(Edge::new(finger, settled, now)).transpose());
+        }
+        now = now.wrapping_add(1_000_000);
+        poll(&mut effector, now, &mut outcomes);
+    }
+    assert_eq!(outcomes.last(), Some(&Ok(Touch::from_micros([0; 3]))));
+    assert_eq!(outcomes.len(), 3);
+}
+
+#[test]
+fn fault_silent_names_the_finger_after_so_many_touches_without_it() {
+    let mut edges = Vec::new();
+    for touch in 0..9 {
+        let at = 50_000 + touch * 1_000_000;
+        edges.extend([
+            (First, true, at),
+            (Last, true, at + 7),
+            (First, false, at + 500_000),
+            (Last, false, at + 500_000),
+        ]);
+    }
+    let (outcomes, _) = play(0, &edges, &[], 10_000_000);
+    let silent: Vec<usize> =
+        outcomes.iter().enumerate().filter(|(_, o)| **o == Err(Fault::Silent(Middle))).map(|(i, _)| i).collect();
+    assert_eq!((outcomes.len(), silent), (11, vec![4, 9]), "after the fourth and the eighth touch");
+}
+
+#[test]
+fn fault_overrun_drops_the_touch_whose_edges_were_lost() {
+    let clock = TestClock::default();
+    let mut queue: Queue<Edge, 3> = Queue::new();
+    let (mut producer, mut consumer) = queue.split();
+    let levels = [Cell::new(false), Cell::new(false), Cell::new(false)];
+    let [a, b, c] = levels.each_ref().map(TestPin);
+    let mut watcher = Watcher::new(Fingers::new(a, b, c, Active::High));
+    let mut effector = Effector::new(SETTINGS);
+    let mut outcomes = Outcomes::new();
+    let mut drain_all = |clock: &TestClock, outcomes: &mut Outcomes| {
+        while let Some(outcome) = drain(&mut effector, &mut consumer, clock).transpose() {
+            outcomes.push(outcome);
+        }
+    };
+    drain_all(&clock, &mut outcomes);
+    for time in [50_000, 51_000] {
+        clock.0.set(time);
+        levels.iter().for_each(|level| level.set(!level.get()));
+        watcher.interrupt(&clock, &mut producer).unwrap();
+    }
+    drain_all(&clock, &mut outcomes);
+    clock.0.set(52_000);
+    levels.iter().for_each(|level| level.set(!level.get()));
+    watcher.interrupt(&clock, &mut producer).unwrap();
+    clock.0.set(1_000_000);
+    drain_all(&clock, &mut outcomes);
+    assert_eq!(outcomes, [Err(Fault::Overrun)]);
+}
+
+#[test]
+fn fault_unreadable_names_the_pin_once_until_it_can_be_read_again() {
+    let low = Transaction::get(Level::Low);
+    let broken = || Transaction::get(Level::Low).with_error(MockError::Io(std::io::ErrorKind::NotConnected));
+    let first = Mock::new(&[low.clone(), low.clone(), low.clone(), low.clone(), low.clone()]);
+    let middle = Mock::new(&[low.clone(), broken(), broken(), low.clone(), broken()]);
+    let last = Mock::new(&[low.clone(), low.clone(), low.clone(), low.clone(), low]);
+    let mut probe = Probe::new(Fingers::new(first, middle, last, Active::High), TestClock::default(), SETTINGS);
+    let outcomes: Vec<_> = (0..5).map(|_| probe.poll()).collect();
+    let fault = Err(Fault::Unreadable(Middle));
+    assert_eq!(outcomes, [Ok(None), fault, Ok(None), Ok(None), fault]);
+    let (a, b, c) = probe.into_parts().0.into_pins();
+    [a, b, c].iter_mut().for_each(Mock::done);
+}
+
+#[test]
+fn each_poll_reads_each_pin_once_and_active_low_switches_close_to_low() {
+    // A touch of the fingers at 20, 21 and 23 ms, polled once a millisecond.
+    let levels = |contact: usize| {
+        let level = move |i| if i >= contact { Level::Low } else { Level::High };
+        (0..30).map(|i| Transaction::get(level(i))).collect::<Vec<_>>()
+    };
+    let pins = [20, 21, 23].map(|contact| Mock::new(&levels(contact)));
+    let [first, middle, last] = pins;
+    let clock = TestClock::default();
+    let mut probe = Probe::new(Fingers::new(first, middle, last, Active::Low), &clock, SETTINGS);
+    let mut touches = Vec::new();
+    for i in 0..30 {
+        clock.0.set(i * 1_000);
+        touches.extend(probe.poll().unwrap());
+    }
+    assert_eq!(touches, [Touch::from_micros([0, 1_000, 3_000])]);
+    assert_eq!(probe.state(), State::Complete);
+    let (a, b, c) = probe.into_parts().0.into_pins();
+    [a, b, c].iter_mut().for_each(Mock::done);
+}
+
+#[test]
+fn every_fault_says_what_to_do() {
+    for finger in Finger::ALL {
+        for fault in [Fault::Stuck(finger), Fault::Bouncing(finger), Fault::Silent(finger), Fault::Unreadable(finger)] {
+            let text = std::format!("{fault}");
+            assert!(text.contains(&std::format!("{finger}")) && text.contains(':'), "{text}");
+            assert_eq!(fault.finger(), Some(finger));
+        }
+    }
+    assert_eq!(Fault::Overrun.finger(), None);
+}
+
+#[test]
+fn settings_out_of_range_are_brought_into_it() {
+    let settings =
+        Settings { debounce: u32::MAX, settle: 0, timeout: u32::MAX, rest: u32::MAX, stuck: 0, silent_after: 0 };
+    let mut effector = Effector::new(settings);
+    for at in 0..1_000 {
+        let closed = at % 3 == 0;
+        assert_eq!(effector.edge(Edge::new(First, closed, at * 1_000)), Ok(None));
+    }
+}
+
+/// A clock that stands where the test puts it.
+#[derive(Default)]
+struct TestClock(Cell<u32>);
+
+impl Clock for TestClock {
+    fn micros(&self) -> u32 {
+        self.0.get()
+    }
+}
+
+impl Clock for &TestClock {
+    fn micros(&self) -> u32 {
+        self.0.get()
+    }
+}
+
+/// A pin that has the level the test gives it.
+struct TestPin<'a>(&'a Cell<bool>);
+
+impl embedded_hal::digital::ErrorType for TestPin<'_> {
+    type Error = core::convert::Infallible;
+}
+
+impl embedded_hal::digital::InputPin for TestPin<'_> {
+    fn is_high(&mut self) -> Result<bool, Self::Error> {
+        Ok(self.0.get())
+    }
+
+    fn is_low(&mut self) -> Result<bool, Self::Error> {
+        Ok(!self.0.get())
+    }
+}
+
+fn finger() -> impl Strategy<Value = Finger> {
+    prop::sample::select(Finger::ALL.to_vec())
+}
+
+/// Random edges in order of time, with pauses from bounces to minutes.
+fn edges() -> impl Strategy<Value = Vec<(Finger, bool, u32)>> {
+    let pause = prop_oneof![3 => 0..3_000_u32, 3 => 0..30_000_u32, 2 => 0..600_000_u32, 1 => 0..20_000_000_u32];
+    prop::collection::vec((finger(), any::<bool>(), pause), 0..80).prop_map(|edges| {
+        let mut now = 0;
+        edges
+            .into_iter()
+            .map(|(finger, closed, pause)| {
+                now += pause;
+                (finger, closed, now)
+            })
+            .collect()
+    })
+}
+
+/// One finger's contact in a touch: how long after the first, and the pauses of its bouncing.
+fn contact() -> impl Strategy<Value = (u32, Vec<u32>)> {
+    (0..300_000_u32, prop::collection::vec(1..4_900_u32, 0..4))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+    #[test]
+    fn outcomes_depend_on_the_edges_and_not_on_how_often_one_polls(
+        edges in edges(),
+        polls in prop::collection::vec(0..40_000_000_u32, 0..200),
+        dense in prop::collection::vec(0..2_000_000_u32, 0..200),
+        start: u32,
+    ) {
+        let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
+        let seldom = play(start, &edges, &[], end);
+        let often = play(start, &edges, &[polls, dense].concat(), end);
+        // Faults that fall due together with a touch may be told before or after it.
+        let touches = |outcomes: &Outcomes| outcomes.iter().flatten().copied().collect::<Vec<_>>();
+        prop_assert_eq!(touches(&seldom.0), touches(&often.0));
+        let faults = |outcomes: &Outcomes| {
+            let mut faults: Vec<_> = outcomes.iter().filter_map(|o| o.err()).map(|f| std::format!("{f:?}")).collect();
+            faults.sort();
+            faults.dedup();
+            faults
+        };
+        prop_assert_eq!(faults(&seldom.0), faults(&often.0));
+        prop_assert_eq!(seldom.1.state(), often.1.state());
+    }
+
+    #[test]
+    fn outcomes_do_not_depend_on_where_the_clock_stands(edges in edges(), start: u32) {
+        let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
+        prop_assert_eq!(play(0, &edges, &[], end).0, play(start, &edges, &[], end).0);
+    }
+
+    #[test]
+    fn any_order_of_events_gives_touches_within_the_timeout(
+        events in prop::collection::vec((finger(), any::<bool>(), any::<bool>(), any::<u32>(), any::<bool>()), 0..200),
+    ) {
+        let mut effector = Effector::new(SETTINGS);
+        for (finger, closed, after_loss, at, is_poll) in events {
+            let outcome = match is_poll {
+                true => effector.poll(at),
+                false => effector.edge(Edge { after_loss, ..Edge::new(finger, closed, at) }),
+            };
+            if let Ok(Some(touch)) = outcome {
+                let times: Vec<u32> = touch.times().iter().filter_map(|t| t.micros()).collect();
+                prop_assert_eq!(times.iter().min(), Some(&0));
+                prop_assert!(times.iter().all(|&t| t < SETTINGS.timeout), "{:?}", times);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bouncing_touch_has_the_times_of_its_first_edges_at_any_clock(
+        contacts in prop::array::uniform3(contact()),
+        start: u32,
+    ) {
+        let mut edges = Vec::new();
+        for (finger, (after, bounces)) in Finger::ALL.into_iter().zip(&contacts) {
+            let mut at = 50_000 + after;
+            edges.push((finger, true, at));
+            for (i, pause) in bounces.iter().enumerate() {
+                at += pause;
+                edges.push((finger, i % 2 == 1, at));
+            }
+            if bounces.len() % 2 == 1 {
+                edges.push((finger, true, at + 100));
+            }
+        }
+        edges.sort_by_key(|&(_, _, at)| at);
+        let touch = Touch::from_micros(contacts.map(|(after, _)| after));
+        prop_assert_eq!(play(start, &edges, &[], 800_000).0, [Ok(touch)]);
+    }
+
+    #[test]
+    fn interrupts_and_polling_at_every_edge_agree(edges in edges(), start: u32) {
+        let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
+        let levels = [Cell::new(false), Cell::new(false), Cell::new(false)];
+        let clock = TestClock::default();
+        clock.0.set(start);
+        let mut probe = { let [a, b, c] = levels.each_ref().map(TestPin); Probe::new(Fingers::new(a, b, c, Active::High), &clock, SETTINGS) };
+        let mut watcher = { let [a, b, c] = levels.each_ref().map(TestPin); Watcher::new(Fingers::new(a, b, c, Active::High)) };
+        let mut queue: Queue<Edge, 128> = Queue::new();
+        let (mut producer, mut consumer) = queue.split();
+        let mut effector = Effector::new(SETTINGS);
+        let (mut polled, mut interrupted) = (Outcomes::new(), Outcomes::new());
+        polled.extend(probe.poll().transpose());
+        interrupted.extend(drain(&mut effector, &mut consumer, &clock).transpose());
+        for (i, &(finger, closed, at)) in edges.iter().enumerate() {
+            clock.0.set(start.wrapping_add(at));
+            // What was due before the edge is handed over before the pin changes, as it is on a chip.
+            for _ in 0..8 { polled.extend(probe.poll().transpose()); }
+            let mut levels = levels.each_ref();
+            finger.of(&mut levels).set(closed);
+            for _ in 0..8 { polled.extend(probe.poll().transpose()); }
+            watcher.interrupt(&clock, &mut producer).unwrap();
+            if i % 3 == 0 {
+                while let Some(outcome) = drain(&mut effector, &mut consumer, &clock).transpose() { interrupted.push(outcome); }
+            }
+        }
+        clock.0.set(start.wrapping_add(end));
+        for _ in 0..8 { polled.extend(probe.poll().transpose()); }
+        while let Some(outcome) = drain(&mut effector, &mut consumer, &clock).transpose() { interrupted.push(outcome); }
+        let touches = |outcomes: &Outcomes| outcomes.iter().flatten().copied().collect::<Vec<_>>();
+        prop_assert_eq!(touches(&polled), touches(&interrupted));
+    }
+
+    #[test]
+    fn a_scale_there_and_back_gives_the_touch_again(
+        times in prop::array::uniform3(0..2_000_000_u32),
+        spacing in 800..1_250_u32,
+        speed in 500..2_000_u32,
+    ) {
+        let model = Geometry { spacing: 1_000, speed: 1_000 };
+        let probe = Geometry { spacing, speed };
+        let touch = Touch::from_micros(times);
+        let there = Scale::new(model, probe).unwrap().apply(&touch);
+        let back = Scale::new(probe, model).unwrap().apply(&there);
+        for (a, b) in touch.times().into_iter().zip(back.times()) {
+            let (a, b) = (a.micros().unwrap(), b.micros().unwrap());
+            // Rounding to microseconds and the factors' 16 binary places.
+            prop_assert!(a.abs_diff(b) <= 400, "{} {}", a, b);
+        }
+    }
+}
+
+#[test]
+fn scale_follows_planes_and_parabolas_exactly_and_speed_everywhere() {
+    // Height h(x) = 6·x + 4·x² at x = −s, 0, s; times are heights over speed, here in µs.
+    let touch = |s: u32, slowness: u32| {
+        let [plane, parabola] = [6 * s * slowness, 4 * s * s * slowness];
+        let middle = plane; // keeps everything positive
+        Touch::from_micros([middle + parabola - plane, middle, middle + parabola + plane])
+    };
+    let model = Geometry { spacing: 100, speed: 1_000 };
+    let probe = Geometry { spacing: 200, speed: 500 };
+    let scale = Scale::new(model, probe).unwrap();
+    assert_eq!(scale.apply(&touch(200, 2)), touch(100, 1));
+    let missing = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(4_000)]);
+    let scaled = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(1_000)]);
+    assert_eq!(scale.apply(&missing), scaled);
+    let alone = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::MISSING]);
+    assert_eq!(scale.apply(&alone), alone);
+}
+
+#[test]
+fn scale_of_the_models_own_probe_changes_nothing() {
+    let geometry = Geometry { spacing: 1_500, speed: 10_000 };
+    assert_eq!(Scale::new(geometry, geometry), Some(Scale::IDENTITY));
+    let longest = Touch::from_micros([0, u32::MAX - 1, 5]);
+    assert_eq!(Scale::IDENTITY.apply(&longest), longest);
+}
+
+#[test]
+fn scale_takes_extremes_without_overflow_and_refuses_worse() {
+    let small = Geometry { spacing: 1, speed: 1 };
+    for probe in [Geometry { spacing: 16, speed: 16 }, Geometry { spacing: 16, speed: 1 }] {
+        for scale in [Scale::new(small, probe).unwrap(), Scale::new(probe, small).unwrap()] {
+            for times in [[0, u32::MAX - 1, 0], [u32::MAX - 1, 0, u32::MAX - 1], [0, 0, u32::MAX - 1]] {
+                assert!(scale.apply(&Touch::from_micros(times)).is_full());
+            }
+        }
+    }
+    for bad in
+        [Geometry { spacing: 17, speed: 1 }, Geometry { spacing: 1, speed: 0 }, Geometry { spacing: 0, speed: 1 }]
+    {
+        assert_eq!(Scale::new(small, bad), None);
+        assert_eq!(Scale::new(bad, small), None);
+    }
+}
+
+#[test]
+fn calibration_finds_the_speed_under_noise_and_from_both_ends() {
+    // 12 mm spacing on a 1 : 6 wedge at 80 mm/s: 50 ms from end to end; deterministic noise of ±5 ms.
+    let mut calibration = Calibration::new(12_000, 1, 6);
+    for i in 0..200_u32 {
+        let noise = [(i * 7_919) % 10_001, (i * 104_729) % 10_001, (i * 1_299_709) % 10_001];
+        let [a, b, c] = [0, 25_000, 50_000];
+        let times = if i % 2 == 0 { [a, b, c] } else { [c, b, a] };
+        let [a, b, c] = times;
+        assert!(calibration.push(&Touch::from_micros([a + noise[0], b + noise[1], c + noise[2]])));
+    }
+    let speed = calibration.speed().unwrap();
+    assert!(speed.abs_diff(80_000) < 800, "{speed}");
+}
+
+#[test]
+fn calibration_says_what_is_wrong() {
+    let run = |touch: Touch, count: u32, rise: u16| {
+        let mut calibration = Calibration::new(12_000, rise, 6);
+        for _ in 0..count {
+            calibration.push(&touch);
+        }
+        calibration.speed()
+    };
+    let tilted = Touch::from_micros([0, 25_000, 50_000]);
+    assert_eq!(run(tilted, 7, 1), Err(CalibrationError::TooFew));
+    assert_eq!(run(tilted, 8, 0), Err(CalibrationError::NotTilted));
+    assert_eq!(run(Touch::from_micros([0; 3]), 8, 1), Err(CalibrationError::NotTilted));
+    assert_eq!(run(Touch::from_micros([0, 50_000, 50_000]), 8, 1), Err(CalibrationError::NotFlat));
+    assert_eq!(run(Touch::from_micros([0, 0, 1]), 8, u16::MAX), Err(CalibrationError::NotFlat));
+    let missing = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(5)]);
+    assert_eq!(run(missing, 100, 1), Err(CalibrationError::TooFew));
+}
+
+#[test]
+fn the_driver_takes_the_ram_that_its_documentation_states() {
+    assert_eq!(size_of::<Effector>(), 172);
+    assert_eq!(size_of::<Edge>(), 8);
+}
