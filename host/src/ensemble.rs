@@ -1,5 +1,7 @@
 //! The full model: boosted trees in f32 as the trainer left them.
 
+mod xgboost_json;
+
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
 
 /// Boosted trees over a descriptor's features, with one margin for each object.

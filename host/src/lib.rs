@@ -17,6 +17,7 @@ pub mod ensemble;
 pub mod error;
 pub mod evaluate;
 pub mod mesh;
+pub mod noise;
 pub mod obj;
 pub mod objects;
 pub mod output;
@@ -28,6 +29,8 @@ pub mod run;
 pub mod scene;
 pub mod source;
 pub mod sweep;
+#[cfg(test)]
+mod synthetic;
 pub mod train;
 
 pub use error::{Error, Result};

@@ -1,8 +1,161 @@
-use palpate::Result;
+use palpate::dataset::Dataset;
+use palpate::train::{self, Settings};
+use palpate::{Result, output};
+use palpate_shared::Descriptor;
+use std::path::PathBuf;
+use std::time::Instant;
 
+/// Train an ensemble on captured touches, and save it as XGBoost JSON.
 #[derive(clap::Args)]
-pub(crate) struct Arguments {}
+#[command(after_help = "\
+Presets:
+  compact    trees whose leaves hold a value for each object, on curvature: small and accurate
+  paper      the published method: 100 rounds of one tree an object on contact times
 
-pub(crate) fn run(_: Arguments) -> Result<()> {
-    Ok(())
+Examples:
+  palpate train data -o ensemble.json
+  palpate train data -o paper.json --preset paper
+  palpate train data -o small.json --rounds 40 --depth 5 --bins 64
+  palpate train data -o robust.json --noise 5ms")]
+pub(crate) struct Arguments {
+    /// Directory that `palpate capture` filled
+    directory: PathBuf,
+    /// Where to save the ensemble
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Where the settings below start from
+    #[arg(long, value_enum, default_value = "compact")]
+    preset: Preset,
+    /// Which features a touch is turned into [default: the preset's]
+    #[arg(long, value_parser = descriptor, value_name = "times|curvature|gravity|oriented")]
+    descriptor: Option<Descriptor>,
+    /// What a leaf holds: a value for each object, or one value (and each object has its own trees) [default: the
+    /// preset's]
+    #[arg(long, value_enum)]
+    leaves: Option<Leaves>,
+    /// Boosting rounds [default: the preset's; compact 60, paper 100]
+    #[arg(long)]
+    rounds: Option<usize>,
+    /// The most splits between root and leaf [default: the preset's; 6]
+    #[arg(long)]
+    depth: Option<usize>,
+    /// The share of each tree that is added [default: the preset's; compact 0.15, paper 0.3]
+    #[arg(long)]
+    eta: Option<f64>,
+    /// The least sum of second derivatives in a leaf [default: the preset's; compact 30, paper 1]
+    #[arg(long, value_name = "WEIGHT")]
+    min_child_weight: Option<f64>,
+    /// The most bins of a feature's histogram [default: the preset's; 256]
+    #[arg(long)]
+    bins: Option<usize>,
+    /// Train for noisy contact times: standard deviation, such as 5ms [default: none]
+    #[arg(long, value_parser = microseconds, value_name = "DURATION")]
+    noise: Option<f64>,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Threads; the ensemble is the same for any number [default: all]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Print what was trained as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Preset {
+    Compact,
+    Paper,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Leaves {
+    Each,
+    One,
+}
+
+#[derive(serde::Serialize)]
+struct Trained {
+    descriptor: &'static str,
+    objects: usize,
+    touches: usize,
+    trees: usize,
+    splits: usize,
+    leaves: usize,
+    seconds: f64,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let settings = arguments.settings();
+    let dataset = Dataset::read(&arguments.directory)?;
+    let start = Instant::now();
+    let ensemble = train::train(&dataset, &settings)?;
+    let seconds = start.elapsed().as_secs_f64();
+    ensemble.save(&arguments.output)?;
+    let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
+    let trees = ensemble.trees.len();
+    // A binary tree has one leaf more than splits.
+    let splits = (nodes - trees) / 2;
+    let trained = Trained {
+        descriptor: settings.descriptor.name(),
+        objects: ensemble.objects.len(),
+        touches: dataset.len(),
+        trees,
+        splits,
+        leaves: nodes - splits,
+        seconds,
+    };
+    if arguments.json {
+        return output::print_json(&trained);
+    }
+    output::print(&format!(
+        "{}: {} trees, {} splits on {} of {} touches of {} objects, trained in {:.1} s\n",
+        arguments.output.display(),
+        trained.trees,
+        trained.splits,
+        trained.descriptor,
+        trained.touches,
+        trained.objects,
+        trained.seconds
+    ))
+}
+
+impl Arguments {
+    fn settings(&self) -> Settings {
+        let preset = match self.preset {
+            Preset::Compact => Settings::compact(),
+            Preset::Paper => Settings::paper(),
+        };
+        Settings {
+            descriptor: self.descriptor.unwrap_or(preset.descriptor),
+            multi_output: self.leaves.map_or(preset.multi_output, |leaves| matches!(leaves, Leaves::Each)),
+            rounds: self.rounds.unwrap_or(preset.rounds),
+            depth: self.depth.unwrap_or(preset.depth),
+            eta: self.eta.unwrap_or(preset.eta),
+            min_child_weight: self.min_child_weight.unwrap_or(preset.min_child_weight),
+            bins: self.bins.unwrap_or(preset.bins),
+            noise: self.noise.unwrap_or(preset.noise),
+            seed: self.seed,
+            threads: self.threads,
+        }
+    }
+}
+
+fn descriptor(name: &str) -> Result<Descriptor, String> {
+    let known = Descriptor::ALL.map(Descriptor::name).join(", ");
+    Descriptor::from_name(name).ok_or_else(|| format!("use one of {known}"))
+}
+
+/// A duration such as `5ms`, `300us` or `0.005s`, in microseconds.
+fn microseconds(text: &str) -> Result<f64, String> {
+    // Longest unit first: every one of them ends in `s`.
+    let units = [("us", 1.0), ("ms", 1e3), ("s", 1e6)];
+    let (number, unit) = units
+        .into_iter()
+        .find_map(|(name, unit)| text.strip_suffix(name).map(|number| (number, unit)))
+        .ok_or("give a number with its unit: 5ms, 300us or 0.005s")?;
+    match number.trim().parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number * unit),
+        _ => Err(format!("{number:?} is not a number of at least 0")),
+    }
 }

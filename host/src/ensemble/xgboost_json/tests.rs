@@ -1,0 +1,157 @@
+use super::*;
+use crate::synthetic;
+use crate::train::{Settings, train};
+use serde_json::{Value, json};
+
+fn ensemble(multi_output: bool) -> Ensemble {
+    let settings = Settings { multi_output, rounds: 4, depth: 3, ..Settings::compact() };
+    train(&synthetic::dataset(&[300, 200, 400], 1), &settings).unwrap()
+}
+
+fn document(multi_output: bool) -> Value {
+    serde_json::to_value(Document::of(&ensemble(multi_output))).unwrap()
+}
+
+fn load(text: &[u8]) -> Result<Ensemble> {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), text).unwrap();
+    Ensemble::load(file.path()).map_err(|error| {
+        assert!(error.to_string().contains(&file.path().display().to_string()), "{error} names no file");
+        assert_eq!(error.exit_code(), 1);
+        error
+    })
+}
+
+/// What is said about the document with the value at `pointer` replaced.
+fn complaint(multi_output: bool, pointer: &str, value: Value) -> String {
+    let mut changed = document(multi_output);
+    *changed.pointer_mut(pointer).unwrap() = value;
+    load(changed.to_string().as_bytes()).unwrap_err().to_string()
+}
+
+#[test]
+fn what_is_saved_loads_again_bit_for_bit() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    for multi_output in [false, true] {
+        let mut saved = ensemble(multi_output);
+        for base_margins in [vec![0.5; 3], vec![0.1, -2.5e-8, 3.0]] {
+            saved.base_margins = base_margins;
+            saved.save(file.path()).unwrap();
+            assert_eq!(Ensemble::load(file.path()).unwrap(), saved);
+        }
+    }
+}
+
+#[test]
+fn leaves_in_the_layout_of_xgboost_2_are_read_too() {
+    let mut old = document(true);
+    for tree in old.pointer_mut("/learner/gradient_booster/model/trees").unwrap().as_array_mut().unwrap() {
+        tree.as_object_mut().unwrap().remove("leaf_weights").unwrap();
+        let right = tree["right_children"].as_array().unwrap().clone();
+        let left = tree["left_children"].as_array().unwrap().clone();
+        let without = right.into_iter().zip(left).map(|(r, l)| if l == json!(-1) { json!(-1) } else { r });
+        tree["right_children"] = without.collect();
+    }
+    assert_eq!(load(old.to_string().as_bytes()).unwrap(), ensemble(true));
+}
+
+#[test]
+fn a_model_that_xgboost_wrote_is_read() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/ensemble/xgboost_json/xgboost-3.2.json");
+    let ensemble = Ensemble::load(file).unwrap();
+    assert_eq!(ensemble.objects, ["bowl", "fork", "mouse"]);
+    assert_eq!(ensemble.descriptor, Descriptor::Curvature);
+    // `booster.predict(..., output_margin=True)` of XGBoost 3.2.0 on the same rows.
+    let expected = include_str!("xgboost-3.2.margins.json");
+    let expected: Vec<(Vec<Option<f32>>, Vec<f32>)> = serde_json::from_str(expected).unwrap();
+    assert!(expected.len() >= 20);
+    for (features, margins) in expected {
+        let features: Vec<f32> = features.into_iter().map(|feature| feature.unwrap_or(f32::NAN)).collect();
+        assert_eq!(ensemble.margins_of_features(&features), margins);
+    }
+}
+
+#[test]
+fn pruned_nodes_are_left_out() {
+    let mut pruned = document(false);
+    let tree = pruned.pointer_mut("/learner/gradient_booster/model/trees/0").unwrap();
+    for (column, value) in [
+        ("left_children", json!(-1)),
+        ("right_children", json!(-1)),
+        ("split_indices", json!(0)),
+        ("split_conditions", json!(9.0)),
+        ("default_left", json!(0)),
+        ("split_type", json!(0)),
+        ("base_weights", json!(9.0)),
+    ] {
+        tree[column].as_array_mut().unwrap().push(value);
+    }
+    tree["tree_param"]["num_nodes"] = json!(tree["left_children"].as_array().unwrap().len().to_string());
+    assert_eq!(load(pruned.to_string().as_bytes()).unwrap(), ensemble(false));
+}
+
+#[test]
+fn an_ensemble_with_another_number_of_features_than_its_descriptor_is_refused() {
+    let complaint = complaint(true, "/learner/learner_model_param/num_feature", json!("3"));
+    assert!(complaint.contains("it has 3 features, but its descriptor curvature has 2 (curvature, slope)"));
+}
+
+#[test]
+fn what_contradicts_itself_is_refused_and_the_place_named() {
+    let model = "/learner/gradient_booster/model";
+    let trees = format!("{model}/trees");
+    let cases = [
+        (true, "/learner/attributes/palpate_descriptor", json!("shape"), "its descriptor \"shape\" is unknown"),
+        (true, "/learner/attributes", json!({}), "no attribute palpate_descriptor"),
+        (true, "/learner/attributes/palpate_objects", json!("bowl"), "palpate_objects is not a JSON array"),
+        (true, "/learner/attributes/palpate_objects", json!("[\"a\"]"), "names 1 objects"),
+        (true, "/learner/attributes/palpate_objects", json!("[\"a\",\"a\",\"b\"]"), "\"a\" twice"),
+        (true, "/learner/attributes/palpate_objects", json!("[\"a\",\"b\"]"), "it has 3 classes"),
+        (true, "/learner/learner_model_param/base_score", json!("[1,2]"), "base_score"),
+        (true, "/learner/learner_model_param/base_score", json!("NaN"), "not finite"),
+        (true, "/learner/objective/name", json!("reg:squarederror"), "not multi:softprob"),
+        (true, "/learner/gradient_booster/name", json!("dart"), "booster is dart"),
+        (true, &format!("{model}/tree_info"), json!([0]), "tree_info has 1 entries for 4 trees"),
+        (false, &format!("{model}/tree_info/5"), json!(3), "tree 5: it is for object 3 of 3"),
+        (true, &trees, json!([]), "no trees"),
+        (true, &format!("{trees}/1/left_children/0"), json!(99), "tree 1: node 0: its left child 99"),
+        (true, &format!("{trees}/1/right_children/0"), json!(-7), "tree 1: node 0: its right child -7"),
+        (true, &format!("{trees}/1/left_children/1"), json!(0), "tree 1: node 0 is reached twice"),
+        (true, &format!("{trees}/2/split_indices/0"), json!(2), "tree 2: node 0: it splits on feature 2"),
+        (true, &format!("{trees}/2/split_indices"), json!([0]), "tree 2: split_indices has 1 entries"),
+        (true, &format!("{trees}/2/split_type/0"), json!(1), "categorical"),
+        (true, &format!("{trees}/0/leaf_weights"), json!([0.5]), "leaf_weights has no 3 values"),
+        (true, &format!("{trees}/0/leaf_weights/0"), json!(1e39), "number out of range"),
+        (false, &format!("{trees}/0/split_conditions/0"), json!("x"), "expected f32"),
+        (true, &format!("{trees}/3/tree_param/size_leaf_vector"), json!("2"), "hold 2 values for 3 objects"),
+        (true, &format!("{trees}/3/tree_param/num_nodes"), json!("2"), "instead of 2"),
+    ];
+    for (multi_output, pointer, value, expected) in cases {
+        let complaint = complaint(multi_output, pointer, value);
+        assert!(complaint.contains(expected), "{pointer}: {complaint}");
+    }
+}
+
+#[test]
+fn what_is_no_json_is_refused_with_its_line() {
+    for (text, expected) in [
+        (&b"{\n  \"learner\": [\n"[..], ":3: not an ensemble in XGBoost's JSON format"),
+        (b"", "not an ensemble in XGBoost's JSON format"),
+        (b"[1, 2]", "not an ensemble in XGBoost's JSON format"),
+        (b"{L\x00\x00\x00learner", "a binary file"),
+        (b"{\"version\":[3,2,0],\"learner\":{}}", "missing field"),
+    ] {
+        let complaint = load(text).unwrap_err().to_string();
+        assert!(complaint.contains(expected), "{complaint}");
+    }
+    let missing = Ensemble::load("no/such.json").unwrap_err().to_string();
+    assert!(missing.contains("no/such.json: cannot read the ensemble"), "{missing}");
+}
+
+#[test]
+fn every_truncation_is_an_error_and_no_panic() {
+    let text = document(true).to_string();
+    for end in (0..text.len()).step_by(97) {
+        assert!(load(&text.as_bytes()[..end]).is_err());
+    }
+}

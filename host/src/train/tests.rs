@@ -1,0 +1,92 @@
+use super::*;
+use crate::synthetic;
+
+fn quick() -> Settings {
+    Settings { rounds: 8, depth: 3, ..Settings::compact() }
+}
+
+#[test]
+fn an_ensemble_predicts_what_its_trainer_predicts_bit_for_bit() {
+    let dataset = synthetic::dataset(&[400, 300, 500], 1);
+    for settings in [quick(), Settings { rounds: 5, ..Settings::paper() }] {
+        let rows = Rows::new(&dataset, &settings);
+        let features = rows.features.clone();
+        let data = rows.matrix().unwrap();
+        let model = hessboost::training::train(&parameters(&settings, 3).unwrap(), &data, settings.rounds).unwrap();
+        let ensemble = ensemble(&model, settings.descriptor, dataset.names());
+        let margins = model.predict_margin(&data, hessboost::model::Iterations::Best).unwrap();
+        for (row, features) in features.chunks(settings.descriptor.feature_count()).enumerate() {
+            assert_eq!(ensemble.margins_of_features(features), margins.row(row).unwrap());
+        }
+    }
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let dataset = synthetic::dataset(&[700, 900, 800], 2);
+    let with = |threads| train(&dataset, &Settings { threads, noise: 3_000.0, ..quick() }).unwrap();
+    assert_eq!(with(Some(1)), with(Some(3)));
+    assert_eq!(with(Some(1)), with(None));
+}
+
+#[test]
+fn margins_do_not_count_how_many_touches_an_object_had() {
+    // The same two objects, once with equally many touches and once with ten times as many of the first.
+    let even = synthetic::dataset(&[4_000, 4_000], 3);
+    let mut uneven = even.clone();
+    uneven.objects[1].touches.truncate(400);
+    let settings = Settings { min_child_weight: 5.0, ..quick() };
+    let [even_margins, uneven_margins] = [&even, &uneven].map(|data| {
+        let ensemble = train(data, &settings).unwrap();
+        let touches = synthetic::dataset(&[2_000, 2_000], 4);
+        let all = touches.objects.iter().flat_map(|object| &object.touches);
+        let advantage = all.map(|touch| ensemble.margins(touch)).map(|m| f64::from(m[0] - m[1]));
+        advantage.sum::<f64>() / 4_000.0
+    });
+    // The prior, had it been counted, would shift the mean by ln 10 ≈ 2.3.
+    assert!((even_margins - uneven_margins).abs() < 0.3, "{even_margins} {uneven_margins}");
+}
+
+#[test]
+fn touches_with_missing_contacts_train_and_predict() {
+    let dataset = synthetic::dataset(&[500, 500], 5);
+    let touches = dataset.objects.iter().flat_map(|object| &object.touches);
+    let partial: Vec<&Touch> = touches.filter(|touch| !touch.is_full()).collect();
+    assert!(partial.len() > 20);
+    let ensemble = train(&dataset, &quick()).unwrap();
+    assert!(partial.iter().flat_map(|touch| ensemble.margins(touch)).all(f32::is_finite));
+}
+
+#[test]
+fn settings_out_of_range_are_argument_errors() {
+    let dataset = synthetic::dataset(&[50, 50], 6);
+    for (settings, option) in [
+        (Settings { rounds: 0, ..quick() }, "--rounds"),
+        (Settings { depth: 0, ..quick() }, "--depth"),
+        (Settings { depth: 17, ..quick() }, "--depth"),
+        (Settings { eta: 0.0, ..quick() }, "--eta"),
+        (Settings { eta: f64::NAN, ..quick() }, "--eta"),
+        (Settings { min_child_weight: -1.0, ..quick() }, "--min-child-weight"),
+        (Settings { bins: 1, ..quick() }, "--bins"),
+        (Settings { noise: f64::INFINITY, ..quick() }, "--noise"),
+        (Settings { threads: Some(0), ..quick() }, "thread"),
+    ] {
+        let error = train(&dataset, &settings).unwrap_err();
+        assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains(option), "{error}");
+    }
+}
+
+#[test]
+fn a_pose_descriptor_without_poses_says_how_to_get_them() {
+    let settings = Settings { descriptor: Descriptor::Gravity, ..quick() };
+    let error = train(&synthetic::dataset(&[50, 50], 7), &settings).unwrap_err();
+    assert!(error.to_string().contains("--pose"), "{error}");
+}
+
+#[test]
+fn one_object_or_an_empty_one_cannot_be_trained() {
+    let error = train(&synthetic::dataset(&[50], 8), &quick()).unwrap_err();
+    assert!(error.to_string().contains("only one object"), "{error}");
+    let error = train(&synthetic::dataset(&[50, 0], 8), &quick()).unwrap_err();
+    assert!(error.to_string().contains("object1 has no touches"), "{error}");
+}
