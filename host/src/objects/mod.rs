@@ -36,6 +36,9 @@ struct Form {
     cells: f32,
 }
 
+/// The depth of the octree in which shapes are meshed.
+const DEPTH: u8 = 9;
+
 /// The built-in objects' names and shapes, in the order in which [`builtin`] gives them.
 const KINDS: [(&str, fn(&mut Proportions) -> Form); 10] = [
     ("bowl", bowl::form),
@@ -93,13 +96,13 @@ fn kind(name: &str) -> Result<fn(&mut Proportions) -> Form> {
 /// Meshes a form in one thread, so that the order of vertices and triangles is always the same.
 fn mesh(form: &Form) -> Mesh {
     let centre = (form.bounds[0] + form.bounds[1]) / 2.0;
-    // A cube of 2^depth cells a side holds the bounds, with a little room so that no surface lies on its faces.
-    let side = (form.bounds[1] - form.bounds[0]).max_element() * 1.02;
-    let depth = (1..=10).find(|&depth| f32::from(1_u16 << depth) >= form.cells).unwrap_or(10);
-    let reach = side * f32::from(1_u16 << depth) / form.cells / 2.0;
+    // The mesher works in a cube of 2^DEPTH cells a side, of which the bounds fill only a part. It merges cells as long
+    // as the surface stays within about a thousandth of that cube, so flat parts get large triangles.
+    let side = (form.bounds[1] - form.bounds[0]).max_element();
+    let reach = side / form.cells * f32::from(1_u16 << DEPTH) / 2.0;
     let (x, y, z) = Tree::axes();
     let tree = form.shape.0.remap_xyz(x * reach + centre.x, y * reach + centre.y, z * reach + centre.z) / reach;
-    let settings = fidget_mesh::Settings { depth, threads: None, ..Default::default() };
+    let settings = fidget_mesh::Settings { depth: DEPTH, threads: None, ..Default::default() };
     // Neither can fail: the shapes have no variables but x, y and z, and nobody cancels.
     let Ok(shape) = fidget_core::vm::VmShape::from(tree).try_into() else { return Mesh::default() };
     let Some(octree) = fidget_mesh::Octree::build(&shape, &settings) else { return Mesh::default() };
