@@ -148,10 +148,20 @@ pub enum Side {
 pub struct EndLabel {
     /// The line's last y.
     pub y: f64,
+    /// The line's mean y, which decides the order of labels whose lines end together.
+    pub mean: f64,
     /// What the line is.
     pub text: String,
     /// The line's colour.
     pub colour: RGBColor,
+}
+
+impl EndLabel {
+    /// The label of a line through `points`; off the chart if there are none.
+    pub fn of(text: &str, colour: RGBColor, points: &[(f64, f64)]) -> Self {
+        let mean = points.iter().map(|point| point.1).sum::<f64>() / points.len().max(1) as f64;
+        Self { y: points.last().map_or(f64::NAN, |point| point.1), mean, text: text.to_string(), colour }
+    }
 }
 
 /// A chart.
@@ -217,8 +227,10 @@ impl Chart {
     /// Adds a line with a point at each of its places and its name at its right end.
     pub fn series(&mut self, name: &str, colour: RGBColor, shape: Shape, points: &[(f64, f64)]) {
         let points: Vec<(f64, f64)> = points.iter().copied().filter(|point| point.1.is_finite()).collect();
-        let Some(&(_, y)) = points.last() else { return };
-        self.labels.push(EndLabel { y, text: name.to_string(), colour });
+        if points.is_empty() {
+            return;
+        }
+        self.labels.push(EndLabel::of(name, colour, &points));
         self.marks.push(Mark::Line { points: points.clone(), colour, stroke: Stroke::Solid });
         self.marks.push(Mark::Dots { points, colour, shape });
     }
@@ -226,9 +238,11 @@ impl Chart {
     /// Adds a line, solid or dashed, with its name at its right end.
     pub fn line(&mut self, name: &str, colour: RGBColor, stroke: Stroke, points: &[(f64, f64)]) {
         let points: Vec<(f64, f64)> = points.iter().copied().filter(|point| point.1.is_finite()).collect();
-        let Some(&(_, y)) = points.last() else { return };
+        if points.is_empty() {
+            return;
+        }
         if !name.is_empty() {
-            self.labels.push(EndLabel { y, text: name.to_string(), colour });
+            self.labels.push(EndLabel::of(name, colour, &points));
         }
         self.marks.push(Mark::Line { points, colour, stroke });
     }
@@ -304,9 +318,11 @@ impl Chart {
 
     fn draw_labels(&self, root: &Root, area: &Plane, frame: &Frame) -> Result<(), String> {
         let x = self.x.ticks.first().map_or(0.0, |tick| tick.0);
-        let wanted: Vec<f64> =
-            self.labels.iter().map(|label| f64::from(area.map_coordinate(&(x, label.y)).1 / FINE)).collect();
-        let places = apart(&wanted, f64::from(TEXT) + 2.0, f64::from(frame.top), f64::from(frame.bottom));
+        let pixel = |y| f64::from(area.map_coordinate(&(x, y)).1 / FINE);
+        let wanted: Vec<f64> = self.labels.iter().map(|label| pixel(label.y)).collect();
+        // A twentieth of the way to the mean is enough to keep the order of lines that end within a pixel or two.
+        let ordered: Vec<f64> = self.labels.iter().map(|label| pixel(label.y) + pixel(label.mean) / 20.0).collect();
+        let places = apart(&wanted, &ordered, f64::from(TEXT) + 2.0, f64::from(frame.top), f64::from(frame.bottom));
         for ((label, wanted), place) in self.labels.iter().zip(wanted).zip(places) {
             let (from, to) = ((frame.right + 3, wanted as i32), (frame.right + 15, place as i32));
             if (wanted - place).abs() > 2.0 {
@@ -484,11 +500,11 @@ fn dashes(path: &[(i32, i32)], dash: f64, gap: f64) -> Vec<Vec<(i32, i32)>> {
     out
 }
 
-/// Places as near as possible to the `wanted` ones, in their order, at least `distance` apart and within `low..high`
+/// Places as near as possible to the `wanted` ones, in the order of `ordered`, at least `distance` apart and within `low..high`
 /// if they fit: neighbours that collide are pooled and spread about their mean.
-fn apart(wanted: &[f64], distance: f64, low: f64, high: f64) -> Vec<f64> {
+fn apart(wanted: &[f64], ordered: &[f64], distance: f64, low: f64, high: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..wanted.len()).collect();
-    order.sort_by(|&a, &b| wanted[a].total_cmp(&wanted[b]));
+    order.sort_by(|&a, &b| ordered[a].total_cmp(&ordered[b]));
     // A pool holds how many labels it has and the sum of where its first one would like to be.
     let mut pools: Vec<(usize, f64)> = Vec::new();
     let start = |pool: &(usize, f64)| {
@@ -529,6 +545,7 @@ mod tests {
 
     #[test]
     fn labels_that_would_collide_are_moved_apart_and_stay_inside() {
+        let apart = |wanted: &[f64], distance, low, high| apart(wanted, wanted, distance, low, high);
         let places = apart(&[100.0, 101.0, 50.0, 102.0], 10.0, 0.0, 105.0);
         assert_eq!(places[2], 50.0);
         assert_eq!([places[0], places[1], places[3]], [85.0, 95.0, 105.0]);

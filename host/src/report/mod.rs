@@ -5,9 +5,11 @@
 
 pub mod chart;
 pub mod colour;
+pub mod kinds;
 pub mod page;
 pub mod scale;
 pub mod short;
+pub mod statistics;
 pub mod table;
 
 pub use page::{Block, Figure, Page, Section};

@@ -130,6 +130,9 @@ impl Page {
                     meta charset="utf-8";
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     meta name="color-scheme" content="light dark";
+                    // The browser itself refuses whatever this page might ask the network for.
+                    meta http-equiv="Content-Security-Policy"
+                        content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
                     // No icon, so that a browser does not ask for one.
                     link rel="icon" href="data:,";
                     title { (self.title) }

@@ -1,6 +1,6 @@
 //! What `palpate run` writes: the short form of the report.
 
-use super::chart::{Chart, EndLabel, Mark, Shape, Stroke};
+use super::chart::{Chart, Mark, Shape, Stroke};
 use super::colour;
 use super::page::{Block, Figure, Page, Section};
 use super::scale::Scale;
@@ -104,7 +104,7 @@ fn touches_scale(results: &RunResults) -> Scale {
 }
 
 fn curves(results: &RunResults) -> Result<Figure> {
-    let mut chart = Chart::new("touches", touches_scale(results), "accuracy", Scale::share()).sized(720, 400);
+    let mut chart = Chart::new("touches", touches_scale(results), "accuracy", Scale::share()).sized(600, 380);
     let mut data = Data::new(["method", "touches", "accuracy", "standard error"]);
     for (index, method) in results.methods.iter().enumerate() {
         let (colour, shape) = method_style(index);
@@ -148,10 +148,8 @@ fn objects(results: &RunResults) -> Result<Figure> {
             let (colour, _) = method_style(index);
             let curve = method.per_object.iter().find(|(object, _)| object == name).map(|found| &found.1);
             let points: Vec<(f64, f64)> = curve.into_iter().flatten().map(|&(n, a)| (n as f64, a)).collect();
-            let Some(&(_, y)) = points.last() else { continue };
             let stroke = if index == 0 { Stroke::Dashed } else { Stroke::Solid };
-            chart.marks.push(Mark::Line { points, colour, stroke });
-            chart.labels.push(EndLabel { y, text: method.name.clone(), colour });
+            chart.line(&method.name, colour, stroke, &points);
             for &(n, accuracy) in curve.into_iter().flatten() {
                 data.push([name.into(), method.name.as_str().into(), Cell::count(n), Cell::Percent(accuracy, 1)]);
             }
