@@ -1,1 +1,388 @@
-//! Wavefront OBJ files, read and written.
+//! Wavefront OBJ files: the faces, and nothing else.
+//!
+//! `tobj` parses and indexes; in front of it, [`FacesOnly`] lets through vertices and faces only, checked, so that an
+//! error can name its line, and nothing that does not shape the surface (normals, materials, groups, lines) can break
+//! a mesh. Polygons become triangles here, concave ones too.
+
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+
+/// Reads the mesh of an OBJ file: all its objects and groups together, polygons cut into triangles.
+///
+/// # Errors
+/// When the file cannot be read, a vertex is not three finite numbers, a face's index is not a whole number or out of
+/// range (line named), when there is no face, or when all corners are the same point.
+pub fn read(path: &Path) -> Result<Mesh> {
+    let file = File::open(path).map_err(|source| Error::io(path, "read the mesh", source))?;
+    parse(BufReader::with_capacity(1 << 18, file), path)
+}
+
+/// Reads the mesh of an OBJ text; errors name `path`.
+///
+/// Memory: at most a few hundred bytes for each byte of the text.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
+    let mut filter = FacesOnly::new(text, path);
+    let loaded = tobj::load_obj_buf(&mut filter, &tobj::LoadOptions::default(), |_| Ok(Default::default()));
+    if let Some(error) = filter.error.take() {
+        return Err(error);
+    }
+    filter.check_indices()?;
+    let unusable = |what: String| Error::file(path, what, "Export the mesh as a Wavefront OBJ file with faces.");
+    let (models, _) = loaded.map_err(|error| unusable(format!("cannot be read as a mesh ({error})")))?;
+    let mut mesh = Mesh::default();
+    for model in models {
+        append(&mut mesh, model.mesh);
+    }
+    if mesh.triangles.is_empty() {
+        return Err(unusable("the mesh has no faces".into()));
+    }
+    if mesh.triangles.iter().flatten().all(|&index| mesh.vertices[index as usize] == mesh.vertices[0]) {
+        return Err(unusable("the mesh has no extent: all its corners are the same point".into()));
+    }
+    Ok(mesh)
+}
+
+fn append(mesh: &mut Mesh, part: tobj::Mesh) {
+    let base = mesh.vertices.len() as u32;
+    mesh.vertices.extend_from_slice(part.positions.as_chunks().0);
+    if part.face_arities.is_empty() {
+        let faces = part.indices.as_chunks().0;
+        mesh.triangles.extend(faces.iter().map(|face: &[u32; 3]| face.map(|index| base + index)));
+        return;
+    }
+    let mut cutter = Cutter::default();
+    let mut indices = part.indices;
+    let mut rest = indices.as_mut_slice();
+    for arity in part.face_arities {
+        let (face, others) = rest.split_at_mut(arity as usize);
+        rest = others;
+        face.iter_mut().for_each(|index| *index += base);
+        cutter.cut(face, mesh);
+    }
+}
+
+/// Cuts polygons into triangles.
+#[derive(Default)]
+struct Cutter {
+    earcut: Option<earcut::Earcut<f64>>,
+    corners: Vec<[f64; 3]>,
+    flat: Vec<[f64; 2]>,
+    cut: Vec<u32>,
+}
+
+impl Cutter {
+    fn cut(&mut self, face: &[u32], mesh: &mut Mesh) {
+        self.corners.clear();
+        self.corners.extend(face.iter().map(|&index| mesh.vertices[index as usize].map(f64::from)));
+        if !is_convex(&self.corners) && self.cut_ears() {
+            mesh.triangles.extend(self.cut.as_chunks().0.iter().map(|cut: &[u32; 3]| cut.map(|i| face[i as usize])));
+            return;
+        }
+        for pair in face[1..].windows(2) {
+            mesh.triangles.push([face[0], pair[0], pair[1]]);
+        }
+    }
+
+    /// False when the polygon is too degenerate to be flattened; then a fan is as good as anything.
+    fn cut_ears(&mut self) -> bool {
+        let size = self.corners.iter().flatten().fold(0.0, |size: f64, c| size.max(c.abs()));
+        self.corners.iter_mut().flatten().for_each(|c| *c /= size);
+        self.cut.clear();
+        if size > 0.0 && earcut::utils3d::project3d_to_2d(&self.corners, self.corners.len(), &mut self.flat) {
+            let earcut = self.earcut.get_or_insert_with(earcut::Earcut::new);
+            earcut.earcut(self.flat.iter().copied(), &[] as &[u32], &mut self.cut);
+        }
+        !self.cut.is_empty()
+    }
+}
+
+/// Whether the polygon turns the same way at every corner.
+fn is_convex(corners: &[[f64; 3]]) -> bool {
+    let corner = |index: usize| glam::DVec3::from(corners[index % corners.len()]);
+    let turn = |i: usize| (corner(i + 1) - corner(i)).cross(corner(i + 2) - corner(i + 1));
+    let normal: glam::DVec3 = (0..corners.len()).map(|i| corner(i).cross(corner(i + 1))).sum();
+    corners.len() <= 3 || (0..corners.len()).all(|i| turn(i).dot(normal) >= 0.0)
+}
+
+/// The vertices and faces of an OBJ text, checked, one clean line after the other; faces keep their position indices
+/// only, all counted from the first vertex.
+struct FacesOnly<'a, R> {
+    text: R,
+    path: &'a Path,
+    line: u64,
+    raw: Vec<u8>,
+    clean: Vec<u8>,
+    taken: usize,
+    vertices: u64,
+    /// The largest vertex index and the line that has it: it may stand before its vertex.
+    largest: (u64, u64),
+    error: Option<Error>,
+}
+
+/// Clean lines are handed on in portions of about this many bytes.
+const PORTION: usize = 1 << 16;
+
+impl<'a, R: BufRead> FacesOnly<'a, R> {
+    fn new(text: R, path: &'a Path) -> Self {
+        let (raw, clean) = (Vec::new(), Vec::new());
+        Self { text, path, line: 0, raw, clean, taken: 0, vertices: 0, largest: (0, 0), error: None }
+    }
+
+    fn check_indices(&self) -> Result<()> {
+        let (index, line) = self.largest;
+        if index <= self.vertices {
+            return Ok(());
+        }
+        let what = format!("vertex {index} of a face is out of range: the file has {} vertices", self.vertices);
+        Err(Error::line(self.path, line, what, FIX))
+    }
+
+    /// Reads the next line, with those that a backslash joins to it; false at the end.
+    fn next_line(&mut self) -> Result<bool> {
+        self.raw.clear();
+        loop {
+            let read = self.text.read_until(b'\n', &mut self.raw);
+            let read = read.map_err(|source| Error::io(self.path, "read the mesh", source))?;
+            self.line += u64::from(read > 0);
+            let end = self.raw.trim_ascii_end().len();
+            if read > 0 && end > 0 && self.raw[end - 1] == b'\\' {
+                self.raw.truncate(end - 1);
+                self.raw.push(b' ');
+            } else {
+                return Ok(read > 0 || end > 0);
+            }
+        }
+    }
+
+    fn clean_line(&mut self) -> Result<(), String> {
+        let Self { raw, clean, .. } = self;
+        let line = raw.split(|&byte| byte == b'#').next().unwrap_or_default();
+        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"v") => {
+                clean.push(b'v');
+                for name in ["x", "y", "z"] {
+                    let word = words.next().ok_or_else(|| format!("a vertex without {name}"))?;
+                    let value: f32 = number(word).ok_or_else(|| format!("{} is not a number", show(word)))?;
+                    if !value.is_finite() {
+                        return Err(format!("the coordinate {name} = {} is not finite", show(word)));
+                    }
+                    clean.push(b' ');
+                    clean.extend_from_slice(word);
+                }
+                clean.push(b'\n');
+                self.vertices += 1;
+            }
+            Some(b"f") => {
+                let start = clean.len();
+                clean.push(b'f');
+                let mut corners = 0;
+                for word in words {
+                    let index = word.split(|&byte| byte == b'/').next().and_then(number::<i64>);
+                    let index = index.ok_or_else(|| format!("{} is not a vertex of a face", show(word)))?;
+                    let absolute = if index < 0 { index.saturating_add_unsigned(self.vertices) + 1 } else { index };
+                    let absolute = u64::try_from(absolute).ok().filter(|&absolute| absolute > 0).ok_or_else(|| {
+                        format!("vertex {index} of a face is out of range: {} vertices before it", self.vertices)
+                    })?;
+                    if absolute > self.largest.0 {
+                        self.largest = (absolute, self.line);
+                    }
+                    // Writing to a vector cannot fail.
+                    let _ = write!(clean, " {absolute}");
+                    corners += 1;
+                }
+                if corners < 3 {
+                    clean.truncate(start);
+                } else {
+                    clean.push(b'\n');
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn refill(&mut self) -> Result<()> {
+        self.clean.clear();
+        self.taken = 0;
+        while self.clean.len() < PORTION && self.next_line()? {
+            self.clean_line().map_err(|what| Error::line(self.path, self.line, what, FIX))?;
+        }
+        Ok(())
+    }
+}
+
+const FIX: &str = "Correct the line, or export the mesh anew.";
+
+fn number<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// A word of the file for an error message: shortened, without control characters.
+fn show(word: &[u8]) -> String {
+    format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(40)]))
+}
+
+impl<R: BufRead> BufRead for FacesOnly<'_, R> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        if self.taken == self.clean.len()
+            && let Err(error) = self.refill()
+        {
+            self.error = Some(error);
+            return Err(std::io::ErrorKind::InvalidData.into());
+        }
+        Ok(&self.clean[self.taken..])
+    }
+
+    fn consume(&mut self, amount: usize) {
+        self.taken += amount;
+    }
+}
+
+impl<R: BufRead> Read for FacesOnly<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let read = self.fill_buf()?.read(buffer)?;
+        self.consume(read);
+        Ok(read)
+    }
+}
+
+/// Writes a mesh as OBJ: `v` and `f` lines that [`read`] gives back bit for bit.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> std::io::Result<()> {
+    for [x, y, z] in &mesh.vertices {
+        writeln!(out, "v {x} {y} {z}")?;
+    }
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|index| u64::from(index) + 1);
+        writeln!(out, "f {a} {b} {c}")?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse_text(text: impl AsRef<[u8]>) -> Result<Mesh> {
+        parse(text.as_ref(), Path::new("cup.obj"))
+    }
+
+    fn area(mesh: &Mesh) -> f64 {
+        let corner = |index: u32| glam::Vec3::from(mesh.vertices[index as usize]).as_dvec3();
+        let double = |&[a, b, c]: &[u32; 3]| (corner(b) - corner(a)).cross(corner(c) - corner(a)).length();
+        mesh.triangles.iter().map(double).sum::<f64>() / 2.0
+    }
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn a_mesh_survives_writing_and_reading() {
+        let mesh = Mesh {
+            vertices: vec![[0.1, -1e-30, 3e30], [1.0, 0.0, 0.33333334], [f32::MIN_POSITIVE, 5.0, -0.0]],
+            triangles: vec![[0, 1, 2], [0, 2, 1]],
+        };
+        let mut text = Vec::new();
+        write(&mesh, &mut text).unwrap();
+        assert_eq!(parse_text(text).unwrap(), mesh);
+    }
+
+    #[test]
+    fn everything_that_real_files_have_is_read_or_passed_over() {
+        let text = "\u{feff}# exported\r\nmtllib cup.mtl\r\no body\r\ng a b\r\nv 0 0 0 1 0.5 0.5\r\nv 1 0 0\r\n\
+            v\t1 1 0 # corner\r\nvn 0 0 1\r\nvt 0.5\r\nvt 0.5 0.5\r\nusemtl gone\r\ns off\r\nf 1/1/1 2/2/1 3//1\r\n\
+            \r\ng c\r\nv 0 1 0 1.0\r\nf -4 -2 \\\r\n  -1\r\nl 1 2 3 4\r\np 1\r\nf 1 2\r\nusemtl\r\nf 1/9/9 3/-7 4";
+        let mesh = parse_text(text).unwrap();
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (4, 3));
+        assert_eq!(mesh.triangles[1], mesh.triangles[2]);
+        assert_eq!(area(&mesh), 1.5);
+    }
+
+    #[test]
+    fn a_byte_order_mark_does_not_hide_the_first_vertex() {
+        assert_eq!(parse_text(format!("\u{feff}{SQUARE}f 1 2 3\n")).unwrap().vertices[0], [0.0; 3]);
+    }
+
+    #[test]
+    fn names_need_not_be_utf8() {
+        assert_eq!(parse_text([b"o caf\xe9\n", SQUARE.as_bytes(), b"f 1 2 3\n"].concat()).unwrap().triangles.len(), 1);
+    }
+
+    #[test]
+    fn polygons_become_triangles_of_the_same_area() {
+        assert_eq!(area(&parse_text(format!("{SQUARE}f 1 2 3 4\n")).unwrap()), 1.0);
+        // An L, starting next to its inner corner, where a fan would cover too much; and tilted, and tiny.
+        let corners = [[2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0], [0, 0, 0], [2, 0, 0]];
+        for (scale, slope) in [(1.0, 0.0), (1.0, 1.0), (1e-20, 0.5), (1e15, 3.0)] {
+            let vertex = |&[x, y, _]: &[i32; 3]| {
+                let [x, y] = [x, y].map(|c| f64::from(c) * scale);
+                format!("v {x} {y} {}\n", slope * x)
+            };
+            let text: String = corners.iter().map(vertex).collect();
+            let mesh = parse_text(text + "f 1 2 3 4 5 6\n").unwrap();
+            let expected = 3.0 * scale * scale * f64::sqrt(1.0 + slope * slope);
+            assert!((area(&mesh) / expected - 1.0).abs() < 1e-6, "{scale} {slope}: {}", area(&mesh) / expected);
+        }
+    }
+
+    #[test]
+    fn the_winding_of_a_concave_polygon_is_kept() {
+        let mesh = parse_text("v 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nv 2 0 0\nf 1 2 3 4 5 6\n").unwrap();
+        let corner = |index: u32| glam::Vec3::from(mesh.vertices[index as usize]);
+        for &[a, b, c] in &mesh.triangles {
+            assert!((corner(b) - corner(a)).cross(corner(c) - corner(a)).z > 0.0);
+        }
+    }
+
+    #[test]
+    fn degenerate_polygons_are_kept_as_they_are() {
+        let mesh = parse_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 3 4\nf 1 1 1 1 1\n").unwrap();
+        assert_eq!(mesh.triangles.len(), 5);
+    }
+
+    #[test]
+    fn a_vertex_may_stand_after_its_face() {
+        assert_eq!(parse_text("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 1 1 0\n").unwrap().triangles.len(), 1);
+    }
+
+    #[test]
+    fn wrong_lines_are_named() {
+        for (text, expected) in [
+            ("v 0 0 0\nv 1 0\n", "cup.obj:2: a vertex without z"),
+            ("v 0 0 nan\n", "cup.obj:1: the coordinate z = \"nan\" is not finite"),
+            ("v 0 1e39 0\n", "cup.obj:1: the coordinate y = \"1e39\" is not finite"),
+            ("v 0 zero 0\n", "cup.obj:1: \"zero\" is not a number"),
+            ("v 0 0 0\nf 1 1 2\nf 1 1 1\n", "cup.obj:2: vertex 2 of a face is out of range: the file has 1"),
+            ("v 0 0 0\nf 1 1 -2\n", "cup.obj:2: vertex -2 of a face is out of range"),
+            ("v 0 0 0\nf 1 0 1\n", "cup.obj:2: vertex 0 of a face is out of range"),
+            ("v 0 0 0\nf 1 1 -9223372036854775808\n", "out of range"),
+            ("v 0 0 0\nf 1 1 9223372036854775807\n", "out of range"),
+            ("v 0 0 0\n\n# ok\nf 1 x 1\n", "cup.obj:4: \"x\" is not a vertex of a face"),
+            ("v 0 0 0\nf 1 1.5 1\n", "cup.obj:2: \"1.5\" is not a vertex"),
+        ] {
+            let error = parse_text(text).unwrap_err();
+            assert!(error.to_string().contains(expected), "{text:?}: {error}");
+            assert_eq!(error.exit_code(), 1);
+        }
+    }
+
+    #[test]
+    fn meshes_without_faces_or_extent_are_refused() {
+        for text in ["", "\0\0\0", SQUARE, "v 0 0 0\nf 1 1\n", "solid ascii stl\n"] {
+            assert!(parse_text(text).unwrap_err().to_string().contains("cup.obj: the mesh has no faces"), "{text:?}");
+        }
+        let point = "v 1 2 3\nv 1 2 3\nv 5 5 5\nf 1 2 1\n";
+        assert!(parse_text(point).unwrap_err().to_string().contains("no extent"));
+        let missing = read(Path::new("nowhere/cup.obj")).unwrap_err().to_string();
+        assert!(missing.contains("nowhere/cup.obj: cannot read the mesh"), "{missing}");
+    }
+}
