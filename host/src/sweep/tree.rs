@@ -1,0 +1,184 @@
+//! The bounding volume hierarchy: built by `obvhs`, then flattened to four children a node.
+
+use super::narrow::{self, Motion, Triangle};
+use super::pack::{LANES, Pack, Ray, bigger, smaller};
+use glam::{DVec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+
+/// How many children a node has: the lanes of an SSE register.
+const WIDTH: usize = 4;
+
+/// Boxes of four children in f32, axis by axis, and where the children are. An unused child has an empty box.
+#[derive(Clone, Debug)]
+struct Node {
+    low: [[f32; WIDTH]; 3],
+    high: [[f32; WIDTH]; 3],
+    children: [u32; WIDTH],
+}
+
+/// A child that is a pack has this bit set.
+const PACK: u32 = 1 << 31;
+
+/// A tree over the triangles of a surface.
+#[derive(Clone, Debug)]
+pub(super) struct Tree {
+    nodes: Vec<Node>,
+    packs: Vec<Pack>,
+}
+
+struct Bounds(Aabb);
+
+impl obvhs::Boundable for Bounds {
+    fn aabb(&self) -> Aabb {
+        self.0
+    }
+}
+
+impl Tree {
+    /// The tree over these triangles, and the triangles in its order.
+    pub(super) fn new(triangles: Vec<Triangle>) -> (Vec<Triangle>, Self) {
+        let bounds: Vec<Bounds> = triangles.iter().map(bounds).collect();
+        let parameters = obvhs::BvhBuildParams { max_prims_per_leaf: LANES as u32, ..PARAMETERS };
+        let bvh = obvhs::bvh2::builder::build_bvh2(&bounds, parameters, &mut Default::default());
+        drop(bounds);
+        let mut flattened = Flattened {
+            bvh: &bvh,
+            triangles: &triangles,
+            ordered: Vec::with_capacity(triangles.len()),
+            tree: Self { nodes: Vec::new(), packs: Vec::new() },
+        };
+        flattened.add_node(0);
+        (flattened.ordered, flattened.tree)
+    }
+
+    /// The distance that the sphere travels until it touches one of the triangles.
+    pub(super) fn first_contact(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
+        let ray = Ray::new(motion);
+        let mut first = if motion.direction == DVec3::ZERO { f64::MIN_POSITIVE } else { f64::INFINITY };
+        let mut limit = first as f32;
+        // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this.
+        let mut stack = Vec::with_capacity(96);
+        stack.push((0.0_f32, 0_u32));
+        while let Some((near, child)) = stack.pop() {
+            if near > limit {
+                continue;
+            }
+            if child & PACK != 0 {
+                let pack = &self.packs[(child & !PACK) as usize];
+                let mut depths = [0.0; LANES];
+                let mut candidates = pack.candidates(&ray, limit, &mut depths);
+                while candidates != 0 {
+                    let lane = candidates.trailing_zeros();
+                    candidates &= candidates - 1;
+                    let triangle = &triangles[(pack.first + lane) as usize];
+                    if let Some(distance) = narrow::first_contact(motion, triangle, first) {
+                        first = distance;
+                        // Rounded up, and with room for the boxes' own rounding.
+                        limit = first as f32 + 2.0 * (ray.margin - motion.radius as f32);
+                    }
+                }
+            } else {
+                self.nodes[child as usize].visit(&ray, limit, &mut stack);
+            }
+        }
+        let is_contact = if motion.direction == DVec3::ZERO { first == 0.0 } else { first < f64::INFINITY };
+        is_contact.then_some(first)
+    }
+}
+
+impl Node {
+    const EMPTY: Self = Self {
+        low: [[f32::INFINITY; WIDTH]; 3],
+        high: [[f32::NEG_INFINITY; WIDTH]; 3],
+        children: [0; WIDTH],
+    };
+
+    /// Puts the children whose inflated boxes the path meets before `limit` on the stack, the nearest on top.
+    #[inline]
+    fn visit(&self, ray: &Ray, limit: f32, stack: &mut Vec<(f32, u32)>) {
+        let mut near = [0.0_f32; WIDTH];
+        let mut far = [limit; WIDTH];
+        for axis in 0..3 {
+            let (origin, inverse) = (ray.origin[axis], ray.inverse[axis]);
+            let (low, high) =
+                if inverse < 0.0 { (&self.high[axis], &self.low[axis]) } else { (&self.low[axis], &self.high[axis]) };
+            let margin = ray.margin.copysign(inverse);
+            for child in 0..WIDTH {
+                near[child] = bigger(near[child], (low[child] - margin - origin) * inverse);
+                far[child] = smaller(far[child], (high[child] + margin - origin) * inverse);
+            }
+        }
+        let bottom = stack.len();
+        for child in 0..WIDTH {
+            if near[child] <= far[child] {
+                let mut place = stack.len();
+                stack.push((near[child], self.children[child]));
+                while place > bottom && stack[place - 1].0 < near[child] {
+                    stack.swap(place - 1, place);
+                    place -= 1;
+                }
+            }
+        }
+    }
+}
+
+const PARAMETERS: obvhs::BvhBuildParams = obvhs::BvhBuildParams::fast_build();
+
+struct Flattened<'a> {
+    bvh: &'a Bvh2,
+    triangles: &'a [Triangle],
+    ordered: Vec<Triangle>,
+    tree: Tree,
+}
+
+impl Flattened<'_> {
+    /// Adds the node that stands for this one of the binary tree, and all below it.
+    fn add_node(&mut self, root: u32) -> u32 {
+        let bvh = self.bvh;
+        let node = |index: u32| &bvh.nodes[index as usize];
+        let mut members = vec![root];
+        // Open the member with the largest box until there are enough.
+        while members.len() < WIDTH {
+            let largest = (0..members.len())
+                .filter(|&member| !node(members[member]).is_leaf())
+                .max_by(|&a, &b| half_area(node(members[a]).aabb()).total_cmp(&half_area(node(members[b]).aabb())));
+            let Some(largest) = largest else { break };
+            let first = node(members.swap_remove(largest)).first_index;
+            members.extend([first, first + 1]);
+        }
+        let index = self.tree.nodes.len();
+        self.tree.nodes.push(Node::EMPTY);
+        for (child, member) in members.into_iter().enumerate() {
+            let aabb = *node(member).aabb();
+            let link = if node(member).is_leaf() { self.add_pack(member) } else { self.add_node(member) };
+            let place = &mut self.tree.nodes[index];
+            for axis in 0..3 {
+                place.low[axis][child] = aabb.min[axis];
+                place.high[axis][child] = aabb.max[axis];
+            }
+            place.children[child] = link;
+        }
+        index as u32
+    }
+
+    fn add_pack(&mut self, leaf: u32) -> u32 {
+        let leaf = &self.bvh.nodes[leaf as usize];
+        let first = self.ordered.len();
+        for index in leaf.first_index..leaf.first_index + leaf.prim_count {
+            self.ordered.push(self.triangles[self.bvh.primitive_indices[index as usize] as usize]);
+        }
+        self.tree.packs.push(Pack::new(&self.ordered[first..], first as u32));
+        (self.tree.packs.len() - 1) as u32 | PACK
+    }
+}
+
+fn bounds(triangle: &Triangle) -> Bounds {
+    let [a, b, c] = triangle.map(|corner| Vec3A::from(corner.as_vec3()));
+    Bounds(Aabb { min: a.min(b).min(c), max: a.max(b).max(c) })
+}
+
+fn half_area(aabb: &Aabb) -> f32 {
+    let side = aabb.max - aabb.min;
+    side.x * side.y + side.y * side.z + side.z * side.x
+}
