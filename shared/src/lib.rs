@@ -26,6 +26,7 @@
 extern crate std;
 
 mod descriptor;
+pub mod link;
 mod touch;
 
 pub use descriptor::{Descriptor, FEATURE_LIMIT, Features, MAX_FEATURES, MISSING_FEATURE};

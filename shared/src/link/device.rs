@@ -1,0 +1,253 @@
+//! The chip's end of the link.
+
+use super::frame::{Decoder, FRAME_MAX, Frame, encode};
+use super::message::{Answer, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics};
+use super::{CHUNK, POSTERIORS, WINDOW};
+use crate::Touch;
+use embedded_io::{Read, Write};
+use serde::{Deserialize, Serialize};
+
+/// What the link drives: a recogniser, and a place for models.
+pub trait Device {
+    /// Takes a touch into account; [`Outcome::Verdict`], with a detail if asked for.
+    fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome;
+
+    /// Forgets all touches.
+    fn reset(&mut self) -> Outcome;
+
+    /// A model or snapshot of `length` bytes is about to come.
+    fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome;
+
+    /// A part of it.
+    fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Outcome;
+
+    /// It is complete: check it and use it, or refuse it and keep what was there before.
+    fn commit(&mut self) -> Outcome;
+
+    /// The model in use.
+    fn model(&self) -> Option<ModelInfo>;
+
+    /// An object's name.
+    fn name(&self, object: u8) -> Option<&str>;
+
+    /// An object's posterior in Q56.
+    fn posterior(&self, object: u8) -> Option<u64>;
+
+    /// Writes the state of recognition from byte `offset` on into `buffer`, and returns (bytes in all, bytes written).
+    ///
+    /// # Errors
+    /// A [`Refusal`] to send instead.
+    fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal>;
+
+    /// Called after a command was executed and before its outcome is sent: a device that is to survive power cuts
+    /// stores its evidence and this, at once or not at all.
+    fn store(&mut self, progress: &Progress) {
+        let _ = progress;
+    }
+}
+
+/// How far a session has come: together with the evidence, all that a chip has to remember through a power cut.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Progress {
+    session: u16,
+    next: u32,
+    outcomes: [Option<Outcome>; WINDOW],
+}
+
+impl Progress {
+    /// No session, nothing executed.
+    pub const NONE: Self = Self { session: 0, next: 0, outcomes: [None; WINDOW] };
+
+    /// The current session; 0 before the first.
+    pub const fn session(&self) -> u16 {
+        self.session
+    }
+
+    /// How many commands of this session have been executed.
+    pub const fn executed(&self) -> u32 {
+        self.next
+    }
+
+    /// Where a command's outcome is kept.
+    fn slot(&mut self, sequence: u32) -> Option<&mut Option<Outcome>> {
+        // WINDOW fits any integer, and divides 2³², so that slots stay in order when the sequence wraps.
+        let window = u32::try_from(WINDOW).unwrap_or(1);
+        self.outcomes.get_mut(usize::try_from(sequence % window).unwrap_or(0))
+    }
+}
+
+/// The chip's end: bytes from the line in, bytes for the line out.
+///
+/// RAM: about 500 bytes, and on the stack 350 while a frame is answered.
+#[derive(Debug, Default)]
+pub struct DeviceEnd {
+    decoder: Decoder,
+    progress: Progress,
+    statistics: Statistics,
+    events: u32,
+}
+
+impl DeviceEnd {
+    /// An end that goes on from `progress`; [`Progress::NONE`] at first.
+    pub const fn new(progress: Progress) -> Self {
+        Self {
+            decoder: Decoder::new(),
+            progress,
+            statistics: Statistics { frames: 0, garbled: 0, repeated: 0, early: 0, foreign: 0 },
+            events: 0,
+        }
+    }
+
+    /// What has happened so far.
+    pub const fn statistics(&self) -> Statistics {
+        self.statistics
+    }
+
+    /// How far the session has come.
+    pub const fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
+    /// Takes bytes from the line, in any portions, does what they say, and hands every frame to be sent to `send`.
+    ///
+    /// Cannot fail or panic, whatever the bytes.
+    pub fn receive(&mut self, bytes: &[u8], device: &mut impl Device, mut send: impl FnMut(&[u8])) {
+        let Self { decoder, progress, statistics, .. } = self;
+        for &byte in bytes {
+            match decoder.feed(byte) {
+                None => {}
+                Some(Err(_)) => statistics.garbled = statistics.garbled.saturating_add(1),
+                Some(Ok(frame)) => {
+                    statistics.frames = statistics.frames.saturating_add(1);
+                    respond(frame, progress, statistics, device, &mut send);
+                }
+            }
+        }
+    }
+
+    /// Tells the host of something that happened here.
+    pub fn tell(&mut self, event: Event, mut send: impl FnMut(&[u8])) {
+        let message = Message::Event { sequence: self.events, event };
+        self.events = self.events.wrapping_add(1);
+        send(encode(&Frame { session: self.progress.session, message }, &mut [0; FRAME_MAX]));
+    }
+
+    /// Waits for bytes on `transport`, and answers them there. Call it in a loop.
+    ///
+    /// # Errors
+    /// The transport's own.
+    pub fn serve<T: Read + Write>(&mut self, transport: &mut T, device: &mut impl Device) -> Result<(), T::Error> {
+        let mut buffer = [0; 32];
+        let count = transport.read(&mut buffer)?;
+        let mut result = Ok(());
+        self.receive(buffer.get(..count).unwrap_or_default(), device, |frame| {
+            if result.is_ok() {
+                result = transport.write_all(frame);
+            }
+        });
+        result?;
+        transport.flush()
+    }
+}
+
+fn respond(
+    frame: Frame<'_>,
+    progress: &mut Progress,
+    statistics: &mut Statistics,
+    device: &mut impl Device,
+    send: &mut impl FnMut(&[u8]),
+) {
+    match frame.message {
+        Message::Query { tag, query } => {
+            if let Query::Open { previous } = query
+                && previous == progress.session
+                && frame.session != progress.session
+            {
+                *progress = Progress { session: frame.session, ..Progress::NONE };
+                device.store(progress);
+            }
+            let mut buffer = [0; CHUNK];
+            let answer = answer(query, progress, statistics, device, &mut buffer);
+            let message = Message::Answer { tag, answer };
+            send(encode(&Frame { session: progress.session, message }, &mut [0; FRAME_MAX]));
+        }
+        Message::Command { sequence, command } => {
+            let message = execute(frame.session, sequence, &command, progress, statistics, device);
+            send(encode(&Frame { session: progress.session, message }, &mut [0; FRAME_MAX]));
+        }
+        // Chips do not talk to each other: an echo.
+        Message::Answer { .. } | Message::Outcome { .. } | Message::Expected { .. } | Message::Event { .. } => {
+            statistics.foreign = statistics.foreign.saturating_add(1);
+        }
+    }
+}
+
+/// Executes the command if it is the next one; the message to send in any case.
+fn execute<'a>(
+    session: u16,
+    sequence: u32,
+    command: &Command<'_>,
+    progress: &mut Progress,
+    statistics: &mut Statistics,
+    device: &mut impl Device,
+) -> Message<'a> {
+    let expected = Message::Expected { sequence: progress.next };
+    if session != progress.session {
+        statistics.foreign = statistics.foreign.saturating_add(1);
+        return expected;
+    }
+    let behind = progress.next.wrapping_sub(sequence);
+    if behind != 0 {
+        let known = usize::try_from(behind).is_ok_and(|behind| behind <= WINDOW);
+        let counter = if known { &mut statistics.repeated } else { &mut statistics.early };
+        *counter = counter.saturating_add(1);
+        let outcome = progress.slot(sequence).and_then(|slot| slot.filter(|_| known));
+        return outcome.map_or(expected, |outcome| Message::Outcome { sequence, outcome });
+    }
+    let outcome = match *command {
+        Command::Touch { touch, detail } => device.touch(&Touch::from(&touch), detail),
+        Command::Reset => device.reset(),
+        Command::Begin { payload, length, checksum } => device.begin(payload, length, checksum),
+        Command::Chunk { offset, bytes } => device.chunk(offset, bytes),
+        Command::Commit => device.commit(),
+    };
+    if let Some(slot) = progress.slot(sequence) {
+        *slot = Some(outcome);
+    }
+    progress.next = sequence.wrapping_add(1);
+    device.store(progress);
+    Message::Outcome { sequence, outcome }
+}
+
+fn answer<'b>(
+    query: Query,
+    progress: &Progress,
+    statistics: &Statistics,
+    device: &'b mut impl Device,
+    buffer: &'b mut [u8; CHUNK],
+) -> Answer<'b> {
+    match query {
+        Query::Hello | Query::Open { .. } => Answer::Session { next: progress.next },
+        Query::Model => device.model().map_or(Answer::Refused(Refusal::NoModel), Answer::Model),
+        Query::Name { object } => match device.name(object) {
+            // A name longer than a chunk would make too long a frame.
+            Some(name) => Answer::Name(name.get(..name.floor_char_boundary(CHUNK)).unwrap_or_default()),
+            None => Answer::Refused(Refusal::NoObject),
+        },
+        Query::Statistics => Answer::Statistics(*statistics),
+        Query::Posteriors { first } => {
+            let objects = (first..=u8::MAX).take(POSTERIORS);
+            let posteriors = objects.map_while(|object| device.posterior(object));
+            let mut count = 0;
+            for (slot, posterior) in buffer.as_chunks_mut::<8>().0.iter_mut().zip(posteriors) {
+                *slot = posterior.to_le_bytes();
+                count += slot.len();
+            }
+            Answer::Posteriors(buffer.get(..count).unwrap_or_default())
+        }
+        Query::Snapshot { offset } => match device.snapshot(offset, buffer) {
+            Ok((length, written)) => Answer::Snapshot { length, bytes: buffer.get(..written).unwrap_or_default() },
+            Err(refusal) => Answer::Refused(refusal),
+        },
+    }
+}

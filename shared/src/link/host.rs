@@ -1,0 +1,489 @@
+//! The host's end of the link.
+
+use super::WINDOW;
+use super::frame::{Decoder, FRAME_MAX, Frame, encode};
+use super::message::{Answer, Command, Event, Message, Outcome, Query};
+use core::fmt;
+use embedded_io::{Read, ReadReady, Write};
+
+/// How patient the host is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HostSettings {
+    /// Microseconds after which an unanswered frame is sent again; doubles with each attempt, up to 16 times.
+    pub retry: u64,
+    /// Attempts after which the chip counts as silent.
+    pub attempts: u32,
+}
+
+impl Default for HostSettings {
+    /// 300 ms: longer than a full window takes at 115,200 baud. 12 attempts: half a minute.
+    fn default() -> Self {
+        Self { retry: 300_000, attempts: 12 }
+    }
+}
+
+/// What the host's end has seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HostStatistics {
+    /// Frames sent for the first time.
+    pub sent: u64,
+    /// Frames sent again.
+    pub resent: u64,
+    /// Whole frames received.
+    pub received: u64,
+    /// Frames that were garbled or too long, or no message of this version.
+    pub garbled: u64,
+    /// Outcomes and answers that had been received before, or belong to another session.
+    pub repeated: u64,
+    /// Times that the chip said that it had missed a command.
+    pub early: u64,
+    /// The chip's own events that were lost on the way.
+    pub missed_events: u64,
+}
+
+/// Something for the program that uses the link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Incoming<'a> {
+    /// The session is open: commands may be given.
+    Opened,
+    /// What came of a command; in the order of the commands, once for each.
+    Outcome {
+        /// The command's number.
+        sequence: u32,
+        /// What came of it.
+        outcome: Outcome,
+    },
+    /// The answer to the question.
+    Answer(Answer<'a>),
+    /// Something happened on the chip by itself.
+    Event {
+        /// What happened.
+        event: Event,
+        /// How many events before it were lost on the way.
+        missed: u32,
+    },
+}
+
+/// Why the session cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The chip does not answer any more.
+    Silent {
+        /// Commands whose outcome is known.
+        answered: u32,
+        /// Commands that may have been executed or not.
+        uncertain: u32,
+    },
+    /// The chip has forgotten the session, and with it what it had been told: it was reset and has no stored state.
+    Forgotten {
+        /// Commands whose outcome is known, and whose effect is lost.
+        answered: u32,
+        /// Commands that may have been executed or not; if so, their effect is lost.
+        uncertain: u32,
+    },
+}
+
+impl fmt::Display for LinkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Silent { answered, uncertain } => write!(
+                f,
+                "the chip does not answer: {answered} commands were executed, {uncertain} may have been. Check port, \
+                 speed and cable, and that the chip's program speaks link version {}",
+                super::VERSION
+            ),
+            Self::Forgotten { answered, uncertain } => write!(
+                f,
+                "the chip was reset and kept nothing: {answered} commands are lost, and up to {uncertain} more. Start \
+                 again, or use a program that stores its progress"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for LinkError {}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Not connected.
+    Closed,
+    /// Asking for the current session.
+    Asking,
+    /// Opening our own.
+    Opening,
+    Open,
+    /// Asking whether the chip has forgotten our session.
+    Doubting,
+}
+
+/// A frame under way.
+#[derive(Clone, Copy, Debug)]
+struct Sent {
+    bytes: [u8; FRAME_MAX],
+    length: usize,
+    at: u64,
+    attempts: u32,
+    outcome: Option<Outcome>,
+}
+
+impl Sent {
+    fn new(frame: &Frame<'_>, now: u64) -> Self {
+        let mut bytes = [0; FRAME_MAX];
+        let length = encode(frame, &mut bytes).len();
+        Self { bytes, length, at: now, attempts: 1, outcome: None }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+
+    fn is_due(&self, now: u64, settings: &HostSettings) -> bool {
+        let doublings = self.attempts.saturating_sub(1).min(4);
+        now.saturating_sub(self.at) >= settings.retry << doublings
+    }
+
+    fn again(&mut self, now: u64, statistics: &mut HostStatistics, send: &mut impl FnMut(&[u8])) {
+        self.at = now;
+        self.attempts = self.attempts.saturating_add(1);
+        statistics.resent += 1;
+        send(self.bytes());
+    }
+}
+
+/// The host's end: bytes from the line in, bytes for the line out. `now` is in microseconds on any clock that does not go
+/// back.
+///
+/// RAM: 2 KB.
+#[derive(Debug)]
+pub struct HostEnd {
+    settings: HostSettings,
+    decoder: Decoder,
+    phase: Phase,
+    session: u16,
+    next: u32,
+    oldest: u32,
+    window: [Option<Sent>; WINDOW],
+    question: Option<(u8, Sent)>,
+    tag: u8,
+    next_event: Option<u32>,
+    last_rush: Option<(u32, u64)>,
+    forgotten: bool,
+    statistics: HostStatistics,
+}
+
+impl HostEnd {
+    /// An end that is not connected.
+    pub const fn new(settings: HostSettings) -> Self {
+        Self {
+            settings,
+            decoder: Decoder::new(),
+            phase: Phase::Closed,
+            session: 0,
+            next: 0,
+            oldest: 0,
+            window: [None; WINDOW],
+            question: None,
+            tag: 0,
+            next_event: None,
+            last_rush: None,
+            forgotten: false,
+            statistics: HostStatistics {
+                sent: 0,
+                resent: 0,
+                received: 0,
+                garbled: 0,
+                repeated: 0,
+                early: 0,
+                missed_events: 0,
+            },
+        }
+    }
+
+    /// What has happened so far.
+    pub const fn statistics(&self) -> HostStatistics {
+        self.statistics
+    }
+
+    /// Begins to open a session; [`Incoming::Opened`] says when it is. Whatever was under way is given up.
+    pub fn connect(&mut self, now: u64, mut send: impl FnMut(&[u8])) {
+        self.phase = Phase::Asking;
+        (self.session, self.next, self.oldest) = (0, 0, 0);
+        self.window = [None; WINDOW];
+        self.forgotten = false;
+        self.put_question(Query::Hello, now, &mut send);
+    }
+
+    /// Whether the session is open, and no command or question is under way.
+    pub fn is_idle(&self) -> bool {
+        self.phase == Phase::Open && self.question.is_none() && self.oldest == self.next
+    }
+
+    /// Whether [`HostEnd::submit`] would take a command.
+    pub fn has_room(&self) -> bool {
+        let open = matches!(self.phase, Phase::Open | Phase::Doubting);
+        open && usize::try_from(self.next.wrapping_sub(self.oldest)).is_ok_and(|under_way| under_way < WINDOW)
+    }
+
+    /// Whether [`HostEnd::ask`] would take a question.
+    pub const fn can_ask(&self) -> bool {
+        matches!(self.phase, Phase::Open) && self.question.is_none()
+    }
+
+    /// Commands whose outcome has been handed out.
+    pub const fn answered(&self) -> u32 {
+        self.oldest
+    }
+
+    /// Sends a command and returns its number; `None` while the window is full or the session is not open.
+    pub fn submit(&mut self, command: Command<'_>, now: u64, mut send: impl FnMut(&[u8])) -> Option<u32> {
+        if !self.has_room() {
+            return None;
+        }
+        let sequence = self.next;
+        let message = Message::Command { sequence, command };
+        let sent = Sent::new(&Frame { session: self.session, message }, now);
+        send(sent.bytes());
+        self.statistics.sent += 1;
+        *slot(&mut self.window, sequence)? = Some(sent);
+        self.next = self.next.wrapping_add(1);
+        Some(sequence)
+    }
+
+    /// Asks a question and says whether it did: only one can be open.
+    pub fn ask(&mut self, query: Query, now: u64, mut send: impl FnMut(&[u8])) -> bool {
+        let can = self.can_ask();
+        if can {
+            self.put_question(query, now, &mut send);
+        }
+        can
+    }
+
+    fn put_question(&mut self, query: Query, now: u64, send: &mut impl FnMut(&[u8])) {
+        self.tag = self.tag.wrapping_add(1);
+        let session = self.session;
+        let sent = Sent::new(&Frame { session, message: Message::Query { tag: self.tag, query } }, now);
+        send(sent.bytes());
+        self.statistics.sent += 1;
+        self.question = Some((self.tag, sent));
+    }
+
+    /// Takes bytes from the line, in any portions, and hands what they bring to `incoming`. Cannot panic, whatever the
+    /// bytes.
+    pub fn receive(
+        &mut self,
+        bytes: &[u8],
+        now: u64,
+        mut send: impl FnMut(&[u8]),
+        mut incoming: impl FnMut(Incoming<'_>),
+    ) {
+        // The decoder hands out what lies in it, so it stands aside from the rest meanwhile.
+        let mut decoder = core::mem::take(&mut self.decoder);
+        for &byte in bytes {
+            match decoder.feed(byte) {
+                None => {}
+                Some(Err(_)) => self.statistics.garbled += 1,
+                Some(Ok(frame)) => {
+                    self.statistics.received += 1;
+                    self.take(frame, now, &mut send, &mut incoming);
+                }
+            }
+        }
+        self.decoder = decoder;
+    }
+
+    fn take(
+        &mut self,
+        frame: Frame<'_>,
+        now: u64,
+        send: &mut impl FnMut(&[u8]),
+        incoming: &mut impl FnMut(Incoming<'_>),
+    ) {
+        match frame.message {
+            Message::Answer { tag, answer } if self.question.as_ref().is_some_and(|(t, _)| *t == tag) => {
+                self.question = None;
+                self.take_answer(frame.session, answer, now, send, incoming);
+            }
+            Message::Outcome { sequence, outcome } if frame.session == self.session && self.is_under_way(sequence) => {
+                self.take_outcome(sequence, outcome, now, send, incoming);
+            }
+            Message::Expected { sequence } if frame.session == self.session => {
+                self.statistics.early += 1;
+                if self.is_under_way(sequence) {
+                    self.rush(sequence, now, send);
+                }
+            }
+            // Either late, or the chip has forgotten our session: ask.
+            Message::Expected { .. } if self.can_ask() => {
+                self.phase = Phase::Doubting;
+                self.put_question(Query::Hello, now, send);
+            }
+            Message::Event { sequence, event } => {
+                // A chip that has started counts from 0.
+                let expected = if event == Event::Started { sequence } else { self.next_event.unwrap_or(sequence) };
+                let missed = sequence.wrapping_sub(expected);
+                if missed >> 31 == 1 {
+                    self.statistics.repeated += 1;
+                    return;
+                }
+                self.next_event = Some(sequence.wrapping_add(1));
+                self.statistics.missed_events += u64::from(missed);
+                incoming(Incoming::Event { event, missed });
+            }
+            _ => self.statistics.repeated += 1,
+        }
+    }
+
+    fn take_answer(
+        &mut self,
+        session: u16,
+        answer: Answer<'_>,
+        now: u64,
+        send: &mut impl FnMut(&[u8]),
+        incoming: &mut impl FnMut(Incoming<'_>),
+    ) {
+        match (self.phase, answer) {
+            (Phase::Asking, Answer::Session { .. }) => {
+                self.phase = Phase::Opening;
+                self.session = next_session(session);
+                self.put_question(Query::Open { previous: session }, now, send);
+            }
+            (Phase::Opening, Answer::Session { .. }) if session == self.session => {
+                self.phase = Phase::Open;
+                incoming(Incoming::Opened);
+            }
+            // Another host opened one meanwhile.
+            (Phase::Opening, Answer::Session { .. }) => {
+                self.session = next_session(session);
+                self.put_question(Query::Open { previous: session }, now, send);
+            }
+            (Phase::Doubting, Answer::Session { .. }) => {
+                self.forgotten = session != self.session;
+                self.phase = Phase::Open;
+            }
+            (Phase::Open, answer) => incoming(Incoming::Answer(answer)),
+            (phase, _) => {
+                // No answer to what was asked: ask again.
+                let query = if phase == Phase::Opening { Query::Open { previous: session } } else { Query::Hello };
+                self.put_question(query, now, send);
+            }
+        }
+    }
+
+    fn take_outcome(
+        &mut self,
+        sequence: u32,
+        outcome: Outcome,
+        now: u64,
+        send: &mut impl FnMut(&[u8]),
+        incoming: &mut impl FnMut(Incoming<'_>),
+    ) {
+        match slot(&mut self.window, sequence) {
+            Some(Some(sent)) if sent.outcome.is_none() => sent.outcome = Some(outcome),
+            _ => self.statistics.repeated += 1,
+        }
+        while self.oldest != self.next
+            && let Some(place) = slot(&mut self.window, self.oldest)
+            && let Some(outcome) = place.as_ref().and_then(|sent| sent.outcome)
+        {
+            *place = None;
+            let sequence = self.oldest;
+            self.oldest = self.oldest.wrapping_add(1);
+            incoming(Incoming::Outcome { sequence, outcome });
+        }
+        // The chip executes in order, so an outcome that is older than this one was lost.
+        if self.is_under_way(self.oldest) && self.oldest != sequence && sequence.wrapping_sub(self.oldest) >> 31 == 0 {
+            self.rush(self.oldest, now, send);
+        }
+    }
+
+    /// Sends everything from `sequence` on again that has no outcome, unless that was done just now.
+    fn rush(&mut self, sequence: u32, now: u64, send: &mut impl FnMut(&[u8])) {
+        let just_now = |(last, at): (u32, u64)| last == sequence && now.saturating_sub(at) < self.settings.retry;
+        if self.last_rush.is_some_and(just_now) {
+            return;
+        }
+        self.last_rush = Some((sequence, now));
+        self.send_again(sequence, now, send);
+    }
+
+    fn send_again(&mut self, from: u32, now: u64, send: &mut impl FnMut(&[u8])) {
+        let mut sequence = from;
+        while sequence != self.next {
+            if let Some(Some(sent)) = slot(&mut self.window, sequence)
+                && sent.outcome.is_none()
+            {
+                sent.again(now, &mut self.statistics, send);
+            }
+            sequence = sequence.wrapping_add(1);
+        }
+    }
+
+    fn is_under_way(&self, sequence: u32) -> bool {
+        sequence.wrapping_sub(self.oldest) < self.next.wrapping_sub(self.oldest)
+    }
+
+    /// Sends again what has been without an answer for too long. Call it often.
+    ///
+    /// # Errors
+    /// [`LinkError`] when the session cannot go on: [`HostEnd::connect`] begins another.
+    pub fn tick(&mut self, now: u64, mut send: impl FnMut(&[u8])) -> Result<(), LinkError> {
+        let (answered, uncertain) = (self.oldest, self.next.wrapping_sub(self.oldest));
+        if self.forgotten {
+            return Err(LinkError::Forgotten { answered, uncertain });
+        }
+        if let Some((_, question)) = &mut self.question
+            && question.is_due(now, &self.settings)
+        {
+            if question.attempts >= self.settings.attempts {
+                return Err(LinkError::Silent { answered, uncertain });
+            }
+            question.again(now, &mut self.statistics, &mut send);
+        }
+        let oldest = self.oldest;
+        if let Some(Some(sent)) = slot(&mut self.window, oldest)
+            && sent.is_due(now, &self.settings)
+        {
+            if sent.attempts >= self.settings.attempts {
+                return Err(LinkError::Silent { answered, uncertain });
+            }
+            self.send_again(oldest, now, &mut send);
+        }
+        Ok(())
+    }
+
+    /// Reads what is there on `transport`, answers it, and sends again what is due. Does not wait.
+    ///
+    /// # Errors
+    /// The transport's own, or [`LinkError`].
+    pub fn exchange<T: Read + Write + ReadReady>(
+        &mut self,
+        transport: &mut T,
+        now: u64,
+        incoming: impl FnMut(Incoming<'_>),
+    ) -> Result<Result<(), LinkError>, T::Error> {
+        let mut buffer = [0; 64];
+        let count = if transport.read_ready()? { transport.read(&mut buffer)? } else { 0 };
+        let mut written = Ok(());
+        let mut send = |frame: &[u8]| {
+            if written.is_ok() {
+                written = transport.write_all(frame);
+            }
+        };
+        self.receive(buffer.get(..count).unwrap_or_default(), now, &mut send, incoming);
+        let ticked = self.tick(now, &mut send);
+        written?;
+        transport.flush()?;
+        Ok(ticked)
+    }
+}
+
+/// A session's number is never 0: that is a chip's that knows of none.
+fn next_session(session: u16) -> u16 {
+    session.checked_add(1).unwrap_or(1)
+}
+
+fn slot(window: &mut [Option<Sent>; WINDOW], sequence: u32) -> Option<&mut Option<Sent>> {
+    let places = u32::try_from(WINDOW).unwrap_or(1);
+    window.get_mut(usize::try_from(sequence % places).unwrap_or(0))
+}

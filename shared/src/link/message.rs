@@ -1,0 +1,346 @@
+//! What is said over the link. The order of variants and fields is the format: add at the end, or raise
+//! [`VERSION`](super::VERSION).
+
+use crate::{ContactTime, Descriptor, Pose, Touch};
+use serde::{Deserialize, Serialize};
+
+/// A message of either side.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Message<'a> {
+    /// Host: a question; the tag comes back with the answer.
+    Query {
+        /// Any number.
+        tag: u8,
+        /// The question.
+        query: Query,
+    },
+    /// Chip: the answer to the question with this tag.
+    Answer {
+        /// The question's number.
+        tag: u8,
+        /// The answer.
+        #[serde(borrow)]
+        answer: Answer<'a>,
+    },
+    /// Host: do this.
+    Command {
+        /// Counts commands from 0 in a session.
+        sequence: u32,
+        /// What to do.
+        #[serde(borrow)]
+        command: Command<'a>,
+    },
+    /// Chip: what came of a command.
+    Outcome {
+        /// The command's number.
+        sequence: u32,
+        /// What came of it.
+        outcome: Outcome,
+    },
+    /// Chip: a command came that is not the next one, or not of the session that this frame is of.
+    Expected {
+        /// The number of the next command.
+        sequence: u32,
+    },
+    /// Chip: something happened by itself.
+    Event {
+        /// Counts events from 0 since power-up.
+        sequence: u32,
+        /// What happened.
+        event: Event,
+    },
+}
+
+/// A question, which changes nothing on the chip; only [`Query::Open`] does, once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Query {
+    /// Which session is current?
+    Hello,
+    /// Open the session of this frame if the current one is `previous`.
+    Open {
+        /// The session that the host believes to be current.
+        previous: u16,
+    },
+    /// Which model is in use?
+    Model,
+    /// What is the name of an object?
+    Name {
+        /// The object's index in the model.
+        object: u8,
+    },
+    /// What has happened on the link?
+    Statistics,
+    /// What are the posteriors of up to [`POSTERIORS`](super::POSTERIORS) objects?
+    Posteriors {
+        /// From this object on.
+        first: u8,
+    },
+    /// The state of recognition as bytes, up to [`CHUNK`](super::CHUNK) of them.
+    Snapshot {
+        /// From this byte on.
+        offset: u32,
+    },
+}
+
+/// The answer to a [`Query`].
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Answer<'a> {
+    /// To [`Query::Hello`] and [`Query::Open`]: the current session is that of this frame.
+    Session {
+        /// The number of its next command.
+        next: u32,
+    },
+    /// To [`Query::Model`].
+    Model(ModelInfo),
+    /// To [`Query::Name`].
+    Name(&'a str),
+    /// To [`Query::Statistics`].
+    Statistics(Statistics),
+    /// To [`Query::Posteriors`]: u64 in Q56, little endian, one after another.
+    Posteriors(&'a [u8]),
+    /// To [`Query::Snapshot`].
+    Snapshot {
+        /// Bytes in all.
+        length: u32,
+        /// From the offset that was asked for.
+        bytes: &'a [u8],
+    },
+    /// There is no answer.
+    Refused(Refusal),
+}
+
+/// Something to do, exactly once.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Command<'a> {
+    /// Take a touch into account.
+    Touch {
+        /// The touch.
+        touch: TouchMessage,
+        /// Whether the outcome should have a [`Detail`].
+        detail: bool,
+    },
+    /// Forget all touches: another object comes.
+    Reset,
+    /// A model or a snapshot is about to come, in chunks.
+    Begin {
+        /// What comes.
+        payload: Payload,
+        /// Its bytes in all.
+        length: u32,
+        /// Its CRC-32 (ISO-HDLC).
+        checksum: u32,
+    },
+    /// Part of it; chunks come in order.
+    Chunk {
+        /// Where it belongs.
+        offset: u32,
+        /// At most [`CHUNK`](super::CHUNK) bytes.
+        bytes: &'a [u8],
+    },
+    /// It is complete: check it and use it. Until then, and if the check fails, what was there before stays in use.
+    Commit,
+}
+
+/// What comes in chunks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Payload {
+    /// A compiled model.
+    Model,
+    /// The state of recognition, from [`Answer::Snapshot`].
+    Snapshot,
+}
+
+/// What came of a [`Command`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Outcome {
+    /// Of anything but a touch: it is done.
+    Done,
+    /// Of a touch.
+    Verdict(VerdictMessage),
+    /// It was not done.
+    Refused(Refusal),
+}
+
+/// Why the chip does not do what it was told to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// There is no model yet: load one.
+    NoModel,
+    /// It does not fit into the chip's memory.
+    TooLong,
+    /// A chunk came without a beginning, or not in order.
+    OutOfOrder,
+    /// What arrived is not what was announced.
+    Checksum,
+    /// What arrived is no model or snapshot that this chip can use.
+    Invalid,
+    /// The chip's program does not do that.
+    Unsupported,
+    /// There is no such object.
+    NoObject,
+}
+
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NoModel => "the chip has no model: load one",
+            Self::TooLong => "it does not fit into the chip's memory: load a smaller model",
+            Self::OutOfOrder => "the chip missed a part: load it again",
+            Self::Checksum => "what arrived is not what was sent: load it again",
+            Self::Invalid => "the chip cannot use it: check that it is a model of this version and small enough",
+            Self::Unsupported => "the chip's program does not do that: flash another",
+            Self::NoObject => "the chip's model has no such object",
+        })
+    }
+}
+
+/// Something that happened on the chip by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Event {
+    /// The chip has started.
+    Started,
+    /// The chip's own fingers touched.
+    Touch {
+        /// The touch.
+        touch: TouchMessage,
+        /// What is known after it.
+        verdict: VerdictMessage,
+    },
+    /// One of the chip's own fingers is faulty.
+    Fault {
+        /// 0: stuck closed, 1: bouncing, 2: silent, 3: unreadable, 4: edges lost.
+        kind: u8,
+        /// 0, 1 or 2 along the row; 255 when no one finger is at fault.
+        finger: u8,
+    },
+}
+
+/// A [`Touch`] as it travels: missing contacts are `u32::MAX`, the pose is direction and alignment in Q15.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TouchMessage {
+    /// Contact times in microseconds.
+    pub times: [u32; 3],
+    /// Direction and alignment, little endian.
+    pub pose: Option<[u8; 12]>,
+}
+
+impl From<&Touch> for TouchMessage {
+    fn from(touch: &Touch) -> Self {
+        let times = touch.times().map(|time| time.micros().unwrap_or(u32::MAX));
+        let pose = touch.pose().map(|Pose { direction, alignment }| {
+            let mut bytes = [0; 12];
+            let cosines = direction.into_iter().chain(alignment).flat_map(i16::to_le_bytes);
+            bytes.iter_mut().zip(cosines).for_each(|(byte, cosine)| *byte = cosine);
+            bytes
+        });
+        Self { times, pose }
+    }
+}
+
+impl From<&TouchMessage> for Touch {
+    fn from(message: &TouchMessage) -> Self {
+        let touch = Self::new(message.times.map(ContactTime::from_micros));
+        let Some([a, b, c, d, e, f, g, h, i, j, k, l]) = message.pose else { return touch };
+        touch.with_pose(Pose {
+            direction: [[a, b], [c, d], [e, f]].map(i16::from_le_bytes),
+            alignment: [[g, h], [i, j], [k, l]].map(i16::from_le_bytes),
+        })
+    }
+}
+
+/// A verdict, and what it is based on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct VerdictMessage {
+    /// What is known.
+    pub decision: Decision,
+    /// The object with the most evidence.
+    pub best: u8,
+    /// Touches since the last reset.
+    pub touches: u32,
+    /// What to hold against another recogniser, where it was asked for.
+    pub detail: Option<Detail>,
+}
+
+/// What is known after a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Decision {
+    /// Nothing yet.
+    Undecided,
+    /// The object with this index.
+    Recognised(u8),
+    /// Most likely no object of the model.
+    Unknown,
+}
+
+/// Enough to see whether two recognisers agree in every bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Detail {
+    /// The posterior of the best object: u64 in Q56, little endian.
+    pub posterior: [u8; 8],
+    /// CRC-32 (ISO-HDLC) of every object's evidence, i64 little endian, and so of every object's posterior.
+    pub evidence: [u8; 4],
+}
+
+impl Detail {
+    /// From the posterior of the best object in Q56 and the evidence of all. Cost: about 400 instructions an object.
+    pub fn new(posterior: u64, evidence: &[i64]) -> Self {
+        let crc = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
+        let mut digest = crc.digest();
+        evidence.iter().for_each(|e| digest.update(&e.to_le_bytes()));
+        Self { posterior: posterior.to_le_bytes(), evidence: digest.finalize().to_le_bytes() }
+    }
+
+    /// The posterior of the best object in Q56.
+    pub const fn posterior(&self) -> u64 {
+        u64::from_le_bytes(self.posterior)
+    }
+}
+
+/// The model in use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ModelInfo {
+    /// Its checksum.
+    pub checksum: u32,
+    /// Its bytes.
+    pub length: u32,
+    /// Objects less one.
+    pub last_object: u8,
+    /// [`Descriptor::code`], 255 for a model of other features.
+    pub descriptor: u8,
+}
+
+impl ModelInfo {
+    /// How many objects the model knows.
+    pub fn objects(&self) -> usize {
+        usize::from(self.last_object) + 1
+    }
+
+    /// What it takes touches as.
+    pub fn descriptor(&self) -> Option<Descriptor> {
+        Descriptor::from_code(self.descriptor)
+    }
+}
+
+/// What the chip's end of the link has seen since power-up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Statistics {
+    /// Whole frames.
+    pub frames: u32,
+    /// Frames that were garbled or too long, or no message of this version.
+    pub garbled: u32,
+    /// Commands that had been executed before: repetitions and doubled frames.
+    pub repeated: u32,
+    /// Commands that came before the one that was expected: something was lost in between.
+    pub early: u32,
+    /// Commands of another session.
+    pub foreign: u32,
+}

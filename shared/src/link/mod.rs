@@ -1,0 +1,56 @@
+//! The link between a host and a chip that recognises.
+//!
+//! # Frames
+//!
+//! ```text
+//! COBS( version u8 │ session u16 LE │ message, postcard │ CRC-32 LE of all before ) 0x00
+//! ```
+//!
+//! At most [`FRAME_MAX`] bytes on the line. A frame that does not decode, is too long or fails its checksum is counted
+//! and dropped; the next 0x00 begins afresh. [`Decoder`] takes bytes in any portions.
+//!
+//! # Who says what
+//!
+//! | from | message | delivery |
+//! |---|---|---|
+//! | host | [`Command`]: touch, reset, load | numbered, executed exactly once and in order |
+//! | chip | [`Outcome`]: verdict, done, refused | repeated on demand for the last [`WINDOW`] commands |
+//! | host | [`Query`]: model, names, posteriors, statistics, snapshot | changes nothing, repeated until answered |
+//! | chip | [`Answer`] | |
+//! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host can tell how many it missed |
+//!
+//! A host opens a session, whose number stands in every frame. Within it, commands are numbered from 0. The chip executes
+//! the command that it expects next and no other: one from before is a repetition (its outcome is sent again), one from
+//! after says that something was lost (the chip tells which it expects). The host keeps up to [`WINDOW`] commands under
+//! way and repeats those that stay without an outcome. So a command is executed once, whatever the line loses, doubles,
+//! garbles or delays; and as the chip's [`Progress`] can be stored with its evidence, that holds through a power cut.
+//!
+//! Opening names the session that the host believes to be current, so that a late copy of an opening cannot open again.
+//!
+//! [`DeviceEnd`] and [`HostEnd`] do this without a transport or a clock: bytes go in, bytes come out. Over an
+//! [`embedded_io`] transport: [`DeviceEnd::serve`] and [`HostEnd::exchange`].
+
+mod device;
+mod frame;
+mod host;
+mod message;
+
+pub use device::{Device, DeviceEnd, Progress};
+pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
+pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
+pub use message::{
+    Answer, Command, Decision, Detail, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,
+    TouchMessage, VerdictMessage,
+};
+
+/// Commands that may be under way at a time, and outcomes that the chip keeps.
+pub const WINDOW: usize = 8;
+
+/// The most bytes of a model or snapshot in one message.
+pub const CHUNK: usize = 128;
+
+/// Posteriors in one answer.
+pub const POSTERIORS: usize = CHUNK / 8;
+
+#[cfg(test)]
+mod tests;

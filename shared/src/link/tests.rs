@@ -1,0 +1,538 @@
+use super::*;
+use crate::{ContactTime, Pose, Touch};
+use proptest::prelude::*;
+use rand::rngs::ChaCha8Rng;
+use rand::{Rng, RngExt, SeedableRng};
+use std::collections::VecDeque;
+use std::{vec, vec::Vec};
+
+fn touch(number: u32) -> Touch {
+    let touch = Touch::new([
+        ContactTime::FIRST,
+        ContactTime::from_micros(number),
+        if number.is_multiple_of(7) { ContactTime::MISSING } else { ContactTime::from_micros(2 * number) },
+    ]);
+    match number % 3 {
+        0 => touch,
+        _ => touch.with_pose(Pose { direction: [-1, i16::MIN, i16::MAX], alignment: [256, 0, -32767] }),
+    }
+}
+
+/// A chip that writes down what it was told, and says in its verdict how many touches that were.
+#[derive(Default)]
+struct Notebook {
+    touches: Vec<Touch>,
+    staged: Vec<u8>,
+    announced: (u32, u32),
+    model: Vec<u8>,
+    stored: Option<(Vec<Touch>, Progress)>,
+}
+
+impl Device for Notebook {
+    fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome {
+        self.touches.push(*touch);
+        let touches = self.touches.len() as u32;
+        let detail = detail.then(|| Detail::new(u64::from(touches) << 40, &[-1, i64::MAX]));
+        Outcome::Verdict(VerdictMessage { decision: Decision::Undecided, best: 3, touches, detail })
+    }
+
+    fn reset(&mut self) -> Outcome {
+        self.touches.clear();
+        Outcome::Done
+    }
+
+    fn begin(&mut self, _: Payload, length: u32, checksum: u32) -> Outcome {
+        self.announced = (length, checksum);
+        self.staged.clear();
+        Outcome::Done
+    }
+
+    fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Outcome {
+        if offset as usize != self.staged.len() {
+            return Outcome::Refused(Refusal::OutOfOrder);
+        }
+        self.staged.extend_from_slice(bytes);
+        Outcome::Done
+    }
+
+    fn commit(&mut self) -> Outcome {
+        let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&self.staged);
+        if (self.staged.len() as u32, checksum) != self.announced {
+            return Outcome::Refused(Refusal::Checksum);
+        }
+        self.model = self.staged.clone();
+        Outcome::Done
+    }
+
+    fn model(&self) -> Option<ModelInfo> {
+        let length = self.model.len() as u32;
+        (length > 0).then_some(ModelInfo { checksum: self.announced.1, length, last_object: 9, descriptor: 1 })
+    }
+
+    fn name(&self, object: u8) -> Option<&str> {
+        ["bowl", "wristwatch"].get(usize::from(object)).copied()
+    }
+
+    fn posterior(&self, object: u8) -> Option<u64> {
+        (object < 20).then_some(u64::from(object) << 50)
+    }
+
+    fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal> {
+        let rest = self.model.get(offset as usize..).ok_or(Refusal::OutOfOrder)?;
+        let count = rest.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&rest[..count]);
+        Ok((self.model.len() as u32, count))
+    }
+
+    fn store(&mut self, progress: &Progress) {
+        self.stored = Some((self.touches.clone(), progress.clone()));
+    }
+}
+
+/// What a line does to what is sent over it; probabilities are for a byte, or for a frame.
+#[derive(Clone, Copy, Debug)]
+struct Faults {
+    byte_lost: f64,
+    byte_changed: f64,
+    frame_lost: f64,
+    frame_doubled: f64,
+    /// Up to so many microseconds; frames may overtake each other.
+    delay: u64,
+}
+
+const CLEAN: Faults = Faults { byte_lost: 0.0, byte_changed: 0.0, frame_lost: 0.0, frame_doubled: 0.0, delay: 0 };
+
+/// One direction of a line: what was sent and when it arrives.
+struct Line {
+    faults: Faults,
+    rng: ChaCha8Rng,
+    under_way: VecDeque<(u64, Vec<u8>)>,
+}
+
+impl Line {
+    fn new(faults: Faults, seed: u64) -> Self {
+        Self { faults, rng: ChaCha8Rng::seed_from_u64(seed), under_way: VecDeque::new() }
+    }
+
+    fn send(&mut self, frame: &[u8], now: u64) {
+        let Faults { byte_lost, byte_changed, frame_lost, frame_doubled, delay } = self.faults;
+        let rng = &mut self.rng;
+        for _ in 0..if rng.random_bool(frame_doubled) { 2 } else { 1 } {
+            if rng.random_bool(frame_lost) {
+                continue;
+            }
+            let mut bytes = frame.to_vec();
+            bytes.retain(|_| !rng.random_bool(byte_lost));
+            for byte in &mut bytes {
+                if rng.random_bool(byte_changed) {
+                    *byte ^= 1 << rng.random_range(0..8);
+                }
+            }
+            self.under_way.push_back((now + rng.random_range(0..=delay), bytes));
+        }
+    }
+
+    /// Portions that have arrived, split anywhere.
+    fn arrived(&mut self, now: u64) -> Vec<Vec<u8>> {
+        let (arrived, rest): (Vec<_>, Vec<_>) = self.under_way.drain(..).partition(|(at, _)| *at <= now);
+        self.under_way = rest.into();
+        let mut portions = Vec::new();
+        for (_, bytes) in arrived {
+            let at = self.rng.next_u32() as usize % (bytes.len() + 1);
+            let (left, right) = bytes.split_at(at);
+            portions.extend([left.to_vec(), right.to_vec()]);
+        }
+        portions
+    }
+}
+
+/// Both ends and the lines between them.
+struct Rig {
+    host: HostEnd,
+    chip: DeviceEnd,
+    notebook: Notebook,
+    down: Line,
+    up: Line,
+    now: u64,
+    outcomes: Vec<(u32, Outcome)>,
+    answers: Vec<std::string::String>,
+    events: Vec<(Event, u32)>,
+    opened: bool,
+}
+
+impl Rig {
+    fn new(faults: Faults, seed: u64) -> Self {
+        Self::with_attempts(1_000, faults, seed)
+    }
+
+    fn with_attempts(attempts: u32, faults: Faults, seed: u64) -> Self {
+        let mut rig = Self {
+            host: HostEnd::new(HostSettings { retry: 20_000, attempts }),
+            chip: DeviceEnd::new(Progress::NONE),
+            notebook: Notebook::default(),
+            down: Line::new(faults, seed),
+            up: Line::new(faults, seed ^ 0x5555),
+            now: 0,
+            outcomes: Vec::new(),
+            answers: Vec::new(),
+            events: Vec::new(),
+            opened: false,
+        };
+        rig.host.connect(0, |frame| rig.down.send(frame, 0));
+        rig.until(|rig| rig.opened);
+        rig
+    }
+
+    fn step(&mut self) -> Result<(), LinkError> {
+        let Self { host, chip, notebook, down, up, now, outcomes, answers, events, opened } = self;
+        *now += 1_000;
+        for bytes in down.arrived(*now) {
+            chip.receive(&bytes, notebook, |frame| up.send(frame, *now));
+        }
+        for bytes in up.arrived(*now) {
+            host.receive(
+                &bytes,
+                *now,
+                |frame| down.send(frame, *now),
+                |incoming| match incoming {
+                    Incoming::Opened => *opened = true,
+                    Incoming::Outcome { sequence, outcome } => outcomes.push((sequence, outcome)),
+                    Incoming::Answer(answer) => answers.push(std::format!("{answer:?}")),
+                    Incoming::Event { event, missed } => events.push((event, missed)),
+                },
+            );
+        }
+        host.tick(*now, |frame| down.send(frame, *now))
+    }
+
+    fn until(&mut self, done: impl Fn(&Self) -> bool) {
+        for _ in 0..2_000_000 {
+            if done(self) {
+                return;
+            }
+            self.step().unwrap();
+        }
+        panic!("no end: {:?} {:?}", self.host.statistics(), self.chip.statistics());
+    }
+
+    /// Gives a command as soon as there is room.
+    fn command(&mut self, command: Command<'_>) {
+        self.until(|rig| rig.host.has_room());
+        let now = self.now;
+        self.host.submit(command, now, |frame| self.down.send(frame, now)).unwrap();
+    }
+
+    fn ask(&mut self, query: Query) -> std::string::String {
+        self.until(|rig| rig.host.can_ask());
+        let now = self.now;
+        assert!(self.host.ask(query, now, |frame| self.down.send(frame, now)));
+        let count = self.answers.len();
+        self.until(|rig| rig.answers.len() > count);
+        self.answers.pop().unwrap()
+    }
+
+    fn send_touches(&mut self, numbers: core::ops::Range<u32>) {
+        for number in numbers {
+            self.command(Command::Touch { touch: (&touch(number)).into(), detail: number % 2 == 0 });
+        }
+        self.until(|rig| rig.host.is_idle());
+    }
+
+    /// Every touch was counted once, in order, and every outcome came once, in order, and is the right one.
+    fn assert_exactly_once(&self, count: u32) {
+        assert_eq!(self.notebook.touches, (0..count).map(touch).collect::<Vec<_>>());
+        assert_eq!(self.outcomes.len(), count as usize);
+        for (expected, (sequence, outcome)) in self.outcomes.iter().enumerate() {
+            let Outcome::Verdict(verdict) = outcome else { panic!("{outcome:?}") };
+            assert_eq!((*sequence as usize, verdict.touches as usize), (expected, expected + 1));
+            assert_eq!(verdict.detail.is_some(), expected % 2 == 0);
+        }
+    }
+}
+
+#[test]
+fn a_clean_line_repeats_nothing() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..1_000);
+    rig.assert_exactly_once(1_000);
+    let (host, chip) = (rig.host.statistics(), rig.chip.statistics());
+    assert_eq!((host.resent, host.garbled, host.repeated, host.early), (0, 0, 0, 0));
+    assert_eq!((chip.garbled, chip.repeated, chip.early, chip.foreign), (0, 0, 0, 0));
+    assert_eq!((host.sent, host.received), (1_002, 1_002));
+}
+
+#[test]
+fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
+    let faults = Faults { byte_lost: 0.001, byte_changed: 0.001, frame_lost: 0.03, frame_doubled: 0.03, delay: 10_000 };
+    let mut rig = Rig::new(faults, 7);
+    rig.send_touches(0..10_000);
+    rig.assert_exactly_once(10_000);
+    let (host, chip) = (rig.host.statistics(), rig.chip.statistics());
+    assert!(host.resent > 100 && host.garbled > 100 && host.repeated > 100, "{host:?}");
+    assert!(chip.garbled > 100 && chip.repeated > 100 && chip.early > 100, "{chip:?}");
+}
+
+#[test]
+fn a_model_arrives_whole_over_a_bad_line_and_a_wrong_one_leaves_the_old() {
+    let faults = Faults { byte_changed: 0.002, frame_lost: 0.05, frame_doubled: 0.05, delay: 5_000, ..CLEAN };
+    let mut rig = Rig::new(faults, 3);
+    let model: Vec<u8> = (0..5_000_u32).map(|i| ((i * i) >> 3) as u8).collect();
+    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&model);
+    let load = |rig: &mut Rig, checksum| {
+        let length = model.len() as u32;
+        rig.command(Command::Begin { payload: Payload::Model, length, checksum });
+        for (i, bytes) in model.chunks(CHUNK).enumerate() {
+            rig.command(Command::Chunk { offset: (i * CHUNK) as u32, bytes });
+        }
+        rig.command(Command::Commit);
+        rig.until(|rig| rig.host.is_idle());
+        rig.outcomes.last().unwrap().1
+    };
+    assert_eq!(load(&mut rig, checksum), Outcome::Done);
+    assert_eq!(rig.notebook.model, model);
+    assert_eq!(load(&mut rig, checksum ^ 1), Outcome::Refused(Refusal::Checksum));
+    assert_eq!(rig.notebook.model, model);
+    let mut snapshot = Vec::new();
+    while snapshot.len() < model.len() {
+        let text = rig.ask(Query::Snapshot { offset: snapshot.len() as u32 });
+        let bytes = text.split_once('[').unwrap().1.trim_end_matches([' ', '}', ']']);
+        snapshot.extend(bytes.split(", ").map(|byte| byte.parse::<u8>().unwrap()));
+    }
+    assert_eq!(snapshot, model);
+}
+
+#[test]
+fn questions_are_answered_between_commands() {
+    let mut rig = Rig::new(CLEAN, 1);
+    assert_eq!(rig.ask(Query::Model), "Refused(NoModel)");
+    assert_eq!(rig.ask(Query::Name { object: 1 }), "Name(\"wristwatch\")");
+    assert_eq!(rig.ask(Query::Name { object: 2 }), "Refused(NoObject)");
+    rig.command(Command::Touch { touch: (&touch(0)).into(), detail: true });
+    assert!(rig.ask(Query::Statistics).contains("frames: 7"));
+    assert_eq!(rig.ask(Query::Posteriors { first: 20 }), "Posteriors([])");
+    let posteriors = rig.ask(Query::Posteriors { first: 10 });
+    assert_eq!(posteriors.matches(',').count(), 10 * 8 - 1);
+    rig.command(Command::Reset);
+    rig.until(|rig| rig.host.is_idle());
+    assert_eq!(rig.outcomes.last().unwrap(), &(1, Outcome::Done));
+    assert!(rig.notebook.touches.is_empty());
+}
+
+#[test]
+fn a_chip_that_stored_its_progress_goes_on_after_power_cuts_with_nothing_lost_or_doubled() {
+    let faults = Faults { frame_lost: 0.02, frame_doubled: 0.02, byte_changed: 0.001, delay: 4_000, ..CLEAN };
+    let mut rig = Rig::new(faults, 11);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for number in 0..3_000 {
+        rig.command(Command::Touch { touch: (&touch(number)).into(), detail: number % 2 == 0 });
+        if rng.random_bool(0.05) {
+            // Whatever was on its way to the chip, in it, and from it is gone.
+            let (touches, progress) = rig.notebook.stored.clone().unwrap();
+            rig.notebook.touches = touches;
+            rig.chip = DeviceEnd::new(progress);
+            rig.down.under_way.clear();
+            rig.up.under_way.clear();
+        }
+    }
+    rig.until(|rig| rig.host.is_idle());
+    rig.assert_exactly_once(3_000);
+}
+
+#[test]
+fn a_chip_that_forgot_the_session_is_reported_with_the_touches_lost() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..5);
+    rig.chip = DeviceEnd::new(Progress::NONE);
+    rig.notebook = Notebook::default();
+    rig.command(Command::Touch { touch: (&touch(5)).into(), detail: false });
+    let error = (0..1_000).find_map(|_| rig.step().err()).unwrap();
+    assert_eq!(error, LinkError::Forgotten { answered: 5, uncertain: 1 });
+    assert!(rig.notebook.touches.is_empty(), "nothing of an old session is counted in a new one");
+}
+
+#[test]
+fn a_silent_chip_is_reported_with_the_touches_in_doubt() {
+    let mut rig = Rig::with_attempts(5, CLEAN, 1);
+    rig.send_touches(0..4);
+    rig.down.faults.frame_lost = 1.0;
+    for number in 4..7 {
+        rig.command(Command::Touch { touch: (&touch(number)).into(), detail: false });
+    }
+    let error = (0..10_000).find_map(|_| rig.step().err()).unwrap();
+    assert_eq!(error, LinkError::Silent { answered: 4, uncertain: 3 });
+}
+
+#[test]
+fn a_second_host_opens_a_session_of_its_own_and_late_copies_open_none() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..3);
+    let old_opening = {
+        let frame = Frame { session: 1, message: Message::Query { tag: 9, query: Query::Open { previous: 0 } } };
+        encode(&frame, &mut [0; FRAME_MAX]).to_vec()
+    };
+    rig.opened = false;
+    let now = rig.now;
+    rig.host.connect(now, |frame| rig.down.send(frame, now));
+    rig.until(|rig| rig.opened);
+    rig.send_touches(3..5);
+    let before = rig.chip.progress().clone();
+    assert_eq!((before.session(), before.executed()), (2, 2));
+    rig.chip.receive(&old_opening, &mut rig.notebook, |_| ());
+    assert_eq!(rig.chip.progress(), &before);
+}
+
+#[test]
+fn events_say_how_many_before_them_were_lost() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let fault = Event::Fault { kind: 1, finger: 2 };
+    for (number, event) in [Event::Started, fault, fault, fault, fault].into_iter().enumerate() {
+        let (up, now) = (&mut rig.up, rig.now);
+        rig.chip.tell(event, |frame| {
+            if number != 2 {
+                up.send(frame, now);
+            }
+            if number == 3 {
+                up.send(frame, now);
+            }
+        });
+        rig.step().unwrap();
+    }
+    assert_eq!(rig.events, [(Event::Started, 0), (fault, 0), (fault, 1), (fault, 0)]);
+    assert_eq!((rig.host.statistics().missed_events, rig.host.statistics().repeated), (1, 1));
+}
+
+#[test]
+fn frames_of_another_version_are_not_read() {
+    let mut out = [0; FRAME_MAX];
+    let bytes = encode(&Frame { session: 7, message: Message::Expected { sequence: 1 } }, &mut out).to_vec();
+    assert!(decode(&bytes)[0].is_ok());
+    // Version 2 with a checksum of its own.
+    let mut plain = vec![2, 7, 0, 4, 1];
+    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&plain);
+    plain.extend(checksum.to_le_bytes());
+    let mut encoded = [0; 32];
+    let length = cobs::encode(&plain, &mut encoded);
+    encoded[length] = 0;
+    assert_eq!(decode(&encoded[..=length]), [Err(FrameError::Version(2))]);
+}
+
+#[test]
+fn golden_frames_pin_the_format() {
+    let touch = Touch::from_micros([300, 0, 70_000]).with_pose(Pose { direction: [1, 2, 3], alignment: [-1, 0, 256] });
+    let detail = Detail { posterior: [8, 7, 6, 5, 4, 3, 2, 1], evidence: [4, 3, 2, 1] };
+    let verdict = VerdictMessage { decision: Decision::Recognised(4), best: 4, touches: 17, detail: Some(detail) };
+    // Written out by hand but for the checksums: version, session, message, CRC-32, in COBS.
+    let frames: [(Message<'_>, &[u8]); 4] = [
+        (
+            Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
+            &[
+                0, 3, 1, 2, 3, 2, 1, 3, 172, 2, 6, 240, 162, 4, 1, 1, 2, 2, 2, 3, 3, 255, 255, 1, 1, 7, 1, 1, 34, 44,
+                22, 85, 0,
+            ],
+        ),
+        (
+            Message::Outcome { sequence: 200, outcome: Outcome::Verdict(verdict) },
+            &[0, 3, 1, 2, 26, 3, 200, 1, 1, 1, 4, 4, 17, 1, 8, 7, 6, 5, 4, 3, 2, 1, 4, 3, 2, 1, 183, 169, 111, 213, 0],
+        ),
+        (
+            Message::Query { tag: 5, query: Query::Open { previous: 513 } },
+            &[0, 3, 1, 2, 1, 9, 5, 1, 129, 4, 200, 57, 254, 45, 0],
+        ),
+        (
+            Message::Answer { tag: 5, answer: Answer::Name("spoon") },
+            &[0, 3, 1, 2, 14, 1, 5, 2, 5, 115, 112, 111, 111, 110, 213, 36, 124, 254, 0],
+        ),
+    ];
+    for (message, golden) in frames {
+        assert_eq!(encode(&Frame { session: 2, message }, &mut [0; FRAME_MAX]), golden);
+        assert_eq!(decode(golden), [Ok(())]);
+    }
+}
+
+/// Everything that a decoder makes of some bytes.
+fn decode(bytes: &[u8]) -> Vec<Result<(), FrameError>> {
+    let mut decoder = Decoder::new();
+    bytes.iter().filter_map(|&byte| decoder.feed(byte).map(|frame| frame.map(drop))).collect()
+}
+
+#[test]
+fn the_longest_messages_fit_into_a_frame() {
+    let longest = [
+        Message::Command { sequence: u32::MAX, command: Command::Chunk { offset: u32::MAX, bytes: &[0; CHUNK] } },
+        Message::Answer { tag: 255, answer: Answer::Snapshot { length: u32::MAX, bytes: &[255; CHUNK] } },
+        Message::Answer { tag: 255, answer: Answer::Posteriors(&[7; CHUNK]) },
+    ];
+    for message in longest {
+        let mut out = [0; FRAME_MAX];
+        let frame = Frame { session: u16::MAX, message };
+        let bytes = encode(&frame, &mut out).to_vec();
+        let mut decoder = Decoder::new();
+        let decoded: Vec<_> =
+            bytes.iter().filter_map(|&byte| decoder.feed(byte).map(|f| f == Ok(frame.clone()))).collect();
+        assert_eq!(decoded, [true]);
+    }
+    let too_long = Message::Command { sequence: 0, command: Command::Chunk { offset: 0, bytes: &[0; CHUNK + 40] } };
+    assert!(encode(&Frame { session: 0, message: too_long }, &mut [0; FRAME_MAX]).is_empty());
+}
+
+#[test]
+fn a_line_of_noise_without_an_end_is_counted_and_the_next_frame_is_read() {
+    let mut out = [0; FRAME_MAX];
+    let good = encode(&Frame { session: 7, message: Message::Expected { sequence: 1 } }, &mut out).to_vec();
+    let noise = vec![0xaa; 10_000];
+    assert_eq!(decode(&[noise, good].concat()), [Err(FrameError::TooLong), Ok(())]);
+}
+
+proptest! {
+    #[test]
+    fn touches_survive_the_journey(times: [u32; 3], pose: Option<([i16; 3], [i16; 3])>) {
+        let touch = Touch::from_micros(times);
+        let touch = match pose {
+            Some((direction, alignment)) => touch.with_pose(Pose { direction, alignment }),
+            None => touch,
+        };
+        prop_assert_eq!(Touch::from(&TouchMessage::from(&touch)), touch);
+    }
+
+    #[test]
+    fn no_bytes_make_an_end_panic(bytes in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>(), 0..8_u8], 0..600)) {
+        let mut host = HostEnd::new(HostSettings::default());
+        host.connect(0, |_| ());
+        host.receive(&bytes, 1, |_| (), |_| ());
+        let mut chip = DeviceEnd::new(Progress::NONE);
+        chip.receive(&bytes, &mut Notebook::default(), |_| ());
+    }
+
+    #[test]
+    fn whole_frames_of_any_content_make_no_end_panic(messages in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 1..20)) {
+        let mut chip = DeviceEnd::new(Progress::NONE);
+        let mut host = HostEnd::new(HostSettings::default());
+        host.connect(0, |_| ());
+        let mut notebook = Notebook::default();
+        for message in messages {
+            let mut plain = vec![VERSION, 0, 0];
+            plain.extend(message);
+            let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&plain);
+            plain.extend(checksum.to_le_bytes());
+            let mut encoded = vec![0; 200];
+            let length = cobs::encode(&plain, &mut encoded);
+            chip.receive(&encoded[..=length], &mut notebook, |_| ());
+            host.receive(&encoded[..=length], 1, |_| (), |_| ());
+        }
+        prop_assert_eq!(chip.statistics().garbled + chip.statistics().frames > 0, true);
+    }
+
+    #[test]
+    fn every_touch_is_counted_exactly_once_over_any_line(
+        byte_lost in 0.0..0.005,
+        byte_changed in 0.0..0.005,
+        frame_lost in 0.0..0.3,
+        frame_doubled in 0.0..0.3,
+        delay in 0..40_000_u64,
+        seed: u64,
+    ) {
+        let mut rig = Rig::new(Faults { byte_lost, byte_changed, frame_lost, frame_doubled, delay }, seed);
+        rig.send_touches(0..60);
+        rig.assert_exactly_once(60);
+    }
+}
