@@ -26,6 +26,7 @@
 extern crate std;
 
 mod descriptor;
+pub mod format;
 pub mod link;
 mod touch;
 

@@ -1,1 +1,0 @@
-//! From an ensemble to the bytes that the chip reads.

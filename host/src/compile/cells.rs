@@ -1,0 +1,142 @@
+//! Every case that an ensemble can tell apart, where they can be counted.
+//!
+//! Between its thresholds an ensemble is constant. Over two features that leaves at most some ten thousand cells, so
+//! that its margins can be had exactly for every possible touch: the grid layout stores them, and the worst error of a
+//! margin is the largest that there is. The three times of a touch are no more than two dimensions, since the earliest
+//! is always 0.
+
+use super::axes::visit;
+use super::forest::{Branch, Forest};
+use palpate_shared::Descriptor;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::{AddAssign, Range};
+
+/// Cells times trees that are looked at; beyond, the worst case is bounded instead of found.
+const MAX_WORK: usize = 2_000_000_000;
+/// The most cells held in memory at once.
+const MAX_CELLS: usize = 4_000_000;
+
+/// The cells of a forest. A place along a dimension is the number of thresholds at or below the value; a missing value
+/// has the place after the last.
+pub(super) struct Cells {
+    /// Features and their thresholds; at least two.
+    pub(super) dimensions: Vec<(u8, Vec<i32>)>,
+    /// Boxes of places; a touch falls into one of them.
+    planes: Vec<Vec<Range<usize>>>,
+}
+
+/// The places along a dimension that lead to a leaf.
+#[derive(Clone)]
+struct Span {
+    places: Range<usize>,
+    /// The place of a missing value, if that leads there too.
+    missing: Option<usize>,
+}
+
+impl Cells {
+    pub(super) fn new(forest: &Forest<'_>) -> Option<Self> {
+        let mut features: BTreeMap<u8, BTreeSet<i32>> = BTreeMap::new();
+        for tree in &forest.trees {
+            visit(&tree.root, &mut |split| {
+                features.entry(split.feature).or_default().insert(split.cut);
+            });
+        }
+        let mut dimensions: Vec<(u8, Vec<i32>)> =
+            features.into_iter().map(|(feature, cuts)| (feature, cuts.into_iter().collect())).collect();
+        while dimensions.len() < 2 {
+            dimensions.push((0, Vec::new()));
+        }
+        let whole: Vec<Range<usize>> = dimensions.iter().map(|(_, cuts)| 0..cuts.len() + 2).collect();
+        let mut planes = vec![whole.clone()];
+        if forest.descriptor == Some(Descriptor::Times) && dimensions.len() == 3 {
+            let missing: Vec<_> = whole.iter().map(|places| places.end - 1..places.end).collect();
+            planes = vec![missing];
+            for first in 0..3 {
+                let zero = dimensions[first].1.partition_point(|&cut| cut <= 0);
+                let mut plane = whole.clone();
+                plane[first] = zero..zero + 1;
+                planes.push(plane);
+            }
+        }
+        let cells = Self { dimensions, planes };
+        let count = cells.count().filter(|&count| count <= MAX_CELLS)?;
+        let trees: usize = (0..forest.objects()).map(|object| forest.trees_of(object).count()).sum();
+        (count.checked_mul(trees)? <= MAX_WORK).then_some(cells)
+    }
+
+    /// How many cells there are.
+    fn count(&self) -> Option<usize> {
+        let lengths = self.planes.iter().map(|plane| plane.iter().try_fold(1_usize, |n, r| n.checked_mul(r.len())));
+        lengths.sum()
+    }
+
+    /// Whether all cells make up one table of two dimensions.
+    pub(super) fn is_table(&self) -> bool {
+        self.dimensions.len() == 2
+    }
+
+    /// Sums over an object's trees, in their order, in every cell: `start`, and `value` of each leaf that is reached,
+    /// given the tree's index.
+    pub(super) fn sums<T: Copy + AddAssign>(
+        &self,
+        forest: &Forest<'_>,
+        object: usize,
+        start: T,
+        value: impl Fn(usize, f32) -> T,
+    ) -> Vec<T> {
+        let mut sums = Vec::new();
+        for plane in &self.planes {
+            let count = plane.iter().map(Range::len).product();
+            let mut cells = vec![start; count];
+            for (index, tree) in forest.trees.iter().enumerate().filter(|(_, tree)| tree.values_for(object)) {
+                let all = self.dimensions.iter().map(|(_, cuts)| Span { places: 0..cuts.len() + 1, missing: Some(cuts.len() + 1) });
+                self.leaves(&tree.root, &mut all.collect(), &mut |spans, leaf| {
+                    fill(&mut cells, plane, spans, value(index, tree.value_of(object, leaf)));
+                });
+            }
+            sums.append(&mut cells);
+        }
+        sums
+    }
+
+    /// Calls `see` on every leaf with the places that lead to it.
+    fn leaves(&self, branch: &Branch<'_>, spans: &mut Vec<Span>, see: &mut impl FnMut(&[Span], &[f32])) {
+        let split = match branch {
+            Branch::Leaf(values) => return see(spans, values),
+            Branch::Split(split) => split,
+        };
+        let Some(dimension) = self.dimensions.iter().position(|(feature, _)| *feature == split.feature) else { return };
+        let cut = self.dimensions[dimension].1.partition_point(|&cut| cut < split.cut) + 1;
+        let whole = spans[dimension].clone();
+        let Range { start, end } = whole.places;
+        spans[dimension] = Span { places: start..end.min(cut), missing: whole.missing.filter(|_| split.missing_left) };
+        self.leaves(&split.left, spans, see);
+        spans[dimension] = Span { places: start.max(cut)..end, missing: whole.missing.filter(|_| !split.missing_left) };
+        self.leaves(&split.right, spans, see);
+        spans[dimension] = Span { places: start..end, missing: whole.missing };
+    }
+}
+
+/// Adds `value` to the cells of a plane that lie within all spans.
+fn fill<T: Copy + AddAssign>(cells: &mut [T], plane: &[Range<usize>], spans: &[Span], value: T) {
+    let ([places, planes @ ..], [span, spans @ ..]) = (plane, spans) else {
+        cells.iter_mut().for_each(|cell| *cell += value);
+        return;
+    };
+    let stride = cells.len() / places.len();
+    let mut add = |part: Range<usize>| {
+        if part.start >= part.end {
+            return;
+        }
+        let part = &mut cells[(part.start - places.start) * stride..(part.end - places.start) * stride];
+        if planes.is_empty() {
+            part.iter_mut().for_each(|cell| *cell += value);
+        } else {
+            part.chunks_mut(stride).for_each(|row| fill(row, planes, spans, value));
+        }
+    };
+    add(span.places.start.max(places.start)..span.places.end.min(places.end));
+    if let Some(place) = span.missing.filter(|place| places.contains(place)) {
+        add(place..place + 1);
+    }
+}

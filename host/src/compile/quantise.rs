@@ -1,0 +1,78 @@
+//! Leaves as integers: one unit for the model, and a shift for each tree, so that the small leaves of late trees keep
+//! their digits.
+
+use super::forest::Forest;
+use palpate_shared::format::{LeafType, MARGIN_LIMIT};
+
+/// The unit of f32 leaves' margins: 2^-16 nats.
+const F32_UNIT: f32 = 1.0 / 65536.0;
+/// A unit is at most this many nats, so that its bits are a fraction.
+const MAX_UNIT: f64 = 0.5;
+/// A unit is at least this many nats.
+const MIN_UNIT: f64 = 1.0 / (1 << 24) as f64;
+/// What a group's margins may come to, with room for base margins and rounding.
+const RANGE: f64 = MARGIN_LIMIT as f64 / 2.0;
+
+/// How values become integers.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Scale {
+    /// Nats in a unit.
+    pub(super) unit: f32,
+    /// Each tree's leaves are in units times 2^shift.
+    pub(super) shifts: Vec<u8>,
+}
+
+impl Scale {
+    /// The finest scale for a forest's trees.
+    pub(super) fn of_trees(forest: &Forest<'_>, leaf: LeafType) -> Option<Self> {
+        let Some(most) = most(leaf) else {
+            return Some(Self { unit: F32_UNIT, shifts: vec![0; forest.trees.len()] });
+        };
+        let largest: Vec<f64> = forest.trees.iter().map(|tree| f64::from(tree.largest)).collect();
+        let all = largest.iter().copied().fold(0.0, f64::max);
+        // From the finest unit to the coarsest, the first whose sums stay in range.
+        (0..=16).rev().find_map(|shift| {
+            let unit = unit_for(all, most * f64::from(1 << shift))?;
+            let shifts: Vec<u8> = largest.iter().map(|&value| shift_for(value, most * f64::from(unit))).collect();
+            let range: f64 = shifts.iter().map(|&shift| (most + 1.0) * f64::from(1_u32 << shift)).sum();
+            let base = forest.base.iter().map(|base| f64::from(base.abs())).fold(0.0, f64::max) / f64::from(unit);
+            (range + base < RANGE).then_some(Self { unit, shifts })
+        })
+    }
+
+    /// The finest scale for a table of margins up to `largest`, if there is one.
+    pub(super) fn of_cells(largest: f64, leaf: LeafType) -> Option<Self> {
+        let unit = match most(leaf) {
+            None => F32_UNIT,
+            Some(most) => unit_for(largest, most)?,
+        };
+        Some(Self { unit, shifts: Vec::new() })
+    }
+
+    /// The nearest integer to a value, in units times 2^`shift`.
+    pub(super) fn integer(&self, value: f32, shift: u8) -> i32 {
+        (f64::from(value) / (f64::from(self.unit) * f64::from(1_u32 << shift))).round() as i32
+    }
+}
+
+/// The largest integer of a leaf type.
+fn most(leaf: LeafType) -> Option<f64> {
+    match leaf {
+        LeafType::I8 => Some(127.0),
+        LeafType::I16 => Some(32767.0),
+        LeafType::F32 => None,
+    }
+}
+
+/// The smallest unit in which `largest` is at most `most`.
+fn unit_for(largest: f64, most: f64) -> Option<f32> {
+    let exact = (largest / most).max(MIN_UNIT);
+    let near = exact as f32;
+    let unit = if f64::from(near) < exact { near.next_up() } else { near };
+    (exact <= MAX_UNIT).then_some(unit)
+}
+
+/// The smallest shift with which a value is at most `most` nats times 2^shift.
+fn shift_for(value: f64, most: f64) -> u8 {
+    (0..=20).find(|&shift| value <= most * f64::from(1_u32 << shift)).unwrap_or(20)
+}

@@ -1,0 +1,144 @@
+//! The bytes, in the order of `FORMAT.md`.
+
+use super::Settings;
+use super::forest::Forest;
+use super::layout::Parts;
+use crate::ensemble::{Ensemble, Node, Output};
+use crate::error::{Error, Result};
+use palpate_onboard::Stopping;
+use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, checksum};
+
+/// The model's bytes.
+pub(super) fn write(
+    ensemble: &Ensemble,
+    settings: &Settings,
+    forest: &Forest<'_>,
+    stopping: Stopping,
+    layout: Layout,
+    parts: &Parts,
+) -> Result<Vec<u8>> {
+    let text = text(ensemble)?;
+    let priors = priors(settings, forest.objects(), parts.unit)?;
+    let (unit_bits, unit_shift) = unit_bits(parts.unit);
+    let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
+    let length = HeaderBuilder::default().bytes().len()
+        + text.len()
+        + records
+        + parts.cuts.len()
+        + parts.nodes.len()
+        + parts.leaves.len()
+        + 4;
+    let header = HeaderBuilder::default()
+        .with_layout(layout.code())
+        .with_leaf(settings.leaf.code())
+        .with_length(count(length)?)
+        .with_descriptor(forest.descriptor.map_or(RAW_FEATURES, palpate_shared::Descriptor::code))
+        .with_key(forest.key.code())
+        .with_last_object(byte(forest.objects() - 1)?)
+        .with_last_feature(byte(forest.features - 1)?)
+        .with_axes(parts.axes.len() as u16)
+        .with_groups(parts.groups.len() as u16)
+        .with_trees(count(forest.trees.len())?)
+        .with_splits(count(forest.splits())?)
+        .with_leaves(count(forest.leaves())?)
+        .with_unit(parts.unit)
+        .with_unit_bits(unit_bits)
+        .with_unit_shift(unit_shift)
+        .with_margin_error(parts.margin_error)
+        .with_odds(stopping.odds())
+        .with_max_touches(stopping.max_touches())
+        .with_spacing(settings.spacing)
+        .with_speed(settings.speed)
+        .with_text_length(count(text.len())?)
+        .with_ensemble(hash(ensemble))
+        .with_cuts_length(count(parts.cuts.len())?)
+        .with_nodes_length(count(parts.nodes.len())?)
+        .with_leaves_length(count(parts.leaves.len())?);
+    let mut bytes = header.bytes().to_vec();
+    bytes.extend(text);
+    bytes.extend(parts.base.iter().chain(&priors).flat_map(|number| number.to_le_bytes()));
+    bytes.extend(parts.axes.iter().flat_map(|axis| axis.to_bytes()));
+    bytes.extend(&parts.cuts);
+    bytes.extend(parts.groups.iter().flat_map(|group| group.to_bytes()));
+    bytes.extend(&parts.nodes);
+    bytes.extend(&parts.leaves);
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    Ok(bytes)
+}
+
+/// The program's version and the objects' names, each with its length in a byte.
+fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
+    let mut text = Vec::new();
+    for string in std::iter::once(env!("CARGO_PKG_VERSION")).chain(ensemble.objects.iter().map(String::as_str)) {
+        let length = u8::try_from(string.len()).map_err(|_| {
+            Error::data(format!("the object's name {string:?} is too long for a model"), "Use names of at most 255 bytes.")
+        })?;
+        text.push(length);
+        text.extend(string.bytes());
+    }
+    Ok(text)
+}
+
+/// The logarithms of the priors in units, the largest 0.
+fn priors(settings: &Settings, objects: usize, unit: f32) -> Result<Vec<i32>> {
+    let Some(priors) = &settings.priors else { return Ok(vec![0; objects]) };
+    if priors.len() != objects || !priors.iter().all(|prior| prior.is_finite() && *prior > 0.0) {
+        return Err(Error::argument(
+            format!("{} priors for {objects} objects", priors.len()),
+            "Give one positive number for each object.",
+        ));
+    }
+    let largest = priors.iter().copied().fold(0.0, f64::max);
+    Ok(priors.iter().map(|prior| ((prior / largest).ln() / f64::from(unit)).round() as i32).collect())
+}
+
+/// A unit in bits, in Q32, as a number of 32 binary digits and a shift.
+fn unit_bits(unit: f32) -> (u32, u8) {
+    let bits = f64::from(unit) * std::f64::consts::LOG2_E * 4_294_967_296.0;
+    // Units are from 2^-24 to 0.5 nats, so the shift is from 1 to 32.
+    let shift = (0..=63_u8).rev().find(|&shift| bits * f64::from(shift).exp2() < 4_294_967_295.0).unwrap_or(0);
+    ((bits * f64::from(shift).exp2()).round() as u32, shift)
+}
+
+/// A CRC-64 (XZ) of everything that makes up an ensemble.
+fn hash(ensemble: &Ensemble) -> u64 {
+    const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
+    let mut digest = CRC.digest();
+    digest.update(&[ensemble.descriptor.code()]);
+    for name in &ensemble.objects {
+        digest.update(name.as_bytes());
+        digest.update(&[0]);
+    }
+    ensemble.base_margins.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
+    for tree in &ensemble.trees {
+        let object = match tree.output {
+            Output::One(object) => object as u64,
+            Output::Each => u64::MAX,
+        };
+        digest.update(&object.to_le_bytes());
+        for node in &tree.nodes {
+            match node {
+                Node::Leaf(values) => values.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes())),
+                Node::Split { feature, threshold, missing_left, left, right } => {
+                    for number in [*feature, usize::from(*missing_left), *left, *right] {
+                        digest.update(&(number as u64).to_le_bytes());
+                    }
+                    digest.update(&threshold.to_bits().to_le_bytes());
+                }
+            }
+        }
+    }
+    digest.finalize()
+}
+
+fn byte(number: usize) -> Result<u8> {
+    u8::try_from(number).map_err(|_| too_large())
+}
+
+fn count(number: usize) -> Result<u32> {
+    u32::try_from(number).map_err(|_| too_large())
+}
+
+fn too_large() -> Error {
+    Error::data("the ensemble is too large for the model format", "Train fewer trees, or trees with fewer splits.")
+}

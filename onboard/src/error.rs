@@ -1,0 +1,81 @@
+//! Why bytes are not a model.
+
+use core::fmt;
+
+/// Why bytes are not a model; [`ModelError::offset`] says where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// There are fewer bytes than the model has, or more.
+    Length {
+        /// How many bytes the model should have.
+        expected: u32,
+        /// How many there are.
+        found: usize,
+    },
+    /// The bytes do not start as a model does.
+    NotAModel,
+    /// The model is of another version of the format.
+    Version(u16),
+    /// The bytes were changed since the export.
+    Checksum {
+        /// The checksum that the model states.
+        stated: u32,
+        /// The checksum of the bytes.
+        computed: u32,
+    },
+    /// A field of the header has a value that means nothing.
+    Field {
+        /// Where it stands.
+        offset: usize,
+    },
+    /// A section does not have the length that the header implies.
+    Section {
+        /// Where it starts.
+        offset: usize,
+    },
+    /// Margins could grow beyond [`MARGIN_LIMIT`](palpate_shared::format::MARGIN_LIMIT).
+    MarginRange,
+    /// Leaves are f32, and this crate was built without its feature `f32-leaves`.
+    FloatLeaves,
+}
+
+impl ModelError {
+    /// The byte at which the model went wrong, counted from 0.
+    pub fn offset(&self) -> usize {
+        match *self {
+            Self::Length { expected, found } => usize::try_from(expected).unwrap_or(found).min(found),
+            Self::NotAModel => 0,
+            Self::Version(_) => 4,
+            Self::FloatLeaves => 7,
+            Self::Checksum { .. } | Self::MarginRange => 8,
+            Self::Field { offset } | Self::Section { offset } => offset,
+        }
+    }
+}
+
+impl fmt::Display for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length { expected, found } if usize::try_from(*expected).is_ok_and(|e| e > *found) => {
+                write!(f, "the model is truncated: {found} bytes of {expected}")
+            }
+            Self::Length { expected, found } => write!(f, "the model has {expected} bytes, but there are {found}"),
+            Self::NotAModel => f.write_str("this is not a Palpate model"),
+            Self::Version(version) => write!(
+                f,
+                "the model is of format version {version}, and this program reads version {}",
+                palpate_shared::format::VERSION
+            ),
+            Self::Checksum { stated, computed } => {
+                write!(f, "the checksum is {computed:08x} where the model states {stated:08x}: its bytes were changed")
+            }
+            Self::Field { .. } => f.write_str("a field of the model has a value that means nothing"),
+            Self::Section { .. } => f.write_str("a section of the model does not have the length that it should have"),
+            Self::MarginRange => f.write_str("the model's margins could overflow"),
+            Self::FloatLeaves => f.write_str("the model has f32 leaves, which this build cannot add"),
+        }
+    }
+}
+
+impl core::error::Error for ModelError {}

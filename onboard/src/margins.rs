@@ -1,0 +1,98 @@
+//! A touch to margins: the evaluator.
+
+use crate::leaves::Sum;
+use crate::model::Model;
+use crate::ranks::ranks;
+use crate::{complete, fixed, grid, preorder};
+use palpate_shared::format::{Group, Layout, LeafType};
+use palpate_shared::{Features, Touch};
+
+impl Model<'_> {
+    /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
+    /// objects are left alone; if it is shorter, nothing is written and the answer is `false`.
+    ///
+    /// Cost: the ensemble's; see the layouts. Cannot fail otherwise; a model over rows of features takes every feature
+    /// of a touch as missing.
+    pub fn margins(&self, touch: &Touch, margins: &mut [i32]) -> bool {
+        let features = self.descriptor.map(|descriptor| descriptor.features(touch));
+        self.margins_of(features.as_ref().map_or(&[], Features::as_slice), margins)
+    }
+
+    /// The margins of a row of features (see [`Model::margins`]): whole numbers or
+    /// [`f32_key`](palpate_shared::format::f32_key)s as [`Model::key`] says,
+    /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where there is none; a short row is filled up with those.
+    pub fn margins_of(&self, features: &[i32], margins: &mut [i32]) -> bool {
+        let Some(margins) = self.sum(features, margins) else { return false };
+        if self.leaf == LeafType::F32 {
+            for margin in margins {
+                *margin = fixed::q16_from_f32_bits(margin.cast_unsigned());
+            }
+        }
+        true
+    }
+
+    /// The margins of a row of features as the trainer's own f32 values, bit for bit; `false`, and nothing written,
+    /// unless the model has f32 leaves and `margins` is as long as there are objects.
+    #[cfg(feature = "f32-leaves")]
+    pub fn f32_margins_of(&self, features: &[i32], margins: &mut [f32]) -> bool {
+        let mut bits = [0; 256];
+        if self.leaf != LeafType::F32 || margins.len() != self.object_count() {
+            return false;
+        }
+        let Some(bits) = self.sum(features, &mut bits) else { return false };
+        for (margin, bits) in margins.iter_mut().zip(bits) {
+            *margin = f32::from_bits(bits.cast_unsigned());
+        }
+        true
+    }
+
+    /// Adds up all trees: in units, or in f32 values' bits.
+    fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
+        let margins = margins.get_mut(..self.object_count())?;
+        let float = self.leaf == LeafType::F32;
+        for (object, margin) in margins.iter_mut().enumerate() {
+            *margin = if float { self.base(object) } else { 0 };
+        }
+        self.add_trees(features, &mut Sum { margins, leaf: self.leaf, object: None });
+        if !float {
+            for (object, margin) in margins.iter_mut().enumerate() {
+                *margin = margin.wrapping_add(self.base(object));
+            }
+        }
+        Some(margins)
+    }
+
+    /// Adds the leaves of all groups. Groups come with the largest shift first, so that all that was added before is
+    /// shifted on the way.
+    fn add_trees(&self, features: &[i32], sum: &mut Sum<'_>) {
+        if self.layout == Layout::Grid {
+            return grid::add(self, features, sum);
+        }
+        let ranks = ranks(self, features);
+        let (mut nodes, mut leaves) = (self.nodes, self.leaves);
+        let mut shift = 0;
+        for &bytes in self.groups.as_chunks().0 {
+            let Some(group) = Group::from_bytes(bytes) else { continue };
+            shift_all(sum.margins, shift, group.shift);
+            shift = group.shift;
+            sum.object = group.object;
+            match self.layout {
+                Layout::Complete => complete::add(&group, &ranks, &mut nodes, &mut leaves, sum),
+                Layout::Wide => preorder::add_wide(self, &group, features, &mut nodes, &mut leaves, sum),
+                Layout::Compact | Layout::Grid => {
+                    preorder::add_compact(&group, &ranks, &mut nodes, &mut leaves, sum);
+                }
+            }
+        }
+        shift_all(sum.margins, shift, 0);
+    }
+}
+
+/// Turns multiples of 2^`from` into multiples of 2^`to`.
+fn shift_all(margins: &mut [i32], from: u8, to: u8) {
+    if from > to {
+        for margin in margins {
+            *margin = margin.wrapping_shl(u32::from(from - to));
+        }
+    }
+}

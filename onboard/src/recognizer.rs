@@ -1,0 +1,146 @@
+//! Touch by touch to a verdict.
+
+use crate::evidence::{self, Posterior, Unit};
+use crate::model::Model;
+use crate::stopping::Stopping;
+use core::fmt;
+use palpate_shared::Touch;
+
+/// What is known after a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// No object is sure enough yet.
+    Undecided,
+    /// An object was recognised. Further touches change nothing until [`Recognizer::reset`].
+    Recognised {
+        /// The object's index in the model.
+        object: u8,
+        /// How many touches it took.
+        touches: u32,
+    },
+    /// The limit of touches was reached without a decision: undecided for good, until [`Recognizer::reset`]. Most
+    /// likely an object that the model does not know.
+    Unknown,
+}
+
+/// A model with more objects than a recogniser has room for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CapacityError {
+    /// The model's objects.
+    pub objects: usize,
+    /// The recogniser's room.
+    pub capacity: usize,
+}
+
+impl fmt::Display for CapacityError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the model has {} objects, and the recogniser has room for {}", self.objects, self.capacity)
+    }
+}
+
+impl core::error::Error for CapacityError {}
+
+/// Recognises an object by touch; has room for up to `N` objects.
+///
+/// State: 8 bytes an object, and 40.
+#[derive(Clone, Debug)]
+pub struct Recognizer<'m, const N: usize> {
+    model: &'m Model<'m>,
+    stopping: Stopping,
+    /// Margins summed over touches, and the prior, in units of a margin.
+    evidence: [i64; N],
+    touches: u32,
+    verdict: Verdict,
+}
+
+impl<'m, const N: usize> Recognizer<'m, N> {
+    /// A recogniser that has touched nothing yet.
+    ///
+    /// # Errors
+    /// [`CapacityError`] when the model has more than `N` objects.
+    pub fn new(model: &'m Model<'m>, stopping: Stopping) -> Result<Self, CapacityError> {
+        let objects = model.object_count();
+        if objects > N {
+            return Err(CapacityError { objects, capacity: N });
+        }
+        let mut recognizer = Self { model, stopping, evidence: [0; N], touches: 0, verdict: Verdict::Undecided };
+        recognizer.reset();
+        Ok(recognizer)
+    }
+
+    /// Takes in a touch.
+    ///
+    /// Cost: the margins, then about 15 instructions an object and one exponential, rarely more. Cannot fail: evidence
+    /// that reaches the limits of 64 bits (after 2^33 touches at the earliest) stays there, which brings objects closer
+    /// together and never makes one recognised.
+    pub fn push(&mut self, touch: &Touch) -> Verdict {
+        let mut margins = [0; N];
+        self.model.margins(touch, &mut margins);
+        self.add(&margins)
+    }
+
+    /// Takes in a row of features, as [`Model::margins_of`].
+    pub fn push_features(&mut self, features: &[i32]) -> Verdict {
+        let mut margins = [0; N];
+        self.model.margins_of(features, &mut margins);
+        self.add(&margins)
+    }
+
+    /// The verdict after the last touch.
+    pub const fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
+    /// How many touches were taken in since the last [`reset`](Self::reset).
+    pub const fn touches(&self) -> u32 {
+        self.touches
+    }
+
+    /// The object with the most evidence; the first of several.
+    pub fn best(&self) -> usize {
+        evidence::best(self.evidence()).0
+    }
+
+    /// The posterior of an object; 0 for one that the model does not know.
+    ///
+    /// Cost: an exponential for each object, and about 800 instructions.
+    pub fn posterior(&self, object: usize) -> Posterior {
+        evidence::posterior(self.evidence(), object, self.unit())
+    }
+
+    /// The evidence for each object: margins summed over touches, and the prior, in [units](Model::unit).
+    pub fn evidence(&self) -> &[i64] {
+        self.evidence.get(..self.model.object_count()).unwrap_or_default()
+    }
+
+    /// Forgets all touches, for the next object.
+    pub fn reset(&mut self) {
+        for (object, evidence) in self.evidence.iter_mut().enumerate() {
+            *evidence = i64::from(self.model.prior(object));
+        }
+        self.touches = 0;
+        self.verdict = Verdict::Undecided;
+    }
+
+    fn add(&mut self, margins: &[i32; N]) -> Verdict {
+        if self.verdict != Verdict::Undecided {
+            return self.verdict;
+        }
+        for (evidence, &margin) in self.evidence.iter_mut().zip(margins) {
+            *evidence = evidence.saturating_add(i64::from(margin));
+        }
+        self.touches = self.touches.saturating_add(1);
+        let best = evidence::best(self.evidence());
+        if evidence::is_decided(self.evidence(), best, self.stopping.odds, self.unit()) {
+            let object = u8::try_from(best.0).unwrap_or(u8::MAX);
+            self.verdict = Verdict::Recognised { object, touches: self.touches };
+        } else if self.touches >= self.stopping.max_touches {
+            self.verdict = Verdict::Unknown;
+        }
+        self.verdict
+    }
+
+    const fn unit(&self) -> Unit {
+        Unit { bits: self.model.unit_bits, shift: self.model.unit_shift }
+    }
+}

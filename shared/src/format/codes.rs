@@ -1,0 +1,92 @@
+//! The codes of what a model may be made of.
+
+/// The header's descriptor code for a model over rows of features instead of touches.
+pub const RAW_FEATURES: u8 = 255;
+
+macro_rules! codes {
+    ($(#[$meta:meta])* $enum:ident { $($(#[$variant_meta:meta])* $variant:ident = $code:literal, $name:literal;)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum $enum { $($(#[$variant_meta])* $variant,)* }
+
+        impl $enum {
+            /// All, in the order of their codes.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
+
+            /// The code in the model format.
+            pub const fn code(self) -> u8 {
+                match self { $(Self::$variant => $code,)* }
+            }
+
+            /// The one with this [`code`](Self::code).
+            pub const fn from_code(code: u8) -> Option<Self> {
+                match code { $($code => Some(Self::$variant),)* _ => None }
+            }
+
+            /// The name on the command line and in JSON.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+        }
+    };
+}
+
+codes! {
+    /// How the trees are laid out.
+    Layout {
+        /// Splits in preorder, three bytes each, leaves in order: the smallest for lopsided trees.
+        Compact = 0, "compact";
+        /// Every tree filled up to its depth: the fastest walk.
+        Complete = 1, "complete";
+        /// A table of margins over the thresholds of at most two features: no walk at all.
+        Grid = 2, "grid";
+        /// Splits in preorder, six bytes each: for what [`Layout::Compact`] cannot number.
+        Wide = 3, "wide";
+    }
+}
+
+codes! {
+    /// What a leaf's value is stored as.
+    LeafType {
+        /// One byte.
+        I8 = 0, "i8";
+        /// Two bytes.
+        I16 = 1, "i16";
+        /// The trainer's own value, added in f32.
+        F32 = 2, "f32";
+    }
+}
+
+impl LeafType {
+    /// Bytes a value.
+    pub const fn size(self) -> usize {
+        match self {
+            Self::I8 => 1,
+            Self::I16 => 2,
+            Self::F32 => 4,
+        }
+    }
+}
+
+codes! {
+    /// What features are compared as.
+    Key {
+        /// Whole numbers, as the descriptors give them.
+        Whole = 0, "whole";
+        /// f32 values as [`f32_key`](super::f32_key)s.
+        Real = 1, "real";
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_find_what_they_stand_for() {
+        assert!(Layout::ALL.iter().all(|&x| Layout::from_code(x.code()) == Some(x)));
+        assert!(LeafType::ALL.iter().all(|&x| LeafType::from_code(x.code()) == Some(x)));
+        assert!(Key::ALL.iter().all(|&x| Key::from_code(x.code()) == Some(x)));
+        assert_eq!(Layout::from_code(4), None);
+    }
+}
