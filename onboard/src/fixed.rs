@@ -27,7 +27,8 @@ mod tests {
 
     #[test]
     fn q16_is_the_nearest_within_limits() {
-        let cases = [0.0, 1.0, -1.0, 0.5, 1e-5, -1e-5, 7.6e-6, 7.7e-6, 1e-30, 16383.99, 300.123, -12345.678, 1.5 / 65536.0];
+        let cases =
+            [0.0, 1.0, -1.0, 0.5, 1e-5, -1e-5, 7.6e-6, 7.7e-6, 1e-30, 16383.99, 300.123, -12345.678, 1.5 / 65536.0];
         for value in cases {
             let expected = (f64::from(value) * 65536.0).round();
             assert_eq!(f64::from(q16_from_f32_bits(f32::to_bits(value))), expected, "{value}");

@@ -54,10 +54,7 @@ pub(crate) fn add_wide(
 
 /// Walks the next tree; `split` says whether a split goes right, and how many splits are in its left subtree. Gives the
 /// leaf and the number of splits.
-fn tree<const SIZE: usize>(
-    nodes: &mut &[u8],
-    split: impl Fn([u8; SIZE]) -> (bool, usize),
-) -> Option<(usize, usize)> {
+fn tree<const SIZE: usize>(nodes: &mut &[u8], split: impl Fn([u8; SIZE]) -> (bool, usize)) -> Option<(usize, usize)> {
     let (&count, rest) = nodes.split_first_chunk()?;
     *nodes = rest;
     let count = usize::from(u16::from_le_bytes(count));

@@ -42,7 +42,8 @@ pub(crate) fn model(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelE
         return Err(ModelError::FloatLeaves);
     }
     axes(model, header)?;
-    let section = |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };
+    let section =
+        |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };
     let values = usize::from(model.objects);
     let mut nodes = model.nodes;
     let mut leaves = model.leaves;
@@ -104,7 +105,8 @@ fn axes(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelError> {
         take(&mut cuts, axis.cuts_length()).ok_or(ModelError::Section { offset: model.offset(model.cuts) })?;
     }
     // Wide splits number thresholds of four bytes throughout; the others have axes.
-    let ends = if model.layout == Layout::Wide { model.axes.is_empty() && cuts.len() % 4 == 0 } else { cuts.is_empty() };
+    let ends =
+        if model.layout == Layout::Wide { model.axes.is_empty() && cuts.len() % 4 == 0 } else { cuts.is_empty() };
     if ends { Ok(()) } else { Err(ModelError::Section { offset: model.offset(cuts) }) }
 }
 

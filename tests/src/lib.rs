@@ -1,1 +1,3 @@
-//! tests
+//! What the tests between the floors share.
+
+pub mod random;

@@ -45,7 +45,7 @@ impl Axes {
             (_, false) => Columns::MissingLeft,
         };
         let right_column = self.columns + usize::from(columns == Columns::Both);
-        for (index, &cut) in (1_u8..).zip(cuts) {
+        for (index, &cut) in (1..=u8::MAX).zip(cuts) {
             self.places.insert((feature, cut, true), (self.columns, index));
             self.places.insert((feature, cut, false), (right_column, index));
         }

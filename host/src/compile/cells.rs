@@ -89,7 +89,10 @@ impl Cells {
             let count = plane.iter().map(Range::len).product();
             let mut cells = vec![start; count];
             for (index, tree) in forest.trees.iter().enumerate().filter(|(_, tree)| tree.values_for(object)) {
-                let all = self.dimensions.iter().map(|(_, cuts)| Span { places: 0..cuts.len() + 1, missing: Some(cuts.len() + 1) });
+                let all = self
+                    .dimensions
+                    .iter()
+                    .map(|(_, cuts)| Span { places: 0..cuts.len() + 1, missing: Some(cuts.len() + 1) });
                 self.leaves(&tree.root, &mut all.collect(), &mut |spans, leaf| {
                     fill(&mut cells, plane, spans, value(index, tree.value_of(object, leaf)));
                 });

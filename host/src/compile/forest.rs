@@ -69,8 +69,13 @@ impl<'a> Forest<'a> {
             let (root, splits, depth) = reader.branch(0, 0).map_err(place)?;
             trees.push(Branches { root, output: tree.output, depth, splits, largest: reader.largest });
         }
-        let forest =
-            Self { base: &ensemble.base_margins, trees, features, key, descriptor: raw_features.is_none().then_some(ensemble.descriptor) };
+        let forest = Self {
+            base: &ensemble.base_margins,
+            trees,
+            features,
+            key,
+            descriptor: raw_features.is_none().then_some(ensemble.descriptor),
+        };
         forest.check_range()?;
         Ok(forest)
     }

@@ -43,7 +43,8 @@ pub(super) fn candidates(
     leaf: LeafType,
     wanted: Option<Layout>,
 ) -> Result<Vec<(Layout, Parts)>> {
-    let mut layouts = wanted.map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid], |layout| vec![layout]);
+    let mut layouts =
+        wanted.map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid], |layout| vec![layout]);
     let narrow = fits_narrow(forest, axes);
     if !narrow {
         layouts.iter_mut().filter(|layout| **layout == Layout::Compact).for_each(|layout| *layout = Layout::Wide);
@@ -68,7 +69,9 @@ pub(super) fn candidates(
 fn unfit(layout: Layout) -> Error {
     let why = match layout {
         Layout::Complete => "its trees are deeper than 8 splits, or have more thresholds than 256 columns hold",
-        Layout::Grid => "it uses more than two features, has more than 255 thresholds of one, or its margins are too large for a byte",
+        Layout::Grid => {
+            "it uses more than two features, has more than 255 thresholds of one, or its margins are too large for a byte"
+        }
         Layout::Compact | Layout::Wide => "it has more thresholds than 65,536, or a tree with more splits than that",
     };
     Error::argument(
@@ -151,8 +154,9 @@ fn margin_error(forest: &Forest<'_>, cells: Option<&Cells>, scale: &Scale) -> f3
         let base = scale.integer(forest.base[object], 0);
         if let Some(cells) = cells {
             let full = cells.sums(forest, object, forest.base[object], |_, value| value);
-            let compiled =
-                cells.sums(forest, object, base, |tree, value| scale.integer(value, scale.shifts[tree]) << scale.shifts[tree]);
+            let compiled = cells.sums(forest, object, base, |tree, value| {
+                scale.integer(value, scale.shifts[tree]) << scale.shifts[tree]
+            });
             let errors = full.iter().zip(compiled).map(|(&full, int)| (f64::from(full) - f64::from(int) * unit).abs());
             worst = errors.fold(worst, f64::max);
         } else {
@@ -360,7 +364,8 @@ fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option<Parts> {
 fn grid_axes(cells: &Cells) -> (Vec<Axis>, Vec<u8>) {
     let mut bytes = Vec::new();
     let axes = cells.dimensions.iter().map(|(feature, cuts)| {
-        let axis = Axis { feature: *feature, columns: Columns::MissingLeft, width: width(cuts), count: cuts.len() as u8 };
+        let axis =
+            Axis { feature: *feature, columns: Columns::MissingLeft, width: width(cuts), count: cuts.len() as u8 };
         bytes.extend(cuts_bytes(axis, cuts));
         axis
     });

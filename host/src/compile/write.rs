@@ -71,7 +71,10 @@ fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
     let mut text = Vec::new();
     for string in std::iter::once(env!("CARGO_PKG_VERSION")).chain(ensemble.objects.iter().map(String::as_str)) {
         let length = u8::try_from(string.len()).map_err(|_| {
-            Error::data(format!("the object's name {string:?} is too long for a model"), "Use names of at most 255 bytes.")
+            Error::data(
+                format!("the object's name {string:?} is too long for a model"),
+                "Use names of at most 255 bytes.",
+            )
         })?;
         text.push(length);
         text.extend(string.bytes());

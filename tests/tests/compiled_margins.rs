@@ -1,0 +1,86 @@
+//! A compiled model's margins are those of its ensemble: exactly with f32 leaves, within the stated error otherwise.
+
+use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
+use palpate::ensemble::Ensemble;
+use palpate_onboard::Model;
+use palpate_shared::{Descriptor, Touch};
+use palpate_tests::random::{self, Shape};
+use proptest::prelude::*;
+
+fn shapes() -> impl Strategy<Value = Shape> {
+    let descriptors = prop::sample::select(Descriptor::ALL.to_vec());
+    (descriptors, 1..12_usize, 1..=300_usize, 0..=10_usize, any::<bool>(), 0..900_usize, 0.01..30.0_f32).prop_map(
+        |(descriptor, objects, trees, depth, each, thresholds, leaf)| {
+            // Deep trees are many nodes: fewer of them keep a case quick.
+            let trees = if depth > 6 { 1 + trees / 20 } else { trees };
+            Shape { descriptor, objects, trees, depth, each, thresholds, leaf }
+        },
+    )
+}
+
+/// The largest difference of a margin, checked against the stated error.
+fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
+    let model = Model::new(&compiled.bytes).unwrap();
+    let mut margins = vec![0; ensemble.objects.len()];
+    for touch in touches {
+        assert!(model.margins(touch, &mut margins));
+        for (full, &margin) in ensemble.margins(touch).iter().zip(&margins) {
+            let error = (f64::from(*full) - f64::from(margin) * f64::from(model.unit())).abs();
+            assert!(error <= f64::from(model.margin_error()), "{error} > {} for {touch:?}", model.margin_error());
+        }
+    }
+}
+
+fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
+    let layouts = [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)];
+    let settings = |layout| Settings { leaf, layout, ..Settings::default() };
+    layouts.into_iter().filter_map(|layout| compile(ensemble, &settings(layout)).ok()).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn integer_margins_stay_within_the_stated_error_in_every_layout(shape in shapes(), seed: u64, wide: bool) {
+        let ensemble = random::ensemble(shape, seed);
+        let touches = random::touches(200, seed);
+        let models = layouts(&ensemble, if wide { Leaf::I16 } else { Leaf::I8 });
+        prop_assert!(models.len() >= 3, "{} layouts", models.len());
+        for compiled in models {
+            hold(&ensemble, &compiled, &touches);
+        }
+    }
+
+    #[test]
+    fn integer_margins_are_the_same_in_every_layout_that_walks_trees(shape in shapes(), seed: u64) {
+        let ensemble = random::ensemble(shape, seed);
+        let models = layouts(&ensemble, Leaf::I16);
+        let mut first = vec![0; shape.objects];
+        let mut other = first.clone();
+        let trees: Vec<Model> = models.iter().map(|compiled| Model::new(&compiled.bytes).unwrap()).collect();
+        let trees: Vec<&Model> = trees.iter().filter(|model| model.layout() != Layout::Grid).collect();
+        for touch in random::touches(100, seed) {
+            trees[0].margins(&touch, &mut first);
+            for model in &trees {
+                model.margins(&touch, &mut other);
+                prop_assert_eq!(&first, &other);
+            }
+        }
+    }
+
+    #[test]
+    fn f32_margins_are_the_ensembles_bit_for_bit_in_every_layout(shape in shapes(), seed: u64) {
+        let ensemble = random::ensemble(shape, seed);
+        let mut margins = vec![0.0; shape.objects];
+        for compiled in layouts(&ensemble, Leaf::F32) {
+            let model = Model::new(&compiled.bytes).unwrap();
+            for touch in random::touches(100, seed) {
+                let features = shape.descriptor.features(&touch);
+                prop_assert!(model.f32_margins_of(features.as_slice(), &mut margins));
+                let bits = |margins: &[f32]| margins.iter().map(|m| m.to_bits()).collect::<Vec<_>>();
+                prop_assert_eq!(bits(&ensemble.margins(&touch)), bits(&margins));
+            }
+            hold(&ensemble, &compiled, &random::touches(100, !seed));
+        }
+    }
+}
