@@ -3,7 +3,10 @@
 //! A line holds three contact times in seconds, a missing contact as `-`, and optionally the probe's direction and
 //! alignment (six numbers). Fields are separated by spaces or commas. The published data set has the same format.
 
+pub mod manifest;
+
 use crate::error::{Error, Result};
+use manifest::Manifest;
 use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use std::fmt::Write as _;
 use std::fs::File;
@@ -30,9 +33,13 @@ impl Dataset {
     /// Reads every `<object>.txt` of a directory.
     ///
     /// # Errors
-    /// When the directory cannot be read or holds fewer than two objects, when a file holds no touch, and when a line
-    /// is wrong (file and line named).
+    /// When the directory cannot be read, holds fewer than two objects or an unfinished capture, when a file holds no
+    /// touch, and when a line is wrong (file and line named).
     pub fn read(directory: &Path) -> Result<Self> {
+        if Manifest::read(directory)?.is_some_and(|manifest| !manifest.complete) {
+            let fix = "Repeat the capture's command with --resume.";
+            return Err(Error::file(directory, "the capture of these touches is not complete", fix));
+        }
         let objects = files(directory)?
             .into_iter()
             .map(|(name, path)| Ok(ObjectTouches { name, touches: read_text(&path)? }))
@@ -255,7 +262,7 @@ mod tests {
     #[test]
     fn objects_are_sorted_by_name_and_other_files_ignored() {
         let directory = tempfile::tempdir().unwrap();
-        for name in ["spoon.txt", "fork.txt", "dataset.json", "cup.txt.part"] {
+        for name in ["spoon.txt", "fork.txt", "notes.md", "cup.part"] {
             std::fs::write(directory.path().join(name), "0 0.1 0.2\r\n\n0.000000,0.3,-").unwrap();
         }
         let dataset = Dataset::read(directory.path()).unwrap();

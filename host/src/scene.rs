@@ -69,7 +69,8 @@ const FIX: &str = "Give a mesh with faces and an extent.";
 
 fn corners(mesh: &Mesh) -> Result<Vec<Triangle>> {
     let corner = |index: u32| {
-        let position = mesh.vertices.get(index as usize).copied().map(Vec3::from).filter(|position| position.is_finite());
+        let position =
+            mesh.vertices.get(index as usize).copied().map(Vec3::from).filter(|position| position.is_finite());
         position
             .map(Vec3::as_dvec3)
             .ok_or_else(|| Error::data(format!("vertex {index} of the mesh is missing or not finite"), FIX))

@@ -88,11 +88,8 @@ impl Tree {
 }
 
 impl Node {
-    const EMPTY: Self = Self {
-        low: [[f32::INFINITY; WIDTH]; 3],
-        high: [[f32::NEG_INFINITY; WIDTH]; 3],
-        children: [0; WIDTH],
-    };
+    const EMPTY: Self =
+        Self { low: [[f32::INFINITY; WIDTH]; 3], high: [[f32::NEG_INFINITY; WIDTH]; 3], children: [0; WIDTH] };
 
     /// Puts the children whose inflated boxes the path meets before `limit` on the stack, the nearest on top.
     #[inline]

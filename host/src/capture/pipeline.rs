@@ -1,0 +1,112 @@
+//! Producers and one writer, joined by bounded channels.
+//!
+//! The chunks of all objects form one sequence. Producer p of n computes chunks p, p + n, p + 2n, … and sends them down
+//! its own channel; the writer takes one from each channel in turn, which is the sequence again. A producer that is
+//! ahead waits, so at most a few chunks are in memory whatever the number of touches.
+
+use super::store::Store;
+use super::{ObjectSummary, Sampler, Settings};
+use crate::dataset::write_touch;
+use crate::error::Result;
+use crate::progress;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use std::ops::Range;
+use std::time::Instant;
+
+/// How many samples a chunk has: some milliseconds of work.
+const CHUNK: u64 = 256;
+
+/// How many chunks a producer may be ahead.
+const AHEAD: usize = 8;
+
+/// What a producer hands to the writer.
+struct Chunk {
+    text: String,
+    approaches: u64,
+}
+
+/// Captures all that the store does not have yet.
+pub(super) fn run(samplers: &[Sampler<'_>], settings: &Settings, store: &mut Store) -> Result<Vec<ObjectSummary>> {
+    let samples = settings.samples();
+    let total = samples.end - samples.start;
+    let rest = |object: usize| samples.start + store.entry(object).touches..samples.end;
+    let jobs: Vec<(usize, Range<u64>)> = (0..samplers.len()).map(|object| (object, rest(object))).collect();
+    let bar = progress::bar("Touching", total * samplers.len() as u64);
+    let threads = settings.threads().max(1);
+    std::thread::scope(|scope| {
+        let mut channels = Vec::with_capacity(threads);
+        for producer in 0..threads {
+            let (sender, receiver) = bounded(AHEAD);
+            let chunks = chunks(&jobs).skip(producer).step_by(threads);
+            scope.spawn(move || produce(chunks, samplers, settings, &sender));
+            channels.push(receiver);
+        }
+        let mut turns = (0..threads).cycle();
+        let mut summaries = Vec::with_capacity(samplers.len());
+        for (object, samples) in &jobs {
+            let start = Instant::now();
+            let before = store.entry(*object).clone();
+            bar.set_message(before.name.clone());
+            bar.inc(before.touches);
+            for part in split(samples) {
+                let turn = turns.next().unwrap_or(0);
+                let chunk = receive(&channels[turn])?;
+                let touches = part.end - part.start;
+                store.append(*object, chunk.text.as_bytes(), touches, chunk.approaches)?;
+                bar.inc(touches);
+            }
+            store.complete(*object)?;
+            let entry = store.entry(*object).clone();
+            summaries.push(ObjectSummary {
+                name: entry.name,
+                touches: entry.touches,
+                approaches: entry.approaches,
+                approaches_now: entry.approaches - before.approaches,
+                seconds: start.elapsed().as_secs_f64(),
+            });
+        }
+        Ok(summaries)
+    })
+}
+
+/// The samples of one object, chunk by chunk.
+fn split(samples: &Range<u64>) -> impl Iterator<Item = Range<u64>> + Clone + use<> {
+    let end = samples.end;
+    samples.clone().step_by(CHUNK as usize).map(move |start| start..end.min(start + CHUNK))
+}
+
+/// The chunks of all objects, in the order in which they are written.
+fn chunks(jobs: &[(usize, Range<u64>)]) -> impl Iterator<Item = (usize, Range<u64>)> {
+    jobs.iter().flat_map(|(object, samples)| split(samples).map(|part| (*object, part)))
+}
+
+/// Computes chunks until they are all done, one fails, or the writer is gone.
+fn produce(
+    chunks: impl Iterator<Item = (usize, Range<u64>)>,
+    samplers: &[Sampler<'_>],
+    settings: &Settings,
+    sender: &Sender<Result<Chunk>>,
+) {
+    for (object, samples) in chunks {
+        let chunk = compute(&samplers[object], settings, samples);
+        let failed = chunk.is_err();
+        if sender.send(chunk).is_err() || failed {
+            return;
+        }
+    }
+}
+
+fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>) -> Result<Chunk> {
+    let mut chunk = Chunk { text: String::new(), approaches: 0 };
+    for sample in samples {
+        let (touch, approaches) = sampler.sample(sample)?;
+        write_touch(&mut chunk.text, &touch, settings.pose);
+        chunk.approaches += approaches;
+    }
+    Ok(chunk)
+}
+
+fn receive(channel: &Receiver<Result<Chunk>>) -> Result<Chunk> {
+    // A producer only goes away early by a panic, which the scope passes on.
+    channel.recv().unwrap_or_else(|_| Err(crate::Error::data("a worker stopped", "Report this as a bug.")))
+}

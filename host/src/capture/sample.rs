@@ -1,0 +1,68 @@
+//! Sample i of an object: a pure function of (seed, object's name, i).
+
+use super::Settings;
+use crate::approach::Approach;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use palpate_shared::Touch;
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+/// After this many approaches without a full touch, an object counts as one that cannot be touched with three fingers.
+/// Real objects need 2 to 36; a wire as thin as a hundredth of the fingers needs a few thousand.
+pub const MOST_ATTEMPTS: u64 = 1 << 22;
+
+/// Draws the samples of one object.
+#[derive(Debug)]
+pub struct Sampler<'a> {
+    scene: &'a Scene,
+    name: &'a str,
+    settings: &'a Settings,
+    stream: u64,
+}
+
+impl<'a> Sampler<'a> {
+    /// The samples of the object with this scene and name.
+    pub fn new(scene: &'a Scene, name: &'a str, settings: &'a Settings) -> Self {
+        let stream = name.bytes().fold(mix(settings.seed), |hash, byte| mix(hash ^ u64::from(byte)));
+        Self { scene, name, settings, stream }
+    }
+
+    /// The object's name.
+    pub fn name(&self) -> &str {
+        self.name
+    }
+
+    /// Sample `index`, and how many approaches it took. Each sample has its own stream of random numbers, from which
+    /// approaches are drawn until one is a full touch; when every approach is kept, the first one is the sample.
+    ///
+    /// # Errors
+    /// When [`MOST_ATTEMPTS`] approaches give no full touch.
+    pub fn sample(&self, index: u64) -> Result<(Touch, u64)> {
+        let mut rng = self.rng(index);
+        let probe = &self.settings.probe;
+        for attempts in 1..=MOST_ATTEMPTS {
+            let approach = Approach::draw(&mut rng, self.scene.bounds(), probe.tilt);
+            if self.settings.approaches {
+                return Ok((approach.touch(approach.distances(self.scene, probe), probe), attempts));
+            }
+            if let Some(distances) = approach.full_distances(self.scene, probe) {
+                return Ok((approach.touch(distances.map(Some), probe), attempts));
+            }
+        }
+        let what = format!("{}: none of {MOST_ATTEMPTS} approaches touched with all three fingers", self.name);
+        Err(Error::data(what, "Leave the object out, or give a larger radius, a smaller spacing or a greater length."))
+    }
+
+    fn rng(&self, index: u64) -> Xoshiro256PlusPlus {
+        Xoshiro256PlusPlus::seed_from_u64(mix(self.stream ^ mix(index)))
+    }
+}
+
+/// The finaliser of SplitMix64: every bit of the input changes about half of the output's.
+fn mix(value: u64) -> u64 {
+    let value = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    value ^ (value >> 31)
+}
