@@ -1,7 +1,7 @@
 //! Noise on contact times, as a sensor's latency would add.
 
+use crate::random;
 use palpate_shared::{ContactTime, Touch};
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// earliest time is subtracted, so that the first contact is 0 again, and times are rounded to whole microseconds, as in
 /// the published evaluation. Missing contacts stay missing. The same name, touches and seed give the same noise.
 pub fn noisy(name: &str, touches: &[Touch], deviation: f64, seed: u64) -> Vec<Touch> {
-    let mut random = generator(seed, name);
+    let mut random = random::generator(seed, name, 0);
     touches.iter().map(|touch| one(touch, deviation, &mut random)).collect()
 }
 
@@ -26,17 +26,6 @@ fn one(touch: &Touch, deviation: f64, random: &mut ChaCha8Rng) -> Touch {
     });
     let noisy = Touch::new(shifted);
     touch.pose().map_or(noisy, |pose| noisy.with_pose(pose))
-}
-
-/// A generator for `seed` and `name`: other names, other numbers.
-pub(crate) fn generator(seed: u64, name: &str) -> ChaCha8Rng {
-    // FNV-1a spreads the name over 64 bits; the stream keeps two seeds with one name apart.
-    let hash = name
-        .bytes()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(hash);
-    random
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Made-up touches for tests: objects whose surfaces bend differently, without any mesh.
 
 use crate::dataset::{Dataset, ObjectTouches};
-use crate::noise;
+use crate::random;
 use palpate_shared::{ContactTime, Touch};
 use rand::{Rng, RngExt};
 
@@ -9,7 +9,7 @@ use rand::{Rng, RngExt};
 pub(crate) fn dataset(counts: &[usize], seed: u64) -> Dataset {
     let object = |(index, &count): (usize, &usize)| {
         let name = format!("object{index}");
-        let mut random = noise::generator(seed, &name);
+        let mut random = random::generator(seed, &name, 0);
         let touches = (0..count).map(|_| touch(index, &mut random)).collect();
         ObjectTouches { name, touches }
     };

@@ -86,6 +86,12 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.add(&margins)
     }
 
+    /// Takes in a touch by its margins, computed beforehand with [`Model::margins`]; missing ones count as 0. For
+    /// replaying the same touches in many orders.
+    pub fn push_margins(&mut self, margins: &[i32]) -> Verdict {
+        self.add(margins)
+    }
+
     /// The verdict after the last touch.
     pub const fn verdict(&self) -> Verdict {
         self.verdict
@@ -122,7 +128,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.verdict = Verdict::Undecided;
     }
 
-    fn add(&mut self, margins: &[i32; N]) -> Verdict {
+    fn add(&mut self, margins: &[i32]) -> Verdict {
         if self.verdict != Verdict::Undecided {
             return self.verdict;
         }

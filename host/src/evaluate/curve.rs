@@ -1,0 +1,150 @@
+//! Accuracy after a fixed number of touches.
+
+use super::estimate::Estimate;
+use super::margins::{Margins, best, rivals};
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+
+/// How often the object with the most evidence was the right one, after 1, 2, 3 … touches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    groups: usize,
+    /// For each tested object, and each number of touches less one: groups recognised.
+    correct: Vec<Vec<usize>>,
+}
+
+/// How sure a model was of the object it thought best, and whether that was the right one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Confidence {
+    /// The posterior of the best object.
+    pub posterior: f64,
+    /// Whether it was the right one.
+    pub correct: bool,
+}
+
+impl Margins<'_> {
+    /// Accuracy after 1 to `most` touches, over `groups` groups drawn for each object.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there are no groups, or an object has fewer than `most` touches.
+    pub fn curve(&self, most: usize, groups: usize, seed: u64) -> Result<Curve> {
+        self.check(most, groups)?;
+        let correct = (0..self.tested.len()).map(|position| {
+            let group = |mut correct: Vec<usize>, group| {
+                self.follow(position, group, most, seed, |touches, evidence| {
+                    correct[touches - 1] += usize::from(best(evidence) == self.tested[position].object);
+                });
+                correct
+            };
+            let none = || vec![0; most];
+            let add = |a: Vec<usize>, b: Vec<usize>| a.iter().zip(b).map(|(a, b)| a + b).collect();
+            (0..groups).into_par_iter().fold(none, group).reduce(none, add)
+        });
+        Ok(Curve { groups, correct: correct.collect() })
+    }
+
+    /// How often each tested object (rows) was taken for each known one (columns) after `touches` touches.
+    ///
+    /// # Errors
+    /// As [`Margins::curve`].
+    pub fn confusion(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Vec<usize>>> {
+        self.check(touches, groups)?;
+        let row = |position| {
+            let mut row = vec![0; self.objects().len()];
+            self.ends(position, touches, groups, seed, best).into_iter().for_each(|object| row[object] += 1);
+            row
+        };
+        Ok((0..self.tested.len()).map(row).collect())
+    }
+
+    /// How sure the model was after `touches` touches, for each group of each object; for calibration.
+    ///
+    /// # Errors
+    /// As [`Margins::curve`].
+    pub fn confidences(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Confidence>> {
+        self.check(touches, groups)?;
+        let unit = self.unit();
+        let of = |position: usize| {
+            let right = self.tested[position].object;
+            self.ends(position, touches, groups, seed, move |evidence| {
+                let best = best(evidence);
+                Confidence { posterior: 1.0 / (1.0 + rivals(evidence, best, unit)), correct: best == right }
+            })
+        };
+        Ok((0..self.tested.len()).flat_map(of).collect())
+    }
+
+    fn check(&self, most: usize, groups: usize) -> Result<()> {
+        if groups == 0 {
+            return Err(Error::argument("there are no groups to evaluate", "Use --groups 1 or more."));
+        }
+        match self.tested.iter().zip(self.tested_names()).find(|(tested, _)| tested.touches < most) {
+            Some((tested, name)) => Err(Error::argument(
+                format!("groups of {most} touches were asked for, but {name} has only {}", tested.touches),
+                "Ask for fewer touches with --at, or capture more.",
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds up the margins of a group, and shows the evidence after each touch.
+    fn follow(&self, position: usize, group: usize, most: usize, seed: u64, mut see: impl FnMut(usize, &[f64])) {
+        let mut evidence = self.prior();
+        for (index, touch) in self.draw(position, group, most, seed).into_iter().enumerate() {
+            self.tested[position].add(touch, &mut evidence);
+            see(index + 1, &evidence);
+        }
+    }
+
+    /// What `end` makes of the evidence at the end of each group.
+    fn ends<T: Send>(
+        &self,
+        position: usize,
+        touches: usize,
+        groups: usize,
+        seed: u64,
+        end: impl Fn(&[f64]) -> T + Sync,
+    ) -> Vec<T> {
+        let group = |group| {
+            let mut evidence = self.prior();
+            self.draw(position, group, touches, seed).into_iter().for_each(|touch| {
+                self.tested[position].add(touch, &mut evidence);
+            });
+            end(&evidence)
+        };
+        (0..groups).into_par_iter().map(group).collect()
+    }
+}
+
+impl Curve {
+    /// The largest number of touches.
+    pub fn most(&self) -> usize {
+        self.correct.first().map_or(0, Vec::len)
+    }
+
+    /// Accuracy after `touches` touches (1 to [`Curve::most`]), each object counting alike.
+    ///
+    /// # Panics
+    /// If `touches` is out of range.
+    pub fn accuracy(&self, touches: usize) -> Estimate {
+        Estimate::mean_of((0..self.correct.len()).map(|position| self.object_accuracy(position, touches)))
+    }
+
+    /// Accuracy for the tested object at `position` after `touches` touches.
+    ///
+    /// # Panics
+    /// If `position` or `touches` is out of range.
+    pub fn object_accuracy(&self, position: usize, touches: usize) -> Estimate {
+        Estimate::share(self.correct[position][touches - 1], self.groups)
+    }
+
+    /// The smallest number of touches from which on accuracy stays at or above one less `error_rate`, if there is one.
+    pub fn touches_to_error(&self, error_rate: f64) -> Option<usize> {
+        let fails = |touches: &usize| self.accuracy(*touches).value < 1.0 - error_rate;
+        match (1..=self.most()).rev().find(fails) {
+            Some(last) if last == self.most() => None,
+            Some(last) => Some(last + 1),
+            None => Some(1),
+        }
+    }
+}

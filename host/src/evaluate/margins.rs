@@ -1,0 +1,196 @@
+//! A model's margins for every test touch, computed once.
+
+use crate::dataset::Dataset;
+use crate::ensemble::{Ensemble, feature_row};
+use crate::error::{Error, Result};
+use crate::random;
+use palpate_onboard::Model;
+use palpate_shared::{Descriptor, Touch};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A model that can be evaluated.
+#[derive(Clone, Copy, Debug)]
+pub enum Candidate<'m> {
+    /// The full model: f32 margins.
+    Full(&'m Ensemble),
+    /// A compiled model, evaluated by the onboard crate.
+    Compiled(&'m Model<'m>),
+}
+
+/// A model's margins for every touch of a data set.
+pub struct Margins<'m> {
+    pub(super) candidate: Candidate<'m>,
+    descriptor: Option<Descriptor>,
+    /// The objects that the model knows.
+    objects: Vec<String>,
+    /// The data set's objects.
+    pub(super) tested: Vec<Tested>,
+    tested_names: Vec<String>,
+}
+
+/// The margins of one object's test touches.
+pub(super) struct Tested {
+    /// The object's index in the model.
+    pub(super) object: usize,
+    pub(super) touches: usize,
+    pub(super) values: Values,
+}
+
+/// Margins of touch after touch, one for each object that the model knows.
+pub(super) enum Values {
+    Full(Vec<f32>),
+    /// In the model's units.
+    Compiled(Vec<i32>),
+}
+
+impl Candidate<'_> {
+    fn descriptor(&self) -> Option<Descriptor> {
+        match self {
+            Self::Full(ensemble) => Some(ensemble.descriptor),
+            Self::Compiled(model) => model.descriptor(),
+        }
+    }
+
+    fn objects(&self) -> Vec<String> {
+        match self {
+            Self::Full(ensemble) => ensemble.objects.clone(),
+            Self::Compiled(model) => (0..model.object_count()).map(|object| model.object_name(object).into()).collect(),
+        }
+    }
+}
+
+impl<'m> Margins<'m> {
+    /// Computes the margins of all touches, on all threads. Every object of the data set must be known to the model; the
+    /// model may know more.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if the model does not know an object, works on rows of features instead of touches, or needs a
+    /// pose that no touch has.
+    pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
+        let objects = candidate.objects();
+        let Some(descriptor) = candidate.descriptor() else {
+            let what = "the model works on rows of features, not on touches";
+            return Err(Error::data(what, "Give a model that was exported from a Palpate ensemble."));
+        };
+        let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
+        if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
+            let what = format!("the descriptor {} needs the probe's pose, which no touch has", descriptor.name());
+            return Err(Error::data(what, "Capture with --pose."));
+        }
+        let tested = dataset.objects.iter().map(|touched| {
+            let object = objects.iter().position(|name| *name == touched.name).ok_or_else(|| {
+                let what = format!("the model does not know the object {}, only {}", touched.name, objects.join(", "));
+                Error::data(what, "Train it on this object too, or take the object out of the data.")
+            })?;
+            let values = values(candidate, descriptor, &touched.touches, objects.len());
+            Ok(Tested { object, touches: touched.touches.len(), values })
+        });
+        let tested = tested.collect::<Result<_>>()?;
+        Ok(Self { candidate, descriptor: Some(descriptor), objects, tested, tested_names: dataset.names() })
+    }
+
+    /// The model's descriptor.
+    pub fn descriptor(&self) -> Option<Descriptor> {
+        self.descriptor
+    }
+
+    /// The objects that the model knows, in its order.
+    pub fn objects(&self) -> &[String] {
+        &self.objects
+    }
+
+    /// The objects of the data set, in its order.
+    pub fn tested_names(&self) -> &[String] {
+        &self.tested_names
+    }
+
+    /// The touches of all tested objects together.
+    pub fn touch_count(&self) -> usize {
+        self.tested.iter().map(|tested| tested.touches).sum()
+    }
+
+    /// The fewest touches that a tested object has: the longest group that can be drawn from each.
+    pub fn fewest_touches(&self) -> usize {
+        self.tested.iter().map(|tested| tested.touches).min().unwrap_or(0)
+    }
+
+    /// Natural logarithms a unit of evidence.
+    pub(super) fn unit(&self) -> f64 {
+        match self.candidate {
+            Candidate::Full(_) => 1.0,
+            Candidate::Compiled(model) => f64::from(model.unit()),
+        }
+    }
+
+    /// The evidence before any touch, in units.
+    pub(super) fn prior(&self) -> Vec<f64> {
+        let prior = |object| match self.candidate {
+            Candidate::Full(_) => 0.0,
+            Candidate::Compiled(model) => f64::from(model.prior(object)),
+        };
+        (0..self.objects.len()).map(prior).collect()
+    }
+
+    /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
+    pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> rand::seq::index::IndexVec {
+        let group = u64::try_from(group).unwrap_or(u64::MAX);
+        let mut random = random::generator(seed, &self.tested_names[position], group);
+        rand::seq::index::sample(&mut random, self.tested[position].touches, count)
+    }
+}
+
+impl Tested {
+    /// Adds the margins of touch `touch` to `evidence`. Whole numbers stay exact: their sums are far below 2⁵³.
+    pub(super) fn add(&self, touch: usize, evidence: &mut [f64]) {
+        let row = row(touch, evidence.len());
+        match &self.values {
+            Values::Full(values) => {
+                evidence.iter_mut().zip(&values[row]).for_each(|(e, &margin)| *e += f64::from(margin))
+            }
+            Values::Compiled(values) => {
+                evidence.iter_mut().zip(&values[row]).for_each(|(e, &margin)| *e += f64::from(margin));
+            }
+        }
+    }
+}
+
+/// Where the margins of touch `touch` stand.
+pub(super) fn row(touch: usize, objects: usize) -> Range<usize> {
+    touch * objects..(touch + 1) * objects
+}
+
+fn values(candidate: Candidate<'_>, descriptor: Descriptor, touches: &[Touch], objects: usize) -> Values {
+    match candidate {
+        Candidate::Full(ensemble) => {
+            let margins = |touch| ensemble.margins_of_features(&feature_row(descriptor, touch));
+            Values::Full(touches.par_iter().flat_map_iter(margins).collect())
+        }
+        Candidate::Compiled(model) => {
+            let margins = |touch| {
+                let mut margins = vec![0; objects];
+                model.margins(touch, &mut margins);
+                margins
+            };
+            Values::Compiled(touches.par_iter().flat_map_iter(margins).collect())
+        }
+    }
+}
+
+/// The object with the most evidence; the first of several, as on the chip.
+pub(super) fn best(evidence: &[f64]) -> usize {
+    let mut best = 0;
+    for (object, value) in evidence.iter().enumerate() {
+        if *value > evidence[best] {
+            best = object;
+        }
+    }
+    best
+}
+
+/// What the other objects' weights come to, the best one's being 1: its posterior is 1 / (1 + this).
+pub(super) fn rivals(evidence: &[f64], best: usize, unit: f64) -> f64 {
+    let most = evidence[best];
+    let others = evidence.iter().enumerate().filter(|(object, _)| *object != best);
+    others.map(|(_, value)| ((value - most) * unit).exp()).sum()
+}

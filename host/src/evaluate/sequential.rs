@@ -1,0 +1,159 @@
+//! Touching until sure.
+
+use super::MAX_TOUCHES;
+use super::estimate::Estimate;
+use super::margins::{Candidate, Margins, Values, best, rivals, row};
+use crate::error::{Error, Result};
+use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// How sequences are drawn and stopped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SequentialSettings {
+    /// The recogniser stops when the posterior passes one less this.
+    pub error_rate: f64,
+    /// Touches after which it gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble. An object
+    /// with fewer test touches gives up when they are used up.
+    pub max_touches: Option<u32>,
+    /// Sequences for each object.
+    pub sequences: usize,
+    /// Seed of the drawing.
+    pub seed: u64,
+}
+
+/// What a recogniser does that stops by itself. Each object counts alike.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sequential {
+    /// What it was asked to stay below.
+    pub error_rate: f64,
+    /// Touches after which it gave up.
+    pub max_touches: u32,
+    /// Touches used on average, also where it gave up.
+    pub mean_touches: f64,
+    /// Standard error of [`Sequential::mean_touches`].
+    pub mean_touches_standard_error: f64,
+    /// Share of sequences with a wrong verdict.
+    pub error: f64,
+    /// Standard error of [`Sequential::error`].
+    pub error_standard_error: f64,
+    /// Share of sequences without a verdict.
+    pub undecided: f64,
+    /// Touches used on average, for each object.
+    pub per_object: BTreeMap<String, f64>,
+    /// For each tested object, how it went for every sequence.
+    #[serde(skip)]
+    pub outcomes: Vec<Vec<Outcome>>,
+}
+
+/// How a sequence ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    /// Touches used.
+    pub touches: usize,
+    /// The object recognised (its index in the model), or none where the recogniser gave up.
+    pub recognised: Option<usize>,
+}
+
+impl Margins<'_> {
+    /// Pushes random sequences of each object's touches into a recogniser until it stops.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there are no sequences, or the error rate is not between 1e-15 and 0.5.
+    pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
+        let SequentialSettings { error_rate, max_touches, sequences, seed } = *settings;
+        if sequences == 0 {
+            return Err(Error::argument("there are no sequences to evaluate", "Use --groups 1 or more."));
+        }
+        let own = match self.candidate {
+            Candidate::Full(_) => MAX_TOUCHES,
+            Candidate::Compiled(model) => Stopping::from_model(model).max_touches(),
+        };
+        let stopping = Stopping::new(error_rate, max_touches.unwrap_or(own)).ok_or_else(|| {
+            let what = format!("a recogniser cannot stop at an error rate of {error_rate}");
+            Error::argument(what, "Use an --error-rate between 1e-15 and 0.5, and at least one touch.")
+        })?;
+        let outcomes: Vec<Vec<Outcome>> =
+            (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
+        let share = |hit: &dyn Fn(usize, &Outcome) -> bool| {
+            Estimate::mean_of(outcomes.iter().enumerate().map(|(position, outcomes)| {
+                Estimate::share(outcomes.iter().filter(|outcome| hit(position, outcome)).count(), sequences)
+            }))
+        };
+        let right = |position: usize| self.tested[position].object;
+        let error = share(&|position, outcome| outcome.recognised.is_some_and(|object| object != right(position)));
+        let undecided = share(&|_, outcome| outcome.recognised.is_none());
+        let touches = outcomes.iter().map(|outcomes| Estimate::mean(outcomes.iter().map(|o| o.touches as f64)));
+        let mean = Estimate::mean_of(touches.clone());
+        let per_object = self.tested_names().iter().cloned().zip(touches.map(|estimate| estimate.value)).collect();
+        Ok(Sequential {
+            error_rate,
+            max_touches: stopping.max_touches(),
+            mean_touches: mean.value,
+            mean_touches_standard_error: mean.standard_error,
+            error: error.value,
+            error_standard_error: error.standard_error,
+            undecided: undecided.value,
+            per_object,
+            outcomes,
+        })
+    }
+
+    fn outcomes(&self, position: usize, stopping: Stopping, sequences: usize, seed: u64) -> Vec<Outcome> {
+        let tested = &self.tested[position];
+        let objects = self.objects().len();
+        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(tested.touches);
+        let run = |sequence| {
+            let touches = self.draw(position, sequence, limit, seed).into_iter();
+            match (&tested.values, self.candidate) {
+                (Values::Compiled(values), Candidate::Compiled(model)) => {
+                    let rows = touches.map(|touch| &values[row(touch, objects)]);
+                    match objects {
+                        0..=16 => onboard::<16>(model, stopping, rows),
+                        17..=64 => onboard::<64>(model, stopping, rows),
+                        _ => onboard::<256>(model, stopping, rows),
+                    }
+                }
+                _ => {
+                    let mut evidence = self.prior();
+                    let odds = stopping.error_rate() / (1.0 - stopping.error_rate());
+                    until_sure(touches.map(|touch| {
+                        tested.add(touch, &mut evidence);
+                        let best = best(&evidence);
+                        (rivals(&evidence, best, 1.0) <= odds).then_some(best)
+                    }))
+                }
+            }
+        };
+        (0..sequences).into_par_iter().map(run).collect()
+    }
+}
+
+/// The onboard recogniser's verdict on margins that its model computed beforehand.
+fn onboard<'r, const N: usize>(
+    model: &Model<'_>,
+    stopping: Stopping,
+    rows: impl Iterator<Item = &'r [i32]>,
+) -> Outcome {
+    let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
+        // Room was made for at least as many objects as the model has.
+        return Outcome { touches: 0, recognised: None };
+    };
+    until_sure(rows.map(|margins| match recognizer.push_margins(margins) {
+        Verdict::Recognised { object, .. } => Some(usize::from(object)),
+        Verdict::Undecided | Verdict::Unknown => None,
+    }))
+}
+
+/// Counts touches up to the first verdict.
+fn until_sure(verdicts: impl Iterator<Item = Option<usize>>) -> Outcome {
+    let mut touches = 0;
+    for verdict in verdicts {
+        touches += 1;
+        if verdict.is_some() {
+            return Outcome { touches, recognised: verdict };
+        }
+    }
+    Outcome { touches, recognised: None }
+}

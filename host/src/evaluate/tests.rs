@@ -1,0 +1,191 @@
+use super::*;
+use crate::compile::{self, Leaf, compile};
+use crate::dataset::Dataset;
+use crate::ensemble::Ensemble;
+use crate::synthetic;
+use crate::train;
+use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_shared::Touch;
+
+fn ensemble() -> Ensemble {
+    let settings = train::Settings { rounds: 20, depth: 4, eta: 0.3, ..train::Settings::compact() };
+    train::train(&synthetic::dataset(&[2_000, 2_000, 2_000], 1), &settings).unwrap()
+}
+
+fn compiled(ensemble: &Ensemble) -> Vec<u8> {
+    compile(ensemble, &compile::Settings { leaf: Leaf::I16, ..compile::Settings::default() }).unwrap().bytes
+}
+
+fn test_touches() -> Dataset {
+    synthetic::dataset(&[400, 300, 500], 2)
+}
+
+fn quick() -> Settings {
+    Settings { at: vec![1, 5, 20], groups: 200, ..Settings::default() }
+}
+
+fn both(check: impl Fn(&Margins<'_>)) {
+    let ensemble = ensemble();
+    let bytes = compiled(&ensemble);
+    let model = Model::new(&bytes).unwrap();
+    for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
+        check(&Margins::new(candidate, &test_touches()).unwrap());
+    }
+}
+
+#[test]
+fn accuracy_after_one_touch_is_what_counting_touches_gives() {
+    let ensemble = ensemble();
+    let touches = test_touches();
+    let margins = Margins::new(Candidate::Full(&ensemble), &touches).unwrap();
+    let groups = 20_000;
+    let curve = margins.curve(1, groups, 1).unwrap();
+    for (position, object) in touches.objects.iter().enumerate() {
+        let right = |touch: &&Touch| {
+            let m = ensemble.margins(touch);
+            (0..3).all(|other| other == position || m[other] < m[position])
+        };
+        let share = object.touches.iter().filter(right).count() as f64 / object.touches.len() as f64;
+        let estimate = curve.object_accuracy(position, 1);
+        // Five standard errors: drawn 20,000 times with the same seed, it cannot fail by chance later.
+        assert!((estimate.value - share).abs() < 5.0 * (0.25 / groups as f64).sqrt(), "{estimate:?} {share}");
+    }
+}
+
+#[test]
+fn more_touches_make_fewer_errors_and_confusion_agrees_with_the_curve() {
+    both(|margins| {
+        let curve = margins.curve(60, 300, 1).unwrap();
+        let [one, ten, sixty] = [1, 10, 60].map(|touches| curve.accuracy(touches).value);
+        assert!(one < ten && ten < sixty && sixty > 0.95, "{one} {ten} {sixty}");
+        let confusion = margins.confusion(60, 300, 1).unwrap();
+        for (object, row) in confusion.iter().enumerate() {
+            assert_eq!(row.iter().sum::<usize>(), 300);
+            assert_eq!(row[object] as f64 / 300.0, curve.object_accuracy(object, 60).value);
+        }
+        let confidences = margins.confidences(60, 300, 1).unwrap();
+        let correct = confidences.iter().filter(|confidence| confidence.correct).count();
+        assert!((correct as f64 / 900.0 - sixty).abs() < 1e-9);
+        assert!(confidences.iter().all(|c| c.posterior > 1.0 / 3.0 - 1e-9 && c.posterior <= 1.0));
+    });
+}
+
+#[test]
+fn touches_to_an_error_rate_is_where_the_curve_passes_for_good() {
+    both(|margins| {
+        let curve = margins.curve(100, 300, 1).unwrap();
+        let touches = curve.touches_to_error(0.05).unwrap();
+        assert!(curve.accuracy(touches).value >= 0.95);
+        assert!(touches == 1 || curve.accuracy(touches - 1).value < 0.95);
+        assert!((touches..=100).all(|more| curve.accuracy(more).value >= 0.95));
+        assert_eq!(margins.curve(1, 300, 1).unwrap().touches_to_error(1e-9), None);
+    });
+}
+
+#[test]
+fn the_sequential_errors_stay_below_the_error_rate() {
+    both(|margins| {
+        for error_rate in [0.2, 0.05, 0.01] {
+            let settings = SequentialSettings { error_rate, max_touches: None, sequences: 500, seed: 3 };
+            let sequential = margins.sequential(&settings).unwrap();
+            assert!(sequential.error <= error_rate + 3.0 * sequential.error_standard_error, "{sequential:?}");
+            assert!(sequential.undecided < 0.05);
+            assert_eq!(sequential.outcomes.iter().map(Vec::len).collect::<Vec<_>>(), [500; 3]);
+        }
+    });
+}
+
+#[test]
+fn a_compiled_model_stops_as_the_recogniser_that_sees_the_touches() {
+    let bytes = compiled(&ensemble());
+    let model = Model::new(&bytes).unwrap();
+    let touches = test_touches();
+    let margins = Margins::new(Candidate::Compiled(&model), &touches).unwrap();
+    let settings = SequentialSettings { error_rate: 0.01, max_touches: Some(40), sequences: 50, seed: 1 };
+    let sequential = margins.sequential(&settings).unwrap();
+    for (position, outcomes) in sequential.outcomes.iter().enumerate() {
+        for (sequence, outcome) in outcomes.iter().enumerate() {
+            let mut recognizer = Recognizer::<3>::new(&model, Stopping::new(0.01, 40).unwrap()).unwrap();
+            let mut verdict = Verdict::Undecided;
+            for touch in margins.draw(position, sequence, 40, 1) {
+                verdict = recognizer.push(&touches.objects[position].touches[touch]);
+                if verdict != Verdict::Undecided {
+                    break;
+                }
+            }
+            let recognised = match verdict {
+                Verdict::Recognised { object, .. } => Some(usize::from(object)),
+                _ => None,
+            };
+            let touches = usize::try_from(recognizer.touches()).unwrap();
+            assert_eq!(*outcome, Outcome { touches, recognised });
+        }
+    }
+}
+
+#[test]
+fn full_and_compiled_model_are_measured_on_the_same_groups() {
+    let ensemble = ensemble();
+    let bytes = compiled(&ensemble);
+    let model = Model::new(&bytes).unwrap();
+    let of = |candidate| evaluate(&Margins::new(candidate, &test_touches()).unwrap(), &quick()).unwrap();
+    let (full, compiled) = (of(Candidate::Full(&ensemble)), of(Candidate::Compiled(&model)));
+    // Sixteen bits change hardly a verdict; other groups would change a percent of them.
+    assert!((full.accuracy[&20] - compiled.accuracy[&20]).abs() < 0.003, "{full:?} {compiled:?}");
+    assert!((full.sequential.mean_touches - compiled.sequential.mean_touches).abs() < 0.05);
+}
+
+#[test]
+fn a_recogniser_that_runs_out_of_touches_is_undecided() {
+    both(|margins| {
+        let settings = SequentialSettings { error_rate: 1e-12, max_touches: Some(2), sequences: 20, seed: 1 };
+        let sequential = margins.sequential(&settings).unwrap();
+        assert_eq!((sequential.undecided, sequential.mean_touches, sequential.max_touches), (1.0, 2.0, 2));
+        let settings = SequentialSettings { max_touches: Some(100_000), error_rate: 1e-15, ..settings };
+        let all = margins.sequential(&settings).unwrap();
+        assert!(all.outcomes[1].iter().all(|outcome| outcome.touches <= 300));
+    });
+}
+
+#[test]
+fn the_json_has_the_keys_that_programs_rely_on() {
+    both(|margins| {
+        let json = serde_json::to_value(evaluate(margins, &quick()).unwrap()).unwrap();
+        for pointer in ["/accuracy/5", "/per_object/object1/20", "/sequential/error_rate", "/sequential/mean_touches"] {
+            assert!(json.pointer(pointer).is_some_and(serde_json::Value::is_number), "{pointer} in {json}");
+        }
+        assert!(json["sequential"]["error"].is_number());
+    });
+}
+
+#[test]
+fn the_same_seed_gives_the_same_figures_on_any_number_of_threads() {
+    both(|margins| {
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| evaluate(margins, &quick()).unwrap())
+        };
+        assert_eq!(with(1), with(3));
+        assert_ne!(with(1), evaluate(margins, &Settings { seed: 2, ..quick() }).unwrap());
+    });
+}
+
+#[test]
+fn what_cannot_be_evaluated_says_so() {
+    let ensemble = ensemble();
+    let margins = Margins::new(Candidate::Full(&ensemble), &test_touches()).unwrap();
+    for (settings, expected) in [
+        (Settings { at: vec![301], ..quick() }, "object1 has only 300"),
+        (Settings { at: vec![0], ..quick() }, "--at"),
+        (Settings { groups: 0, ..quick() }, "--groups"),
+        (Settings { error_rate: 0.5, ..quick() }, "--error-rate"),
+        (Settings { error_rate: f64::NAN, ..quick() }, "--error-rate"),
+        (Settings { max_touches: Some(0), ..quick() }, "at least one touch"),
+    ] {
+        let error = evaluate(&margins, &settings).unwrap_err();
+        assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains(expected), "{error}");
+    }
+    let unknown = synthetic::dataset(&[9, 9, 9, 9], 1);
+    let error = Margins::new(Candidate::Full(&ensemble), &unknown).err().unwrap();
+    assert!(error.to_string().contains("does not know the object object3, only object0, object1, object2"), "{error}");
+}
