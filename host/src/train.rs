@@ -22,8 +22,21 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 
+#[cfg(feature = "xgboost")]
+mod xgboost;
+
 /// What every margin starts from; the same for all objects, so it changes no verdict. XGBoost's default.
 pub const BASE_MARGIN: f32 = 0.5;
+
+/// Who grows the trees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Engine {
+    /// hessboost, in Rust.
+    #[default]
+    Hessboost,
+    /// XGBoost 1.6.2, if the cargo feature `xgboost` built it in. It has no multi-output trees.
+    Xgboost,
+}
 
 /// How an ensemble is trained. Parameters have XGBoost's names and meanings.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +61,8 @@ pub struct Settings {
     pub seed: u64,
     /// Threads, or all of the machine's; the ensemble is the same for any number.
     pub threads: Option<usize>,
+    /// Who grows the trees.
+    pub engine: Engine,
 }
 
 impl Settings {
@@ -64,6 +79,7 @@ impl Settings {
             noise: 0.0,
             seed: 1,
             threads: None,
+            engine: Engine::Hessboost,
         }
     }
 
@@ -90,17 +106,45 @@ pub fn train(dataset: &Dataset, settings: &Settings) -> Result<Ensemble> {
     check(dataset, settings.descriptor)?;
     let parameters = parameters(settings, dataset.objects.len())?;
     let rows = Rows::new(dataset, settings);
+    match settings.engine {
+        Engine::Hessboost => with_hessboost(rows, settings, &parameters, dataset.names()),
+        Engine::Xgboost => with_xgboost(&rows, settings, dataset.names()),
+    }
+}
+
+fn with_hessboost(
+    rows: Rows,
+    settings: &Settings,
+    parameters: &TrainingParams,
+    objects: Vec<String>,
+) -> Result<Ensemble> {
     let data = rows.matrix().map_err(|error| refused(&error))?;
-    let rounds = u64::try_from(settings.rounds).unwrap_or(u64::MAX);
-    let bar = progress::bar("training", rounds);
-    let result = Trainer::new(&parameters, &data, settings.rounds)
+    let bar = progress::bar("training", u64::try_from(settings.rounds).unwrap_or(u64::MAX));
+    let result = Trainer::new(parameters, &data, settings.rounds)
         .on_round(|_| {
             bar.inc(1);
             ControlFlow::Continue(())
         })
         .train()
         .map_err(|error| refused(&error))?;
-    Ok(ensemble(&result.model, settings.descriptor, dataset.names()))
+    Ok(ensemble(&result.model, settings.descriptor, objects))
+}
+
+#[cfg(feature = "xgboost")]
+fn with_xgboost(rows: &Rows, settings: &Settings, objects: Vec<String>) -> Result<Ensemble> {
+    if settings.multi_output {
+        let what = "XGBoost 1.6.2 cannot train leaves that hold a value for each object";
+        return Err(Error::argument(what, "Use --preset paper or --leaves one, or --trainer hessboost."));
+    }
+    xgboost::train(rows, settings, objects)
+}
+
+#[cfg(not(feature = "xgboost"))]
+fn with_xgboost(_: &Rows, _: &Settings, _: Vec<String>) -> Result<Ensemble> {
+    Err(Error::argument(
+        "this program was built without XGBoost",
+        "Use --trainer hessboost, or build with: cargo build --release --features xgboost (cmake, g++ and libclang needed).",
+    ))
 }
 
 /// Whether there is something to learn from.

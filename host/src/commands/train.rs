@@ -1,5 +1,5 @@
 use palpate::dataset::Dataset;
-use palpate::train::{self, Settings};
+use palpate::train::{self, Engine, Settings};
 use palpate::{Result, output};
 use palpate_shared::Descriptor;
 use std::path::PathBuf;
@@ -57,6 +57,9 @@ pub(crate) struct Arguments {
     /// Threads; the ensemble is the same for any number [default: all]
     #[arg(long)]
     threads: Option<usize>,
+    /// Who grows the trees; xgboost (version 1.6.2, no multi-output trees) needs the cargo feature of that name
+    #[arg(long, value_enum, default_value = "hessboost")]
+    trainer: Trainer,
     /// Print what was trained as JSON
     #[arg(long)]
     json: bool,
@@ -72,6 +75,12 @@ enum Preset {
 enum Leaves {
     Each,
     One,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Trainer {
+    Hessboost,
+    Xgboost,
 }
 
 #[derive(serde::Serialize)]
@@ -137,6 +146,10 @@ impl Arguments {
             noise: self.noise.unwrap_or(preset.noise),
             seed: self.seed,
             threads: self.threads,
+            engine: match self.trainer {
+                Trainer::Hessboost => Engine::Hessboost,
+                Trainer::Xgboost => Engine::Xgboost,
+            },
         }
     }
 }

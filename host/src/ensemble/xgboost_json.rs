@@ -41,6 +41,15 @@ impl Ensemble {
         document.into_ensemble().map_err(|problem| Error::file(path, problem.what, problem.fix))
     }
 
+    /// What XGBoost itself has just trained on `descriptor`'s features of `objects`.
+    #[cfg(feature = "xgboost")]
+    pub(crate) fn from_xgboost(json: &[u8], descriptor: Descriptor, objects: Vec<String>) -> Result<Self> {
+        let path = Path::new("XGBoost's model");
+        let mut document: Document = serde_json::from_slice(json).map_err(|error| not_json(path, json, &error))?;
+        document.learner.attributes = palpate_attributes(descriptor, &objects);
+        document.into_ensemble().map_err(|problem| Error::file(path, problem.what, problem.fix))
+    }
+
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all.
     ///
     /// # Errors
@@ -210,14 +219,10 @@ impl Document {
         let objects = ensemble.objects.len();
         let features = ensemble.descriptor.feature_count();
         let trees = &ensemble.trees;
-        let names = serde_json::Value::from(ensemble.objects.clone()).to_string();
         let num_class = objects.to_string();
         Self {
             learner: Learner {
-                attributes: BTreeMap::from([
-                    ("palpate_descriptor".into(), ensemble.descriptor.name().into()),
-                    ("palpate_objects".into(), names),
-                ]),
+                attributes: palpate_attributes(ensemble.descriptor, &ensemble.objects),
                 feature_names: Vec::new(),
                 feature_types: Vec::new(),
                 gradient_booster: GradientBooster {
@@ -296,6 +301,11 @@ impl Document {
             .collect::<Result<_, _>>()?;
         Ok(Ensemble { descriptor, objects, base_margins, trees })
     }
+}
+
+fn palpate_attributes(descriptor: Descriptor, objects: &[String]) -> BTreeMap<String, String> {
+    let names = serde_json::Value::from(objects.to_vec()).to_string();
+    BTreeMap::from([("palpate_descriptor".into(), descriptor.name().into()), ("palpate_objects".into(), names)])
 }
 
 /// Where each boosting round's trees begin and end: one tree for each object in order, or one tree for all.

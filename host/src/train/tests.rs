@@ -90,3 +90,55 @@ fn one_object_or_an_empty_one_cannot_be_trained() {
     let error = train(&synthetic::dataset(&[50, 0], 8), &quick()).unwrap_err();
     assert!(error.to_string().contains("object1 has no touches"), "{error}");
 }
+
+#[test]
+#[cfg(not(feature = "xgboost"))]
+fn a_build_without_xgboost_says_how_to_get_it() {
+    let settings = Settings { engine: Engine::Xgboost, ..Settings::paper() };
+    let error = train(&synthetic::dataset(&[50, 50], 9), &settings).unwrap_err();
+    assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains("--features xgboost"), "{error}");
+}
+
+#[cfg(feature = "xgboost")]
+mod xgboost {
+    use super::*;
+    use crate::evaluate::{Candidate, Margins};
+
+    /// The two trainers on the same touches: how far margins lie apart on average, in nats, and both accuracies.
+    fn compare(counts: &[usize], settings: &Settings) -> (f64, f64, f64) {
+        let dataset = synthetic::dataset(counts, 10);
+        let unseen = synthetic::dataset(&[500, 500, 500], 11);
+        let [ours, theirs] = [Engine::Hessboost, Engine::Xgboost]
+            .map(|engine| train(&dataset, &Settings { engine, threads: Some(1), ..settings.clone() }).unwrap());
+        assert_eq!((&ours.objects, ours.trees.len()), (&theirs.objects, theirs.trees.len()));
+        let touches = unseen.objects.iter().flat_map(|object| &object.touches);
+        let apart = touches.flat_map(|touch| {
+            let margins = ours.margins(touch).into_iter().zip(theirs.margins(touch));
+            margins.map(|(a, b)| f64::from((a - b).abs())).collect::<Vec<_>>()
+        });
+        let apart: Vec<f64> = apart.collect();
+        let accuracy = |ensemble| {
+            let margins = Margins::new(Candidate::Full(ensemble), &unseen).unwrap();
+            margins.curve(10, 500, 1).unwrap().accuracy(10).value
+        };
+        (apart.iter().sum::<f64>() / apart.len() as f64, accuracy(&ours), accuracy(&theirs))
+    }
+
+    #[test]
+    fn both_trainers_agree_on_the_published_method() {
+        let settings = Settings { rounds: 30, ..Settings::paper() };
+        for counts in [[2_000, 2_000, 2_000], [2_000, 500, 1_000]] {
+            let (apart, ours, theirs) = compare(&counts, &settings);
+            eprintln!("{counts:?}: margins {apart:.2e} nats apart on average, accuracies {ours:.3} and {theirs:.3}");
+            assert!(apart < 0.05, "{apart}");
+            assert!((ours - theirs).abs() < 0.01, "{ours} {theirs}");
+        }
+    }
+
+    #[test]
+    fn xgboost_refuses_multi_output_trees() {
+        let settings = Settings { engine: Engine::Xgboost, ..quick() };
+        let error = train(&synthetic::dataset(&[50, 50], 12), &settings).unwrap_err();
+        assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains("--leaves one"), "{error}");
+    }
+}
