@@ -1,7 +1,7 @@
 //! A table fork: four tines on a hollowed head, a neck that rises from it, a handle that widens and droops.
 
 use super::shape::{Shape, bar, curve, rectangle};
-use super::{Form, Proportions};
+use super::{contour::Form, proportions::Proportions};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 

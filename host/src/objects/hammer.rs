@@ -1,7 +1,7 @@
 //! A claw hammer, lying on its side: a round face, a cheek with the handle's eye, a split and curved claw.
 
 use super::shape::{Shape, bar, below, cuboid, curve, cylinder, rod};
-use super::{Form, Proportions};
+use super::{contour::Form, proportions::Proportions};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 

@@ -6,6 +6,7 @@
 
 mod bowl;
 mod camera;
+mod contour;
 mod fork;
 mod hammer;
 mod mouse;
@@ -18,26 +19,10 @@ mod winebottle;
 mod wristwatch;
 
 use crate::error::{Error, Result};
-use crate::mesh::{Mesh, Object};
-use fidget_core::context::Tree;
-use glam::Vec3;
+use crate::mesh::Object;
+use contour::{Form, mesh};
 use proportions::Proportions;
 use rayon::prelude::*;
-use shape::Shape;
-
-/// An implicit shape, where it is, and how finely it is to be meshed.
-struct Form {
-    /// Negative inside.
-    shape: Shape,
-    /// The corners of a box that holds it, in centimetres.
-    bounds: [Vec3; 2],
-    /// How many of the meshing's smallest cells go along the longest side of `bounds`: enough that the thinnest feature
-    /// is three of them thick.
-    cells: f32,
-}
-
-/// The depth of the octree in which shapes are meshed.
-const DEPTH: u8 = 9;
 
 /// The built-in objects' names and shapes, in the order in which [`builtin`] gives them.
 const KINDS: [(&str, fn(&mut Proportions) -> Form); 10] = [
@@ -91,28 +76,6 @@ fn kind(name: &str) -> Result<fn(&mut Proportions) -> Form> {
     KINDS.iter().find(|kind| kind.0 == name).map(|kind| kind.1).ok_or_else(|| {
         Error::argument(format!("no built-in object \"{name}\""), format!("Choose one of {}.", names().join(", ")))
     })
-}
-
-/// Meshes a form in one thread, so that the order of vertices and triangles is always the same.
-fn mesh(form: &Form) -> Mesh {
-    let centre = (form.bounds[0] + form.bounds[1]) / 2.0;
-    // The mesher works in a cube of 2^DEPTH cells a side, of which the bounds fill only a part. It merges cells as long
-    // as the surface stays within about a thousandth of that cube, so flat parts get large triangles.
-    let side = (form.bounds[1] - form.bounds[0]).max_element();
-    let reach = side / form.cells * f32::from(1_u16 << DEPTH) / 2.0;
-    let (x, y, z) = Tree::axes();
-    let tree = form.shape.0.remap_xyz(x * reach + centre.x, y * reach + centre.y, z * reach + centre.z) / reach;
-    let settings = fidget_mesh::Settings { depth: DEPTH, threads: None, ..Default::default() };
-    // Neither can fail: the shapes have no variables but x, y and z, and nobody cancels.
-    let Ok(shape) = fidget_core::vm::VmShape::from(tree).try_into() else { return Mesh::default() };
-    let Some(octree) = fidget_mesh::Octree::build(&shape, &settings) else { return Mesh::default() };
-    let contoured = octree.walk_dual();
-    let place = |v: [f32; 3]| (Vec3::from(v) * reach + centre).to_array();
-    let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
-    Mesh {
-        vertices: contoured.vertices.iter().map(|v| place([v.x, v.y, v.z])).collect(),
-        triangles: contoured.triangles.iter().map(|t| [index(t.x), index(t.y), index(t.z)]).collect(),
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A computer mouse: a domed body with two buttons, the seams around them, a wheel, and two keys for the thumb.
 
 use super::shape::{Shape, bar, cuboid, cylinder, ellipsoid, rectangle};
-use super::{Form, Proportions};
+use super::{contour::Form, proportions::Proportions};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 
@@ -49,7 +49,7 @@ pub(super) fn form(p: &mut Proportions) -> Form {
     let side = half_width * 0.94;
     let keys = key.moved(Vec3::new(1.35, side, 1.75)) + &key.moved(Vec3::new(-0.75, side, 1.8));
     Form {
-        shape: (body - &seams).joined(&keys, 0.05).carved(&slot, 0.15) + &tyre,
+        shape: body.carved(&seams, 0.12).joined(&keys, 0.1).carved(&slot, 0.15) + &tyre,
         bounds: [
             Vec3::new(-half_length, -half_width - 0.2, 0.0),
             Vec3::new(half_length, half_width + 0.2, height + 0.6),

@@ -1,7 +1,7 @@
 //! A Gem paper clip: one wire, three bends.
 
 use super::shape::{Shape, below, rod, torus};
-use super::{Form, Proportions};
+use super::{contour::Form, proportions::Proportions};
 use glam::Vec3;
 
 /// A half circle of wire about (`x`, `y`), on its side towards `sign`·x.

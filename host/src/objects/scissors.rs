@@ -1,7 +1,7 @@
 //! A pair of household scissors, half open: two blades that cross at a screw, two finger rings of different size.
 
 use super::shape::{Shape, bar, below, cuboid, cylinder, ellipse};
-use super::{Form, Proportions};
+use super::{contour::Form, proportions::Proportions};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 

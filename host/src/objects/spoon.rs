@@ -1,7 +1,7 @@
 //! A soup spoon: an egg-shaped hollow bowl, a narrow neck that rises from it, a handle that widens and droops.
 
 use super::shape::{bar, curve, ellipse};
-use super::{Form, Proportions};
+use super::{contour::Form, proportions::Proportions};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 

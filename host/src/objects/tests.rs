@@ -1,4 +1,6 @@
 use super::*;
+use crate::mesh::Mesh;
+use glam::Vec3;
 use std::collections::HashMap;
 
 /// The signed volume, in cubic centimetres: positive if the triangles are anticlockwise seen from outside.

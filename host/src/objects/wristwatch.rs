@@ -1,14 +1,14 @@
 //! A wristwatch, its strap closed as around a wrist: case, bezel, dial with hands and hour marks, crown, lugs, buckle.
 
 use super::shape::{Shape, cuboid, curve, cylinder, ellipse, rod, torus};
-use super::{Form, Proportions};
+use super::{contour::Form, proportions::Proportions};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 
 pub(super) fn form(p: &mut Proportions) -> Form {
     let radius = p.within(2.0, 0.15);
     let half_height = p.within(0.48, 0.15);
-    let wrist = Vec2::new(p.within(3.1, 0.12), p.within(2.65, 0.12));
+    let wrist = Vec2::new(radius * p.within(1.58, 0.08), p.within(2.75, 0.12));
     let strap_width = p.within(1.0, 0.1);
     let strap = p.within(0.15, 0.12);
     let crown = p.about(0.33);
@@ -51,12 +51,12 @@ pub(super) fn form(p: &mut Proportions) -> Form {
     let knob =
         (knob + &cylinder(crown * 0.5, 0.5, 0.05)).in_axes(x.clone(), z.clone() - top, y.clone() + radius + 0.26);
 
-    let lug = rod(
-        Vec3::new(radius * 0.72, strap_width + 0.16, top + 0.05),
-        Vec3::new(radius + 0.42, strap_width + 0.16, top - 0.5),
-        0.26,
-        0.17,
-    );
+    // The lugs reach down to the strap, where a bar holds it.
+    let out = radius + 0.22;
+    let down = wrist.y * (1.0 - (out / wrist.x).powi(2)).sqrt() + 0.08;
+    let side = strap_width + 0.12;
+    let lug = rod(Vec3::new(radius * 0.78, side, top), Vec3::new(out, side, down), 0.3, 0.2);
+    let lug = lug + &rod(Vec3::new(out, 0.0, down), Vec3::new(out, side, down), 0.12, 0.12);
     let lugs = lug.twice_x().twice_y();
     let buckle = cuboid(Vec3::new(0.55, strap_width * 0.78 + 0.24, 0.16), 0.1)
         - &cuboid(Vec3::new(0.36, strap_width * 0.78 + 0.05, 0.5), 0.05);
