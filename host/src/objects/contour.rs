@@ -22,12 +22,32 @@ pub(super) struct Form {
 const DEPTH: u8 = 9;
 
 /// Meshes a form in one thread, so that the order of vertices and triangles is always the same.
+///
+/// Where two sheets pass through one cell, dual contouring may join them in an edge of four triangles. That depends on
+/// where the cells happen to lie, so a mesh that is not closed is made again with cells a hundredth larger.
 pub(super) fn mesh(form: &Form) -> Mesh {
+    const ATTEMPTS: u8 = 12;
+    (0..ATTEMPTS)
+        .map(|attempt| contour(form, form.cells * (1.0 - 0.0117 * f32::from(attempt))))
+        .find(is_closed)
+        .unwrap_or_default()
+}
+
+/// Whether every edge is used once in each direction.
+fn is_closed(mesh: &Mesh) -> bool {
+    let mut edges: Vec<(u32, u32)> = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
+    let mut opposites: Vec<(u32, u32)> = edges.iter().map(|&(a, b)| (b, a)).collect();
+    edges.sort_unstable();
+    opposites.sort_unstable();
+    edges == opposites && edges.windows(2).all(|pair| pair[0] != pair[1])
+}
+
+fn contour(form: &Form, cells: f32) -> Mesh {
     let centre = (form.bounds[0] + form.bounds[1]) / 2.0;
     // The mesher works in a cube of 2^DEPTH cells a side, of which the bounds fill only a part. It merges cells as long
     // as the surface stays within about a thousandth of that cube, so flat parts get large triangles.
     let side = (form.bounds[1] - form.bounds[0]).max_element();
-    let reach = side / form.cells * f32::from(1_u16 << DEPTH) / 2.0;
+    let reach = side / cells * f32::from(1_u16 << DEPTH) / 2.0;
     let (x, y, z) = Tree::axes();
     let tree = form.shape.0.remap_xyz(x * reach + centre.x, y * reach + centre.y, z * reach + centre.z) / reach;
     let shape = VmShape::from(tree);

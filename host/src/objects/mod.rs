@@ -24,8 +24,11 @@ use contour::{Form, mesh};
 use proportions::Proportions;
 use rayon::prelude::*;
 
+/// A name, and the shape that proportions give.
+type Kind = (&'static str, fn(&mut Proportions) -> Form);
+
 /// The built-in objects' names and shapes, in the order in which [`builtin`] gives them.
-const KINDS: [(&str, fn(&mut Proportions) -> Form); 10] = [
+const KINDS: [Kind; 10] = [
     ("bowl", bowl::form),
     ("camera", camera::form),
     ("paperclip", paperclip::form),
@@ -45,12 +48,17 @@ pub fn names() -> [&'static str; 10] {
 
 /// The ten built-in objects: closed, their triangles anticlockwise seen from outside, in centimetres with z up.
 ///
-/// The same meshes on any number of threads. About a second of work.
+/// The same meshes on any number of threads. A few seconds of work for one thread.
 pub fn builtin() -> Vec<Object> {
-    KINDS
-        .into_par_iter()
-        .map(|(name, form)| Object { name: name.into(), mesh: mesh(&form(&mut Proportions::canonical())) })
-        .collect()
+    make_all(&KINDS, None)
+}
+
+/// The built-in object `name`, as [`builtin`] makes it.
+///
+/// # Errors
+/// [`Error::Argument`] if there is no such object.
+pub fn one(name: &str) -> Result<Object> {
+    Ok(make_one(&kind(name)?, None))
 }
 
 /// Another object of the kind `name`: its lengths, radii, curvatures and angles each vary by up to a fifth or so. The
@@ -59,21 +67,29 @@ pub fn builtin() -> Vec<Object> {
 /// # Errors
 /// [`Error::Argument`] if there is no such kind.
 pub fn varied(name: &str, seed: u64) -> Result<Object> {
-    let form = kind(name)?;
-    Ok(Object { name: name.into(), mesh: mesh(&form(&mut Proportions::varied(seed))) })
+    Ok(make_one(&kind(name)?, Some(seed)))
 }
 
-/// The built-in object `name`, as [`builtin`] makes it.
+/// The objects `names`, in that order: canonical, or with a seed [`varied`].
 ///
 /// # Errors
-/// [`Error::Argument`] if there is no such object.
-pub fn one(name: &str) -> Result<Object> {
-    let form = kind(name)?;
-    Ok(Object { name: name.into(), mesh: mesh(&form(&mut Proportions::canonical())) })
+/// [`Error::Argument`] if there is no object of one of the names.
+pub fn make(names: &[&str], seed: Option<u64>) -> Result<Vec<Object>> {
+    let kinds = names.iter().map(|name| kind(name)).collect::<Result<Vec<_>>>()?;
+    Ok(make_all(&kinds, seed))
 }
 
-fn kind(name: &str) -> Result<fn(&mut Proportions) -> Form> {
-    KINDS.iter().find(|kind| kind.0 == name).map(|kind| kind.1).ok_or_else(|| {
+fn make_all(kinds: &[Kind], seed: Option<u64>) -> Vec<Object> {
+    kinds.par_iter().map(|kind| make_one(kind, seed)).collect()
+}
+
+fn make_one(&(name, form): &Kind, seed: Option<u64>) -> Object {
+    let mut proportions = seed.map_or(Proportions::canonical(), Proportions::varied);
+    Object { name: name.into(), mesh: mesh(&form(&mut proportions)) }
+}
+
+fn kind(name: &str) -> Result<Kind> {
+    KINDS.into_iter().find(|kind| kind.0 == name).ok_or_else(|| {
         Error::argument(format!("no built-in object \"{name}\""), format!("Choose one of {}.", names().join(", ")))
     })
 }

@@ -30,7 +30,9 @@ impl Picture {
     /// Puts a rendered mesh with its upper left corner at (`left`, `top`).
     pub(super) fn draw(&mut self, raster: &Raster, left: u32, top: u32) {
         for (i, &(light, coverage)) in (0..).zip(&raster.pixels) {
-            if let Some(pixel) = self.at(left + i % raster.size, top + i / raster.size) {
+            if coverage > 0.0
+                && let Some(pixel) = self.at(left + i % raster.size, top + i / raster.size)
+            {
                 let [r, g, b] = tone(light);
                 *pixel = [r, g, b, (coverage * 255.0).round() as u8];
             }

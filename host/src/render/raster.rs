@@ -134,7 +134,9 @@ fn openness(nearest: &[(f32, Vec3)], wide: u32, x: u32, y: u32, depth: f32) -> f
     let mut hidden = 0.0;
     let mut count = 0.0;
     for radius in [wide as f32 * 0.006, wide as f32 * 0.016] {
-        for (dx, dy) in [(1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.7, -0.7), (0.0, -1.0), (0.7, -0.7)] {
+        for (dx, dy) in
+            [(1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.7, -0.7), (0.0, -1.0), (0.7, -0.7)]
+        {
             let (nx, ny) = (x as f32 + dx * radius, y as f32 + dy * radius);
             count += 1.0;
             if nx >= 0.0 && ny >= 0.0 && nx < wide as f32 && ny < wide as f32 {
