@@ -117,6 +117,14 @@ impl Error {
         Self::Argument { what: what.into(), fix: fix.into() }
     }
 
+    /// Says which file wrong data came from; other errors stay as they are.
+    pub fn in_file(self, path: impl AsRef<Path>) -> Self {
+        match self {
+            Self::Data { what, fix } => Self::file(path, what, fix),
+            other => other,
+        }
+    }
+
     /// The program's exit code: 1 for bad input, 2 for bad arguments, 0 when the reader of stdout went away.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -1,8 +1,101 @@
-use palpate::Result;
+use palpate::compile::{self, Layout, Leaf, Settings};
+use palpate::ensemble::Ensemble;
+use palpate::{Result, output};
+use std::path::PathBuf;
 
+/// Compile an ensemble to the bytes that the chip reads.
 #[derive(clap::Args)]
-pub(crate) struct Arguments {}
+#[command(after_help = "\
+Leaves:
+  i16   two bytes a value: verdicts as the full model's (the default)
+  i8    one byte a value: half the size, margins within a few hundredths of a nat
+  f32   four bytes a value, added as the trainer adds them: margins bit for bit
 
-pub(crate) fn run(_: Arguments) -> Result<()> {
-    Ok(())
+Examples:
+  palpate export ensemble.json -o model.palpate
+  palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
+  palpate export ensemble.json -o strict.palpate --error-rate 0.001 --max-touches 500")]
+pub(crate) struct Arguments {
+    /// Ensemble that `palpate train` saved
+    ensemble: PathBuf,
+    /// Where to write the model
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// What leaves are stored as
+    #[arg(long, value_parser = leaf, default_value = "i16", value_name = "i8|i16|f32")]
+    leaf: Leaf,
+    /// How trees are laid out; auto takes the least bytes times instructions
+    #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid")]
+    layout: LayoutChoice,
+    /// The error rate at which recognisers stop unless told otherwise
+    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    error_rate: f64,
+    /// The touches after which they give up
+    #[arg(long, default_value_t = 200, value_name = "N")]
+    max_touches: u32,
+    /// Print what was exported as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone)]
+struct LayoutChoice(Option<Layout>);
+
+#[derive(serde::Serialize)]
+struct Exported {
+    bytes: usize,
+    layout: &'static str,
+    leaf: &'static str,
+    trees: usize,
+    splits: usize,
+    leaves: usize,
+    margin_error: f32,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let ensemble = Ensemble::load(&arguments.ensemble)?;
+    let settings = Settings {
+        leaf: arguments.leaf,
+        layout: arguments.layout.0,
+        error_rate: arguments.error_rate,
+        max_touches: arguments.max_touches,
+        ..Settings::default()
+    };
+    let compiled = compile::compile(&ensemble, &settings).map_err(|error| error.in_file(&arguments.ensemble))?;
+    output::write_bytes(&arguments.output, &compiled.bytes)?;
+    let exported = Exported {
+        bytes: compiled.bytes.len(),
+        layout: compiled.layout.name(),
+        leaf: settings.leaf.name(),
+        trees: ensemble.trees.len(),
+        splits: compiled.splits,
+        leaves: compiled.leaves,
+        margin_error: compiled.margin_error,
+    };
+    if arguments.json {
+        return output::print_json(&exported);
+    }
+    output::print(&format!(
+        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}), margins within {:.2e} nats\n",
+        arguments.output.display(),
+        exported.bytes,
+        exported.trees,
+        exported.splits,
+        exported.leaves,
+        exported.layout,
+        exported.leaf,
+        exported.margin_error,
+    ))
+}
+
+fn leaf(name: &str) -> Result<Leaf, String> {
+    Leaf::ALL.iter().copied().find(|leaf| leaf.name() == name).ok_or_else(|| "use one of i8, i16, f32".to_owned())
+}
+
+fn layout(name: &str) -> Result<LayoutChoice, String> {
+    if name == "auto" {
+        return Ok(LayoutChoice(None));
+    }
+    let layout = Layout::ALL.iter().copied().find(|layout| layout.name() == name);
+    layout.map(|layout| LayoutChoice(Some(layout))).ok_or_else(|| "use one of auto, compact, complete, grid".to_owned())
 }

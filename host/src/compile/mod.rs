@@ -7,11 +7,13 @@
 
 mod axes;
 mod cells;
+mod file;
 mod forest;
 mod layout;
 mod quantise;
 mod write;
 
+pub use file::CompiledFile;
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 
 use crate::ensemble::Ensemble;
