@@ -15,7 +15,7 @@ Presets:
 Examples:
   palpate train data -o ensemble.json
   palpate train data -o paper.json --preset paper
-  palpate train data -o small.json --rounds 40 --depth 5 --bins 64
+  palpate train data -o small.json --rounds 20 --depth 5
   palpate train data -o robust.json --noise 5ms")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
@@ -33,13 +33,13 @@ pub(crate) struct Arguments {
     /// preset's]
     #[arg(long, value_enum)]
     leaves: Option<Leaves>,
-    /// Boosting rounds [default: the preset's; compact 60, paper 100]
+    /// Boosting rounds [default: the preset's; compact 30, paper 100]
     #[arg(long)]
     rounds: Option<usize>,
     /// The most splits between root and leaf [default: the preset's; 6]
     #[arg(long)]
     depth: Option<usize>,
-    /// The share of each tree that is added [default: the preset's; compact 0.15, paper 0.3]
+    /// The share of each tree that is added [default: the preset's; 0.3]
     #[arg(long)]
     eta: Option<f64>,
     /// The least sum of second derivatives in a leaf [default: the preset's; compact 30, paper 1]
