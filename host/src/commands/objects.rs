@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let made = objects::make(&names, arguments.varied)?;
     let written = made.iter().map(|object| write(object, &arguments)).collect::<Result<Vec<_>>>()?;
     if let Some(picture) = &arguments.picture {
-        output::write_bytes(picture, &render::sheet(&made, 1400))?;
+        output::write_bytes(picture, &render::sheet(&made, 1200))?;
     }
     if arguments.json {
         return output::print_json(&written);

@@ -81,7 +81,7 @@ impl Picture {
 /// The colour of a brightness from 0 to 1.
 fn tone(light: f32) -> [u8; 3] {
     // In steps that the eye does not see and that compress to half the size.
-    let t = (light.clamp(0.0, 1.0) * 96.0).round() / 48.0;
+    let t = (light.clamp(0.0, 1.0) * 64.0).round() / 32.0;
     let [dark, middle, bright] = TONES;
     let (from, to, t) = if t < 1.0 { (dark, middle, t) } else { (middle, bright, t - 1.0) };
     std::array::from_fn(|i| (from[i] + (to[i] - from[i]) * t).round() as u8)

@@ -53,3 +53,10 @@ fn meshes_without_extent_give_an_empty_picture_and_no_objects_an_empty_sheet() {
     }
     assert!(sheet(&[], 100).len() < 200);
 }
+
+#[test]
+fn thumbnails_are_small_enough_to_embed_ten_of_them_in_a_page() {
+    let camera = objects::one("camera").unwrap();
+    let bytes = thumbnail(&camera.mesh, 160).len();
+    assert!(bytes < 16_000, "{bytes} bytes");
+}
