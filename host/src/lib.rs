@@ -35,5 +35,6 @@ pub mod sweep;
 #[cfg(test)]
 mod synthetic;
 pub mod train;
+pub mod tune;
 
 pub use error::{Error, Result};

@@ -53,8 +53,12 @@ pub struct Settings {
     pub eta: f64,
     /// `min_child_weight`: the least sum of second derivatives in a leaf.
     pub min_child_weight: f64,
-    /// `max_bin`: the most bins of a feature's histogram; at most `bins − 1` different thresholds a feature.
+    /// `max_bin`: the most bins of a feature's histogram: at most `bins − 1` different thresholds a feature, and one more
+    /// where contacts are missing.
     pub bins: usize,
+    /// Bins of each feature, at quantiles, if they are to differ: values are rounded down to the lower edge of their bin
+    /// before training, so that no feature has more thresholds than that. For models that are compiled to a table.
+    pub feature_bins: Option<Vec<usize>>,
     /// Standard deviation in microseconds of the Gaussian noise that is added to contact times before training.
     pub noise: f64,
     /// Seed of the noise.
@@ -76,6 +80,7 @@ impl Settings {
             eta: 0.3,
             min_child_weight: 1.0,
             bins: 256,
+            feature_bins: None,
             noise: 0.0,
             seed: 1,
             threads: None,
@@ -183,6 +188,11 @@ fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
     if !(2..=65_536).contains(&settings.bins) {
         return range("--bins", "2 to 65536");
     }
+    if let Some(bins) = &settings.feature_bins
+        && (bins.len() != settings.descriptor.feature_count() || bins.iter().any(|bins| !(2..=65_536).contains(bins)))
+    {
+        return range("--bins", "one number from 2 to 65536 for all features, or one for each");
+    }
     if !(settings.noise >= 0.0 && settings.noise.is_finite()) {
         return range("--noise", "a duration of at least 0");
     }
@@ -232,6 +242,10 @@ impl Rows {
             let rows: Vec<Vec<f32>> = touches.par_iter().map(|touch| feature_row(descriptor, touch)).collect();
             rows.into_iter().flatten()
         });
+        let mut features: Vec<f32> = features.collect();
+        for (column, &bins) in settings.feature_bins.iter().flatten().enumerate() {
+            round_down(&mut features, column, descriptor.feature_count(), bins);
+        }
         let per_touch = |value: fn(usize, usize, usize) -> f32| {
             let (classes, total) = (objects.len(), dataset.len());
             let share = |(label, count)| std::iter::repeat_n(value(label, count * classes, total), count);
@@ -239,7 +253,7 @@ impl Rows {
         };
         let equal = objects.windows(2).all(|pair| pair[0].touches.len() == pair[1].touches.len());
         Self {
-            features: features.collect(),
+            features,
             labels: per_touch(|label, _, _| label as f32),
             weights: (!equal).then(|| per_touch(|_, expected, total| (total as f64 / expected as f64) as f32)),
             columns: descriptor.feature_count(),
@@ -253,6 +267,19 @@ impl Rows {
             Some(weights) => matrix.with_weights(&weights),
             None => Ok(matrix),
         }
+    }
+}
+
+/// Rounds a column's values down to the edges of `bins` bins that hold equally many of them. Missing values stay.
+fn round_down(features: &mut [f32], column: usize, columns: usize, bins: usize) {
+    let mut values: Vec<f32> =
+        features.iter().skip(column).step_by(columns).copied().filter(|value| !value.is_nan()).collect();
+    values.sort_unstable_by(f32::total_cmp);
+    let mut edges: Vec<f32> = (0..bins).filter_map(|bin| values.get(bin * values.len() / bins)).copied().collect();
+    edges.dedup();
+    for value in features.iter_mut().skip(column).step_by(columns).filter(|value| !value.is_nan()) {
+        // The first edge is the smallest value, so there is always one at or below.
+        *value = edges[edges.partition_point(|edge| *edge <= *value).max(1) - 1];
     }
 }
 

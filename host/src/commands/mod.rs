@@ -40,6 +40,8 @@ commands! {
     Recognize => recognize,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
+    /// Find the best model that fits a chip
+    Tune => tune,
     /// Hold a compiled model against its ensemble
     Parity => parity,
 }

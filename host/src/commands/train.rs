@@ -16,6 +16,7 @@ Examples:
   palpate train data -o ensemble.json
   palpate train data -o paper.json --preset paper
   palpate train data -o small.json --rounds 20 --depth 5
+  palpate train data -o table.json --bins 64,16     few thresholds: compiles to a small, very fast table
   palpate train data -o robust.json --noise 5ms")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
@@ -45,9 +46,9 @@ pub(crate) struct Arguments {
     /// The least sum of second derivatives in a leaf [default: the preset's; compact 30, paper 1]
     #[arg(long, value_name = "WEIGHT")]
     min_child_weight: Option<f64>,
-    /// The most bins of a feature's histogram [default: the preset's; 256]
-    #[arg(long)]
-    bins: Option<usize>,
+    /// The most bins of a feature's histogram, for all features or for each [default: the preset's; 256]
+    #[arg(long, value_delimiter = ',', value_name = "BINS[,BINS…]")]
+    bins: Vec<usize>,
     /// Train for noisy contact times: standard deviation, such as 5ms [default: none]
     #[arg(long, value_parser = microseconds, value_name = "DURATION")]
     noise: Option<f64>,
@@ -142,7 +143,8 @@ impl Arguments {
             depth: self.depth.unwrap_or(preset.depth),
             eta: self.eta.unwrap_or(preset.eta),
             min_child_weight: self.min_child_weight.unwrap_or(preset.min_child_weight),
-            bins: self.bins.unwrap_or(preset.bins),
+            bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
+            feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
             noise: self.noise.unwrap_or(preset.noise),
             seed: self.seed,
             threads: self.threads,
@@ -154,7 +156,7 @@ impl Arguments {
     }
 }
 
-fn descriptor(name: &str) -> Result<Descriptor, String> {
+pub(super) fn descriptor(name: &str) -> Result<Descriptor, String> {
     let known = Descriptor::ALL.map(Descriptor::name).join(", ");
     Descriptor::from_name(name).ok_or_else(|| format!("use one of {known}"))
 }

@@ -73,6 +73,8 @@ pub struct Compiled {
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
+    /// About how many instructions a touch takes on a Cortex-M4, by a model of the evaluator.
+    pub instructions: u64,
 }
 
 /// Compiles an ensemble.
@@ -104,7 +106,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
             "Train fewer trees, or trees with fewer splits.",
         ));
     };
-    let margin_error = parts.margin_error;
+    let (margin_error, instructions) = (parts.margin_error, parts.instructions);
     let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts)?;
-    Ok(Compiled { bytes, splits: forest.splits(), leaves: forest.leaves(), margin_error, layout })
+    Ok(Compiled { bytes, splits: forest.splits(), leaves: forest.leaves(), margin_error, layout, instructions })
 }

@@ -68,12 +68,29 @@ fn settings_out_of_range_are_argument_errors() {
         (Settings { eta: f64::NAN, ..quick() }, "--eta"),
         (Settings { min_child_weight: -1.0, ..quick() }, "--min-child-weight"),
         (Settings { bins: 1, ..quick() }, "--bins"),
+        (Settings { feature_bins: Some(vec![9]), ..quick() }, "--bins"),
+        (Settings { feature_bins: Some(vec![9, 1]), ..quick() }, "--bins"),
         (Settings { noise: f64::INFINITY, ..quick() }, "--noise"),
         (Settings { threads: Some(0), ..quick() }, "thread"),
     ] {
         let error = train(&dataset, &settings).unwrap_err();
         assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains(option), "{error}");
     }
+}
+
+#[test]
+fn no_feature_has_more_thresholds_than_its_bins_leave() {
+    let settings = Settings { rounds: 20, feature_bins: Some(vec![12, 5]), ..quick() };
+    let ensemble = train(&synthetic::dataset(&[2_000, 2_000], 7), &settings).unwrap();
+    let mut thresholds = [const { std::collections::BTreeSet::new() }; 2];
+    for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
+        if let Node::Split { feature, threshold, .. } = node {
+            thresholds[*feature].insert(threshold.to_bits());
+        }
+    }
+    let [curvature, slope] = thresholds.map(|set| set.len());
+    // One threshold fewer than bins, and one that tells missing values from all others.
+    assert!((6..=12).contains(&curvature) && (2..=5).contains(&slope), "{curvature} {slope}");
 }
 
 #[test]

@@ -1,0 +1,135 @@
+use palpate::dataset::Dataset;
+use palpate::tune::{self, Row, Settings, Tuned};
+use palpate::{Result, output};
+use palpate_shared::Descriptor;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// Find the best model that fits a chip.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Trains a family of ensembles, compiles each in several ways, and keeps the model that needs the fewest touches within
+the limits. Chosen on touches held out from training, measured on others again.
+
+Examples:
+  palpate tune data --max-bytes 16K -o model.palpate
+  palpate tune data --max-bytes 16K --max-instructions 500 -o fast.palpate
+  palpate tune data --json")]
+pub(crate) struct Arguments {
+    /// Directory that `palpate capture` filled
+    directory: PathBuf,
+    /// Where to write the best model that fits
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Where to save its ensemble
+    #[arg(long, value_name = "FILE")]
+    ensemble: Option<PathBuf>,
+    /// The most bytes of the model, such as 16K
+    #[arg(long, value_parser = bytes, value_name = "BYTES")]
+    max_bytes: Option<usize>,
+    /// The most instructions a touch on a Cortex-M4
+    #[arg(long, value_name = "COUNT")]
+    max_instructions: Option<u64>,
+    /// Which features a touch is turned into
+    #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "NAME")]
+    descriptor: Descriptor,
+    /// Stop touching when the posterior passes one less this
+    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    error_rate: f64,
+    /// Groups of touches, and sequences, to draw at random for each object
+    #[arg(long, default_value_t = 1000)]
+    groups: usize,
+    /// Seed of the split and of the drawing
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print all models of the family, and the choice, as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let dataset = Dataset::read(&arguments.directory)?;
+    let tuned = tune::tune(
+        &dataset,
+        &Settings {
+            descriptor: arguments.descriptor,
+            max_bytes: arguments.max_bytes,
+            max_instructions: arguments.max_instructions,
+            error_rate: arguments.error_rate,
+            groups: arguments.groups,
+            seed: arguments.seed,
+        },
+    )?;
+    if let Some(path) = &arguments.ensemble {
+        tuned.ensemble.save(path)?;
+    }
+    if let Some(path) = &arguments.output {
+        output::write_bytes(path, &tuned.model)?;
+    }
+    if arguments.json { output::print_json(&tuned) } else { output::print(&table(&tuned)) }
+}
+
+/// The frontier, the choice marked, and what it achieves on touches of its own.
+fn table(tuned: &Tuned) -> String {
+    let mut text = format!(
+        "  {:>6} {:>6} {:>4} {:>9} {:>4} {:>8} {:>7} {:>6} {:>8} {:>8} {:>7} {:>7}\n",
+        "trees", "depth", "eta", "bins", "leaf", "layout", "bytes", "instr.", "at 10", "at 30", "touches", "wrong"
+    );
+    let mut line = |mark: &str, row: &Row| {
+        let accuracy = |at| row.accuracy.get(&at).map_or("–".into(), |share| format!("{:.1} %", 100.0 * share));
+        let number = |number: Option<u64>| number.map_or("–".into(), |number| number.to_string());
+        let bins: Vec<String> = row.recipe.bins.iter().map(ToString::to_string).collect();
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "{mark:1} {:>6} {:>6} {:>4} {:>9} {:>4} {:>8} {:>7} {:>6} {:>8} {:>8} {:>7.1} {:>5.2} %",
+            row.recipe.trees,
+            row.recipe.depth,
+            row.recipe.eta,
+            bins.join("×"),
+            row.leaf.unwrap_or("full"),
+            row.layout.unwrap_or("–"),
+            number(row.bytes.map(|bytes| bytes as u64)),
+            number(row.instructions),
+            accuracy(10),
+            accuracy(30),
+            row.mean_touches,
+            100.0 * row.error,
+        );
+    };
+    for (index, row) in tuned.rows.iter().enumerate() {
+        if index == tuned.chosen || row.frontier {
+            line(if index == tuned.chosen { "*" } else { "" }, row);
+        }
+    }
+    line("", &tuned.unlimited);
+    let accuracy: Vec<String> =
+        tuned.test.accuracy.iter().map(|(at, share)| format!("{:.1} % at {at}", 100.0 * share)).collect();
+    _ = write!(
+        text,
+        "\n* the best that fits; on touches that did not choose it: {}; stops after {:.1} touches, {:.2} % wrong.\n\
+         Instructions a touch on a Cortex-M4, by the exporter's model of the evaluator. The last line is the full model \
+         without limits.\n",
+        accuracy.join(", "),
+        tuned.test.sequential.mean_touches,
+        100.0 * tuned.test.sequential.error,
+    );
+    text
+}
+
+/// A number of bytes: `16384`, `16K`, `6.5K`, `1M`; K is 1024.
+fn bytes(text: &str) -> Result<usize, String> {
+    let number = text.trim_end_matches(['B', 'b']).trim_end_matches('i');
+    let (number, unit) = match number.trim_end_matches(['K', 'k']) {
+        shorter if shorter.len() < number.len() => (shorter, 1024.0),
+        _ => match number.trim_end_matches('M') {
+            shorter if shorter.len() < number.len() => (shorter, 1024.0 * 1024.0),
+            same => (same, 1.0),
+        },
+    };
+    match number.trim().parse::<f64>() {
+        // Saturates for absurd sizes.
+        Ok(number) if number > 0.0 && number.is_finite() => Ok((number * unit).floor() as usize),
+        _ => Err("give a number of bytes, such as 16384 or 16K".into()),
+    }
+}
