@@ -44,6 +44,8 @@ commands! {
     Tune => tune,
     /// Hold a compiled model against its ensemble
     Parity => parity,
+    /// Remake the whole evaluation: every figure, the limit, speed against error
+    Report => report,
 }
 
 /// Recognise objects by touch: virtual touches, boosted trees, a model of a few kilobytes for a microcontroller.

@@ -139,6 +139,10 @@ pub enum Side {
     Above,
     /// Below it.
     Below,
+    /// Below it, to the right.
+    LowerRight,
+    /// Above it, to the left.
+    UpperLeft,
     /// On it.
     Centre,
 }
@@ -270,7 +274,7 @@ impl Chart {
         let left = tick_width + if self.y_name.is_empty() { 4 } else { 22 };
         let tick_height = if self.upright_names { (self.x.longest() as f64 * CHARACTER) as i32 + 10 } else { 22 };
         let bottom = tick_height + if self.x_name.is_empty() { 4 } else { 20 };
-        let right = if label_width == 0 { 18 } else { (label_width as f64 * CHARACTER) as i32 + 24 };
+        let right = if label_width == 0 { 18 } else { (label_width as f64 * CHARACTER * 1.12) as i32 + 24 };
         let (width, height) = (self.width as i32, self.height as i32);
         let spec = Cartesian2d::<Scale, Scale>::new(
             self.x.clone(),
@@ -401,6 +405,8 @@ fn draw_mark(root: &Root, area: &Plane, frame: &Frame, mark: &Mark) -> Result<()
                 Side::Right => ((x + 6, y), HPos::Left, VPos::Center),
                 Side::Above => ((x, y - 6), HPos::Center, VPos::Bottom),
                 Side::Below => ((x, y + 6), HPos::Center, VPos::Top),
+                Side::LowerRight => ((x + 5, y + 10), HPos::Left, VPos::Center),
+                Side::UpperLeft => ((x - 5, y - 10), HPos::Right, VPos::Center),
                 Side::Centre => ((x, y), HPos::Center, VPos::Center),
             };
             draw_text(root, text, place, h, v, colour, false)

@@ -1,18 +1,35 @@
 //! A page that shows what was measured: figures, tables, and the files behind them.
 //!
 //! [`Page`] is plain data; [`write()`] puts it and everything behind it into a directory. The short page of
-//! `palpate run` is [`short`], the whole evaluation is built by the other modules here, a figure group a file.
+//! `palpate run` is [`short()`], the whole evaluation [`full()`], which the other modules here measure and draw, a figure group a file.
 
+mod cache;
+mod calibration;
 pub mod chart;
 pub mod colour;
+mod context;
+mod cost;
+mod cross_validation;
+mod density;
+mod full;
+mod generalisation;
+mod growth;
 pub mod kinds;
+mod limit;
+mod noise;
+mod objects;
 pub mod page;
+mod published;
 pub mod scale;
+mod sequential;
+mod settings;
 pub mod short;
 pub mod statistics;
 pub mod table;
 
+pub use full::{Written, full};
 pub use page::{Block, Figure, Page, Section};
+pub use settings::Settings;
 pub use short::{Picture, RunMethod, RunResults, short};
 pub use table::{Cell, Data, Table};
 

@@ -196,9 +196,13 @@ mod tests {
         let html = page.html();
         assert_eq!(page.figures().count(), 2);
         assert_eq!(html.matches("<svg ").count(), 3);
-        for part in
-            ["data:image/png;base64,AQID", "65.0 %", "75.0 %", "palpate run builtin --seed 1", "5.6 % of approaches"]
-        {
+        for part in [
+            "data:image/png;base64,AQID",
+            "65.0\u{a0}%",
+            "75.0\u{a0}%",
+            "palpate run builtin --seed 1",
+            "5.6 % of approaches",
+        ] {
             assert!(html.contains(part), "{part}");
         }
     }

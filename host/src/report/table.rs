@@ -43,12 +43,15 @@ impl Cell {
         match *self {
             Self::Text(ref text) => text.clone(),
             Self::Number(value, decimals) => grouped(&finite(value, decimals)),
+            // One measurement has no spread.
+            Self::Spread(value, 0.0, decimals) => finite(value, decimals),
+            Self::PercentSpread(value, 0.0, decimals) => Self::Percent(value, decimals).shown(),
             Self::Spread(value, spread, decimals) => {
                 format!("{} ± {}", finite(value, decimals), finite(spread, decimals))
             }
-            Self::Percent(value, decimals) => format!("{} %", finite(value * 100.0, decimals)),
+            Self::Percent(value, decimals) => format!("{}\u{a0}%", finite(value * 100.0, decimals)),
             Self::PercentSpread(value, spread, decimals) => {
-                format!("{} ± {} %", finite(value * 100.0, decimals), finite(spread * 100.0, decimals))
+                format!("{} ± {}\u{a0}%", finite(value * 100.0, decimals), finite(spread * 100.0, decimals))
             }
             Self::Missing => "–".to_string(),
         }
@@ -186,7 +189,7 @@ mod tests {
     fn numbers_are_shown_for_people() {
         assert_eq!(Cell::Number(1234567.0, 0).shown(), "1\u{202f}234\u{202f}567");
         assert_eq!(Cell::Number(-1234.5, 1).shown(), "\u{2212}1234.5");
-        assert_eq!(Cell::PercentSpread(0.907, 0.025, 1).shown(), "90.7 ± 2.5 %");
+        assert_eq!(Cell::PercentSpread(0.907, 0.025, 1).shown(), "90.7 ± 2.5\u{a0}%");
         assert_eq!(Cell::Number(f64::NAN, 1).shown(), "–");
     }
 }

@@ -1,0 +1,139 @@
+//! Calibration: whether a posterior of nine tenths is right nine times in ten.
+
+use super::colour;
+use super::context::{Context, compiled, opened};
+use super::kinds::{ReliabilityBin, reliability};
+use super::limit::Large;
+use super::page::{Figure, Section};
+use super::statistics::wilson;
+use super::table::{Cell, Data, Table};
+use crate::error::Result;
+use crate::evaluate::{Candidate, Confidence, Margins};
+use serde::{Deserialize, Serialize};
+
+/// Numbers of touches looked at.
+const AT: [usize; 4] = [1, 5, 10, 20];
+const BINS: usize = 10;
+const METHODS: [&str; 2] = ["paper's method", "ours"];
+
+/// What the posteriors were worth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Calibration {
+    /// Groups an object.
+    pub(super) groups: usize,
+    /// For each method, for each number of touches: bins.
+    pub(super) bins: Vec<Vec<Vec<ReliabilityBin>>>,
+    /// For each method, for each number of touches: expected calibration error.
+    pub(super) error: Vec<Vec<f64>>,
+}
+
+/// Tests the first fold's models on the test touches of the large capture.
+pub(super) fn measure(context: &Context, large: &Large) -> Result<Calibration> {
+    let settings = context.settings;
+    let models = context.models()?;
+    let bytes = compiled(&models.ours)?.bytes;
+    let ours = opened(&bytes)?;
+    let groups = if settings.quick { 500 } else { 2_000 };
+    let mut result = Calibration { groups, bins: Vec::new(), error: Vec::new() };
+    for candidate in [Candidate::Full(&models.paper), Candidate::Compiled(&ours)] {
+        let margins = Margins::new(candidate, &large.test)?;
+        let bins = AT.iter().map(|&at| Ok(binned(&margins.confidences(at, groups, settings.seed)?)));
+        let bins = bins.collect::<Result<Vec<_>>>()?;
+        result.error.push(bins.iter().map(|bins| expected_error(bins)).collect());
+        result.bins.push(bins);
+    }
+    Ok(result)
+}
+
+/// Verdicts gathered into bins of equal width; empty bins are left out.
+fn binned(confidences: &[Confidence]) -> Vec<ReliabilityBin> {
+    let mut sums = [(0.0, 0.0, 0.0); BINS];
+    for confidence in confidences {
+        let sum = &mut sums[((confidence.posterior * BINS as f64) as usize).min(BINS - 1)];
+        sum.0 += 1.0;
+        sum.1 += confidence.posterior;
+        sum.2 += f64::from(u8::from(confidence.correct));
+    }
+    let filled = sums.into_iter().filter(|sum| sum.0 > 0.0);
+    filled
+        .map(|(count, posterior, right)| {
+            let (low, high) = wilson(right, count);
+            let share = count / confidences.len() as f64;
+            ReliabilityBin { posterior: posterior / count, right: right / count, low, high, share }
+        })
+        .collect()
+}
+
+/// Naeini and others (2015): the mean distance between posterior and share right, over verdicts.
+fn expected_error(bins: &[ReliabilityBin]) -> f64 {
+    bins.iter().map(|bin| bin.share * (bin.posterior - bin.right).abs()).sum()
+}
+
+/// The figure and the table.
+pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Section> {
+    let mut section = Section::new("calibration", "Calibration");
+    section.text(format!(
+        "Is an object with a posterior of 90 % the right one nine times in ten? {} groups an object from the large capture, \
+         in ten bins of the best object's posterior.",
+        calibration.groups
+    ));
+    let mut panels = Vec::new();
+    let mut data = Data::new(["method", "touches", "posterior", "right", "low", "high", "share of groups"]);
+    for (method, name) in METHODS.iter().enumerate() {
+        let colour = if method == 0 { colour::PAPER } else { colour::OURS };
+        for (index, at) in AT.iter().enumerate() {
+            let bins = &calibration.bins[method][index];
+            let touches = if *at == 1 { "touch" } else { "touches" };
+            let short = if method == 0 { "paper" } else { "ours" };
+            panels.push(reliability(&format!("{short}, {at} {touches}"), bins, colour)?);
+            for bin in bins {
+                let shares =
+                    [bin.posterior, bin.right, bin.low, bin.high, bin.share].map(|value| Cell::Percent(value, 2));
+                data.push([(*name).into(), Cell::count(*at)].into_iter().chain(shares));
+            }
+        }
+    }
+    section.figure(Figure {
+        id: "reliability".into(),
+        title: "Reliability diagrams".into(),
+        caption:
+            "On the dashed line a posterior is what it says; above it the model is too modest, below it too sure. Bars \
+                  are 95 % intervals (Wilson); grey columns show how many of the groups are in each bin."
+                .into(),
+        command: context.settings.command(),
+        panels,
+        data,
+    });
+    let mut data = Data::new(
+        std::iter::once("method".to_string())
+            .chain(AT.iter().map(|at| format!("after {at} {}", if *at == 1 { "touch" } else { "touches" }))),
+    );
+    for (method, name) in METHODS.iter().enumerate() {
+        let errors = calibration.error[method].iter().map(|&error| Cell::Percent(error, 2));
+        data.push(std::iter::once((*name).into()).chain(errors));
+    }
+    section.table(Table {
+        id: "calibration".into(),
+        title: "Expected calibration error".into(),
+        caption: "The mean distance between posterior and share right, over ten bins of equal width.".into(),
+        command: context.settings.command(),
+        data,
+    });
+    Ok(section)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn posteriors_that_keep_their_word_have_no_error() {
+        let confidences: Vec<Confidence> =
+            (0..1000).map(|k| Confidence { posterior: 0.75, correct: k % 4 != 0 }).collect();
+        let bins = binned(&confidences);
+        assert_eq!(bins.len(), 1);
+        assert!(expected_error(&bins) < 1e-9 && bins[0].low < 0.75 && bins[0].high > 0.75);
+        let sure: Vec<Confidence> = (0..10).map(|k| Confidence { posterior: 1.0, correct: k % 2 == 0 }).collect();
+        assert!((expected_error(&binned(&sure)) - 0.5).abs() < 1e-9);
+    }
+}

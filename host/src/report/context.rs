@@ -1,0 +1,189 @@
+//! What the stages of a report share: objects, touches, folds, and the models of the first fold.
+
+use super::cache::Cache;
+use super::settings::Settings;
+use crate::capture::{self, Sampler};
+use crate::dataset::{Dataset, ObjectTouches};
+use crate::ensemble::Ensemble;
+use crate::error::{Error, Result};
+use crate::folds::{self, Split};
+use crate::mesh::Object;
+use crate::scene::Scene;
+use crate::{compile, objects, progress, train};
+use palpate_onboard::Model;
+use palpate_shared::Touch;
+use rayon::prelude::*;
+use std::cell::OnceCell;
+use std::time::Instant;
+
+/// The objects' scenes and names, and what is computed from them once.
+pub(super) struct Context<'a> {
+    pub(super) settings: &'a Settings,
+    pub(super) objects: &'a [Object],
+    pub(super) cache: &'a Cache,
+    scenes: Vec<Scene>,
+    captured: OnceCell<Captured>,
+    first: OnceCell<Split>,
+    models: OnceCell<Models>,
+    kinds: OnceCell<Vec<Vec<Object>>>,
+}
+
+/// The touches that folds are made of, and what they took.
+pub(super) struct Captured {
+    pub(super) data: Dataset,
+    /// Approaches tried, for each object.
+    pub(super) approaches: Vec<u64>,
+    pub(super) seconds: f64,
+}
+
+/// The first fold's ensembles.
+pub(super) struct Models {
+    pub(super) paper: Ensemble,
+    pub(super) ours: Ensemble,
+    pub(super) noise: Ensemble,
+}
+
+/// The noise that our models for noisy sensors are trained with, in microseconds.
+pub(super) const NOISE: f64 = 5_000.0;
+
+impl<'a> Context<'a> {
+    pub(super) fn new(settings: &'a Settings, objects: &'a [Object], cache: &'a Cache) -> Result<Self> {
+        let length = capture::Settings::default().length;
+        let scenes = objects.par_iter().map(|object| Scene::new(&object.mesh, length)).collect::<Result<_>>()?;
+        let (captured, first, models, kinds) = Default::default();
+        Ok(Self { settings, objects, cache, scenes, captured, first, models, kinds })
+    }
+
+    /// The touches that folds are made of.
+    pub(super) fn captured(&self) -> Result<&Captured> {
+        get_or_try(&self.captured, || {
+            let began = Instant::now();
+            let touched = self.touch(self.settings.touches, self.settings.seed)?;
+            let (objects, approaches) = touched.into_iter().unzip();
+            Ok(Captured { data: Dataset { objects }, approaches, seconds: began.elapsed().as_secs_f64() })
+        })
+    }
+
+    /// `count` full touches of each object, and the approaches that they took.
+    pub(super) fn touch(&self, count: usize, seed: u64) -> Result<Vec<(ObjectTouches, u64)>> {
+        let bar = progress::bar("touching", (count * self.objects.len()) as u64);
+        let one = |(object, scene): (&Object, &Scene)| {
+            let touched = touch(scene, &object.name, count, seed);
+            bar.inc(count as u64);
+            touched
+        };
+        self.objects.iter().zip(&self.scenes).map(one).collect()
+    }
+
+    /// Fold `fold`.
+    pub(super) fn fold(&self, fold: usize) -> Result<Split> {
+        folds::fold(&self.captured()?.data, fold, self.settings.folds, self.settings.seed)
+    }
+
+    /// The first fold.
+    pub(super) fn first(&self) -> Result<&Split> {
+        get_or_try(&self.first, || self.fold(0))
+    }
+
+    /// The first fold's ensembles, kept on disk.
+    pub(super) fn models(&self) -> Result<&Models> {
+        get_or_try(&self.models, || {
+            let trained = |name: &str, settings: &train::Settings| -> Result<Ensemble> {
+                let path = self.cache.path(&format!("fold0-{name}"), "ensemble");
+                if let Ok(kept) = Ensemble::load(&path) {
+                    return Ok(kept);
+                }
+                let ensemble = train::train(&self.first()?.train, settings)?;
+                ensemble.save(&path)?;
+                Ok(ensemble)
+            };
+            Ok(Models {
+                paper: trained("paper", &self.paper())?,
+                ours: trained("ours", &self.ours())?,
+                noise: trained("noise", &self.ours_for_noise())?,
+            })
+        })
+    }
+
+    /// Instances of the ten built-in kinds, each sorted by name: the canonical ones first, then others with varied
+    /// proportions, as many as growth and generalisation need.
+    pub(super) fn kinds(&self) -> Result<&[Vec<Object>]> {
+        let settings = self.settings;
+        let grown = settings.growth_objects.iter().copied().max().unwrap_or(0).div_ceil(objects::names().len());
+        let trained = settings.instances.iter().copied().max().unwrap_or(0);
+        let count = grown.max(trained + settings.test_instances);
+        get_or_try(&self.kinds, || {
+            let mut names = objects::names();
+            names.sort_unstable();
+            let is_builtin = self.settings.sources == ["builtin"];
+            let jobs: Vec<(usize, usize)> =
+                (0..count).flat_map(|k| (0..names.len()).map(move |kind| (k, kind))).collect();
+            let bar = progress::bar("making objects", jobs.len() as u64);
+            let made = jobs.into_par_iter().map(|(instance, kind)| {
+                let object = match instance {
+                    0 if is_builtin => self.objects[kind].clone(),
+                    0 => objects::one(names[kind])?,
+                    _ => objects::varied(names[kind], 2_000 + instance as u64)?,
+                };
+                bar.inc(1);
+                Ok(object)
+            });
+            let made: Vec<Object> = made.collect::<Result<_>>()?;
+            Ok(made.chunks(names.len()).map(<[Object]>::to_vec).collect())
+        })
+        .map(Vec::as_slice)
+    }
+
+    /// How the paper's method is trained.
+    pub(super) fn paper(&self) -> train::Settings {
+        train::Settings { rounds: self.settings.paper_rounds, seed: self.settings.seed, ..train::Settings::paper() }
+    }
+
+    /// How ours is trained.
+    pub(super) fn ours(&self) -> train::Settings {
+        train::Settings { seed: self.settings.seed, ..train::Settings::compact() }
+    }
+
+    /// How ours is trained for noise.
+    pub(super) fn ours_for_noise(&self) -> train::Settings {
+        train::Settings { noise: NOISE, ..self.ours() }
+    }
+
+    /// The objects' names.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.objects.iter().map(|object| object.name.clone()).collect()
+    }
+}
+
+/// `count` full touches of a scene, and the approaches that they took.
+///
+/// # Errors
+/// If the object cannot be touched with three fingers.
+pub(super) fn touch(scene: &Scene, name: &str, count: usize, seed: u64) -> Result<(ObjectTouches, u64)> {
+    let settings = capture::Settings { seed, ..capture::Settings::default() };
+    let sampler = Sampler::new(scene, name, &settings);
+    let samples: Vec<(Touch, u64)> =
+        (0..count as u64).into_par_iter().map(|index| sampler.sample(index)).collect::<Result<_>>()?;
+    let approaches = samples.iter().map(|sample| sample.1).sum();
+    let touches = samples.into_iter().map(|sample| sample.0).collect();
+    Ok((ObjectTouches { name: name.into(), touches }, approaches))
+}
+
+/// The bytes of an ensemble compiled with 16-bit leaves: what the chip would run.
+pub(super) fn compiled(ensemble: &Ensemble) -> Result<compile::Compiled> {
+    compile::compile(ensemble, &compile::Settings::default())
+}
+
+fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+    if let Some(value) = cell.get() {
+        return Ok(value);
+    }
+    let value = make()?;
+    Ok(cell.get_or_init(|| value))
+}
+
+/// A compiled model, checked.
+pub(super) fn opened(bytes: &[u8]) -> Result<Model<'_>> {
+    Model::new(bytes)
+        .map_err(|e| Error::data(format!("a model just compiled does not open: {e}"), "Report this as a bug."))
+}

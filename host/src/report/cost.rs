@@ -1,0 +1,315 @@
+//! Speed against error: a family of compiled models, what each costs, and how good it is.
+
+use super::chart::{Chart, Mark, Shape, Side, Stroke};
+use super::colour;
+use super::context::{Context, opened};
+use super::limit::Large;
+use super::page::{Figure, Section};
+use super::scale::{Scale, short_number};
+use super::table::{Cell, Data, Table};
+use crate::compile::{self, Leaf};
+use crate::ensemble::Ensemble;
+use crate::error::Result;
+use crate::evaluate::{Candidate, Margins};
+use crate::train;
+use palpate_onboard::Model;
+use palpate_shared::Touch;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// One compiled model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Member {
+    /// What was trained.
+    pub(super) name: String,
+    /// Whether it is the paper's method.
+    pub(super) paper: bool,
+    /// How leaves are stored.
+    pub(super) leaf: String,
+    /// How the trees are laid out.
+    pub(super) layout: String,
+    /// Size.
+    pub(super) bytes: usize,
+    /// Nanoseconds a touch on this machine.
+    pub(super) nanoseconds: f64,
+    /// Instructions a touch on a Cortex-M4F, from the compiler's model of the evaluator.
+    pub(super) instructions: u64,
+    /// The largest difference to the ensemble's margins over the test touches, in nats.
+    pub(super) margin_error: f64,
+    /// What the model states.
+    pub(super) stated_error: f64,
+    /// Accuracy after ten touches.
+    pub(super) at_10: f64,
+    /// Accuracy after thirty.
+    pub(super) at_30: f64,
+    /// Touches of a fixed number from which on errors stay at or below 1 %.
+    pub(super) to_1_percent: Option<usize>,
+}
+
+/// Instructions on a Cortex-M0+ for each on a Cortex-M4F, as measured for the same coding under emulation.
+const M0_RATIO: f64 = 1.48;
+
+/// Trees, depth and bins of the family.
+const FAMILY: [(usize, usize, usize); 8] =
+    [(120, 6, 256), (60, 6, 256), (40, 5, 256), (30, 5, 64), (30, 4, 64), (20, 4, 32), (12, 4, 32), (8, 3, 16)];
+
+/// Trains, compiles and measures the family.
+pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
+    let settings = context.settings;
+    let first = context.first()?;
+    let touches: Vec<Touch> =
+        first.test.objects.iter().flat_map(|object| object.touches.iter().take(1_000)).copied().collect();
+    let mut members = Vec::new();
+    let mut add =
+        |name: &str, ensemble: &Ensemble, leaves: &[Leaf], layouts: &[Option<compile::Layout>]| -> Result<()> {
+            for &layout in layouts {
+                for &leaf in leaves {
+                    let compiled =
+                        compile::compile(ensemble, &compile::Settings { leaf, layout, ..Default::default() });
+                    // Not every ensemble fits every layout.
+                    let Ok(compiled) = compiled else { continue };
+                    members.push(member(context, large, &touches, name, ensemble, leaf, &compiled)?);
+                }
+            }
+            Ok(())
+        };
+    let models = context.models()?;
+    add("paper's method, 1000 trees", &models.paper, &[Leaf::I16, Leaf::F32], &[None])?;
+    for (rounds, depth, bins) in FAMILY {
+        let mut family = train::Settings { rounds, depth, bins, ..context.ours() };
+        if rounds < 30 {
+            // Few trees have to learn faster.
+            family.eta = 0.3;
+        }
+        let ensemble = train::train(&first.train, &family)?;
+        let name = format!("{rounds} trees, depth {depth}, {bins} bins");
+        let layouts =
+            if settings.quick { vec![None] } else { vec![Some(compile::Layout::Compact), Some(compile::Layout::Grid)] };
+        add(&name, &ensemble, &[Leaf::I8, Leaf::I16], &layouts)?;
+    }
+    Ok(members)
+}
+
+fn member(
+    context: &Context,
+    large: &Large,
+    touches: &[Touch],
+    name: &str,
+    ensemble: &Ensemble,
+    leaf: Leaf,
+    compiled: &compile::Compiled,
+) -> Result<Member> {
+    let settings = context.settings;
+    let model = opened(&compiled.bytes)?;
+    let margins = Margins::new(Candidate::Compiled(&model), &large.test)?;
+    let groups = if settings.quick { 500 } else { 1_500 };
+    let curve = margins.curve(100.min(margins.fewest_touches()), groups, settings.seed)?;
+    Ok(Member {
+        name: name.into(),
+        paper: ensemble.descriptor == palpate_shared::Descriptor::Times,
+        leaf: leaf.name().into(),
+        layout: compiled.layout.name().into(),
+        bytes: compiled.bytes.len(),
+        nanoseconds: nanoseconds(&model, touches),
+        instructions: compiled.instructions,
+        margin_error: margin_error(&model, ensemble, touches),
+        stated_error: f64::from(compiled.margin_error),
+        at_10: curve.accuracy(10).value,
+        at_30: curve.accuracy(30).value,
+        to_1_percent: curve.touches_to_error(0.01),
+    })
+}
+
+/// The least of five means over all touches, on one thread.
+fn nanoseconds(model: &Model<'_>, touches: &[Touch]) -> f64 {
+    let mut margins = vec![0; model.object_count()];
+    let mut best = f64::INFINITY;
+    for _ in 0..5 {
+        let began = Instant::now();
+        for touch in touches {
+            std::hint::black_box(model.margins(std::hint::black_box(touch), &mut margins));
+        }
+        best = best.min(began.elapsed().as_secs_f64() * 1e9 / touches.len().max(1) as f64);
+    }
+    best
+}
+
+/// The largest difference between compiled and full margins, in nats.
+fn margin_error(model: &Model<'_>, ensemble: &Ensemble, touches: &[Touch]) -> f64 {
+    let unit = f64::from(model.unit());
+    let worst = |touch: &Touch| {
+        let mut margins = vec![0; model.object_count()];
+        model.margins(touch, &mut margins);
+        let full = ensemble.margins(touch);
+        let error = |(compiled, full): (&i32, &f32)| (f64::from(*compiled) * unit - f64::from(*full)).abs();
+        margins.iter().zip(&full).map(error).fold(0.0, f64::max)
+    };
+    touches.par_iter().map(worst).reduce(|| 0.0, f64::max)
+}
+
+/// The members that no other beats in both bytes and accuracy, by rising size.
+fn frontier(members: &[Member]) -> Vec<&Member> {
+    let mut by_size: Vec<&Member> = members.iter().collect();
+    by_size.sort_by_key(|member| member.bytes);
+    let mut best = f64::NEG_INFINITY;
+    by_size.retain(|member| {
+        let better = member.at_10 > best;
+        best = best.max(member.at_10);
+        better
+    });
+    by_size
+}
+
+/// The figure and the table.
+pub(super) fn section(context: &Context, members: &[Member]) -> Result<Section> {
+    let mut section = Section::new("cost", "Speed against error");
+    section.text(
+        "A family of models, trained on the first fold and tested on the large capture. Instructions are the export's own \
+         estimate for a Cortex-M4F, from a model of the evaluator (modelled, not measured); on a Cortex-M0+ the same coding \
+         takes about 1.48 times as many. Nanoseconds are of this machine, one thread.",
+    );
+    section.figure(figure(context, members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
+    section.figure(figure(context, members, "cost-time", "nanoseconds a touch, this machine", |m| m.nanoseconds)?);
+    section.table(table(context, members));
+    Ok(section)
+}
+
+fn figure(
+    context: &Context,
+    members: &[Member],
+    id: &str,
+    unit: &str,
+    cost: impl Fn(&Member) -> f64,
+) -> Result<Figure> {
+    let all = || members.iter().map(&cost);
+    let low = members.iter().map(|member| member.at_10).fold(1.0, f64::min);
+    let high = members.iter().map(|member| member.at_10).fold(0.0, f64::max);
+    let x = Scale::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.6);
+    let y = Scale::percent((low * 20.0).floor() / 20.0, ((high + 0.02) * 20.0).ceil() / 20.0);
+    let mut chart = Chart::new(unit, x, "accuracy after 10 touches", y).sized(660, 400);
+    let mut data = Data::new(["model", "leaf", "layout", unit, "accuracy after 10 touches"]);
+    let mut by_cost: Vec<&Member> = members.iter().collect();
+    by_cost.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    let mut best = f64::NEG_INFINITY;
+    let mut steps = Vec::new();
+    for member in &by_cost {
+        if member.at_10 > best {
+            if let Some(&(_, y)) = steps.last() {
+                steps.push((cost(member), y));
+            }
+            steps.push((cost(member), member.at_10));
+            best = member.at_10;
+        }
+    }
+    steps.push((all().fold(0.0, f64::max), best));
+    chart.marks.push(Mark::Line { points: steps.clone(), colour: colour::GREY, stroke: Stroke::Dashed });
+    let mut labelled: Vec<(f64, f64)> = Vec::new();
+    for member in &by_cost {
+        let at = (cost(member), member.at_10);
+        let (colour, shape) = if member.paper { (colour::PAPER, Shape::Ring) } else { (colour::OURS, Shape::Disc) };
+        chart.marks.push(Mark::Dots { points: vec![at], colour, shape });
+        // A label only where there is room for it.
+        let near =
+            |other: &(f64, f64)| (other.0 / at.0).ln().abs() < 0.9 && (other.1 - at.1).abs() < (high - low) * 0.07;
+        if !labelled.iter().any(near) {
+            let text = if member.paper {
+                format!("paper, {}", member.leaf)
+            } else {
+                let trees = member.name.split(',').next().unwrap_or_default();
+                format!("{trees}, {}{}", member.leaf, if member.layout == "grid" { ", grid" } else { "" })
+            };
+            let side =
+                if at.0.ln() > (all().fold(0.0, f64::max)).ln() - 1.8 { Side::UpperLeft } else { Side::LowerRight };
+            chart.marks.push(Mark::Text { at, text, colour, side });
+            labelled.push(at);
+        }
+        data.push([
+            member.name.as_str().into(),
+            member.leaf.as_str().into(),
+            member.layout.as_str().into(),
+            Cell::Number(at.0, 1),
+            Cell::Percent(at.1, 2),
+        ]);
+    }
+    Ok(Figure {
+        id: id.into(),
+        title: format!("Accuracy against {unit}"),
+        caption: "Dashed: the frontier, the best that can be had for so much.".into(),
+        command: context.settings.command(),
+        panels: vec![chart.svg()?],
+        data,
+    })
+}
+
+fn table(context: &Context, members: &[Member]) -> Table {
+    let mut data = Data::new([
+        "model",
+        "leaf",
+        "layout",
+        "bytes",
+        "ns a touch",
+        "instructions, M4F (modelled)",
+        "instructions, M0+ (modelled)",
+        "largest margin error (nats)",
+        "stated bound (nats)",
+        "accuracy at 10",
+        "accuracy at 30",
+        "touches to 1 %",
+        "on the frontier",
+    ]);
+    let best = frontier(members);
+    for member in members {
+        let on = best.iter().any(|other| std::ptr::eq(*other, member));
+        data.push([
+            member.name.as_str().into(),
+            member.leaf.as_str().into(),
+            member.layout.as_str().into(),
+            Cell::count(member.bytes),
+            Cell::Number(member.nanoseconds, 0),
+            Cell::count(member.instructions),
+            Cell::Number(member.instructions as f64 * M0_RATIO, 0),
+            Cell::Number(member.margin_error, 5),
+            Cell::Number(member.stated_error, 5),
+            Cell::Percent(member.at_10, 1),
+            Cell::Percent(member.at_30, 1),
+            member.to_1_percent.map_or(Cell::Missing, Cell::count),
+            Cell::from(if on { "yes" } else { "" }),
+        ]);
+    }
+    Table {
+        id: "cost".into(),
+        title: "The family".into(),
+        caption: format!(
+            "The frontier is of bytes and accuracy at ten touches; the smallest model on it has {} bytes.",
+            best.first().map_or("0".into(), |member| short_number(member.bytes as f64))
+        ),
+        command: context.settings.command(),
+        data,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_frontier_holds_what_nothing_smaller_beats() {
+        let member = |bytes: usize, at_10: f64| Member {
+            name: String::new(),
+            paper: false,
+            leaf: String::new(),
+            layout: String::new(),
+            bytes,
+            nanoseconds: 1.0,
+            instructions: 1,
+            margin_error: 0.0,
+            stated_error: 0.0,
+            at_10,
+            at_30: 1.0,
+            to_1_percent: None,
+        };
+        let members = [member(300, 0.7), member(100, 0.5), member(200, 0.4), member(400, 0.6)];
+        assert_eq!(frontier(&members).iter().map(|member| member.bytes).collect::<Vec<_>>(), [100, 300]);
+    }
+}

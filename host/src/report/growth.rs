@@ -1,0 +1,251 @@
+//! Growth: what more objects, and finer meshes, cost.
+
+use super::chart::{Chart, Mark, Shape, Side};
+use super::colour;
+use super::context::{Context, compiled, opened, touch};
+use super::page::{Figure, Section};
+use super::scale::Scale;
+use super::table::{Cell, Data, Table};
+use crate::dataset::Dataset;
+use crate::error::Result;
+use crate::evaluate::{Candidate, Margins};
+use crate::folds;
+use crate::mesh::{Mesh, Object};
+use crate::scene::Scene;
+use crate::{capture, train};
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// What growth costs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Growth {
+    /// For each number of objects.
+    pub(super) objects: Vec<Objects>,
+    /// For each number of triangles.
+    pub(super) triangles: Vec<Triangles>,
+}
+
+/// What so many objects cost.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Objects {
+    /// How many.
+    pub(super) count: usize,
+    /// Seconds of capturing.
+    pub(super) capture: f64,
+    /// Seconds of training.
+    pub(super) train: f64,
+    /// Bytes of the compiled model.
+    pub(super) bytes: usize,
+    /// Modelled instructions a touch.
+    pub(super) instructions: u64,
+    /// Accuracy after ten touches.
+    pub(super) at_10: f64,
+    /// Accuracy after sixty touches.
+    pub(super) at_60: f64,
+}
+
+/// What so many triangles cost.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Triangles {
+    /// How many.
+    pub(super) count: usize,
+    /// Seconds of building the scene and its tree.
+    pub(super) build: f64,
+    /// Approaches a second, all threads.
+    pub(super) approaches: f64,
+}
+
+/// Touches more and more objects, and finer and finer meshes.
+pub(super) fn measure(context: &Context) -> Result<Growth> {
+    let settings = context.settings;
+    let all: Vec<Object> = context
+        .kinds()?
+        .iter()
+        .enumerate()
+        .flat_map(|(instance, kinds)| {
+            kinds
+                .iter()
+                .map(move |object| Object { name: format!("{}-{instance}", object.name), mesh: object.mesh.clone() })
+        })
+        .collect();
+    let grown = settings.growth_objects.iter().map(|&count| objects_cost(context, &all[..count]));
+    let triangles = settings.growth_triangles.iter().map(|&count| triangles_cost(context, count));
+    Ok(Growth { objects: grown.collect::<Result<_>>()?, triangles: triangles.collect::<Result<_>>()? })
+}
+
+fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
+    let settings = context.settings;
+    let length = capture::Settings::default().length;
+    let began = Instant::now();
+    let touched = objects.iter().map(|object| {
+        let scene = Scene::new(&object.mesh, length)?;
+        Ok(touch(&scene, &object.name, settings.growth_touches, settings.seed)?.0)
+    });
+    let mut data = Dataset { objects: touched.collect::<Result<_>>()? };
+    let capture = began.elapsed().as_secs_f64();
+    data.objects.sort_by(|a, b| a.name.cmp(&b.name));
+    let split = folds::split(&data, 0.2, settings.seed)?;
+    let began = Instant::now();
+    let ensemble = train::train(&split.train, &context.ours())?;
+    let train = began.elapsed().as_secs_f64();
+    let compiled = compiled(&ensemble)?;
+    let model = opened(&compiled.bytes)?;
+    let curve = Margins::new(Candidate::Compiled(&model), &split.test)?.curve(60, 100, settings.seed)?;
+    Ok(Objects {
+        count: objects.len(),
+        capture,
+        train,
+        bytes: compiled.bytes.len(),
+        instructions: compiled.instructions,
+        at_10: curve.accuracy(10).value,
+        at_60: curve.accuracy(60).value,
+    })
+}
+
+fn triangles_cost(context: &Context, count: usize) -> Result<Triangles> {
+    let mesh = Mesh::globe((count as f64 / 4.0).sqrt().round() as u32);
+    let began = Instant::now();
+    let scene = Scene::new(&mesh, capture::Settings::default().length)?;
+    let build = began.elapsed().as_secs_f64();
+    let touches = if context.settings.quick { 5_000 } else { 40_000 };
+    let began = Instant::now();
+    let (_, approaches) = touch(&scene, "globe", touches, context.settings.seed)?;
+    let seconds = began.elapsed().as_secs_f64();
+    Ok(Triangles { count: mesh.triangles.len(), build, approaches: approaches as f64 / seconds })
+}
+
+/// The figures and the tables.
+pub(super) fn section(context: &Context, growth: &Growth) -> Result<Section> {
+    let mut section = Section::new("growth", "Growth");
+    section.text(format!(
+        "More objects: the ten built-in ones, then others of the same kinds with varied proportions, which are harder to \
+         tell apart; {} touches each, four fifths of them for training our method. Finer meshes: the same bumpy \
+         globe, cut into more and more triangles. Times are of this machine, all threads.",
+        context.settings.growth_touches
+    ));
+    section.figure(objects_figure(context, growth)?);
+    section.table(objects_table(context, growth));
+    section.figure(triangles_figure(context, growth)?);
+    Ok(section)
+}
+
+fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
+    let counts: Vec<f64> = growth.objects.iter().map(|objects| objects.count as f64).collect();
+    let most = counts.iter().copied().fold(2.0, f64::max);
+    let x = || {
+        let ticks = growth.objects.iter().map(|objects| (objects.count as f64, objects.count.to_string())).collect();
+        Scale::logarithmic(2.0, most).with_ticks(ticks)
+    };
+    let panel = |title: &str, unit: &str, lines: &[(&str, plotters::style::RGBColor, Shape, Vec<f64>)]| {
+        let all = || lines.iter().flat_map(|line| line.3.iter().copied());
+        let y = Scale::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.4);
+        let mut chart = Chart::new("objects", x(), unit, y).sized(370, 270).titled(title);
+        for (name, colour, shape, values) in lines {
+            let points: Vec<(f64, f64)> = counts.iter().copied().zip(values.iter().copied()).collect();
+            chart.series(name, *colour, *shape, &points);
+        }
+        chart.svg()
+    };
+    let of = |value: fn(&Objects) -> f64| growth.objects.iter().map(value).collect::<Vec<f64>>();
+    let panels = vec![
+        panel(
+            "Time",
+            "seconds",
+            &[
+                ("capture", colour::GREEN, Shape::Triangle, of(|o| o.capture)),
+                ("training", colour::OURS, Shape::Disc, of(|o| o.train)),
+            ],
+        )?,
+        panel("Size", "bytes", &[("model", colour::OURS, Shape::Disc, of(|o| o.bytes as f64))])?,
+        panel(
+            "Work (modelled)",
+            "instructions a touch, M4F",
+            &[("model", colour::OURS, Shape::Disc, of(|o| o.instructions as f64))],
+        )?,
+    ];
+    Ok(Figure {
+        id: "growth-objects-figure".into(),
+        title: "More objects".into(),
+        caption: "All axes are logarithmic.".into(),
+        command: context.settings.command(),
+        panels,
+        data: objects_data(growth),
+    })
+}
+
+fn objects_data(growth: &Growth) -> Data {
+    let mut data = Data::new([
+        "objects",
+        "capture (s)",
+        "training (s)",
+        "bytes",
+        "instructions, M4F (modelled)",
+        "accuracy at 10",
+        "accuracy at 60",
+    ]);
+    for objects in &growth.objects {
+        data.push([
+            Cell::count(objects.count),
+            Cell::Number(objects.capture, 2),
+            Cell::Number(objects.train, 2),
+            Cell::count(objects.bytes),
+            Cell::count(objects.instructions),
+            Cell::Percent(objects.at_10, 1),
+            Cell::Percent(objects.at_60, 1),
+        ]);
+    }
+    data
+}
+
+fn objects_table(context: &Context, growth: &Growth) -> Table {
+    Table {
+        id: "growth-objects".into(),
+        title: "More objects, in numbers".into(),
+        caption: "Accuracy is over all objects: beyond ten, a fork has other forks to be taken for.".into(),
+        command: context.settings.command(),
+        data: objects_data(growth),
+    }
+}
+
+fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {
+    let most = growth.triangles.iter().map(|t| t.count as f64).fold(1e4, f64::max);
+    let least = growth.triangles.iter().map(|t| t.count as f64).fold(most, f64::min);
+    let x = || Scale::logarithmic(least * 0.8, most * 1.2);
+    let mut data = Data::new(["triangles", "building (s)", "approaches a second"]);
+    let (mut fast, mut build) = (Vec::new(), Vec::new());
+    for triangles in &growth.triangles {
+        fast.push((triangles.count as f64, triangles.approaches));
+        build.push((triangles.count as f64, triangles.build.max(1e-5)));
+        data.push([
+            Cell::count(triangles.count),
+            Cell::Number(triangles.build, 3),
+            Cell::Number(triangles.approaches, 0),
+        ]);
+    }
+    let panel = |title: &str, unit: &str, colour, points: Vec<(f64, f64)>| {
+        let y = || points.iter().map(|point| point.1);
+        let scale = Scale::logarithmic(y().fold(f64::INFINITY, f64::min) * 0.5, y().fold(0.0, f64::max) * 2.0);
+        let mut chart = Chart::new("triangles", x(), unit, scale).sized(420, 270).titled(title);
+        for &at in &points {
+            let text = super::scale::short_number(at.1);
+            chart.marks.push(Mark::Text { at, text, colour: colour::INK, side: Side::Above });
+        }
+        chart.series("", colour, Shape::Disc, &points);
+        chart.labels.clear();
+        chart.svg()
+    };
+    Ok(Figure {
+        id: "growth-triangles".into(),
+        title: "Finer meshes".into(),
+        caption:
+            "Approaches a second, full touches and failed ones together, all threads; seconds to scale the mesh and \
+                  build its tree."
+                .into(),
+        command: context.settings.command(),
+        panels: vec![
+            panel("Speed", "approaches a second", colour::OURS, fast)?,
+            panel("Building", "seconds", colour::GREEN, build)?,
+        ],
+        data,
+    })
+}

@@ -1,0 +1,138 @@
+//! How much of everything a report measures.
+
+use serde::{Deserialize, Serialize};
+
+/// What a report is made with. A change of any of these starts it afresh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Where the objects come from, as on the command line.
+    pub sources: Vec<String>,
+    /// The seed of everything random.
+    pub seed: u64,
+    /// Fewer folds, levels and touches; the same figures.
+    pub quick: bool,
+    /// Full touches captured of each object.
+    pub touches: usize,
+    /// Folds that the touches are divided into.
+    pub folds: usize,
+    /// Folds that are trained and tested.
+    pub folds_used: usize,
+    /// Boosting rounds of the paper's method.
+    pub paper_rounds: usize,
+    /// Numbers of touches at which cross-validation looks, log-spaced from 10 to 120.
+    pub levels: usize,
+    /// Groups an object in a fold, as in the paper.
+    pub groups: usize,
+    /// Groups an object in a fold, for figures with narrower intervals.
+    pub many_groups: usize,
+    /// Noise levels from 0 to 10 ms, evenly spaced.
+    pub noise_levels: usize,
+    /// Folds of the noise figures.
+    pub noise_folds: usize,
+    /// Full touches captured of each object, to estimate the limit.
+    pub limit_touches: usize,
+    /// Boosting rounds of the ensemble that estimates the limit.
+    pub limit_rounds: usize,
+    /// Numbers of objects in the growth figures.
+    pub growth_objects: Vec<usize>,
+    /// Numbers of triangles in the growth figures.
+    pub growth_triangles: Vec<usize>,
+    /// Touches an object in the growth figures.
+    pub growth_touches: usize,
+    /// Numbers of instances of each kind that are trained on, to see how well they stand for others.
+    pub instances: Vec<usize>,
+    /// Instances of each kind that are tested on.
+    pub test_instances: usize,
+    /// Touches of each kind in training, and of each instance in testing.
+    pub instance_touches: usize,
+}
+
+impl Settings {
+    /// Everything the paper did, and a capture large enough for the limit.
+    pub fn full(sources: Vec<String>, seed: u64) -> Self {
+        Self {
+            sources,
+            seed,
+            quick: false,
+            touches: 21_000,
+            folds: 10,
+            folds_used: 10,
+            paper_rounds: 100,
+            levels: 30,
+            groups: 10,
+            many_groups: 300,
+            noise_levels: 41,
+            noise_folds: 3,
+            limit_touches: 300_000,
+            limit_rounds: 80,
+            growth_objects: vec![2, 5, 10, 20, 50, 100],
+            growth_triangles: vec![1_000, 10_000, 100_000, 1_000_000],
+            growth_touches: 4_000,
+            instances: vec![1, 2, 4, 8],
+            test_instances: 3,
+            instance_touches: 12_000,
+        }
+    }
+
+    /// The same figures in half a minute.
+    pub fn quick(sources: Vec<String>, seed: u64) -> Self {
+        Self {
+            quick: true,
+            touches: 5_000,
+            folds_used: 2,
+            paper_rounds: 50,
+            levels: 12,
+            many_groups: 200,
+            noise_levels: 6,
+            noise_folds: 1,
+            limit_touches: 20_000,
+            limit_rounds: 40,
+            growth_objects: vec![2, 5, 10, 20],
+            growth_triangles: vec![1_000, 10_000, 100_000],
+            growth_touches: 1_000,
+            instances: vec![1, 2],
+            test_instances: 1,
+            instance_touches: 2_000,
+            ..Self::full(sources, seed)
+        }
+    }
+
+    /// The command that makes this report.
+    pub fn command(&self) -> String {
+        let quoted = |source: &String| if source.contains(' ') { format!("\"{source}\"") } else { source.clone() };
+        let sources: Vec<String> = self.sources.iter().map(quoted).collect();
+        let quick = if self.quick { " --quick" } else { "" };
+        format!("palpate report {} --seed {}{quick}", sources.join(" "), self.seed)
+    }
+
+    /// The numbers of touches at which cross-validation looks: log-spaced from 10 to 120, rounded, without repeats.
+    pub fn levels(&self) -> Vec<usize> {
+        let last = self.levels.max(2) - 1;
+        let level = |k: usize| (10.0 * 12f64.powf(k as f64 / last as f64)).round() as usize;
+        let mut levels: Vec<usize> = (0..=last).map(level).collect();
+        levels.dedup();
+        levels
+    }
+
+    /// The noise levels, in milliseconds: 0 to 10.
+    pub fn deviations(&self) -> Vec<f64> {
+        let last = self.noise_levels.max(2) - 1;
+        (0..=last).map(|k| 10.0 * k as f64 / last as f64).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_the_papers() {
+        let settings = Settings::full(vec!["builtin".into()], 1);
+        let levels = settings.levels();
+        assert_eq!(levels.len(), 30);
+        assert_eq!((levels[0], levels[29]), (10, 120));
+        let deviations = settings.deviations();
+        assert_eq!((deviations[1], deviations[20], deviations[40]), (0.25, 5.0, 10.0));
+        assert_eq!(settings.command(), "palpate report builtin --seed 1");
+    }
+}
