@@ -36,5 +36,6 @@ pub mod sweep;
 mod synthetic;
 pub mod train;
 pub mod tune;
+pub mod view;
 
 pub use error::{Error, Result};

@@ -28,6 +28,8 @@ commands! {
     Run => run,
     /// Write the ten built-in objects as OBJ files
     Objects => objects,
+    /// Make a page that shows an object and some touches, to look at in a browser
+    View => view,
     /// Touch objects with the virtual probe
     Capture => capture,
     /// Train an ensemble on captured touches
