@@ -173,8 +173,15 @@ fn html(object: &Object, settings: &Settings, facts: &Facts, shown: &Shown, draw
                             }
                         }
                         p.key {
-                            span.finger.first {} "finger 1 " span.finger.middle {} "finger 2 " span.finger.last {} "finger 3 "
-                            span.finger.missed {} "misses " span.finger.back {} "inside of the surface"
+                            @for (class, label) in [
+                                ("first", "finger 1"),
+                                ("middle", "finger 2"),
+                                ("last", "finger 3"),
+                                ("missed", "misses"),
+                                ("back", "inside of the surface"),
+                            ] {
+                                span { span class={ "finger " (class) } {} (label) }
+                            }
                         }
                         div.scroll {
                             table {

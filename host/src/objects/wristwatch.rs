@@ -32,7 +32,7 @@ pub(super) fn form(p: &mut Proportions) -> Form {
     let mut face = case.joined(&bezel, 0.1) - &well;
     for hour in 0..12 {
         let long = if hour % 3 == 0 { 0.26 } else { 0.17 };
-        let mark = cuboid(Vec3::new(long, 0.065, 0.09), 0.02).moved(Vec3::X * (radius - 0.46 - long));
+        let mark = cuboid(Vec3::new(long, 0.09, 0.11), 0.05).moved(Vec3::X * (radius - 0.46 - long));
         face = face + &mark.turned_z(30.0 * hour as f32).moved(Vec3::Z * dial);
     }
     // Ten past ten, as in every shop window.
@@ -68,6 +68,6 @@ pub(super) fn form(p: &mut Proportions) -> Form {
             Vec3::new(-wrist.x - 0.5, -radius - 0.8, -wrist.y - 0.5),
             Vec3::new(wrist.x + 0.5, radius + 0.8, top + half_height + 0.3),
         ],
-        cells: 120.0,
+        cells: 136.0,
     }
 }

@@ -24,7 +24,9 @@
   const reach = high.clone().sub(low).length() / 2;
   const camera = new THREE.PerspectiveCamera(35, 1, reach / 50, reach * 50);
   camera.up.set(0, 0, 1);
-  camera.position.set(0.55, -0.95, 0.7).normalize().multiplyScalar(reach * 4.2);
+  // The flatter it lies, the more from above.
+  const flatness = Math.min(1, (high.z - low.z) / Math.min(high.x - low.x, high.y - low.y));
+  camera.position.set(0.55, -0.95, 2 - 1.5 * flatness).normalize().multiplyScalar(reach * 4.2);
   scene.add(camera, new THREE.HemisphereLight(0xffffff, 0x8890a0, 1.6));
   const lamp = new THREE.DirectionalLight(0xffffff, 2.2);
   lamp.position.set(-1, 1.2, 1);
@@ -39,9 +41,11 @@
   geometry.setIndex(new THREE.BufferAttribute(decode(data.indices, data.wide ? Uint32Array : Uint16Array), 1));
   geometry.computeVertexNormals();
   const outside = new THREE.MeshStandardMaterial({ color: 0xb9c0c9, roughness: 0.6, side: THREE.FrontSide });
-  outside.polygonOffset = true;
-  outside.polygonOffsetFactor = outside.polygonOffsetUnits = 1;
   const inside = new THREE.MeshBasicMaterial({ color: colour("back"), side: THREE.BackSide });
+  // A little back, so that edges show on it; the inside a little further, so that it does not shine through a rim.
+  outside.polygonOffset = inside.polygonOffset = true;
+  outside.polygonOffsetFactor = outside.polygonOffsetUnits = 1;
+  inside.polygonOffsetFactor = inside.polygonOffsetUnits = 3;
   const body = new THREE.Mesh(geometry, outside);
   scene.add(body, new THREE.Mesh(geometry, inside));
   const wires = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: 0x20242a, wireframe: true, transparent: true, opacity: 0.35 }));
@@ -123,6 +127,15 @@
     draw();
   };
 
+  const render = () => {
+    renderer.render(scene, camera);
+    for (const { label, place } of labels) {
+      const seen = place.clone().project(camera);
+      label.hidden = !shown("box") || Math.abs(seen.x) > 1 || Math.abs(seen.y) > 1;
+      label.style.left = `${(seen.x + 1) / 2 * stage.clientWidth}px`;
+      label.style.top = `${(1 - seen.y) / 2 * stage.clientHeight}px`;
+    }
+  };
   // Nothing moves by itself, so a frame is drawn only when something changed.
   let waiting = false;
   const draw = () => {
@@ -130,14 +143,7 @@
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
-      renderer.render(scene, camera);
-      for (const { label, place } of labels) {
-        const seen = place.clone().project(camera);
-        label.hidden = !shown("box") || Math.abs(seen.x) > 1 || Math.abs(seen.y) > 1;
-        label.style.left = `${(seen.x + 1) / 2 * stage.clientWidth}px`;
-        label.style.top = `${(1 - seen.y) / 2 * stage.clientHeight}px`;
-      }
-      document.body.dataset.drawn = renderer.info.render.triangles;
+      render();
     });
   };
   controls.addEventListener("change", draw);
@@ -187,15 +193,17 @@
 
   const fit = () => {
     const { clientWidth: width, clientHeight: height } = stage;
-    if (width === 0 || height === 0) return;
+    const now = renderer.getSize(new THREE.Vector2());
+    if (width === 0 || height === 0 || (now.x === width && now.y === height)) return;
     renderer.setSize(width, height);
     camera.aspect = width / height;
     // What fits a narrow window's width fits its height.
     camera.fov = width < height ? 2 * Math.atan(Math.tan(17.5 * Math.PI / 180) / camera.aspect) * 180 / Math.PI : 35;
     camera.updateProjectionMatrix();
-    draw();
+    // At once: the new size has cleared the drawing.
+    render();
   };
-  new ResizeObserver(fit).observe(stage);
-  fit();
   paint();
+  fit();
+  new ResizeObserver(fit).observe(stage);
 })();
