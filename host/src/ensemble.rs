@@ -55,6 +55,16 @@ pub enum Node {
     Leaf(Vec<f32>),
 }
 
+impl Node {
+    /// A leaf's values.
+    pub fn leaf(&self) -> Option<&[f32]> {
+        match self {
+            Self::Leaf(values) => Some(values),
+            Self::Split { .. } => None,
+        }
+    }
+}
+
 impl Tree {
     /// The leaf that `features` (NaN where missing) reach.
     ///

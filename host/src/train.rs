@@ -59,6 +59,9 @@ pub struct Settings {
     /// Bins of each feature, at quantiles, if they are to differ: values are rounded down to the lower edge of their bin
     /// before training, so that no feature has more thresholds than that. For models that are compiled to a table.
     pub feature_bins: Option<Vec<usize>>,
+    /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
+    /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
+    pub leaf_bits: Option<u32>,
     /// Standard deviation in microseconds of the Gaussian noise that is added to contact times before training.
     pub noise: f64,
     /// Seed of the noise.
@@ -81,6 +84,7 @@ impl Settings {
             min_child_weight: 1.0,
             bins: 256,
             feature_bins: None,
+            leaf_bits: None,
             noise: 0.0,
             seed: 1,
             threads: None,
@@ -96,6 +100,7 @@ impl Settings {
             multi_output: true,
             rounds: 30,
             min_child_weight: 30.0,
+            leaf_bits: Some(16),
             ..Self::paper()
         }
     }
@@ -111,9 +116,33 @@ pub fn train(dataset: &Dataset, settings: &Settings) -> Result<Ensemble> {
     check(dataset, settings.descriptor)?;
     let parameters = parameters(settings, dataset.objects.len())?;
     let rows = Rows::new(dataset, settings);
-    match settings.engine {
-        Engine::Hessboost => with_hessboost(rows, settings, &parameters, dataset.names()),
-        Engine::Xgboost => with_xgboost(&rows, settings, dataset.names()),
+    let mut ensemble = match settings.engine {
+        Engine::Hessboost => with_hessboost(rows, settings, &parameters, dataset.names())?,
+        Engine::Xgboost => with_xgboost(&rows, settings, dataset.names())?,
+    };
+    if let Some(bits) = settings.leaf_bits {
+        round_leaves(&mut ensemble, bits);
+    }
+    Ok(ensemble)
+}
+
+/// Rounds every leaf to a whole multiple of a power of two (the unit, at most 2⁻¹ and at least 2⁻¹⁵ nats), the smallest
+/// with which the largest leaf still fits `bits` bits, its sign included.
+///
+/// A 16-bit unit is about 10⁻⁴ nats, far below what a finite number of touches can teach a leaf. In exchange, f32 sums
+/// of leaves are exact in any order while they stay below 2²⁴ units, a compiled model with leaves of that width holds
+/// the very same numbers, and full and compiled model cannot differ.
+pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
+    let leaves = || ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(Node::leaf).flatten();
+    let largest = leaves().fold(0.0_f32, |most, value| most.max(value.abs()));
+    let most = 2.0_f32.powi(i32::try_from(bits).unwrap_or(32) - 1) - 1.0;
+    let fits = |digits: &i32| (largest * 2.0_f32.powi(*digits)).round() <= most;
+    let unit = 2.0_f32.powi(-(1..=15).rev().find(fits).unwrap_or(1));
+    for node in ensemble.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+        if let Node::Leaf(values) = node {
+            // Multiplying and dividing by a power of two is exact.
+            values.iter_mut().for_each(|value| *value = (*value / unit).round() * unit);
+        }
     }
 }
 
@@ -192,6 +221,9 @@ fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
         && (bins.len() != settings.descriptor.feature_count() || bins.iter().any(|bins| !(2..=65_536).contains(bins)))
     {
         return range("--bins", "one number from 2 to 65536 for all features, or one for each");
+    }
+    if settings.leaf_bits.is_some_and(|bits| !(4..=24).contains(&bits)) {
+        return range("--leaf-bits", "4 to 24, or 0 to leave the leaves as they are");
     }
     if !(settings.noise >= 0.0 && settings.noise.is_finite()) {
         return range("--noise", "a duration of at least 0");

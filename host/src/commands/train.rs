@@ -49,6 +49,10 @@ pub(crate) struct Arguments {
     /// The most bins of a feature's histogram, for all features or for each [default: the preset's; 256]
     #[arg(long, value_delimiter = ',', value_name = "BINS[,BINS…]")]
     bins: Vec<usize>,
+    /// Round leaves to multiples of a power of two that fit so many bits, so that a compiled model with leaves of that
+    /// width is exact; 0 leaves them as they are [default: the preset's; compact 16, paper 0]
+    #[arg(long, value_name = "BITS")]
+    leaf_bits: Option<u32>,
     /// Train for noisy contact times: standard deviation, such as 5ms [default: none]
     #[arg(long, value_parser = microseconds, value_name = "DURATION")]
     noise: Option<f64>,
@@ -145,6 +149,7 @@ impl Arguments {
             min_child_weight: self.min_child_weight.unwrap_or(preset.min_child_weight),
             bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
             feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
+            leaf_bits: self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
             noise: self.noise.unwrap_or(preset.noise),
             seed: self.seed,
             threads: self.threads,

@@ -92,6 +92,20 @@ impl<'a> Forest<'a> {
         self.trees.iter().map(|tree| tree.splits + 1).sum()
     }
 
+    /// Every value of every leaf.
+    pub(super) fn leaf_values(&self) -> impl Iterator<Item = f32> + Clone {
+        let mut open: Vec<&Branch<'a>> = self.trees.iter().map(|tree| &tree.root).collect();
+        let leaves = std::iter::from_fn(move || {
+            loop {
+                match open.pop()? {
+                    Branch::Leaf(values) => return Some(*values),
+                    Branch::Split(split) => open.extend([&split.left, &split.right]),
+                }
+            }
+        });
+        leaves.flatten().copied()
+    }
+
     /// How far an object's margin can be from 0.
     pub(super) fn range(&self, object: usize) -> f64 {
         let base = f64::from(self.base[object].abs());

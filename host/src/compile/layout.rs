@@ -164,9 +164,13 @@ fn margin_error(forest: &Forest<'_>, cells: Option<&Cells>, scale: &Scale) -> f3
             for (index, tree) in forest.trees.iter().enumerate().filter(|(_, tree)| tree.values_for(object)) {
                 bound += leaf_error(tree, object, scale, scale.shifts[index]);
             }
-            // What f32 sums lose: half an ulp of the largest partial sum at each addition.
-            let additions = forest.trees_of(object).count() as f64;
-            worst = worst.max(bound + additions * forest.range(object) * f64::from(f32::EPSILON) / 2.0);
+            // What f32 sums lose: half an ulp of the largest partial sum at each addition, or nothing at all while they
+            // are whole numbers of units that f32 holds.
+            let range = forest.range(object);
+            if bound > 0.0 || range / unit > f64::from(1 << 24) {
+                bound += forest.trees_of(object).count() as f64 * range * f64::from(f32::EPSILON) / 2.0;
+            }
+            worst = worst.max(bound);
         }
     }
     round_up(worst)
@@ -334,8 +338,7 @@ fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option<Parts> {
     }
     let sums: Vec<Vec<f32>> =
         (0..forest.objects()).map(|object| cells.sums(forest, object, forest.base[object], |_, value| value)).collect();
-    let largest = sums.iter().flatten().fold(0.0_f32, |most, sum| most.max(sum.abs()));
-    let scale = Scale::of_cells(f64::from(largest), leaf)?;
+    let scale = Scale::of_cells(&sums, leaf)?;
     let mut leaves = Leaves { leaf, scale: &scale, bytes: Vec::new() };
     let mut worst = if leaf == LeafType::F32 { f64::from(scale.unit) / 2.0 } else { 0.0 };
     for cell in 0..sides.iter().product() {

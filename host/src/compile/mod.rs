@@ -92,7 +92,11 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let forest = Forest::new(ensemble, settings.raw_features)?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
-    let candidates = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
+    let mut candidates = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
+    // Where some layout holds the ensemble's very numbers, none that rounds them is worth a few bytes.
+    if candidates.iter().any(|(_, parts)| parts.margin_error == 0.0) {
+        candidates.retain(|(_, parts)| parts.margin_error == 0.0);
+    }
     let mut best: Option<(u64, Layout, layout::Parts)> = None;
     for (layout, parts) in candidates {
         let cost = parts.bytes() as u64 * parts.instructions;

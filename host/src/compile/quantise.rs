@@ -28,6 +28,9 @@ impl Scale {
         let Some(most) = most(leaf) else {
             return Some(Self { unit: F32_UNIT, shifts: vec![0; forest.trees.len()] });
         };
+        if let Some(exact) = Self::exact(forest, most) {
+            return Some(exact);
+        }
         let largest: Vec<f64> = forest.trees.iter().map(|tree| f64::from(tree.largest)).collect();
         let all = largest.iter().copied().fold(0.0, f64::max);
         // From the finest unit to the coarsest, the first whose sums stay in range.
@@ -40,11 +43,24 @@ impl Scale {
         })
     }
 
-    /// The finest scale for a table of margins up to `largest`, if there is one.
-    pub(super) fn of_cells(largest: f64, leaf: LeafType) -> Option<Self> {
+    /// A unit of which every leaf and every base margin is a whole multiple, if there is one that all leaves fit: then
+    /// nothing is rounded. Ensembles whose training rounded their leaves have one.
+    fn exact(forest: &Forest<'_>, most: f64) -> Option<Self> {
+        let unit = common_unit(forest.leaf_values().chain(forest.base.iter().copied()))?;
+        let fits = forest.trees.iter().all(|tree| f64::from(tree.largest) / f64::from(unit) <= most);
+        fits.then(|| Self { unit, shifts: vec![0; forest.trees.len()] })
+    }
+
+    /// The scale for a table of margins: one without rounding if there is one, else the finest.
+    pub(super) fn of_cells(sums: &[Vec<f32>], leaf: LeafType) -> Option<Self> {
+        let values = || sums.iter().flatten().copied();
+        let largest = values().fold(0.0_f64, |most, sum| most.max(f64::from(sum.abs())));
         let unit = match most(leaf) {
             None => F32_UNIT,
-            Some(most) => unit_for(largest, most)?,
+            Some(most) => match common_unit(values()) {
+                Some(exact) if largest / f64::from(exact) <= most => exact,
+                _ => unit_for(largest, most)?,
+            },
         };
         Some(Self { unit, shifts: Vec::new() })
     }
@@ -53,6 +69,12 @@ impl Scale {
     pub(super) fn integer(&self, value: f32, shift: u8) -> i32 {
         (f64::from(value) / (f64::from(self.unit) * f64::from(1_u32 << shift))).round() as i32
     }
+}
+
+/// The largest power of two from 2^-24 to 2^-1 of which all values are whole multiples.
+fn common_unit(values: impl Iterator<Item = f32> + Clone) -> Option<f32> {
+    let mut units = (1..=24).map(|digits| 0.5_f32.powi(digits));
+    units.find(|unit| values.clone().all(|value| value % unit == 0.0))
 }
 
 /// The largest integer of a leaf type.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::compile;
 use crate::synthetic;
 
 fn quick() -> Settings {
@@ -157,5 +158,44 @@ mod xgboost {
         let settings = Settings { engine: Engine::Xgboost, ..quick() };
         let error = train(&synthetic::dataset(&[50, 50], 12), &settings).unwrap_err();
         assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains("--leaves one"), "{error}");
+    }
+}
+
+#[test]
+fn rounded_leaves_compile_without_any_error_and_add_up_exactly_in_f32() {
+    let dataset = synthetic::dataset(&[300, 300, 300], 1);
+    let ensemble = train(&dataset, &Settings { rounds: 20, ..Settings::compact() }).unwrap();
+    let compiled = compile::compile(&ensemble, &compile::Settings::default()).unwrap();
+    assert_eq!(compiled.margin_error, 0.0);
+    let model = palpate_onboard::Model::new(&compiled.bytes).unwrap();
+    for touch in dataset.objects.iter().flat_map(|object| &object.touches) {
+        let mut margins = [0; 3];
+        model.margins(touch, &mut margins);
+        assert_eq!(ensemble.margins(touch), margins.map(|units| units as f32 * model.unit()));
+    }
+}
+
+#[test]
+fn rounding_moves_no_leaf_by_more_than_half_a_unit_and_uses_the_bits_it_was_given() {
+    let dataset = synthetic::dataset(&[300, 300, 300], 1);
+    let settings = |leaf_bits| Settings { rounds: 5, leaf_bits, ..Settings::compact() };
+    let plain = train(&dataset, &settings(None)).unwrap();
+    let leaves = |ensemble: &crate::ensemble::Ensemble| -> Vec<f32> {
+        ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| node.leaf()).flatten().copied().collect()
+    };
+    let largest = leaves(&plain).iter().fold(0.0_f32, |most, leaf| most.max(leaf.abs()));
+    for bits in [4, 8, 12] {
+        let rounded = leaves(&train(&dataset, &settings(Some(bits))).unwrap());
+        let unit = (1..=15)
+            .rev()
+            .map(|digits| 0.5_f32.powi(digits))
+            .find(|unit| (largest / unit).round() < 2.0_f32.powi(bits as i32 - 1))
+            .unwrap();
+        for (before, after) in leaves(&plain).into_iter().zip(rounded) {
+            assert!(
+                (before - after).abs() <= unit / 2.0 && after % unit == 0.0,
+                "{bits} bits: {before} became {after}"
+            );
+        }
     }
 }
