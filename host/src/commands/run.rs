@@ -1,8 +1,41 @@
-use palpate::Result;
+use palpate::{Result, capture, output, run, source};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
-pub(crate) struct Arguments {}
+#[command(after_help = "\
+Examples:
+  palpate run                          ten built-in objects, 21,000 touches each; results in out/
+  palpate run meshes/ -o mine          your own OBJ files
+  palpate run --touches 2000           a quick look
+  palpate run --json | jq .ours.accuracy
 
-pub(crate) fn run(_: Arguments) -> Result<()> {
-    Ok(())
+Written into the output directory: data/ (the touches), paper.json and ensemble.json (the full models), paper.palpate
+and model.palpate (the compiled ones), summary.json, report.html.")]
+pub(crate) struct Arguments {
+    /// What to touch: `builtin`, OBJ files, directories of them
+    #[arg(value_name = "SOURCE", default_value = "builtin")]
+    sources: Vec<String>,
+    /// Directory for the results
+    #[arg(short, long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Touches of each object, a tenth of them to test on
+    #[arg(long, value_name = "N", default_value_t = 21_000, value_parser = clap::value_parser!(u64).range(100..))]
+    touches: u64,
+    /// Seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print the summary as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let Arguments { sources, out, touches, seed, json } = arguments;
+    let settings = run::Settings {
+        capture: capture::Settings { touches, seed, ..capture::Settings::default() },
+        command: format!("palpate run {} -o {} --touches {touches} --seed {seed}", sources.join(" "), out.display()),
+        ..run::Settings::default()
+    };
+    let summary = run::run(&source::objects(&sources)?, &settings, &out)?;
+    if json { output::print_json(&summary) } else { output::print(&run::text(&summary, &out)) }
 }
