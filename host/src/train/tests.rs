@@ -117,7 +117,7 @@ fn a_build_without_xgboost_says_how_to_get_it() {
     assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains("--features xgboost"), "{error}");
 }
 
-#[cfg(feature = "xgboost")]
+/// The comparison of trainers; shown as ignored where XGBoost is not built in.
 mod xgboost {
     use super::*;
     use crate::evaluate::{Candidate, Margins};
@@ -143,6 +143,7 @@ mod xgboost {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "xgboost"), ignore = "needs XGBoost: cargo test -p palpate --features xgboost")]
     fn both_trainers_agree_on_the_published_method() {
         let settings = Settings { rounds: 30, ..Settings::paper() };
         for counts in [[2_000, 2_000, 2_000], [2_000, 500, 1_000]] {
@@ -154,6 +155,7 @@ mod xgboost {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "xgboost"), ignore = "needs XGBoost: cargo test -p palpate --features xgboost")]
     fn xgboost_refuses_multi_output_trees() {
         let settings = Settings { engine: Engine::Xgboost, ..quick() };
         let error = train(&synthetic::dataset(&[50, 50], 12), &settings).unwrap_err();

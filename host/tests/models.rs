@@ -1,0 +1,147 @@
+//! The commands that make and measure models, as a user calls them: train, tune, evaluate.
+
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A directory of touches of two objects: one bends by up to 0.1 s, the other by up to 0.2 s.
+fn touches(directory: &Path) {
+    for (name, bend) in [("bowl", 100_000), ("fork", 200_000)] {
+        // Golden-ratio steps spread evenly, without chance.
+        let spread = |index: u64, range: u64| (index * 618_033 + 7) % range;
+        let line = |index| {
+            let (slope, bend) = (spread(index, 300_007), spread(index * index + 3, bend));
+            let times = [0, slope / 2 + bend, slope].map(|micros| micros as f64 * 1e-6);
+            format!("{:.6} {:.6} {:.6}\n", times[0], times[1], times[2])
+        };
+        let text = (0..400).fold(String::new(), |mut text, index| {
+            _ = write!(text, "{}", line(index));
+            text
+        });
+        std::fs::write(directory.join(format!("{name}.txt")), text).unwrap();
+    }
+}
+
+fn palpate(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_palpate")).current_dir(directory).args(arguments).output().unwrap()
+}
+
+#[track_caller]
+fn succeeds(directory: &Path, arguments: &[&str]) -> String {
+    let output = palpate(directory, arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Runs and fails with this exit code; what it says, which must hold `expected`, and no backtrace.
+#[track_caller]
+fn fails(directory: &Path, arguments: &[&str], code: i32, expected: &str) {
+    let output = palpate(directory, arguments);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    assert!(said.contains(expected), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+    assert!(output.stdout.is_empty());
+}
+
+fn set_up() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::create_dir(directory.path().join("data")).unwrap();
+    touches(&directory.path().join("data"));
+    directory
+}
+
+#[test]
+fn an_ensemble_and_its_compiled_model_evaluate_side_by_side() {
+    let directory = set_up();
+    let at = directory.path();
+    let trained = succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "5", "--json"]);
+    let trained: Value = serde_json::from_str(&trained).unwrap();
+    assert_eq!((&trained["trees"], &trained["touches"]), (&5.into(), &800.into()));
+    succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
+    let figures = ["ensemble.json", "model.palpate"].map(|model| -> Value {
+        let json = succeeds(at, &["evaluate", model, "data", "--at", "5,20", "--groups", "100", "--json"]);
+        serde_json::from_str(&json).unwrap()
+    });
+    for figures in &figures {
+        assert!(figures["accuracy"]["20"].as_f64() >= figures["accuracy"]["5"].as_f64());
+        assert!(figures["per_object"]["fork"]["5"].is_number());
+        assert!(figures["sequential"]["mean_touches"].as_f64() >= Some(1.0));
+    }
+    let table = succeeds(at, &["evaluate", "model.palpate", "data"]);
+    assert!(table.contains("bowl") && table.contains("Stopping at an error rate of 0.01"), "{table}");
+}
+
+#[test]
+fn training_twice_writes_the_same_bytes_whatever_the_threads() {
+    let directory = set_up();
+    let read = |name| std::fs::read(directory.path().join(name)).unwrap();
+    for (name, threads) in [("one.json", "1"), ("three.json", "3")] {
+        succeeds(directory.path(), &["train", "data", "-o", name, "--noise", "5ms", "--threads", threads]);
+    }
+    assert_eq!(read("one.json"), read("three.json"));
+}
+
+#[test]
+fn tuning_writes_a_model_within_the_limit() {
+    let directory = set_up();
+    let tune = ["tune", "data", "--max-bytes", "2K", "--groups", "20", "-o", "tuned.palpate", "--json"];
+    let tuned: Value = serde_json::from_str(&succeeds(directory.path(), &tune)).unwrap();
+    let chosen = usize::try_from(tuned["chosen"].as_u64().unwrap()).unwrap();
+    let bytes = std::fs::metadata(directory.path().join("tuned.palpate")).unwrap().len();
+    assert!(bytes <= 2048);
+    assert_eq!(tuned["rows"][chosen]["bytes"].as_u64(), Some(bytes));
+    succeeds(directory.path(), &["evaluate", "tuned.palpate", "data", "--groups", "20"]);
+}
+
+#[test]
+fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
+    let directory = set_up();
+    let at = directory.path();
+    std::fs::write(at.join("ensemble.json"), "older").unwrap();
+    let train = |data, more: &[&'static str]| [&["train", data, "-o", "ensemble.json"], more].concat();
+    std::fs::create_dir(at.join("lonely")).unwrap();
+    std::fs::copy(at.join("data/bowl.txt"), at.join("lonely/bowl.txt")).unwrap();
+    std::fs::create_dir(at.join("broken")).unwrap();
+    std::fs::copy(at.join("data/bowl.txt"), at.join("broken/bowl.txt")).unwrap();
+    std::fs::write(at.join("broken/fork.txt"), "0.0 0.1 0.2\n0.0 -0.1 inf\n").unwrap();
+    std::fs::create_dir(at.join("empty")).unwrap();
+    fails(at, &train("lonely", &[]), 1, "lonely");
+    fails(at, &train("empty", &[]), 1, "empty");
+    fails(at, &train("broken", &[]), 1, "fork.txt:2:");
+    fails(at, &train("missing", &[]), 1, "missing");
+    fails(at, &train("data", &["--descriptor", "gravity"]), 1, "--pose");
+    fails(at, &train("data", &["--descriptor", "shape"]), 2, "curvature");
+    fails(at, &train("data", &["--rounds", "0"]), 2, "--rounds");
+    fails(at, &train("data", &["--noise", "5"]), 2, "unit");
+    fails(at, &train("data", &["--bins", "9,9,9"]), 2, "--bins");
+    fails(at, &train("data", &["--no-such-option"]), 2, "--no-such-option");
+    fails(at, &["tune", "data", "--max-bytes", "9", "--groups", "5", "-o", "ensemble.json"], 1, "the smallest has");
+    fails(at, &["tune", "data", "--max-bytes", "many"], 2, "16K");
+    assert_eq!(std::fs::read(at.join("ensemble.json")).unwrap(), b"older");
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 5, "something was left behind");
+}
+
+#[test]
+fn what_cannot_be_evaluated_is_refused() {
+    let directory = set_up();
+    let at = directory.path();
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3"]);
+    succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
+    let text = std::fs::read_to_string(at.join("ensemble.json")).unwrap();
+    std::fs::write(at.join("times.json"), text.replace("\"curvature\"", "\"times\"")).unwrap();
+    let bytes = std::fs::read(at.join("model.palpate")).unwrap();
+    std::fs::write(at.join("cut.palpate"), &bytes[..100]).unwrap();
+    std::fs::create_dir(at.join("others")).unwrap();
+    touches(&at.join("others"));
+    std::fs::rename(at.join("others/fork.txt"), at.join("others/spoon.txt")).unwrap();
+    fails(at, &["evaluate", "times.json", "data"], 1, "times.json: it has 2 features, but its descriptor times has 3");
+    fails(at, &["evaluate", "cut.palpate", "data"], 1, "cut.palpate: byte 100:");
+    fails(at, &["evaluate", "missing.palpate", "data"], 1, "missing.palpate: cannot read");
+    fails(at, &["evaluate", "data/bowl.txt", "data"], 1, "bowl.txt");
+    fails(at, &["evaluate", "model.palpate", "others"], 1, "does not know the object spoon");
+    fails(at, &["evaluate", "model.palpate", "data", "--at", "401"], 2, "bowl has only 400");
+    fails(at, &["evaluate", "model.palpate", "data", "--error-rate", "0.7"], 2, "--error-rate");
+    fails(at, &["evaluate", "model.palpate", "data", "--groups", "0"], 2, "--groups");
+}
