@@ -17,7 +17,9 @@ pub(super) fn form(p: &mut Proportions) -> Form {
     let inside = ellipse(radius - wall, height - foot_height * 0.5 - wall).moved(middle).revolve();
     let shell = (outside - &inside).and(&below(Vec3::Z, height));
     let rim: Shape = torus(radius - wall / 2.0, rim).moved(Vec3::Z * height);
-    let ring = bar(Vec2::new(foot - 0.1, 0.3), Vec2::new(foot, foot_height), 0.3, 0.35).revolve();
+    // The ring reaches up to where the shell passes above it.
+    let top = height - (height - foot_height * 0.5) * (1.0 - (foot / radius).powi(2)).sqrt();
+    let ring = bar(Vec2::new(foot - 0.1, 0.3), Vec2::new(foot, top.max(foot_height)), 0.3, 0.35).revolve();
     let ring = ring - &inside;
     Form {
         shape: shell.joined(&rim, 0.2).joined(&ring, 0.5),

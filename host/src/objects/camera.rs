@@ -65,7 +65,7 @@ pub(super) fn form(p: &mut Proportions) -> Form {
     }
     let dial = dial.moved(Vec3::new(half_width - 1.9, 0.3, height + 0.4));
     let wheel = cylinder(0.85, 0.4, 0.2).moved(Vec3::new(-half_width + 2.2, 0.6, height + 0.2));
-    let eyelet = torus(0.38, 0.13).in_axes(y.clone(), z.clone() - height * 0.86, x.abs() - half_width - 0.2);
+    let eyelet = torus(0.38, 0.13).in_axes(y.clone(), z.clone() - height * 0.86, x.abs() - half_width - 0.06);
 
     let solid = body.joined(&grip_shape, 1.0).joined(&hump, 0.5);
     let solid = solid.joined(&eyepiece, 0.2).joined(&screen, 0.1) + &shoe + &tube + &button + &dial + &wheel + &eyelet;
