@@ -1,7 +1,7 @@
 //! Calibration: whether a posterior of nine tenths is right nine times in ten.
 
 use super::colour;
-use super::context::{Context, compiled, opened};
+use super::context::{Context, compiled, compiled_f32, opened};
 use super::kinds::{ReliabilityBin, reliability};
 use super::limit::Large;
 use super::page::{Figure, Section};
@@ -31,11 +31,11 @@ pub(super) struct Calibration {
 pub(super) fn measure(context: &Context, large: &Large) -> Result<Calibration> {
     let settings = context.settings;
     let models = context.models()?;
-    let bytes = compiled(&models.ours)?.bytes;
-    let ours = opened(&bytes)?;
+    let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
+    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
     let groups = if settings.quick { 500 } else { 2_000 };
     let mut result = Calibration { groups, bins: Vec::new(), error: Vec::new() };
-    for candidate in [Candidate::Full(&models.paper), Candidate::Compiled(&ours)] {
+    for candidate in [Candidate::Compiled(&paper), Candidate::Compiled(&ours)] {
         let margins = Margins::new(candidate, &large.test)?;
         let bins = AT.iter().map(|&at| Ok(binned(&margins.confidences(at, groups, settings.seed)?)));
         let bins = bins.collect::<Result<Vec<_>>>()?;

@@ -75,7 +75,12 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
             Ok(())
         };
     let models = context.models()?;
-    add("paper's method, 1000 trees", &models.paper, &[Leaf::I16, Leaf::F32], &[None])?;
+    add(
+        &format!("paper's method, {} trees", models.paper.trees.len()),
+        &models.paper,
+        &[Leaf::I16, Leaf::F32],
+        &[None],
+    )?;
     for (rounds, depth, bins) in FAMILY {
         let mut family = train::Settings { rounds, depth, bins, ..context.ours() };
         if rounds < 30 {
@@ -245,6 +250,7 @@ fn figure(
 fn table(context: &Context, members: &[Member]) -> Table {
     let mut data = Data::new([
         "model",
+        "frontier",
         "leaf",
         "layout",
         "bytes",
@@ -256,13 +262,13 @@ fn table(context: &Context, members: &[Member]) -> Table {
         "accuracy at 10",
         "accuracy at 30",
         "touches to 1 %",
-        "on the frontier",
     ]);
     let best = frontier(members);
     for member in members {
         let on = best.iter().any(|other| std::ptr::eq(*other, member));
         data.push([
             member.name.as_str().into(),
+            Cell::from(if on { "yes" } else { "" }),
             member.leaf.as_str().into(),
             member.layout.as_str().into(),
             Cell::count(member.bytes),
@@ -274,7 +280,6 @@ fn table(context: &Context, members: &[Member]) -> Table {
             Cell::Percent(member.at_10, 1),
             Cell::Percent(member.at_30, 1),
             member.to_1_percent.map_or(Cell::Missing, Cell::count),
-            Cell::from(if on { "yes" } else { "" }),
         ]);
     }
     Table {

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::output::write_json;
-use crate::{progress, source};
+use crate::{capture, compile, progress, source, train};
 use serde::Serialize;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,14 @@ pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Writt
         return Err(Error::data("there is only one object, and nothing to tell it from", "Give at least two objects."));
     }
     let began = Instant::now();
-    let cache = Cache::open(directory, settings, &objects, resume)?;
+    let presets = format!(
+        "{:?} {:?} {:?} {:?}",
+        train::Settings::paper(),
+        train::Settings::compact(),
+        capture::Settings::default(),
+        compile::Settings::default()
+    );
+    let cache = Cache::open(directory, &(settings, presets), &objects, resume)?;
     let context = Context::new(settings, &objects, &cache)?;
     let mut stages: Vec<(String, f64)> = Vec::new();
     let spinner = progress::spinner("report");

@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Mark, Shape, Stroke};
 use super::colour;
-use super::context::{Context, Models, NOISE, compiled, opened};
+use super::context::{Context, Models, NOISE, compiled, compiled_f32, opened};
 use super::cross_validation::{normalised, push_matrix};
 use super::kinds::confusion;
 use super::page::{Figure, Section};
@@ -54,9 +54,9 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
 
 fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Result<Fold> {
     let settings = context.settings;
-    let compiled = [compiled(&models.ours)?.bytes, compiled(&models.noise)?.bytes];
-    let [ours, noise] = [opened(&compiled[0])?, opened(&compiled[1])?];
-    let candidates = [Candidate::Full(&models.paper), Candidate::Compiled(&ours), Candidate::Compiled(&noise)];
+    let compiled = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes, compiled(&models.noise)?.bytes];
+    let models = [opened(&compiled[0])?, opened(&compiled[1])?, opened(&compiled[2])?];
+    let candidates = models.each_ref().map(Candidate::Compiled);
     let mut result = Fold { accuracy: vec![Vec::new(); METHODS.len()], confusion: vec![Vec::new(); METHODS.len()] };
     // Noise that no training saw: training uses the seed itself.
     let seed = settings.seed.wrapping_add(1_000 + fold as u64);

@@ -162,8 +162,8 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
 pub(super) fn sentence(summary: &Summary) -> String {
     let percent = |value: f64| super::scale::number(value * 100.0, 1);
     format!(
-        "After ten touches the paper's method knows the object {}\u{a0}% of the time, ours {}\u{a0}%, and no classifier could do \
-         better than about {}\u{a0}% with what three contact times say. Stopping when sure, ours takes {} touches on average \
+        "After ten touches the paper's method knows the object {}\u{a0}% of the time, ours {}\u{a0}%, and the best that any classifier could \
+         do with what three contact times say is about {}\u{a0}%. Stopping when sure, ours takes {} touches on average \
          for {}\u{a0}% errors.",
         percent(summary.paper.at_10.0),
         percent(summary.ours.at_10.0),

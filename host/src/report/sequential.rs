@@ -1,7 +1,7 @@
 //! Sequential recognition: how many touches it takes to be sure, against how often that was wrong.
 
 use super::chart::{Chart, Mark, Stroke};
-use super::context::{Context, compiled, opened};
+use super::context::{Context, compiled, compiled_f32, opened};
 use super::limit::Large;
 use super::page::{Figure, Section};
 use super::scale::{Scale, number};
@@ -61,11 +61,11 @@ impl Stopped {
 pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
     let settings = context.settings;
     let models = context.models()?;
-    let bytes = compiled(&models.ours)?.bytes;
-    let ours = opened(&bytes)?;
+    let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
+    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
     let count = if settings.quick { 300 } else { 1_000 };
     let mut result = Sequences { count, methods: Vec::new(), used: Vec::new() };
-    for candidate in [Candidate::Full(&models.paper), Candidate::Compiled(&ours)] {
+    for candidate in [Candidate::Compiled(&paper), Candidate::Compiled(&ours)] {
         let margins = Margins::new(candidate, &large.test)?;
         let most = MOST.min(margins.fewest_touches());
         let curve = margins.curve(most, count, settings.seed.wrapping_add(1))?;
