@@ -11,6 +11,7 @@
 
 pub mod approach;
 pub mod capture;
+pub mod cast;
 pub mod compile;
 pub mod dataset;
 pub mod ensemble;

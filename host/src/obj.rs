@@ -10,11 +10,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 
-/// Reads the mesh of an OBJ file: all its objects and groups together, polygons cut into triangles.
+/// Reads the mesh of an OBJ file: all its objects and groups together, polygons cut into triangles, faces that are a
+/// single point left out.
 ///
 /// # Errors
 /// When the file cannot be read, a vertex is not three finite numbers, a face's index is not a whole number or out of
-/// range (line named), when there is no face, or when all corners are the same point.
+/// range (line named), when there is no face, or when each is a single point.
 pub fn read(path: &Path) -> Result<Mesh> {
     let file = File::open(path).map_err(|source| Error::io(path, "read the mesh", source))?;
     parse(BufReader::with_capacity(1 << 18, file), path)
@@ -42,8 +43,13 @@ pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
     if mesh.triangles.is_empty() {
         return Err(unusable("the mesh has no faces".into()));
     }
-    if mesh.triangles.iter().flatten().all(|&index| mesh.vertices[index as usize] == mesh.vertices[0]) {
-        return Err(unusable("the mesh has no extent: all its corners are the same point".into()));
+    // A face whose corners are one point is no surface. Left in, it could still be touched where it floats, and would
+    // stretch the bounding box.
+    let Mesh { vertices, triangles } = &mut mesh;
+    let vertex = |index: u32| vertices[index as usize];
+    triangles.retain(|&[a, b, c]| vertex(a) != vertex(b) || vertex(b) != vertex(c));
+    if mesh.triangles.is_empty() {
+        return Err(unusable("the mesh has no extent: each of its faces is a single point".into()));
     }
     Ok(mesh)
 }
@@ -344,9 +350,9 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_polygons_are_kept_as_they_are() {
+    fn polygons_without_area_become_segments_and_those_without_extent_are_left_out() {
         let mesh = parse_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 3 4\nf 1 1 1 1 1\n").unwrap();
-        assert_eq!(mesh.triangles.len(), 5);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
     }
 
     #[test]

@@ -7,6 +7,9 @@ pub mod narrow;
 mod pack;
 mod tree;
 
+#[cfg(test)]
+mod tests;
+
 use glam::DVec3;
 use narrow::{Motion, Triangle};
 use tree::Tree;

@@ -32,6 +32,8 @@ commands! {
     View => view,
     /// Touch objects with the virtual probe
     Capture => capture,
+    /// Move spheres against a mesh as a file says, to hold the simulator against another engine
+    Cast => cast,
     /// Train an ensemble on captured touches
     Train => train,
     /// Compile an ensemble to the bytes that the chip reads

@@ -1,0 +1,69 @@
+use palpate::cast::{self, Agreement};
+use palpate::scene::Scene;
+use palpate::{Error, Result, obj, output};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+CASTS is a text file with a cast a line: `set,ox,oy,oz,dx,dy,dz` or `set,ox,oy,oz,dx,dy,dz,t`, where t is the time that
+another engine found, or `miss`. The same lines come back with our time appended. Times are in lengths of the direction,
+which is not renormalised; all numbers are taken as the nearest f32.
+
+Examples:
+  palpate cast cup.obj casts.csv                        lines on standard output
+  palpate cast cup.obj casts.csv -o ours.csv            lines in a file, and how the times agree on standard output
+  palpate cast cup.obj casts.csv -o ours.csv --as-is    for a mesh that is already in the units of the probe")]
+pub(crate) struct Arguments {
+    /// The mesh, as an OBJ file
+    #[arg(value_name = "MESH.obj")]
+    mesh: PathBuf,
+    /// The casts
+    #[arg(value_name = "CASTS.csv")]
+    casts: PathBuf,
+    /// Where to write the lines [default: standard output]
+    #[arg(short, long, value_name = "OUT.csv")]
+    output: Option<PathBuf>,
+    /// The longest side that the mesh's bounding box is scaled to, centred at the origin
+    #[arg(long, value_name = "UNITS", default_value_t = 10.0)]
+    length: f64,
+    /// Leave the mesh as it is, neither scaled nor centred
+    #[arg(long, conflicts_with = "length")]
+    as_is: bool,
+    /// The sphere's radius, in units
+    #[arg(long, value_name = "UNITS", default_value_t = 0.15)]
+    radius: f32,
+    /// Print how the times agree as JSON (with --output)
+    #[arg(long, requires = "output")]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    for (name, value) in [("length", arguments.length), ("radius", f64::from(arguments.radius))] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(Error::argument(format!("the {name} is {value}"), "Give a number greater than 0."));
+        }
+    }
+    let mesh = obj::read(&arguments.mesh)?;
+    let scene = if arguments.as_is { Scene::as_is(&mesh) } else { Scene::new(&mesh, arguments.length) }?;
+    let lines = cast::read(&arguments.casts)?;
+    let times = cast::times(&scene, &lines, f64::from(arguments.radius));
+    let text = cast::annotate(&lines, &times);
+    let Some(path) = arguments.output else { return output::print(&text) };
+    output::write_bytes(&path, text.as_bytes())?;
+    let agreement = cast::agreement(&lines, &times);
+    if arguments.json { output::print_json(&agreement) } else { output::print(&table(&agreement)) }
+}
+
+fn table(sets: &[Agreement]) -> String {
+    let mut text = format!("{:12} {:>8} {:>8} {:>8}  {:>13}\n", "set", "casts", "missed", "false", "largest error");
+    for set in sets {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{:12} {:>8} {:>8} {:>8}  {:>13.1e}",
+            set.set, set.casts, set.missed, set.false_contacts, set.largest_error
+        );
+    }
+    text
+}
