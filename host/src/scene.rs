@@ -43,6 +43,11 @@ impl Scene {
         Self { surface: Surface::new(triangles), bounds }
     }
 
+    /// The surface itself.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
     /// The triangles' corners, in no particular order.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = Triangle> + '_ {
         self.surface.triangles()

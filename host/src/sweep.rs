@@ -3,6 +3,7 @@
 //! Boxes in f32 with slack find the leaves that the sphere may reach ([`tree`]), an f32 test on eight triangles at once
 //! throws out those that it cannot ([`pack`]), and the rest is decided in f64 ([`narrow`]).
 
+pub mod budget;
 pub mod narrow;
 mod pack;
 mod tree;
@@ -11,8 +12,61 @@ mod tree;
 mod tests;
 
 use glam::DVec3;
-use narrow::{Motion, Triangle};
+use narrow::{Motion, Triangle, double, single};
 use tree::Tree;
+
+/// How the triangles of a leaf are decided: the choices that there are between speed and error.
+pub trait Precision {
+    /// Whether the eight-wide f32 test goes first.
+    const REJECT: bool;
+
+    /// The distance until the sphere touches the triangle, if that is less than `limit`.
+    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64>;
+}
+
+/// f64 after the f32 reject: what casts use.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact;
+
+/// f64 for every triangle of a leaf.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
+
+/// f32 after the f32 reject, only to measure what that costs.
+#[derive(Clone, Copy, Debug)]
+pub struct Single;
+
+impl Precision for Exact {
+    const REJECT: bool = true;
+
+    #[inline]
+    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
+        double::first_contact(motion, triangle, limit)
+    }
+}
+
+impl Precision for Plain {
+    const REJECT: bool = false;
+
+    #[inline]
+    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
+        double::first_contact(motion, triangle, limit)
+    }
+}
+
+impl Precision for Single {
+    const REJECT: bool = true;
+
+    #[inline]
+    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
+        let motion = single::Motion {
+            origin: motion.origin.as_vec3(),
+            direction: motion.direction.as_vec3(),
+            radius: motion.radius as f32,
+        };
+        single::first_contact(&motion, &triangle.map(|corner| corner.as_vec3()), limit as f32).map(f64::from)
+    }
+}
 
 /// A triangle mesh, ready for spheres to be moved against it.
 #[derive(Clone, Debug)]
@@ -60,6 +114,11 @@ impl Surface {
     /// the surface; 0 when it starts in contact, none when it never does. The direction need not have unit length;
     /// without a direction (zero, or not finite) only a contact at the start counts.
     pub fn first_contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
+        self.first_contact_in::<Exact>(origin, direction, radius)
+    }
+
+    /// The same in another [`Precision`].
+    pub fn first_contact_in<P: Precision>(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
         let length = direction.length();
         let moves = length > 0.0 && length.is_finite();
         let motion = Motion {
@@ -69,7 +128,7 @@ impl Surface {
         };
         let entry = self.entry(&motion)?;
         let near = Motion { origin: motion.origin + motion.direction * entry, ..motion };
-        let distance = entry + self.tree.first_contact(&self.triangles, &near)?;
+        let distance = entry + self.tree.first_contact::<P>(&self.triangles, &near)?;
         Some(if moves { distance * self.unit / length } else { 0.0 })
     }
 
@@ -83,7 +142,7 @@ impl Surface {
     /// there. From far away this saves the digits that the distance would cost.
     fn entry(&self, motion: &Motion) -> Option<f64> {
         // Rounding moves a point that is far away by this much at most.
-        let slack = 1e-9 + 1e-15 * motion.origin.abs().max_element();
+        let slack = budget::ENTRY + budget::ENTRY_FAR * motion.origin.abs().max_element();
         let reach = self.half + DVec3::splat(motion.radius + slack);
         let (mut near, mut far) = (0.0_f64, f64::INFINITY);
         for axis in 0..3 {

@@ -5,6 +5,7 @@
 //! or beyond the limit is out of reach. Slack makes up for the rounding, so a triangle that is thrown out is surely
 //! not touched; of those that stay, most are.
 
+use super::budget::BOX;
 use super::narrow::{Motion, Triangle};
 use glam::{DVec3, Vec3};
 
@@ -37,10 +38,15 @@ impl Pack {
         Self { corners, first, count: triangles.len() as u32 }
     }
 
-    /// A bit for each triangle that the sphere may touch within `limit`, and in `depths` how far away the triangle's
-    /// nearest corner is, along the motion.
+    /// A bit for each triangle.
     #[inline]
-    pub(super) fn candidates(&self, ray: &Ray, limit: f32, depths: &mut Lanes) -> u32 {
+    pub(super) fn all(&self) -> u32 {
+        (1 << self.count) - 1
+    }
+
+    /// A bit for each triangle that the sphere may touch within `limit`.
+    #[inline]
+    pub(super) fn candidates(&self, ray: &Ray, limit: f32) -> u32 {
         let u = self.corners.each_ref().map(|corner| ray.along(corner, 0));
         let v = self.corners.each_ref().map(|corner| ray.along(corner, 1));
         let w = self.corners.each_ref().map(|corner| ray.along(corner, 2));
@@ -52,7 +58,6 @@ impl Pack {
             out |= greatest(us) < -ray.margin;
             out |= least(vs) > ray.margin;
             out |= greatest(vs) < -ray.margin;
-            depths[lane] = least(ws);
             out |= least(ws) > limit + ray.margin;
             out |= greatest(ws) < -ray.margin;
             for (from, to, opposite) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
@@ -69,7 +74,7 @@ impl Pack {
         for (lane, apart) in apart.into_iter().enumerate() {
             mask |= u32::from(!apart) << lane;
         }
-        mask & ((1 << self.count) - 1)
+        mask & self.all()
     }
 }
 
@@ -88,11 +93,11 @@ pub(super) struct Ray {
 
 impl Ray {
     /// Coordinates are at most 1 in the frame of the casts, a sphere that has been moved up to the box starts within
-    /// √3 + radius of it or stands inside: a few roundings of 6e-8 of that each, for which 4e-6 of it is plenty.
+    /// √3 + radius of it or stands inside.
     pub(super) fn new(motion: &Motion) -> Self {
         let direction = if motion.direction == DVec3::ZERO { DVec3::X } else { motion.direction };
         let (u, v) = direction.any_orthonormal_pair();
-        let margin = motion.radius + 4e-6 * (1.0 + motion.radius + motion.origin.abs().max_element());
+        let margin = motion.radius + BOX * (1.0 + motion.radius + motion.origin.abs().max_element());
         let component = |c: f64| if c.abs() < 1e-12 { 1e12_f64.copysign(c) } else { 1.0 / c };
         let across = |axis: DVec3| axis.dot(motion.origin) as f32;
         Self {

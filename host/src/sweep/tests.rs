@@ -165,7 +165,7 @@ fn globe(rings: u32) -> Vec<Triangle> {
 fn brute(triangles: &[Triangle], origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
     let length = direction.length();
     let motion = Motion { origin, direction: direction / length, radius };
-    let contact = |triangle| narrow::first_contact(&motion, triangle, f64::INFINITY);
+    let contact = |triangle| narrow::double::first_contact(&motion, triangle, f64::INFINITY);
     triangles.iter().filter_map(contact).min_by(f64::total_cmp).map(|distance| distance / length)
 }
 

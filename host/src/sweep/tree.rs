@@ -1,6 +1,7 @@
 //! The bounding volume hierarchy: built by `obvhs`, then flattened to four children a node.
 
-use super::narrow::{self, Motion, Triangle};
+use super::Precision;
+use super::narrow::{Motion, Triangle};
 use super::pack::{LANES, Pack, Ray, bigger, smaller};
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -53,7 +54,7 @@ impl Tree {
     }
 
     /// The distance that the sphere travels until it touches one of the triangles.
-    pub(super) fn first_contact(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
+    pub(super) fn first_contact<P: Precision>(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
         let ray = Ray::new(motion);
         let mut first = if motion.direction == DVec3::ZERO { f64::MIN_POSITIVE } else { f64::INFINITY };
         let mut limit = first as f32;
@@ -66,13 +67,12 @@ impl Tree {
             }
             if child & PACK != 0 {
                 let pack = &self.packs[(child & !PACK) as usize];
-                let mut depths = [0.0; LANES];
-                let mut candidates = pack.candidates(&ray, limit, &mut depths);
+                let mut candidates = if P::REJECT { pack.candidates(&ray, limit) } else { pack.all() };
                 while candidates != 0 {
                     let lane = candidates.trailing_zeros();
                     candidates &= candidates - 1;
                     let triangle = &triangles[(pack.first + lane) as usize];
-                    if let Some(distance) = narrow::first_contact(motion, triangle, first) {
+                    if let Some(distance) = P::first_contact(motion, triangle, first) {
                         first = distance;
                         // Rounded up, and with room for the boxes' own rounding.
                         limit = first as f32 + 2.0 * (ray.margin - motion.radius as f32);

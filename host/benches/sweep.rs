@@ -1,0 +1,257 @@
+//! `cargo bench -p palpate --bench sweep`: the swept spheres against parry3d, on the same casts in the same run; speed
+//! against error; how the cost grows with the mesh; and the ten real objects, where `PALPATE_SHARED` leads to them.
+//!
+//! Rates are the best of three passes, one thread, except where it says otherwise.
+
+use glam::DVec3;
+use palpate::approach::{Approach, Probe};
+use palpate::capture::{self, Settings};
+use palpate::cast;
+use palpate::mesh::Mesh;
+use palpate::scene::Scene;
+use palpate::sweep::narrow::double::{self, Motion, Triangle};
+use palpate::sweep::{Exact, Plain, Precision, Single, budget};
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const RADIUS: f64 = 0.15;
+
+struct Cast {
+    origin: DVec3,
+    direction: DVec3,
+}
+
+fn main() {
+    // `cargo test --benches` only asks whether it starts.
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    peers();
+    speed_against_error();
+    growth();
+    real_objects();
+    error_budget();
+}
+
+fn mesh_of(triangles: f64) -> Mesh {
+    Mesh::globe((triangles / 4.0).sqrt().round() as u32)
+}
+
+/// Casts as the probe makes them, every sixth turned into one that grazes the surface: tangent to it with a clearance
+/// of ±1e-7 to ±1e-2.
+fn casts(scene: &Scene, count: usize) -> Vec<Cast> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let triangles: Vec<Triangle> = scene.triangles().collect();
+    let cast = |index| {
+        let approach = Approach::draw(&mut rng, scene.bounds(), 10.0);
+        let Approach { start, direction, .. } = approach;
+        if index % 6 != 0 {
+            return Cast { origin: approach.fingers(1.5)[index % 3], direction };
+        }
+        // Through a point beside a triangle's corner, perpendicular to the way from it, clear of the triangle itself.
+        let [a, b, c] = triangles[rng.random_range(0..triangles.len())];
+        let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
+        let along = normal.cross(direction).normalize_or(DVec3::X);
+        let clearance = 10.0_f64.powf(rng.random_range(-7.0..-2.0)) * if rng.random() { 1.0 } else { -1.0 };
+        let beside = (a + b + c) / 3.0 + normal * (RADIUS + clearance);
+        Cast { origin: beside - along * (start.length() + 1.0), direction: along }
+    };
+    (0..count).map(cast).collect()
+}
+
+/// The best rate of three passes over the casts, and the times found.
+fn measure<T>(casts: &[T], passes: usize, contact: impl Fn(&T) -> Option<f64>) -> (f64, Vec<Option<f64>>) {
+    let mut best = 0.0_f64;
+    let mut times = Vec::new();
+    for _ in 0..passes {
+        let start = Instant::now();
+        times = casts.iter().map(|cast| black_box(contact(black_box(cast)))).collect();
+        best = best.max(casts.len() as f64 / start.elapsed().as_secs_f64());
+    }
+    (best, times)
+}
+
+/// The parry3d of one precision: mesh, casts and rate, converted outside the clock.
+macro_rules! parry {
+    ($parry:ident, $real:ident, $mesh:expr, $scene:expr, $casts:expr) => {{
+        use $parry::math::{Pose, Vector};
+        use $parry::query::{ShapeCastOptions, cast_shapes};
+        use $parry::shape::{Ball, TriMesh};
+        let [low, high] = Scene::as_is($mesh).unwrap().bounds();
+        let (centre, scale) = ((low + high) / 2.0, 10.0 / (high - low).max_element());
+        let vector = |v: DVec3| Vector::new(v.x as $real, v.y as $real, v.z as $real);
+        let vertex = |&v: &[f32; 3]| vector((glam::Vec3::from(v).as_dvec3() - centre) * scale);
+        let shape = TriMesh::new($mesh.vertices.iter().map(vertex).collect(), $mesh.triangles.clone()).unwrap();
+        let ball = Ball::new(RADIUS as $real);
+        let casts: Vec<_> = $casts.iter().map(|cast| (vector(cast.origin), vector(cast.direction))).collect();
+        let options = ShapeCastOptions { compute_impact_geometry_on_penetration: false, ..Default::default() };
+        measure(&casts, 1, |&(origin, direction)| {
+            let pose = Pose::from_translation(origin);
+            let hit = cast_shapes(&Pose::IDENTITY, Vector::ZERO, &shape, &pose, direction, &ball, options);
+            hit.unwrap().map(|hit| f64::from(hit.time_of_impact))
+        })
+    }};
+}
+
+fn peers() {
+    println!("Against parry3d 0.31: casts of a sphere of radius {RADIUS}, one thread, a sixth of them grazing\n");
+    println!(
+        "{:>9}  {:12} {:>12} {:>9} {:>7} {:>7} {:>12}",
+        "triangles", "engine", "casts/s", "ratio", "missed", "false", "worst time"
+    );
+    for triangles in [1e3, 1e4, 1e5] {
+        let mesh = mesh_of(triangles);
+        let scene = Scene::new(&mesh, 10.0).unwrap();
+        let casts = casts(&scene, 12_000);
+        let (our_rate, ours) = measure(&casts, 3, |cast| scene.first_contact(cast.origin, cast.direction, RADIUS));
+        let (single_rate, single) = parry!(parry3d, f32, &mesh, &scene, casts);
+        let (double_rate, double) = parry!(parry3d_f64, f64, &mesh, &scene, casts);
+        let truth = truth(&scene, &casts, [&ours, &single, &double]);
+        let rows =
+            [("palpate", our_rate, ours), ("parry3d f32", single_rate, single), ("parry3d f64", double_rate, double)];
+        for (engine, rate, times) in rows {
+            let [missed, false_contacts, worst] = compare(&truth, &times);
+            let (count, ratio) = (mesh.triangles.len(), our_rate / rate);
+            println!(
+                "{count:>9}  {engine:12} {rate:>12.0} {ratio:>8.1}x {missed:>7} {false_contacts:>7} {worst:>12.1e}"
+            );
+        }
+    }
+    println!(
+        "\nratio: how many times as long as palpate takes. missed, false: contacts lost or made up; worst time: largest"
+    );
+    println!("error of a contact's time. Wherever the engines disagree, f64 over all triangles decides.\n");
+}
+
+/// What is right: ours where all agree on whether and, to 1e-9, when; else the earliest contact over all triangles.
+fn truth(scene: &Scene, casts: &[Cast], engines: [&[Option<f64>]; 3]) -> Vec<Option<f64>> {
+    let triangles: Vec<Triangle> = scene.triangles().collect();
+    let brute = |cast: &Cast| {
+        let motion = Motion { origin: cast.origin, direction: cast.direction, radius: RADIUS };
+        let contact = |triangle| double::first_contact(&motion, triangle, f64::INFINITY);
+        triangles.iter().filter_map(contact).min_by(f64::total_cmp)
+    };
+    let decide = |(index, cast): (usize, &Cast)| {
+        let [ours, single, double] = engines.map(|times| times[index]);
+        let agree = match (ours, double) {
+            (Some(ours), Some(double)) => (ours - double).abs() < 1e-9,
+            (ours, double) => ours == double,
+        };
+        if agree && single.is_some() == ours.is_some() { ours } else { brute(cast) }
+    };
+    casts.iter().enumerate().map(decide).collect()
+}
+
+fn compare(truth: &[Option<f64>], times: &[Option<f64>]) -> [f64; 3] {
+    let mut result = [0.0; 3];
+    for (truth, time) in truth.iter().zip(times) {
+        match (truth, time) {
+            (Some(truth), Some(time)) => result[2] = f64::max(result[2], (truth - time).abs()),
+            (Some(_), None) => result[0] += 1.0,
+            (None, Some(_)) => result[1] += 1.0,
+            (None, None) => {}
+        }
+    }
+    result
+}
+
+fn shared(folder: &str) -> Option<PathBuf> {
+    let shared = std::env::var_os("PALPATE_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"), PathBuf::from);
+    let directory = shared.join(folder);
+    if directory.is_dir() {
+        return Some(directory);
+    }
+    println!("SKIPPED: {} is not there (set PALPATE_SHARED)", directory.display());
+    None
+}
+
+fn speed_against_error() {
+    println!("Speed against error, on the reference casts (1,400 a mesh, computed in quad precision)\n");
+    println!(
+        "{:12} {:24} {:>12} {:>7} {:>7} {:>14}",
+        "mesh", "narrow phase", "casts/s", "missed", "false", "largest error"
+    );
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data");
+    let mut meshes = vec![(own, "slivers")];
+    if let Some(directory) = shared("reference") {
+        meshes.extend(["paperclip", "winebottle", "scissors"].map(|name| (directory.clone(), name)));
+    }
+    for (directory, name) in meshes {
+        let mesh = palpate::obj::read(&directory.join(format!("{name}.obj"))).unwrap();
+        let lines = cast::read(&directory.join(format!("{name}.casts.csv"))).unwrap();
+        let scene = Scene::as_is(&mesh).unwrap();
+        row::<Single>(name, "f32 after f32 reject", &scene, &lines);
+        row::<Plain>(name, "f64", &scene, &lines);
+        row::<Exact>(name, "f64 after f32 reject", &scene, &lines);
+    }
+    println!();
+
+    fn row<P: Precision>(name: &str, phase: &str, scene: &Scene, lines: &[cast::Line]) {
+        let casts: Vec<&cast::Cast> = lines
+            .iter()
+            .filter_map(|line| match line {
+                cast::Line::Cast(cast) => Some(cast),
+                cast::Line::Other(_) => None,
+            })
+            .collect();
+        let radius = f64::from(0.15_f32);
+        let contact = |cast: &&cast::Cast| scene.surface().first_contact_in::<P>(cast.origin, cast.direction, radius);
+        let (rate, times) = measure(&casts, 20, contact);
+        let sets = cast::agreement(lines, &times);
+        let missed: usize = sets.iter().map(|set| set.missed).sum();
+        let false_contacts: usize = sets.iter().map(|set| set.false_contacts).sum();
+        let error = sets.iter().map(|set| set.largest_error).fold(0.0, f64::max);
+        println!("{name:12} {phase:24} {rate:>12.0} {missed:>7} {false_contacts:>7} {error:>14.1e}");
+    }
+}
+
+fn growth() {
+    println!("How the cost grows: the same shape in 1 k to 1 M triangles\n");
+    println!("{:>9} {:>14} {:>14} {:>9}", "triangles", "scene built in", "approaches/s", "against 1 k");
+    let mut first = None;
+    for triangles in [1e3, 1e4, 1e5, 1e6] {
+        let mesh = mesh_of(triangles);
+        let start = Instant::now();
+        let scene = Scene::new(&mesh, 10.0).unwrap();
+        let built = start.elapsed().as_secs_f64();
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
+        let probe = Probe::default();
+        let approaches: Vec<Approach> =
+            (0..30_000).map(|_| Approach::draw(&mut rng, scene.bounds(), probe.tilt)).collect();
+        let (rate, _) =
+            measure(&approaches, 3, |approach| approach.full_distances(&scene, &probe).map(|distances| distances[0]));
+        let against = *first.get_or_insert(rate) / rate;
+        println!("{:>9} {built:>13.3}s {rate:>14.0} {against:>8.2}x", mesh.triangles.len());
+    }
+    println!();
+}
+
+fn real_objects() {
+    println!("Ten real objects, 21,000 full touches of each, all threads\n");
+    let Some(directory) = shared("objects") else { return };
+    let sources = [directory.to_string_lossy().into_owned()];
+    let objects = palpate::source::objects(&sources).unwrap();
+    let output = tempfile::tempdir().unwrap();
+    let summary = capture::capture(&objects, &Settings::default(), output.path()).unwrap();
+    println!("{:12} {:>11} {:>7} {:>14}", "object", "approaches", "share", "approaches/s");
+    for object in &summary.objects {
+        let share = 100.0 * object.touches as f64 / object.approaches as f64;
+        println!(
+            "{:12} {:>11} {share:>6.1}% {:>14.0}",
+            object.name,
+            object.approaches,
+            object.approaches as f64 / object.seconds
+        );
+    }
+    println!("{:12} {:>11} in {:.2} s\n", "all", summary.approaches(), summary.seconds);
+}
+
+fn error_budget() {
+    println!("What each step may be wrong by\n");
+    for budget::Allowance { step, error, of, reason } in budget::BUDGET {
+        println!("{error:8.0e} of {of}: {step}\n         {reason}");
+    }
+}
