@@ -329,6 +329,46 @@ mod tests {
     }
 
     #[test]
+    fn what_an_interruption_left_behind_is_cut_off_and_the_rest_is_the_same() {
+        let whole = files(&settings());
+        let mut manifest: Manifest = serde_json::from_str(&whole["dataset.json"]).unwrap();
+        let scenes = scenes(&objects(), &settings()).unwrap();
+        for (object, kept) in [(0, 0), (0, 1), (0, 777), (0, 1500), (1, 0), (1, 1499), (1, 1500)] {
+            // As if it had been killed after an account of so many touches of this object.
+            let directory = tempfile::tempdir().unwrap();
+            manifest.complete = false;
+            for (index, entry) in manifest.objects.iter_mut().enumerate() {
+                let kept = [kept, if index < object { 1500 } else { 0 }][usize::from(index != object)];
+                let text = &whole[&format!("{}.txt", entry.name)];
+                let sampler = Sampler::new(&scenes[index], &entry.name, &manifest.settings);
+                entry.touches = kept;
+                entry.approaches = (0..kept).map(|sample| sampler.sample(sample).unwrap().1).sum();
+                entry.bytes = text.lines().take(kept as usize).map(|line| line.len() as u64 + 1).sum();
+                let end = if index == object { "part" } else { "txt" };
+                if index <= object {
+                    let mut left = text[..entry.bytes as usize].to_owned();
+                    left += if index == object { "0.000000 0.1" } else { "" };
+                    std::fs::write(directory.path().join(format!("{}.{end}", entry.name)), left).unwrap();
+                }
+            }
+            manifest.write(directory.path()).unwrap();
+            capture(&objects(), &Settings { resume: true, ..settings() }, directory.path()).unwrap();
+            assert!(read_files(directory.path()) == whole, "object {object}, {kept} touches");
+        }
+    }
+
+    #[test]
+    fn a_part_that_lost_what_was_accounted_for_is_not_gone_on_with() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut manifest = Manifest::new(&settings(), ["disc".into(), "globe".into()]);
+        manifest.objects[0] =
+            crate::dataset::manifest::Entry { name: "disc".into(), touches: 9, approaches: 99, bytes: 252 };
+        manifest.write(directory.path()).unwrap();
+        let error = capture(&objects(), &Settings { resume: true, ..settings() }, directory.path()).unwrap_err();
+        assert!(error.to_string().contains("disc.part: shorter than the 252 bytes"), "{error}");
+    }
+
+    #[test]
     fn an_object_that_three_fingers_cannot_touch_is_named() {
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let speck = Object { name: "speck".into(), mesh: Mesh { vertices, triangles: vec![[0, 1, 2]] } };

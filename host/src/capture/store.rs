@@ -8,7 +8,7 @@ use super::Settings;
 use crate::dataset::manifest::{Entry, Manifest};
 use crate::error::{Error, Result};
 use std::fs::{File, TryLockError};
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -90,7 +90,14 @@ impl Store {
     /// Says that the data set is complete.
     pub(super) fn finish(&mut self) -> Result<()> {
         self.manifest.complete = true;
-        self.manifest.write(&self.directory)
+        self.write_manifest()
+    }
+
+    fn write_manifest(&self) -> Result<()> {
+        self.manifest.write(&self.directory).map_err(|error| match error {
+            Error::Io { path, source, .. } => stopped(&path, source),
+            other => other,
+        })
     }
 
     fn account(&mut self) -> Result<()> {
@@ -98,7 +105,7 @@ impl Store {
             file.sync_data().map_err(|error| stopped(&self.part(*object), error))?;
         }
         self.accounted = Instant::now();
-        self.manifest.write(&self.directory)
+        self.write_manifest()
     }
 
     /// The object's part, cut to what the manifest accounts for when it is opened.
@@ -144,7 +151,7 @@ fn text(directory: &Path, name: &str) -> PathBuf {
 fn remove_touches(directory: &Path, name: &str) -> Result<()> {
     for path in [part(directory, name), text(directory, name)] {
         match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
                 return Err(Error::io(&path, "remove the old touches", error));
             }
             _ => {}
@@ -154,8 +161,13 @@ fn remove_touches(directory: &Path, name: &str) -> Result<()> {
 }
 
 /// A capture that could not write, and can be resumed.
-fn stopped(path: &Path, error: std::io::Error) -> Error {
-    Error::io(path, "write the touches", error)
+fn stopped(path: &Path, source: std::io::Error) -> Error {
+    let cure = match source.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space",
+        _ => "Check the disk",
+    };
+    let fix = format!("{cure}, then repeat the command with --resume: what is accounted for is safe.");
+    Error::Io { path: path.into(), action: "write the touches", source, fix }
 }
 
 fn lock(directory: &Path) -> Result<File> {

@@ -1,9 +1,11 @@
 //! Eight triangles at once in f32: which of them can a moving sphere not touch?
 //!
 //! Seen along the motion, the sphere's path is a disc and a triangle is a triangle: they are apart if a line separates
-//! them (their bounding boxes' sides and the triangle's edges are tried). Along the motion, a triangle behind the start
-//! or beyond the limit is out of reach. Slack makes up for the rounding, so a triangle that is thrown out is surely
-//! not touched; of those that stay, most are.
+//! them (the sides of the triangle's bounding rectangle and its edges are tried). Along the motion, a triangle behind
+//! the start is out of reach, and one at a distance from the path is touched late. Slack makes up for the rounding, so
+//! a triangle that is thrown out is surely not touched; of those that stay, most are.
+
+#![allow(clippy::needless_range_loop, reason = "arrays of lanes side by side, by index, are what vectorises")]
 
 use super::budget::BOX;
 use super::narrow::{Motion, Triangle};
@@ -38,28 +40,27 @@ impl Pack {
         Self { corners, first, count: triangles.len() as u32 }
     }
 
-    /// A bit for each triangle.
+    /// For each triangle, that the sphere may touch it at once.
     #[inline]
-    pub(super) fn all(&self) -> u32 {
-        (1 << self.count) - 1
+    pub(super) fn unknown(&self) -> Lanes {
+        std::array::from_fn(|lane| if lane < self.count as usize { 0.0 } else { f32::INFINITY })
     }
 
-    /// A bit for each triangle that the sphere may touch within `limit`.
+    /// For each triangle, a distance before which the sphere does not touch it; infinite if it never does.
     #[inline]
-    pub(super) fn candidates(&self, ray: &Ray, limit: f32) -> u32 {
+    pub(super) fn earliest(&self, ray: &Ray) -> Lanes {
         let u = self.corners.each_ref().map(|corner| ray.along(corner, 0));
         let v = self.corners.each_ref().map(|corner| ray.along(corner, 1));
         let w = self.corners.each_ref().map(|corner| ray.along(corner, 2));
-        let mut apart = [false; LANES];
+        let mut earliest = [0.0; LANES];
         let margin_squared = ray.margin * ray.margin;
         for lane in 0..LANES {
             let (us, vs, ws) = (u.map(|c| c[lane]), v.map(|c| c[lane]), w.map(|c| c[lane]));
-            let mut out = least(us) > ray.margin;
-            out |= greatest(us) < -ray.margin;
-            out |= least(vs) > ray.margin;
-            out |= greatest(vs) < -ray.margin;
-            out |= least(ws) > limit + ray.margin;
-            out |= greatest(ws) < -ray.margin;
+            // The triangle's bounding rectangle, at its distance from the path, is met where the sphere is round.
+            let beside = bigger(bigger(least(us), -greatest(us)), 0.0);
+            let above = bigger(bigger(least(vs), -greatest(vs)), 0.0);
+            let reach = margin_squared - (beside * beside + above * above);
+            let mut out = (reach < 0.0) | (greatest(ws) < -ray.margin);
             for (from, to, opposite) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
                 let (eu, ev) = (us[to] - us[from], vs[to] - vs[from]);
                 // Where the path and the opposite corner stand across this edge, times its length.
@@ -68,13 +69,12 @@ impl Pack {
                 let beyond = bigger(path - bigger(corner, 0.0), smaller(corner, 0.0) - path);
                 out |= (beyond > 0.0) & (beyond * beyond > margin_squared * (eu * eu + ev * ev));
             }
-            apart[lane] = out;
+            let entry = least(ws) - bigger(reach, 0.0).sqrt();
+            earliest[lane] = if out { f32::INFINITY } else { bigger(entry, 0.0) };
         }
-        let mut mask = 0;
-        for (lane, apart) in apart.into_iter().enumerate() {
-            mask |= u32::from(!apart) << lane;
-        }
-        mask & self.all()
+        // Free lanes repeat the first triangle.
+        earliest[self.count as usize..].fill(f32::INFINITY);
+        earliest
     }
 }
 
@@ -107,6 +107,24 @@ impl Ray {
             offsets: [across(u), across(v), across(direction)],
             margin: margin as f32,
         }
+    }
+
+    /// Of boxes, given by their centre and half their sides: where the centre is along one of the axes, and how far
+    /// the box reaches from there.
+    #[inline]
+    pub(super) fn extent<const N: usize>(
+        &self,
+        [x, y, z]: &[[f32; N]; 3],
+        [a, b, c]: &[[f32; N]; 3],
+        axis: usize,
+    ) -> ([f32; N], [f32; N]) {
+        let (direction, offset, size) = (self.axes[axis], self.offsets[axis], self.axes[axis].abs());
+        let (mut centre, mut reach) = ([0.0; N], [0.0; N]);
+        for lane in 0..N {
+            centre[lane] = x[lane] * direction.x + y[lane] * direction.y + z[lane] * direction.z - offset;
+            reach[lane] = a[lane] * size.x + b[lane] * size.y + c[lane] * size.z;
+        }
+        (centre, reach)
     }
 
     #[inline]

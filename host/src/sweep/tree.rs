@@ -1,5 +1,7 @@
 //! The bounding volume hierarchy: built by `obvhs`, then flattened to four children a node.
 
+#![allow(clippy::needless_range_loop, reason = "arrays of lanes side by side, by index, are what vectorises")]
+
 use super::Precision;
 use super::narrow::{Motion, Triangle};
 use super::pack::{LANES, Pack, Ray, bigger, smaller};
@@ -10,11 +12,13 @@ use obvhs::bvh2::Bvh2;
 /// How many children a node has: the lanes of an SSE register.
 const WIDTH: usize = 4;
 
-/// Boxes of four children in f32, axis by axis, and where the children are. An unused child has an empty box.
+/// Boxes of four children in f32, axis by axis, and where the children are. An unused child has a box that nothing
+/// meets.
 #[derive(Clone, Debug)]
 struct Node {
-    low: [[f32; WIDTH]; 3],
-    high: [[f32; WIDTH]; 3],
+    centre: [[f32; WIDTH]; 3],
+    /// Half the box's sides.
+    half: [[f32; WIDTH]; 3],
     children: [u32; WIDTH],
 }
 
@@ -67,11 +71,9 @@ impl Tree {
             }
             if child & PACK != 0 {
                 let pack = &self.packs[(child & !PACK) as usize];
-                let mut candidates = if P::REJECT { pack.candidates(&ray, limit) } else { pack.all() };
-                while candidates != 0 {
-                    let lane = candidates.trailing_zeros();
-                    candidates &= candidates - 1;
-                    let triangle = &triangles[(pack.first + lane) as usize];
+                let mut earliest = if P::REJECT { pack.earliest(&ray) } else { pack.unknown() };
+                while let Some(lane) = pop_least(&mut earliest, limit) {
+                    let triangle = &triangles[pack.first as usize + lane];
                     if let Some(distance) = P::first_contact(motion, triangle, first) {
                         first = distance;
                         // Rounded up, and with room for the boxes' own rounding.
@@ -88,23 +90,32 @@ impl Tree {
 }
 
 impl Node {
-    const EMPTY: Self =
-        Self { low: [[f32::INFINITY; WIDTH]; 3], high: [[f32::NEG_INFINITY; WIDTH]; 3], children: [0; WIDTH] };
+    const EMPTY: Self = Self { centre: [[0.0; WIDTH]; 3], half: [[-1e30; WIDTH]; 3], children: [0; WIDTH] };
 
-    /// Puts the children whose inflated boxes the path meets before `limit` on the stack, the nearest on top.
+    /// Puts the children that the sphere may touch before `limit` on the stack, the nearest on top.
     #[inline]
     fn visit(&self, ray: &Ray, limit: f32, stack: &mut Vec<(f32, u32)>) {
         let mut near = [0.0_f32; WIDTH];
         let mut far = [limit; WIDTH];
         for axis in 0..3 {
-            let (origin, inverse) = (ray.origin[axis], ray.inverse[axis]);
-            let (low, high) =
-                if inverse < 0.0 { (&self.high[axis], &self.low[axis]) } else { (&self.low[axis], &self.high[axis]) };
-            let margin = ray.margin.copysign(inverse);
+            let (origin, inverse, margin) = (ray.origin[axis], ray.inverse[axis], ray.margin);
             for child in 0..WIDTH {
-                near[child] = bigger(near[child], (low[child] - margin - origin) * inverse);
-                far[child] = smaller(far[child], (high[child] + margin - origin) * inverse);
+                let middle = (self.centre[axis][child] - origin) * inverse;
+                let half = (self.half[axis][child] + margin) * inverse.abs();
+                near[child] = bigger(near[child], middle - half);
+                far[child] = smaller(far[child], middle + half);
             }
+        }
+        // A box that is inflated like that has corners where the sphere is round. Seen along the motion, a box at a
+        // distance from the path is met later than its depth says, or never: on fine meshes this is what keeps the
+        // search to the few triangles about the point of contact.
+        let [beside, above, depth] = [0, 1, 2].map(|axis| ray.extent(&self.centre, &self.half, axis));
+        for child in 0..WIDTH {
+            let u = bigger(beside.0[child].abs() - beside.1[child], 0.0);
+            let v = bigger(above.0[child].abs() - above.1[child], 0.0);
+            let reach = ray.margin * ray.margin - (u * u + v * v);
+            let entry = depth.0[child] - depth.1[child] - bigger(reach, 0.0).sqrt();
+            near[child] = if reach < 0.0 { f32::INFINITY } else { bigger(near[child], entry) };
         }
         let bottom = stack.len();
         for child in 0..WIDTH {
@@ -118,6 +129,19 @@ impl Node {
             }
         }
     }
+}
+
+/// The lane with the least value, if that is at most `limit`; it does not come again.
+#[inline]
+fn pop_least(values: &mut [f32; LANES], limit: f32) -> Option<usize> {
+    let (mut least, mut lane) = (f32::INFINITY, 0);
+    for (index, &value) in values.iter().enumerate() {
+        if value < least {
+            (least, lane) = (value, index);
+        }
+    }
+    values[lane] = f32::INFINITY;
+    (least <= limit && least < f32::INFINITY).then_some(lane)
 }
 
 const PARAMETERS: obvhs::BvhBuildParams = obvhs::BvhBuildParams::fast_build();
@@ -151,8 +175,10 @@ impl Flattened<'_> {
             let link = if node(member).is_leaf() { self.add_pack(member) } else { self.add_node(member) };
             let place = &mut self.tree.nodes[index];
             for axis in 0..3 {
-                place.low[axis][child] = aabb.min[axis];
-                place.high[axis][child] = aabb.max[axis];
+                let (low, high) = (aabb.min[axis], aabb.max[axis]);
+                let centre = (low + high) / 2.0;
+                place.centre[axis][child] = centre;
+                place.half[axis][child] = bigger(high - centre, centre - low);
             }
             place.children[child] = link;
         }

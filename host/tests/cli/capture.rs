@@ -1,0 +1,247 @@
+use crate::{command, globe, listing, run, stderr, stdout};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A capture of the meshes in `directory` into its folder `output`.
+fn capture(directory: &Path, output: &str, more: &[&str]) -> Command {
+    let mut command = command(["capture"]);
+    command.arg(directory.join("meshes")).arg("-o").arg(directory.join(output)).args(more);
+    command
+}
+
+/// Two meshes to capture.
+fn meshes() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::create_dir(directory.path().join("meshes")).unwrap();
+    globe(&directory.path().join("meshes"), "globe", 12);
+    globe(&directory.path().join("meshes"), "apple", 6);
+    directory
+}
+
+/// The files of a data set, without the lock.
+fn files(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+    let names = listing(directory).into_iter().filter(|name| name != ".lock");
+    names.map(|name| (name.clone(), std::fs::read(directory.join(name)).unwrap())).collect()
+}
+
+fn is_complete(directory: &Path) -> bool {
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(directory.join("dataset.json")).unwrap()).unwrap();
+    manifest["complete"].as_bool().unwrap()
+}
+
+/// Waits until the capture has written its first account, or a minute.
+fn wait_for(path: &Path) {
+    let start = Instant::now();
+    while !path.exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{} never appeared", path.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A child that does not outlive its test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn touches_are_lines_of_three_times_and_the_manifest_says_how_they_were_made() {
+    let directory = meshes();
+    let table = stdout(capture(directory.path(), "out", &["--touches", "300", "--seed", "7"]).output().unwrap());
+    assert!(table.starts_with("object ") && table.contains("\nall "), "{table}");
+    let out = directory.path().join("out");
+    assert_eq!(files(&out).keys().collect::<Vec<_>>(), ["apple.txt", "dataset.json", "globe.txt"]);
+    let text = std::fs::read_to_string(out.join("globe.txt")).unwrap();
+    assert_eq!(text.lines().count(), 300);
+    for line in text.lines() {
+        let times: Vec<&str> = line.split(' ').collect();
+        assert!(times.len() == 3 && times.contains(&"0.000000"), "{line}");
+        assert!(
+            times.iter().all(|time| time.split_once('.').is_some_and(|(_, decimals)| decimals.len() == 6)),
+            "{line}"
+        );
+    }
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("dataset.json")).unwrap()).unwrap();
+    assert_eq!(manifest["settings"]["seed"], 7);
+    assert_eq!(manifest["settings"]["probe"]["spacing"], 1.5);
+    assert_eq!(manifest["objects"][1]["name"], "globe");
+    assert_eq!(manifest["palpate"], env!("CARGO_PKG_VERSION"));
+    let approaches = manifest["objects"][1]["approaches"].as_u64().unwrap();
+    assert!((300..3000).contains(&approaches), "{approaches}");
+}
+
+#[test]
+fn the_summary_as_json_holds_what_the_manifest_holds() {
+    let directory = meshes();
+    let more = ["--touches", "50", "--pose", "--json", "--threads", "1"];
+    let summary: serde_json::Value =
+        serde_json::from_str(&stdout(capture(directory.path(), "out", &more).output().unwrap())).unwrap();
+    assert_eq!(summary["objects"][0]["name"], "apple");
+    assert_eq!(summary["objects"][0]["touches"], 50);
+    assert!(summary["seconds"].as_f64().unwrap() > 0.0);
+    let text = std::fs::read_to_string(directory.path().join("out/apple.txt")).unwrap();
+    assert!(text.lines().all(|line| line.split(' ').count() == 9));
+}
+
+#[test]
+fn every_approach_is_kept_when_asked_and_one_that_touches_nothing_is_three_dashes() {
+    let directory = meshes();
+    stdout(capture(directory.path(), "out", &["--touches", "400", "--approaches"]).output().unwrap());
+    let text = std::fs::read_to_string(directory.path().join("out/globe.txt")).unwrap();
+    assert_eq!(text.lines().count(), 400);
+    assert!(text.lines().any(|line| line == "- - -"));
+    assert!(text.lines().any(|line| line != "- - -" && line.contains('-')));
+    assert!(text.lines().any(|line| !line.contains('-')));
+}
+
+#[test]
+fn wrong_input_is_refused_and_nothing_is_left_behind() {
+    let directory = meshes();
+    for (name, text, what) in [
+        ("empty.obj", "", "empty.obj: the mesh has no faces"),
+        ("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "range.obj:4: vertex 4 of a face is out of range"),
+        ("nan.obj", "v 0 nan 0\n", "nan.obj:1: the coordinate y = \"nan\" is not finite"),
+        ("point.obj", "v 1 1 1\nf 1 1 1\n", "point.obj: the mesh has no extent"),
+    ] {
+        let path = directory.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let out = directory.path().join("out");
+        let error = stderr(command(["capture", "-o"]).args([&out, &path]).output().unwrap(), 1);
+        assert!(error.contains(what), "{error}");
+        assert!(!out.exists());
+    }
+    let error = stderr(run(["capture", "nowhere.obj", "-o", "never"]), 1);
+    assert!(error.contains("nowhere.obj: cannot read the mesh"), "{error}");
+    for wrong in [&["--radius", "-1"][..], &["--tilt", "90"], &["--touches", "0"], &["--shard", "3/2"], &["--sed", "1"]]
+    {
+        stderr(capture(directory.path(), "out", wrong).output().unwrap(), 2);
+        assert!(!directory.path().join("out").exists());
+    }
+}
+
+#[test]
+fn a_second_capture_into_the_same_directory_is_refused() {
+    let directory = meshes();
+    let mut first = capture(directory.path(), "out", &["--touches", "100000000"]);
+    let _first = Running(first.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    wait_for(&directory.path().join("out/dataset.json"));
+    for more in [&["--touches", "10"][..], &["--touches", "100000000", "--resume"]] {
+        let error = stderr(capture(directory.path(), "out", more).output().unwrap(), 1);
+        assert!(error.contains("another capture is writing into this directory"), "{error}");
+    }
+}
+
+#[test]
+fn a_capture_that_is_killed_again_and_again_ends_with_the_same_bytes() {
+    let directory = meshes();
+    let more = ["--touches", "60000", "--seed", "3", "--resume"];
+    stdout(capture(directory.path(), "whole", &more).output().unwrap());
+    let killed = directory.path().join("killed");
+    let mut cut_short = 0;
+    for kill in 0..10_u64 {
+        let mut running = capture(directory.path(), "killed", &more);
+        let mut running = Running(running.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+        // From before the first account to well after it, in no order.
+        std::thread::sleep(Duration::from_millis(30 + kill * 379 % 900));
+        running.0.kill().unwrap();
+        running.0.wait().unwrap();
+        cut_short += u32::from(killed.join("dataset.json").exists() && !is_complete(&killed));
+    }
+    stdout(capture(directory.path(), "killed", &more).output().unwrap());
+    assert!(files(&killed) == files(&directory.path().join("whole")), "after {cut_short} kills on the way");
+    assert!(is_complete(&killed));
+}
+
+#[test]
+fn resuming_with_other_arguments_is_refused() {
+    let directory = meshes();
+    stdout(capture(directory.path(), "out", &["--touches", "20"]).output().unwrap());
+    let before = files(&directory.path().join("out"));
+    for other in [&["--touches", "30", "--resume"][..], &["--touches", "20", "--seed", "2", "--resume"]] {
+        let error = stderr(capture(directory.path(), "out", other).output().unwrap(), 1);
+        assert!(error.contains("dataset.json: cannot resume: other settings"), "{error}");
+    }
+    stdout(capture(directory.path(), "out", &["--touches", "20", "--resume"]).output().unwrap());
+    assert_eq!(files(&directory.path().join("out")), before);
+}
+
+/// Runs a shell script, which gets the program as $1 and the directory as $2; none where it cannot be run.
+#[cfg(unix)]
+fn shell(script: &str, directory: &Path) -> std::process::Output {
+    Command::new("sh").args(["-c", script, "sh", env!("CARGO_BIN_EXE_palpate")]).arg(directory).output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_may_not_grow_stops_the_capture_which_can_be_resumed() {
+    // The shell's limit is in blocks of 512 or 1024 bytes; the signal is ignored so that writing fails instead.
+    let directory = meshes();
+    let script = "trap '' XFSZ; ulimit -f 400; exec \"$1\" capture \"$2/meshes\" -o \"$2/out\" --touches 50000";
+    let error = stderr(shell(script, directory.path()), 1);
+    assert!(error.contains("apple.part: cannot write the touches") && error.contains("--resume"), "{error}");
+    assert!(!is_complete(&directory.path().join("out")));
+    let more = ["--touches", "50000", "--resume"];
+    stdout(capture(directory.path(), "out", &more).output().unwrap());
+    stdout(capture(directory.path(), "whole", &more).output().unwrap());
+    assert!(files(&directory.path().join("out")) == files(&directory.path().join("whole")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_stops_the_capture_which_can_be_resumed() {
+    // A disk of one megabyte, in a mount namespace of its own; what it holds is copied out before it goes.
+    let directory = meshes();
+    std::fs::create_dir(directory.path().join("disk")).unwrap();
+    let script = "exec unshare -rm sh -c '
+        mount -t tmpfs -o size=1m none \"$2/disk\" || exit 99
+        \"$1\" capture \"$2/meshes\" -o \"$2/disk/out\" --touches 50000; code=$?
+        cp -r \"$2/disk/out\" \"$2/out\"; exit $code' sh \"$1\" \"$2\"";
+    let output = shell(script, directory.path());
+    if !directory.path().join("out").exists() {
+        eprintln!("SKIPPED: no disk of our own ({})", String::from_utf8_lossy(&output.stderr).trim());
+        return;
+    }
+    let error = stderr(output, 1);
+    assert!(error.contains("No space left on device") && error.contains("--resume"), "{error}");
+    let more = ["--touches", "50000", "--resume"];
+    stdout(capture(directory.path(), "out", &more).output().unwrap());
+    stdout(capture(directory.path(), "whole", &more).output().unwrap());
+    assert!(files(&directory.path().join("out")) == files(&directory.path().join("whole")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_does_not_grow_with_the_number_of_touches() {
+    let directory = meshes();
+    let peak = |touches: &str| -> u64 {
+        let mut child = capture(directory.path(), "out", &["--touches", touches]);
+        let mut child = Running(child.stdout(Stdio::null()).spawn().unwrap());
+        let status = PathBuf::from(format!("/proc/{}/status", child.0.id()));
+        let mut peak = 0;
+        while child.0.try_wait().unwrap().is_none() {
+            let text = std::fs::read_to_string(&status).unwrap_or_default();
+            let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+            let kilobytes =
+                line.and_then(|line| line.trim().strip_suffix(" kB")).and_then(|number| number.parse().ok());
+            peak = peak.max(kilobytes.unwrap_or(0));
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        peak
+    };
+    let (few, many) = (peak("5000"), peak("200000"));
+    // Up to a megabyte either way is the allocator's.
+    assert!(many <= few + few / 5 + 1024, "{few} kB for 5,000 touches, {many} kB for 200,000");
+}
+
+#[test]
+fn help_has_examples() {
+    assert!(stdout(run(["capture", "--help"])).contains("Examples:\n  palpate capture builtin -o touches"));
+}
