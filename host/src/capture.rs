@@ -10,6 +10,7 @@ mod sample;
 mod store;
 
 use crate::approach::Probe;
+use crate::dataset::Format;
 use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::scene::Scene;
@@ -37,6 +38,8 @@ pub struct Settings {
     pub pose: bool,
     /// Whether every approach is kept, not only full touches: sample i is then approach i.
     pub approaches: bool,
+    /// How the touches are kept; Parquet keeps the pose in any case.
+    pub format: Format,
     /// Which part of the samples to compute.
     pub shard: Shard,
     /// Whether to go on where an interrupted capture into the same directory stopped.
@@ -56,6 +59,7 @@ impl Default for Settings {
             probe: Probe::default(),
             pose: false,
             approaches: false,
+            format: Format::Text,
             shard: Shard::WHOLE,
             resume: false,
             threads: None,
@@ -75,7 +79,13 @@ impl Settings {
         if self.threads == Some(0) {
             return Err(Error::argument("0 threads were asked for", "Ask for at least 1, or leave the option out."));
         }
+        self.format.check()?;
         self.probe.check(self.length)
+    }
+
+    /// Whether the pose is written.
+    fn writes_pose(&self) -> bool {
+        self.pose || self.format == Format::Parquet
     }
 
     /// The samples that are to be computed: the shard's part of all.
@@ -176,7 +186,7 @@ impl Summary {
     }
 }
 
-/// Touches the objects and writes `DIR/<object>.txt` for each, and `DIR/dataset.json`.
+/// Touches the objects and writes `DIR/<object>.txt` (or `.parquet`) for each, and `DIR/dataset.json`.
 ///
 /// # Errors
 /// When a setting is wrong, a mesh cannot be touched, the directory cannot be written to or another capture is writing

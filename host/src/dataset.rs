@@ -4,6 +4,8 @@
 //! alignment (six numbers). Fields are separated by spaces or commas. The published data set has the same format.
 
 pub mod manifest;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 
 use crate::error::{Error, Result};
 use manifest::Manifest;
@@ -30,7 +32,7 @@ pub struct ObjectTouches {
 }
 
 impl Dataset {
-    /// Reads every `<object>.txt` of a directory.
+    /// Reads every `<object>.txt` and `<object>.parquet` of a directory.
     ///
     /// # Errors
     /// When the directory cannot be read, holds fewer than two objects or an unfinished capture, when a file holds no
@@ -42,7 +44,7 @@ impl Dataset {
         }
         let objects = files(directory)?
             .into_iter()
-            .map(|(name, path)| Ok(ObjectTouches { name, touches: read_text(&path)? }))
+            .map(|(name, path, format)| Ok(ObjectTouches { name, touches: format.read(&path)? }))
             .collect::<Result<Vec<_>>>()?;
         Ok(Self { objects })
     }
@@ -63,26 +65,74 @@ impl Dataset {
     }
 }
 
+/// How touches are kept on the disk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// A line a touch.
+    #[default]
+    Text,
+    /// A row a touch, in columns, compressed.
+    Parquet,
+}
+
+impl Format {
+    /// How the files' names end.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Text => "txt",
+            Self::Parquet => "parquet",
+        }
+    }
+
+    /// Refuses a format that this program was built without.
+    ///
+    /// # Errors
+    /// [`Error::Argument`].
+    pub fn check(self) -> Result<()> {
+        if self == Self::Parquet && !cfg!(feature = "parquet") {
+            let fix = "Build it with: cargo build --release --features parquet.";
+            return Err(Error::argument("this program was built without Parquet", fix));
+        }
+        Ok(())
+    }
+
+    fn read(self, path: &Path) -> Result<Vec<Touch>> {
+        self.check()?;
+        #[cfg(feature = "parquet")]
+        if self == Self::Parquet {
+            return parquet::read(path);
+        }
+        read_text(path)
+    }
+}
+
 /// The objects' names and files, sorted by name.
-fn files(directory: &Path) -> Result<Vec<(String, PathBuf)>> {
+fn files(directory: &Path) -> Result<Vec<(String, PathBuf, Format)>> {
     let io = |source| Error::io(directory, "read the data set", source);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(directory).map_err(io)? {
         let path = entry.map_err(io)?.path();
-        if path.extension().is_some_and(|extension| extension == "txt")
+        let is_in = |format: &Format| path.extension().is_some_and(|extension| extension == format.extension());
+        if let Some(format) = [Format::Text, Format::Parquet].into_iter().find(is_in)
             && let Some(name) = path.file_stem().and_then(|stem| stem.to_str())
         {
-            files.push((name.to_owned(), path));
+            files.push((name.to_owned(), path, format));
         }
     }
     files.sort();
+    if let Some(twice) = files.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        let what =
+            format!("two files of the object {}: {} and {}", twice[0].0, twice[0].1.display(), twice[1].1.display());
+        return Err(Error::file(directory, what, "Remove one of them."));
+    }
     match files.as_slice() {
         [] => Err(Error::file(
             directory,
             "no touches here (no .txt file)",
             "Fill it with: palpate capture builtin -o DIR.",
         )),
-        [(name, _)] => Err(Error::file(
+        [(name, ..)] => Err(Error::file(
             directory,
             format!("only one object here, {name}, and nothing to tell it from"),
             "Capture at least two objects into the directory.",
@@ -91,26 +141,39 @@ fn files(directory: &Path) -> Result<Vec<(String, PathBuf)>> {
     }
 }
 
+/// Touches of a text file, one after the other.
+///
+/// # Errors
+/// When the file cannot be read; then each line that is wrong.
+pub fn lines(path: &Path) -> Result<impl Iterator<Item = Result<Touch>>> {
+    let io = move |source| Error::io(path, "read the touches", source);
+    let mut reader = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
+    let (mut bytes, mut line) = (Vec::new(), 0);
+    Ok(std::iter::from_fn(move || {
+        loop {
+            bytes.clear();
+            line += 1;
+            match reader.read_until(b'\n', &mut bytes) {
+                Err(error) => return Some(Err(io(error))),
+                Ok(0) => return None,
+                Ok(_) => {}
+            }
+            let wrong = |what| Error::line(path, line, what, "Correct the line, or capture the object anew.");
+            match std::str::from_utf8(&bytes).map(str::trim) {
+                Err(_) => return Some(Err(wrong("not text (no UTF-8)".to_owned()))),
+                Ok("") => {}
+                Ok(text) => return Some(parse_touch(text).map_err(wrong)),
+            }
+        }
+    }))
+}
+
 /// Reads the touches of one text file; blank lines are skipped.
 ///
 /// # Errors
 /// When the file cannot be read, holds no touch, or has a wrong line.
 pub fn read_text(path: &Path) -> Result<Vec<Touch>> {
-    let io = |source| Error::io(path, "read the touches", source);
-    let mut reader = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
-    let mut touches = Vec::new();
-    let mut bytes = Vec::new();
-    for line in 1.. {
-        bytes.clear();
-        if reader.read_until(b'\n', &mut bytes).map_err(io)? == 0 {
-            break;
-        }
-        let wrong = |what| Error::line(path, line, what, "Correct the line, or capture the object anew.");
-        let text = std::str::from_utf8(&bytes).map_err(|_| wrong("not text (no UTF-8)".to_owned()))?.trim();
-        if !text.is_empty() {
-            touches.push(parse_touch(text).map_err(wrong)?);
-        }
-    }
+    let touches = lines(path)?.collect::<Result<Vec<_>>>()?;
     if touches.is_empty() {
         return Err(Error::file(path, "no touches in it", "Capture the object anew, or remove the file."));
     }
@@ -152,13 +215,17 @@ fn parse_time(field: &str) -> Result<ContactTime, String> {
     if field == "-" {
         return Ok(ContactTime::MISSING);
     }
-    let seconds = parse_number(field)?;
+    contact_time(parse_number(field)?)
+}
+
+/// Finite seconds as whole microseconds.
+fn contact_time(seconds: f64) -> Result<ContactTime, String> {
     if seconds < 0.0 {
-        return Err(format!("the time {field} is negative"));
+        return Err(format!("the time {seconds} is negative"));
     }
     let micros = (seconds * 1e6).round();
     if micros > LONGEST {
-        return Err(format!("the time {field} is longer than the 4294 s that a touch can hold"));
+        return Err(format!("the time {seconds} is longer than the 4294 s that a touch can hold"));
     }
     Ok(ContactTime::from_micros(micros as u32))
 }

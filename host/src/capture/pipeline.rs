@@ -100,7 +100,7 @@ fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>) -> R
     let mut chunk = Chunk { text: String::new(), approaches: 0 };
     for sample in samples {
         let (touch, approaches) = sampler.sample(sample)?;
-        write_touch(&mut chunk.text, &touch, settings.pose);
+        write_touch(&mut chunk.text, &touch, settings.writes_pose());
         chunk.approaches += approaches;
     }
     Ok(chunk)

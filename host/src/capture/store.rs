@@ -1,10 +1,12 @@
 //! A data set on its way to the disk.
 //!
-//! Touches of an object are appended to `<object>.part`, which becomes `<object>.txt` when it is complete. Twice a
+//! Touches of an object are appended to `<object>.part`, which becomes `<object>.txt` when it is complete, or is
+//! converted to `<object>.parquet`. Twice a
 //! second the part is flushed to the disk, then the manifest says how much of it counts: whatever an interruption
 //! leaves behind that is cut off when the capture is resumed.
 
 use super::Settings;
+use crate::dataset::Format;
 use crate::dataset::manifest::{Entry, Manifest};
 use crate::error::{Error, Result};
 use std::fs::{File, TryLockError};
@@ -77,14 +79,18 @@ impl Store {
 
     /// Gives the object's file its name, once all its touches are there.
     pub(super) fn complete(&mut self, object: usize) -> Result<()> {
-        if self.entry(object).touches < self.samples || self.text(object).exists() {
+        let done = done(&self.directory, &self.entry(object).name, self.manifest.settings.format);
+        if self.entry(object).touches < self.samples || done.exists() {
             return Ok(());
         }
         self.part_file(object)?;
         self.account()?;
         self.open = None;
-        let (part, text) = (self.part(object), self.text(object));
-        std::fs::rename(&part, &text).map_err(|error| stopped(&part, error))
+        let part = self.part(object);
+        match self.manifest.settings.format {
+            Format::Text => std::fs::rename(&part, &done).map_err(|error| stopped(&part, error)),
+            Format::Parquet => convert(&part, &done, &self.entry(object).name),
+        }
     }
 
     /// Says that the data set is complete.
@@ -134,22 +140,36 @@ impl Store {
     fn part(&self, object: usize) -> PathBuf {
         part(&self.directory, &self.entry(object).name)
     }
-
-    fn text(&self, object: usize) -> PathBuf {
-        text(&self.directory, &self.entry(object).name)
-    }
 }
 
 fn part(directory: &Path, name: &str) -> PathBuf {
     directory.join(format!("{name}.part"))
 }
 
-fn text(directory: &Path, name: &str) -> PathBuf {
-    directory.join(format!("{name}.txt"))
+fn done(directory: &Path, name: &str, format: Format) -> PathBuf {
+    directory.join(format!("{name}.{}", format.extension()))
+}
+
+/// Turns a complete part into a Parquet file.
+#[cfg(feature = "parquet")]
+fn convert(part: &Path, done: &Path, object: &str) -> Result<()> {
+    let unfinished = done.with_extension("parquet.part");
+    let io = |error| stopped(&unfinished, error);
+    let file = File::create(&unfinished).map_err(io)?;
+    crate::dataset::parquet::write(&unfinished, &file, object, crate::dataset::lines(part)?)?;
+    file.sync_all().map_err(io)?;
+    std::fs::rename(&unfinished, done).map_err(io)?;
+    std::fs::remove_file(part).map_err(|error| Error::io(part, "remove the converted touches", error))
+}
+
+#[cfg(not(feature = "parquet"))]
+fn convert(_: &Path, _: &Path, _: &str) -> Result<()> {
+    Format::Parquet.check()
 }
 
 fn remove_touches(directory: &Path, name: &str) -> Result<()> {
-    for path in [part(directory, name), text(directory, name)] {
+    let done = [Format::Text, Format::Parquet].map(|format| done(directory, name, format));
+    for path in done.into_iter().chain([part(directory, name), directory.join(format!("{name}.parquet.part"))]) {
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 return Err(Error::io(&path, "remove the old touches", error));

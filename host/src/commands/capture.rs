@@ -1,5 +1,6 @@
 use palpate::approach::Probe;
 use palpate::capture::{self, Settings, Shard, Summary};
+use palpate::dataset::Format;
 use palpate::{Result, output, source};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -50,6 +51,9 @@ pub(crate) struct Arguments {
     /// Keep every approach, also those that not all fingers touch
     #[arg(long)]
     approaches: bool,
+    /// How to keep the touches: text, or parquet (columns t1, t2, t3, direction, alignment, object)
+    #[arg(long, value_enum, default_value = "text")]
+    format: TouchFormat,
     /// Capture only the K-th of N parts; the parts, one after the other, are the whole
     #[arg(long, value_name = "K/N", default_value_t = Shard::WHOLE)]
     shard: Shard,
@@ -64,6 +68,12 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum TouchFormat {
+    Text,
+    Parquet,
+}
+
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let Arguments { radius, spacing, speed, tilt, .. } = arguments;
     let settings = Settings {
@@ -73,6 +83,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         probe: Probe { radius, spacing, speed, tilt },
         pose: arguments.pose,
         approaches: arguments.approaches,
+        format: match arguments.format {
+            TouchFormat::Text => Format::Text,
+            TouchFormat::Parquet => Format::Parquet,
+        },
         shard: arguments.shard,
         resume: arguments.resume,
         threads: arguments.threads,

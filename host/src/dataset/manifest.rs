@@ -40,7 +40,8 @@ impl Manifest {
         Self {
             palpate: env!("CARGO_PKG_VERSION").into(),
             complete: false,
-            settings: settings.clone(),
+            // Not how, but what.
+            settings: Settings { resume: false, threads: None, ..settings.clone() },
             objects: names.into_iter().map(|name| Entry { name, ..Entry::default() }).collect(),
         }
     }

@@ -46,12 +46,14 @@ impl Pack {
         std::array::from_fn(|lane| if lane < self.count as usize { 0.0 } else { f32::INFINITY })
     }
 
-    /// For each triangle, a distance before which the sphere does not touch it; infinite if it never does.
+    /// For each triangle, a distance before which the sphere does not touch it; infinite if it does not before `limit`.
     #[inline]
-    pub(super) fn earliest(&self, ray: &Ray) -> Lanes {
+    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> Lanes {
         let u = self.corners.each_ref().map(|corner| ray.along(corner, 0));
         let v = self.corners.each_ref().map(|corner| ray.along(corner, 1));
         let w = self.corners.each_ref().map(|corner| ray.along(corner, 2));
+        let end = if limit < f32::INFINITY { limit } else { 0.0 };
+        let open = limit == f32::INFINITY;
         let mut earliest = [0.0; LANES];
         let margin_squared = ray.margin * ray.margin;
         for lane in 0..LANES {
@@ -69,6 +71,13 @@ impl Pack {
                 let beyond = bigger(path - bigger(corner, 0.0), smaller(corner, 0.0) - path);
                 out |= (beyond > 0.0) & (beyond * beyond > margin_squared * (eu * eu + ev * ev));
             }
+            // With the sphere at the limit, in the direction of the triangle's middle: if that points forward and all of
+            // the triangle lies beyond the radius, the sphere has not reached it there, nor before.
+            let (mu, mv, mw) = (us[0] + us[1] + us[2], vs[0] + vs[1] + vs[2], ws[0] + ws[1] + ws[2] - 3.0 * end);
+            let along = |corner: usize| us[corner] * mu + vs[corner] * mv + (ws[corner] - end) * mw;
+            let nearest = least([along(0), along(1), along(2)]);
+            let square = mu * mu + mv * mv + mw * mw;
+            out |= !open & (mw >= 0.0) & (nearest > 0.0) & (nearest * nearest > margin_squared * square);
             let entry = least(ws) - bigger(reach, 0.0).sqrt();
             earliest[lane] = if out { f32::INFINITY } else { bigger(entry, 0.0) };
         }
@@ -125,6 +134,12 @@ impl Ray {
             reach[lane] = a[lane] * size.x + b[lane] * size.y + c[lane] * size.z;
         }
         (centre, reach)
+    }
+
+    /// Unit vector of the motion.
+    #[inline]
+    pub(super) fn direction(&self) -> Vec3 {
+        self.axes[2]
     }
 
     #[inline]

@@ -71,7 +71,7 @@ impl Tree {
             }
             if child & PACK != 0 {
                 let pack = &self.packs[(child & !PACK) as usize];
-                let mut earliest = if P::REJECT { pack.earliest(&ray) } else { pack.unknown() };
+                let mut earliest = if P::REJECT { pack.earliest(&ray, limit) } else { pack.unknown() };
                 while let Some(lane) = pop_least(&mut earliest, limit) {
                     let triangle = &triangles[pack.first as usize + lane];
                     if let Some(distance) = P::first_contact(motion, triangle, first) {
@@ -117,9 +117,10 @@ impl Node {
             let entry = depth.0[child] - depth.1[child] - bigger(reach, 0.0).sqrt();
             near[child] = if reach < 0.0 { f32::INFINITY } else { bigger(near[child], entry) };
         }
+        let passed = if limit < f32::INFINITY { self.passed(ray, limit) } else { [false; WIDTH] };
         let bottom = stack.len();
         for child in 0..WIDTH {
-            if near[child] <= far[child] {
+            if near[child] <= far[child] && !passed[child] {
                 let mut place = stack.len();
                 stack.push((near[child], self.children[child]));
                 while place > bottom && stack[place - 1].0 < near[child] {
@@ -128,6 +129,23 @@ impl Node {
                 }
             }
         }
+    }
+
+    /// Which boxes the sphere has not reached when it has gone as far as `limit`: from there, all of the box lies beyond
+    /// the radius in a direction that points forward, and so from everywhere before it.
+    #[inline]
+    fn passed(&self, ray: &Ray, limit: f32) -> [bool; WIDTH] {
+        let end = ray.origin + ray.direction() * limit;
+        let (mut square, mut forward) = ([0.0_f32; WIDTH], [0.0_f32; WIDTH]);
+        for axis in 0..3 {
+            for child in 0..WIDTH {
+                let way = self.centre[axis][child] - end[axis];
+                let gap = bigger(way.abs() - self.half[axis][child], 0.0).copysign(way);
+                square[child] += gap * gap;
+                forward[child] += gap * ray.direction()[axis];
+            }
+        }
+        std::array::from_fn(|child| (forward[child] >= 0.0) & (square[child] > ray.margin * ray.margin))
     }
 }
 
