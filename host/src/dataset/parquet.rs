@@ -98,7 +98,9 @@ fn column<T: DataType>(
         levels.clear();
         batch.iter().for_each(|touch| encode(touch, &mut values, &mut levels));
         let (definition, repetition): (Vec<i16>, Vec<i16>) = levels.iter().copied().unzip();
-        column.typed::<T>().write_batch(&values, Some(&definition), Some(&repetition))?;
+        // A column that is never null has no levels.
+        let levels = |levels| (!definition.is_empty()).then_some(levels);
+        column.typed::<T>().write_batch(&values, levels(definition.as_slice()), levels(repetition.as_slice()))?;
     }
     column.close()
 }
@@ -130,7 +132,7 @@ fn read_group(group: &dyn RowGroupReader, touches: &mut Vec<Touch>) -> Result<()
     let [mut direction, mut alignment] = [Column::open(group, "direction")?, Column::open(group, "alignment")?];
     loop {
         let rows = times.iter_mut().map(Column::rows::<1>).collect::<Result<Vec<_>, _>>()?;
-        let mut vectors = |column: &mut Option<Column>| column.as_mut().map(Column::rows::<3>).transpose();
+        let vectors = |column: &mut Option<Column>| column.as_mut().map(Column::rows::<3>).transpose();
         let (directions, alignments) = (vectors(&mut direction)?, vectors(&mut alignment)?);
         let [first, middle, last] = rows.as_slice() else { return Ok(()) };
         if first.is_empty() {
