@@ -1,9 +1,9 @@
 //! Virtual touches of objects, as many as wanted.
 //!
-//! Sample i of an object is a pure function of (seed, object's name, i) ([`sample`]), so neither the number of threads
+//! Sample i of an object is a pure function of (seed, object's name, i) (`sample`), so neither the number of threads
 //! nor shards nor an interruption changes a data set. Producers compute chunks of samples, one writer puts them on the
-//! disk in order, and bounded channels between them keep the memory flat ([`pipeline`]). What is on the disk is
-//! accounted for every half second, so that an interrupted capture can be resumed ([`store`]).
+//! disk in order, and bounded channels between them keep the memory flat (`pipeline`). What is on the disk is
+//! accounted for every half second, so that an interrupted capture can be resumed (`store`).
 
 mod pipeline;
 mod sample;

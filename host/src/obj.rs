@@ -1,6 +1,6 @@
 //! Wavefront OBJ files: the faces, and nothing else.
 //!
-//! `tobj` parses and indexes; in front of it, [`FacesOnly`] lets through vertices and faces only, checked, so that an
+//! `tobj` parses and indexes; in front of it, `FacesOnly` lets through vertices and faces only, checked, so that an
 //! error can name its line, and nothing that does not shape the surface (normals, materials, groups, lines) can break
 //! a mesh. Polygons become triangles here, concave ones too.
 

@@ -49,10 +49,10 @@ impl Source {
     }
 }
 
-/// What [`objects`] gives, files not yet read: sorted by name.
+/// What [`objects`](fn@objects) gives, files not yet read: sorted by name.
 ///
 /// # Errors
-/// As [`objects`], apart from what is wrong inside a file.
+/// As [`objects`](fn@objects), apart from what is wrong inside a file.
 pub fn files(sources: &[String]) -> Result<Vec<Source>> {
     let mut paths = Vec::new();
     let mut found = BTreeMap::new();

@@ -1,7 +1,7 @@
 //! First contact of a moving sphere with a triangle mesh.
 //!
-//! Boxes in f32 with slack find the leaves that the sphere may reach ([`tree`]), an f32 test on eight triangles at once
-//! throws out those that it cannot ([`pack`]), and the rest is decided in f64 ([`narrow`]).
+//! Boxes in f32 with slack find the leaves that the sphere may reach (`tree`), an f32 test on eight triangles at once
+//! throws out those that it cannot (`pack`), and the rest is decided in f64 ([`narrow`]).
 
 pub mod budget;
 pub mod narrow;
