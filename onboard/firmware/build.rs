@@ -1,6 +1,6 @@
-//! Hands memory.x and cortex-m-rt's linker script to the linker.
+//! Hands memory.x and cortex-m-rt's linker script to the linker, and the benchmark's models to the benchmark.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
@@ -11,5 +11,38 @@ fn main() -> io::Result<()> {
     // Here and not in .cargo/config.toml, where RUSTFLAGS would override them.
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     println!("cargo::rustc-link-arg-bins=--nmagic");
+    models(&out.join("bench"))
+}
+
+/// What `palpate-tests`' `bench-models` writes.
+const BENCH: [&str; 10] = [
+    "one-i16.palpate",
+    "one-compact.palpate",
+    "each100-i16.palpate",
+    "each100-i8.palpate",
+    "each40-i16.palpate",
+    "each40-i8.palpate",
+    "each40-compact.palpate",
+    "grid-i8.palpate",
+    "grid-i16.palpate",
+    "touches.bin",
+];
+
+/// Copies the benchmark's files from the directory in `PALPATE_BENCH`; without one they are empty, and the benchmark
+/// says so.
+fn models(out: &Path) -> io::Result<()> {
+    println!("cargo::rerun-if-env-changed=PALPATE_BENCH");
+    fs::create_dir_all(out)?;
+    let source = env::var_os("PALPATE_BENCH").map(PathBuf::from);
+    for name in BENCH {
+        match &source {
+            Some(directory) => {
+                let file = directory.join(name);
+                println!("cargo::rerun-if-changed={}", file.display());
+                fs::copy(file, out.join(name))?;
+            }
+            None => fs::write(out.join(name), [])?,
+        }
+    }
     Ok(())
 }

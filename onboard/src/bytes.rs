@@ -1,6 +1,7 @@
 //! Reading bytes without a way to panic.
 
 /// The element at `index`; the default beyond the end, which validated indices never reach.
+#[inline(always)]
 pub(crate) fn at<T: Copy + Default>(slice: &[T], index: usize) -> T {
     slice.get(index).copied().unwrap_or_default()
 }

@@ -30,6 +30,7 @@ mod model;
 mod preorder;
 mod ranks;
 mod recognizer;
+mod snapshot;
 mod stopping;
 mod validate;
 
@@ -38,4 +39,5 @@ pub use evidence::Posterior;
 pub use model::Model;
 pub use palpate_shared as shared;
 pub use recognizer::{CapacityError, Recognizer, Verdict};
+pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;

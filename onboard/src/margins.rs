@@ -49,15 +49,16 @@ impl Model<'_> {
     /// Adds up all trees: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
+        let (base, _) = self.base.as_chunks();
+        let bases = base.iter().map(|&base| i32::from_le_bytes(base));
         let float = self.leaf == LeafType::F32;
-        for (object, margin) in margins.iter_mut().enumerate() {
-            *margin = if float { self.base(object) } else { 0 };
+        margins.fill(0);
+        if float {
+            margins.iter_mut().zip(bases.clone()).for_each(|(margin, base)| *margin = base);
         }
         self.add_trees(features, &mut Sum { margins, leaf: self.leaf, object: None });
         if !float {
-            for (object, margin) in margins.iter_mut().enumerate() {
-                *margin = margin.wrapping_add(self.base(object));
-            }
+            margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base));
         }
         Some(margins)
     }

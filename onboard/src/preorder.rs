@@ -17,7 +17,7 @@ use palpate_shared::format::Group;
 pub(crate) fn add_compact(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leaves: &mut &[u8], sum: &mut Sum<'_>) {
     for _ in 0..group.trees {
         let Some((leaf, splits)) = tree(nodes, |[column, threshold, left]: [u8; 3]| {
-            let right = crate::bytes::at(ranks, usize::from(column)) >= threshold;
+            let right = crate::bytes::at(ranks, usize::from(column)) > threshold;
             (right, usize::from(left))
         }) else {
             return;

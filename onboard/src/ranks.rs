@@ -57,22 +57,17 @@ pub(crate) fn rank(cuts: &[u8], width: u8, value: i32) -> u8 {
 }
 
 fn rank_of_width<const WIDTH: usize>(cuts: &[u8], value: i32) -> usize {
-    let (cuts, _) = cuts.as_chunks::<WIDTH>();
-    let (mut start, mut length) = (0, cuts.len());
-    while length > 0 {
-        let half = length / 2;
-        if signed(&at_chunk(cuts, start + half)) <= value {
-            start += half + 1;
-            length -= half + 1;
+    let (mut cuts, _) = cuts.as_chunks::<WIDTH>();
+    let mut rank = 0;
+    while let Some((lower, [middle, upper @ ..])) = cuts.split_at_checked(cuts.len() / 2) {
+        cuts = if signed(middle) <= value {
+            rank += lower.len() + 1;
+            upper
         } else {
-            length = half;
-        }
+            lower
+        };
     }
-    start
-}
-
-fn at_chunk<const WIDTH: usize>(cuts: &[[u8; WIDTH]], index: usize) -> [u8; WIDTH] {
-    cuts.get(index).copied().unwrap_or([0; WIDTH])
+    rank
 }
 
 #[cfg(test)]

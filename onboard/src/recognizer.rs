@@ -128,6 +128,18 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.verdict = Verdict::Undecided;
     }
 
+    /// The model.
+    pub const fn model(&self) -> &'m Model<'m> {
+        self.model
+    }
+
+    /// Takes over the state of a snapshot.
+    pub(crate) const fn set_state(&mut self, evidence: [i64; N], touches: u32, verdict: Verdict) {
+        self.evidence = evidence;
+        self.touches = touches;
+        self.verdict = verdict;
+    }
+
     fn add(&mut self, margins: &[i32]) -> Verdict {
         if self.verdict != Verdict::Undecided {
             return self.verdict;

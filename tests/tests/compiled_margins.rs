@@ -1,8 +1,9 @@
 //! A compiled model's margins are those of its ensemble: exactly with f32 leaves, within the stated error otherwise.
 
 use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
-use palpate::ensemble::Ensemble;
+use palpate::ensemble::{Ensemble, Node};
 use palpate_onboard::Model;
+use palpate_shared::format::f32_key;
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::random::{self, Shape};
 use proptest::prelude::*;
@@ -37,8 +38,38 @@ fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     layouts.into_iter().filter_map(|layout| compile(ensemble, &settings(layout)).ok()).collect()
 }
 
+/// The same trees over so many features of f32 values, as an imported model has them.
+fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
+    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
+        for (index, node) in tree.nodes.iter_mut().enumerate() {
+            if let Node::Split { feature, threshold, .. } = node {
+                *feature = (*feature * 37 + number * 11 + index) % features;
+                *threshold *= 1.000_001e-3;
+            }
+        }
+    }
+    ensemble
+}
+
+/// A row next to some of the thresholds, and with all that is special about f32.
+fn row(ensemble: &Ensemble, features: usize, seed: usize) -> Vec<f32> {
+    let special = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1e-42, -1e-42, f32::MAX, f32::MIN];
+    let nodes = ensemble.trees.iter().flat_map(|tree| &tree.nodes);
+    let thresholds: Vec<f32> = nodes
+        .filter_map(|node| if let Node::Split { threshold, .. } = node { Some(*threshold) } else { None })
+        .collect();
+    let value = |index: usize| {
+        let pick = (index + 1).wrapping_mul(seed.wrapping_mul(2_654_435_761) | 1) >> 7;
+        match thresholds.get(pick % (thresholds.len() + 3)) {
+            Some(&near) => [near, near.next_up(), near.next_down()][pick % 3],
+            None => special[pick % special.len()],
+        }
+    };
+    (0..features).map(value).collect()
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(ProptestConfig::with_cases(10))]
 
     #[test]
     fn integer_margins_stay_within_the_stated_error_in_every_layout(shape in shapes(), seed: u64, wide: bool) {
@@ -82,5 +113,26 @@ proptest! {
             }
             hold(&ensemble, &compiled, &random::touches(100, !seed));
         }
+    }
+
+    #[test]
+    fn real_features_split_as_f32_does_in_every_layout(shape in shapes(), features in 1..=256_usize, seed: u64) {
+        let ensemble = imported(random::ensemble(shape, seed), features);
+        let mut margins = vec![0.0; shape.objects];
+        let mut models = 0;
+        for layout in [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)] {
+            let settings = Settings { leaf: Leaf::F32, layout, raw_features: Some(features), ..Settings::default() };
+            let Ok(compiled) = compile(&ensemble, &settings) else { continue };
+            models += 1;
+            let model = Model::new(&compiled.bytes).unwrap();
+            for index in 0..40 {
+                let row = row(&ensemble, features, index);
+                let keys: Vec<i32> = row.iter().map(|&value| f32_key(value)).collect();
+                prop_assert!(model.f32_margins_of(&keys, &mut margins));
+                let bits = |margins: &[f32]| margins.iter().map(|m| m.to_bits()).collect::<Vec<_>>();
+                prop_assert_eq!(bits(&ensemble.margins_of_features(&row)), bits(&margins));
+            }
+        }
+        prop_assert!(models >= 2, "{} layouts", models);
     }
 }

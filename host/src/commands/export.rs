@@ -24,7 +24,7 @@ pub(crate) struct Arguments {
     /// What leaves are stored as
     #[arg(long, value_parser = leaf, default_value = "i16", value_name = "i8|i16|f32")]
     leaf: Leaf,
-    /// How trees are laid out; auto takes the least bytes times instructions
+    /// How trees are laid out; auto weighs size and speed
     #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid")]
     layout: LayoutChoice,
     /// The error rate at which recognisers stop unless told otherwise

@@ -10,7 +10,7 @@ const MAX_CUTS: usize = 255;
 /// The axes of a forest: each feature's thresholds, in lists of at most 255.
 pub(super) struct Axes {
     pub(super) axes: Vec<(Axis, Vec<i32>)>,
-    /// The column and the rank at which a split goes right, by (feature, threshold, missing goes left).
+    /// The column and the rank above which a split goes right, by (feature, threshold, missing goes left).
     places: BTreeMap<(u8, i32, bool), (usize, u8)>,
     pub(super) columns: usize,
 }
@@ -45,7 +45,7 @@ impl Axes {
             (_, false) => Columns::MissingLeft,
         };
         let right_column = self.columns + usize::from(columns == Columns::Both);
-        for (index, &cut) in (1..=u8::MAX).zip(cuts) {
+        for (index, &cut) in (0..=u8::MAX).zip(cuts) {
             self.places.insert((feature, cut, true), (self.columns, index));
             self.places.insert((feature, cut, false), (right_column, index));
         }
@@ -54,7 +54,7 @@ impl Axes {
         self.axes.push((axis, cuts.to_vec()));
     }
 
-    /// The column of a split and the rank from which it goes right.
+    /// The column of a split and the rank above which it goes right.
     pub(super) fn place(&self, split: &Split<'_>) -> (usize, u8) {
         self.places[&(split.feature, split.cut, split.missing_left)]
     }

@@ -7,7 +7,10 @@ use super::quantise::Scale;
 use crate::ensemble::Output;
 use crate::error::{Error, Result};
 use palpate_shared::format::{Axis, Columns, Group, HEADER_LENGTH, Layout, LeafType, MAX_COMPLETE_DEPTH};
+use rayon::prelude::*;
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
+use std::ops::AddAssign;
 
 /// A table may have this many bytes.
 const MAX_TABLE: usize = 1 << 24;
@@ -50,11 +53,19 @@ pub(super) fn candidates(
         layouts.iter_mut().filter(|layout| **layout == Layout::Compact).for_each(|layout| *layout = Layout::Wide);
     }
     let mut candidates = Vec::new();
+    let scale = Scale::of_trees(forest, leaf);
+    // The same for every layout that walks trees, and slow to find.
+    let error = OnceCell::new();
+    let scale = scale.as_ref().map(|scale| (scale, || *error.get_or_init(|| margin_error(forest, cells, leaf, scale))));
     for layout in layouts {
+        let walked = |structure: &dyn Fn(&[Run], &mut Leaves<'_>) -> Option<Structure>| {
+            let (scale, error) = scale.as_ref()?;
+            trees(forest, scale, error, leaf, structure)
+        };
         let parts = match layout {
-            Layout::Complete => trees(forest, cells, leaf, |order, leaves| complete(forest, axes, order, leaves)),
-            Layout::Compact => trees(forest, cells, leaf, |order, leaves| compact(forest, axes, order, leaves)),
-            Layout::Wide => trees(forest, cells, leaf, |order, leaves| wide(forest, order, leaves)),
+            Layout::Complete => walked(&|order, leaves| complete(forest, axes, order, leaves)),
+            Layout::Compact => walked(&|order, leaves| compact(forest, axes, order, leaves)),
+            Layout::Wide => walked(&|order, leaves| wide(forest, order, leaves)),
             Layout::Grid => cells.and_then(|cells| grid(forest, cells, leaf)),
         };
         match parts {
@@ -101,7 +112,7 @@ impl Leaves<'_> {
         for &value in values {
             let integer = self.scale.integer(value, shift);
             match self.leaf {
-                LeafType::I8 => self.bytes.extend((integer as i8).to_le_bytes()),
+                LeafType::I8 => self.bytes.push((integer + 128) as u8),
                 LeafType::I16 => self.bytes.extend((integer as i16).to_le_bytes()),
                 LeafType::F32 => self.bytes.extend(value.to_le_bytes()),
             }
@@ -122,23 +133,20 @@ type Structure = (Vec<Axis>, Vec<u8>, Vec<Group>, Vec<u8>, u64);
 /// The parts of a layout that walks trees; `structure` writes its splits and leaves.
 fn trees(
     forest: &Forest<'_>,
-    cells: Option<&Cells>,
+    scale: &Scale,
+    margin_error: &impl Fn() -> f32,
     leaf: LeafType,
-    structure: impl FnOnce(&[Run], &mut Leaves<'_>) -> Option<Structure>,
+    structure: &dyn Fn(&[Run], &mut Leaves<'_>) -> Option<Structure>,
 ) -> Option<Parts> {
-    let scale = Scale::of_trees(forest, leaf)?;
-    let mut leaves = Leaves { leaf, scale: &scale, bytes: Vec::new() };
-    let runs = runs(forest, leaf, &scale);
+    let mut leaves = Leaves { leaf, scale, bytes: Vec::new() };
+    let runs = runs(forest, leaf, scale);
     let (axes, cuts, groups, nodes, instructions) = structure(&runs, &mut leaves)?;
     if groups.len() > usize::from(u16::MAX) {
         return None;
     }
-    let base = forest.base.iter().map(|&base| base_bits(base, leaf, &scale)).collect();
-    let margin_error = match leaf {
-        LeafType::F32 => scale.unit / 2.0,
-        LeafType::I8 | LeafType::I16 => margin_error(forest, cells, &scale),
-    };
+    let base = forest.base.iter().map(|&base| base_bits(base, leaf, scale)).collect();
     let leaves = leaves.bytes;
+    let margin_error = margin_error();
     Some(Parts { axes, cuts, groups, nodes, leaves, base, unit: scale.unit, margin_error, instructions })
 }
 
@@ -146,34 +154,55 @@ fn base_bits(base: f32, leaf: LeafType, scale: &Scale) -> i32 {
     if leaf == LeafType::F32 { base.to_bits().cast_signed() } else { scale.integer(base, 0) }
 }
 
-/// The farthest that a margin can be from the ensemble's f32 sum.
-fn margin_error(forest: &Forest<'_>, cells: Option<&Cells>, scale: &Scale) -> f32 {
+/// The farthest that a margin can be from the ensemble's f32 sum: the largest error in any cell, where cells can be
+/// counted; otherwise the sum of the trees' largest roundings, and what f32 sums lose.
+fn margin_error(forest: &Forest<'_>, cells: Option<&Cells>, leaf: LeafType, scale: &Scale) -> f32 {
+    if leaf == LeafType::F32 {
+        return scale.unit / 2.0;
+    }
     let unit = f64::from(scale.unit);
-    let mut worst = 0.0_f64;
-    for object in 0..forest.objects() {
+    let of_object = |object: usize| {
         let base = scale.integer(forest.base[object], 0);
         if let Some(cells) = cells {
-            let full = cells.sums(forest, object, forest.base[object], |_, value| value);
-            let compiled = cells.sums(forest, object, base, |tree, value| {
-                scale.integer(value, scale.shifts[tree]) << scale.shifts[tree]
+            let start = Both { full: forest.base[object], compiled: base };
+            let sums = cells.sums(forest, object, start, |tree, value| {
+                let shift = scale.shifts[tree];
+                Both { full: value, compiled: scale.integer(value, shift) << shift }
             });
-            let errors = full.iter().zip(compiled).map(|(&full, int)| (f64::from(full) - f64::from(int) * unit).abs());
-            worst = errors.fold(worst, f64::max);
-        } else {
-            let mut bound = (f64::from(forest.base[object]) - f64::from(base) * unit).abs();
-            for (index, tree) in forest.trees.iter().enumerate().filter(|(_, tree)| tree.values_for(object)) {
-                bound += leaf_error(tree, object, scale, scale.shifts[index]);
-            }
-            // What f32 sums lose: half an ulp of the largest partial sum at each addition, or nothing at all while they
-            // are whole numbers of units that f32 holds.
-            let range = forest.range(object);
-            if bound > 0.0 || range / unit > f64::from(1 << 24) {
-                bound += forest.trees_of(object).count() as f64 * range * f64::from(f32::EPSILON) / 2.0;
-            }
-            worst = worst.max(bound);
+            return sums.iter().fold(0.0, |worst, sum| f64::max(worst, sum.difference(unit)));
         }
+        let trees = forest.trees.iter().zip(&scale.shifts).filter(|(tree, _)| tree.values_for(object));
+        let rounding: f64 = trees.map(|(tree, &shift)| leaf_error(tree, object, scale, shift)).sum();
+        let bound = Both { full: forest.base[object], compiled: base }.difference(unit) + rounding;
+        // What f32 sums lose: half an ulp of the largest partial sum at each addition, or nothing at all while they are
+        // whole numbers of units that f32 holds.
+        let range = forest.range(object);
+        if bound == 0.0 && range / unit <= f64::from(1 << 24) {
+            return 0.0;
+        }
+        bound + forest.trees_of(object).count() as f64 * range * f64::from(f32::EPSILON) / 2.0
+    };
+    round_up((0..forest.objects()).into_par_iter().map(of_object).reduce(|| 0.0, f64::max))
+}
+
+/// A margin of the full and of the compiled model.
+#[derive(Clone, Copy)]
+struct Both {
+    full: f32,
+    compiled: i32,
+}
+
+impl Both {
+    fn difference(self, unit: f64) -> f64 {
+        (f64::from(self.full) - f64::from(self.compiled) * unit).abs()
     }
-    round_up(worst)
+}
+
+impl AddAssign for Both {
+    fn add_assign(&mut self, other: Self) {
+        self.full += other.full;
+        self.compiled += other.compiled;
+    }
 }
 
 /// The largest rounding of a tree's leaves for an object.
@@ -237,11 +266,17 @@ fn complete(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<
     let (mut groups, mut nodes, mut instructions) = (Vec::new(), Vec::new(), 0);
     for run in runs {
         let depth = run.trees.iter().map(|&tree| forest.trees[tree].depth).max()?.max(1);
+        let (mut columns, mut thresholds) = (Vec::new(), Vec::new());
         for &tree in &run.trees {
-            let start = nodes.len();
-            nodes.resize(start + (2 << depth), 0);
-            fill(&forest.trees[tree].root, &mut nodes[start..], axes, 1, depth, run.shift, leaves);
+            let mut slots = vec![(0, 0); 1 << depth];
+            // The number of the root; see `palpate_onboard`'s walk.
+            slots[0].0 = 1;
+            fill(&forest.trees[tree].root, &mut slots, axes, 1, depth, run.shift, leaves);
+            columns.extend(slots.iter().map(|slot| slot.0));
+            thresholds.extend(slots.iter().map(|slot| slot.1));
         }
+        nodes.append(&mut columns);
+        nodes.append(&mut thresholds);
         groups.push(group(run, u8::try_from(depth).ok()?));
         instructions += run.trees.len() * (15 + 5 * depth + leaf_instructions(forest, run));
     }
@@ -254,7 +289,7 @@ fn complete(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<
 /// copies are left at 0, which goes right.
 fn fill(
     branch: &Branch<'_>,
-    nodes: &mut [u8],
+    slots: &mut [(u8, u8)],
     axes: &Axes,
     slot: usize,
     levels: usize,
@@ -265,10 +300,9 @@ fn fill(
         Branch::Leaf(values) => (0..1_usize << levels).for_each(|_| leaves.push(values, shift)),
         Branch::Split(split) => {
             let (column, threshold) = axes.place(split);
-            nodes[slot] = column as u8;
-            nodes[nodes.len() / 2 + slot] = threshold;
-            fill(&split.left, nodes, axes, 2 * slot, levels - 1, shift, leaves);
-            fill(&split.right, nodes, axes, 2 * slot + 1, levels - 1, shift, leaves);
+            slots[slot] = (column as u8, threshold);
+            fill(&split.left, slots, axes, 2 * slot, levels - 1, shift, leaves);
+            fill(&split.right, slots, axes, 2 * slot + 1, levels - 1, shift, leaves);
         }
     }
 }

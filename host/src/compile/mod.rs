@@ -28,7 +28,8 @@ use palpate_onboard::Stopping;
 pub struct Settings {
     /// What leaves are stored as.
     pub leaf: Leaf,
-    /// How trees are laid out; `None` takes the layout with the least bytes times instructions.
+    /// How trees are laid out; `None` takes the layout with the least bytes² × instructions: a
+    /// table that is many times faster may be a few times larger.
     pub layout: Option<Layout>,
     /// The error rate that recognisers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
@@ -97,9 +98,10 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     if candidates.iter().any(|(_, parts)| parts.margin_error == 0.0) {
         candidates.retain(|(_, parts)| parts.margin_error == 0.0);
     }
-    let mut best: Option<(u64, Layout, layout::Parts)> = None;
+    let mut best: Option<(u128, Layout, layout::Parts)> = None;
     for (layout, parts) in candidates {
-        let cost = parts.bytes() as u64 * parts.instructions;
+        let bytes = parts.bytes() as u128;
+        let cost = bytes * bytes * u128::from(parts.instructions);
         if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
             best = Some((cost, layout, parts));
         }

@@ -10,6 +10,8 @@ const F32_UNIT: f32 = 1.0 / 65536.0;
 const MAX_UNIT: f64 = 0.5;
 /// A unit is at least this many nats.
 const MIN_UNIT: f64 = 1.0 / (1 << 24) as f64;
+/// A unit that is fine enough for priors.
+const PRIOR_UNIT: f32 = 1.0 / 1024.0;
 /// What a group's margins may come to, with room for base margins and rounding.
 const RANGE: f64 = MARGIN_LIMIT as f64 / 2.0;
 
@@ -33,10 +35,15 @@ impl Scale {
         }
         let largest: Vec<f64> = forest.trees.iter().map(|tree| f64::from(tree.largest)).collect();
         let all = largest.iter().copied().fold(0.0, f64::max);
-        // From the finest unit to the coarsest, the first whose sums stay in range.
-        (0..=16).rev().find_map(|shift| {
+        // From the finest unit to the coarsest, the first that some tree needs and whose sums stay in range.
+        (0..=max_shift(leaf)).rev().find_map(|shift| {
             let unit = unit_for(all, most * f64::from(1 << shift))?;
             let shifts: Vec<u8> = largest.iter().map(|&value| shift_for(value, most * f64::from(unit))).collect();
+            let needed =
+                shift == 0 || shifts.contains(&0) || unit_for(all, most * f64::from(1 << (shift - 1))).is_none();
+            if !needed {
+                return None;
+            }
             let range: f64 = shifts.iter().map(|&shift| (most + 1.0) * f64::from(1_u32 << shift)).sum();
             let base = forest.base.iter().map(|base| f64::from(base.abs())).fold(0.0, f64::max) / f64::from(unit);
             (range + base < RANGE).then_some(Self { unit, shifts })
@@ -47,8 +54,8 @@ impl Scale {
     /// nothing is rounded. Ensembles whose training rounded their leaves have one.
     fn exact(forest: &Forest<'_>, most: f64) -> Option<Self> {
         let unit = common_unit(forest.leaf_values().chain(forest.base.iter().copied()))?;
-        let fits = forest.trees.iter().all(|tree| f64::from(tree.largest) / f64::from(unit) <= most);
-        fits.then(|| Self { unit, shifts: vec![0; forest.trees.len()] })
+        let fits = |unit: f32| forest.trees.iter().all(|tree| f64::from(tree.largest) / f64::from(unit) <= most);
+        finest(unit, fits).map(|unit| Self { unit, shifts: vec![0; forest.trees.len()] })
     }
 
     /// The scale for a table of margins: one without rounding if there is one, else the finest.
@@ -57,10 +64,9 @@ impl Scale {
         let largest = values().fold(0.0_f64, |most, sum| most.max(f64::from(sum.abs())));
         let unit = match most(leaf) {
             None => F32_UNIT,
-            Some(most) => match common_unit(values()) {
-                Some(exact) if largest / f64::from(exact) <= most => exact,
-                _ => unit_for(largest, most)?,
-            },
+            Some(most) => common_unit(values())
+                .and_then(|unit| finest(unit, |unit| largest / f64::from(unit) <= most))
+                .or_else(|| unit_for(largest, most))?,
         };
         Some(Self { unit, shifts: Vec::new() })
     }
@@ -75,6 +81,17 @@ impl Scale {
 fn common_unit(values: impl Iterator<Item = f32> + Clone) -> Option<f32> {
     let mut units = (1..=24).map(|digits| 0.5_f32.powi(digits));
     units.find(|unit| values.clone().all(|value| value % unit == 0.0))
+}
+
+/// `unit`, or the finest part of it by a power of two that still fits: priors, which are rounded, are the better for it.
+fn finest(unit: f32, fits: impl Fn(f32) -> bool) -> Option<f32> {
+    let finer = std::iter::successors(Some(unit), |unit| (*unit > PRIOR_UNIT).then_some(unit / 2.0));
+    finer.take_while(|&unit| fits(unit)).last()
+}
+
+/// How many times a tree's unit may be doubled: bytes need it to be exact, for two bytes it would only make groups.
+fn max_shift(leaf: LeafType) -> u32 {
+    if leaf == LeafType::I8 { 4 } else { 0 }
 }
 
 /// The largest integer of a leaf type.

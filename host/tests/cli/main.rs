@@ -2,6 +2,7 @@
 
 mod capture;
 mod cast;
+mod compiled;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

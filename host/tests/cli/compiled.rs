@@ -1,0 +1,269 @@
+//! The commands around a compiled model, as a user calls them: export, inspect, parity, recognize.
+
+use palpate::ensemble::{Ensemble, Node, Output, Tree};
+use palpate_shared::Descriptor;
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output as Finished, Stdio};
+
+fn palpate(arguments: &[&str]) -> Finished {
+    Command::new(env!("CARGO_BIN_EXE_palpate")).args(arguments).stdin(Stdio::null()).output().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let finished = palpate(arguments);
+    assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
+    serde_json::from_slice(&finished.stdout).unwrap()
+}
+
+/// The exit code and what was said on stderr.
+fn refusal(arguments: &[&str]) -> (i32, String) {
+    let finished = palpate(arguments);
+    assert!(finished.stdout.is_empty(), "{}", String::from_utf8_lossy(&finished.stdout));
+    (finished.status.code().unwrap(), String::from_utf8(finished.stderr).unwrap())
+}
+
+/// One split: flat is a bowl, curved a fork.
+fn ensemble() -> Ensemble {
+    let leaf = |bowl: f32, fork: f32| Node::Leaf(vec![bowl, fork]);
+    let split = Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 };
+    let nodes = vec![split, leaf(0.7, -0.7), leaf(-0.7, 0.7)];
+    Ensemble {
+        descriptor: Descriptor::Curvature,
+        objects: vec!["bowl".into(), "fork".into()],
+        base_margins: vec![0.0, 0.0],
+        trees: vec![Tree { nodes, output: Output::Each }],
+    }
+}
+
+struct Place {
+    directory: tempfile::TempDir,
+}
+
+impl Place {
+    /// A directory with `ensemble.json`, `model.palpate` and touches in `data`.
+    fn new() -> Self {
+        let place = Self { directory: tempfile::tempdir().unwrap() };
+        ensemble().save(place.path("ensemble.json")).unwrap();
+        std::fs::create_dir(place.path("data")).unwrap();
+        std::fs::write(place.path("data/bowl.txt"), "0 0 0.01\n0 0.001 0\n").unwrap();
+        std::fs::write(place.path("data/fork.txt"), "0 0 0.08\n0.09 0 0.01\n").unwrap();
+        json(&["export", &place.text("ensemble.json"), "-o", &place.text("model.palpate"), "--json"]);
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.path(name).to_str().unwrap().to_owned()
+    }
+}
+
+fn change(path: &Path, change: impl FnOnce(&mut Vec<u8>)) {
+    let mut bytes = std::fs::read(path).unwrap();
+    change(&mut bytes);
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn export_says_size_splits_leaves_and_error_and_the_file_has_that_size() {
+    let place = Place::new();
+    for leaf in ["i8", "i16", "f32"] {
+        for layout in ["auto", "compact", "complete", "grid"] {
+            let output = place.text("other.palpate");
+            let exported = json(&[
+                "export",
+                &place.text("ensemble.json"),
+                "-o",
+                &output,
+                "--leaf",
+                leaf,
+                "--layout",
+                layout,
+                "--json",
+            ]);
+            assert_eq!(exported["bytes"], std::fs::metadata(&output).unwrap().len());
+            assert_eq!(
+                (&exported["splits"], &exported["leaves"], &exported["trees"]),
+                (&1.into(), &2.into(), &1.into())
+            );
+            assert!(exported["margin_error"].as_f64().unwrap() < 0.01);
+        }
+    }
+}
+
+#[test]
+fn inspect_tells_what_was_exported() {
+    let place = Place::new();
+    let inspected = json(&["inspect", &place.text("model.palpate"), "--json"]);
+    assert_eq!(inspected["version"], 1);
+    assert_eq!(inspected["descriptor"], "curvature");
+    assert_eq!(inspected["objects"], serde_json::json!(["bowl", "fork"]));
+    assert_eq!(inspected["stopping"], serde_json::json!({"error_rate": 0.01, "max_touches": 200}));
+    let parts = inspected["bytes_by_part"].as_object().unwrap().values();
+    assert_eq!(inspected["bytes"], parts.map(|bytes| bytes.as_u64().unwrap()).sum::<u64>());
+    let text = palpate(&["inspect", &place.text("model.palpate")]);
+    assert!(String::from_utf8(text.stdout).unwrap().contains("bowl, fork"));
+}
+
+#[test]
+fn parity_of_a_model_with_its_own_ensemble_has_no_difference() {
+    let place = Place::new();
+    let (ensemble, model, data) = (place.text("ensemble.json"), place.text("model.palpate"), place.text("data"));
+    let parity = json(&["parity", &ensemble, &model, &data, "--sequences", "200", "--json"]);
+    assert_eq!(
+        (&parity["touches"], &parity["best_differs"], &parity["verdict_differs"]),
+        (&4.into(), &0.into(), &0.into())
+    );
+    assert!(parity["max_margin_error"].as_f64() <= parity["stated_bound"].as_f64(), "{parity}");
+}
+
+#[test]
+fn parity_refuses_a_model_of_other_objects() {
+    let place = Place::new();
+    let other = Ensemble { objects: vec!["bowl".into(), "spoon".into()], ..ensemble() };
+    other.save(place.path("other.json")).unwrap();
+    let (code, message) =
+        refusal(&["parity", &place.text("other.json"), &place.text("model.palpate"), &place.text("data")]);
+    assert_eq!(code, 1);
+    assert!(message.contains("model.palpate") && message.contains("not compiled from this ensemble"), "{message}");
+}
+
+#[test]
+fn recognize_starts_afresh_after_each_verdict() {
+    let place = Place::new();
+    std::fs::write(place.path("touches.txt"), "0 0 0.08\n".repeat(9) + &"0 0 0.01\n".repeat(4)).unwrap();
+    let finished = palpate(&["recognize", &place.text("model.palpate"), &place.text("touches.txt"), "--json"]);
+    assert!(finished.status.success());
+    let lines: Vec<Value> = finished.stdout.lines().map(|line| serde_json::from_str(&line.unwrap()).unwrap()).collect();
+    let verdicts: Vec<_> = lines
+        .iter()
+        .map(|line| {
+            (line["touch"].as_u64().unwrap(), line["verdict"].as_str().unwrap(), line["object"].as_str().unwrap())
+        })
+        .collect();
+    let three = |object| [(1, "undecided", object), (2, "undecided", object), (3, "undecided", object)];
+    let recognized = |object| [(4, "recognized", object)];
+    let fork = [&three("fork")[..], &recognized("fork")].concat();
+    // The ninth touch is the first of the third object, which the bowl's touches then pull back.
+    let mixed =
+        [(1, "undecided", "fork"), (2, "undecided", "bowl"), (3, "undecided", "bowl"), (4, "undecided", "bowl")];
+    assert_eq!(verdicts[..8], [fork.clone(), fork].concat());
+    assert_eq!((verdicts[8], verdicts[10], verdicts[11]), (mixed[0], mixed[2], mixed[3]));
+    let keys: Vec<_> = lines[0].as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(keys.len(), 4);
+    assert!(["touch", "verdict", "object", "posterior"].iter().all(|key| keys.contains(key)));
+    let posterior = lines[0]["posterior"].as_f64().unwrap();
+    assert!((posterior - 1.0 / (1.0 + (-1.4_f64).exp())).abs() < 1e-4, "{posterior}");
+}
+
+#[test]
+fn recognize_answers_each_line_of_a_slow_pipe_before_the_next_comes() {
+    let place = Place::new();
+    for json in [true, false] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+        command.args(["recognize", &place.text("model.palpate")]).args(json.then_some("--json"));
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let mut input = child.stdin.take().unwrap();
+        let mut output = BufReader::new(child.stdout.take().unwrap());
+        // The next touch is only written once the verdict of the one before was read: no answer, no progress.
+        for number in 1..=10 {
+            input.write_all(b"0 0 0.08\n").unwrap();
+            input.flush().unwrap();
+            let mut line = String::new();
+            output.read_line(&mut line).unwrap();
+            assert!(line.contains(if number % 4 == 0 { "recognized" } else { "undecided" }), "{number}: {line}");
+        }
+        drop(input);
+        assert!(child.wait().unwrap().success());
+    }
+}
+
+#[test]
+fn recognize_gives_up_after_the_limit_of_touches() {
+    let place = Place::new();
+    std::fs::write(place.path("touches.txt"), "0 0 0.08\n0 0 0.01\n".repeat(3)).unwrap();
+    let arguments = ["recognize", &place.text("model.palpate"), &place.text("touches.txt"), "--max-touches", "4"];
+    let text = String::from_utf8(palpate(&arguments).stdout).unwrap();
+    let verdicts: Vec<&str> = text.lines().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
+    assert_eq!(verdicts, ["undecided", "undecided", "undecided", "unknown", "undecided", "undecided"]);
+}
+
+#[test]
+fn recognize_names_the_line_that_is_wrong_after_answering_those_before() {
+    let place = Place::new();
+    for wrong in ["0 0", "0 0 -1", "0 0 nan", "0 0 x", "0 0 0 0"] {
+        std::fs::write(place.path("touches.txt"), format!("0 0 0.08\n\n{wrong}\n")).unwrap();
+        let finished = palpate(&["recognize", &place.text("model.palpate"), &place.text("touches.txt")]);
+        assert_eq!(finished.status.code(), Some(1), "{wrong}");
+        assert_eq!(finished.stdout.lines().count(), 1);
+        let message = String::from_utf8(finished.stderr).unwrap();
+        assert!(message.contains("touches.txt:3: "), "{message}");
+    }
+}
+
+#[test]
+fn models_that_are_truncated_changed_or_of_another_version_are_refused_with_the_byte() {
+    let place = Place::new();
+    let whole = std::fs::read(place.path("model.palpate")).unwrap();
+    let refuse = |expected: &str| {
+        for command in ["inspect", "recognize"] {
+            let (code, message) = refusal(&[command, &place.text("model.palpate")]);
+            assert_eq!(code, 1);
+            assert!(message.contains("model.palpate: byte ") && message.contains(expected), "{message}");
+        }
+        std::fs::write(place.path("model.palpate"), &whole).unwrap();
+    };
+    change(&place.path("model.palpate"), |bytes| bytes.truncate(100));
+    refuse("truncated");
+    change(&place.path("model.palpate"), Vec::clear);
+    refuse("truncated");
+    change(&place.path("model.palpate"), |bytes| bytes[4] = 9);
+    refuse("format version 9");
+    change(&place.path("model.palpate"), |bytes| bytes[120] ^= 1);
+    refuse("checksum");
+    change(&place.path("model.palpate"), |bytes| bytes[0] = b'X');
+    refuse("not a Palpate model");
+}
+
+#[test]
+fn a_missing_model_is_named_with_what_to_do() {
+    let (code, message) = refusal(&["inspect", "no/such.palpate"]);
+    assert_eq!(code, 1);
+    assert!(message.contains("no/such.palpate") && message.contains("Check the path"), "{message}");
+}
+
+#[test]
+fn bad_arguments_of_export_exit_with_2_and_leave_the_old_model() {
+    let place = Place::new();
+    let before = std::fs::read(place.path("model.palpate")).unwrap();
+    for wrong in [
+        ["--leaf", "i4"],
+        ["--layout", "spiral"],
+        ["--error-rate", "0.7"],
+        ["--error-rate", "0"],
+        ["--max-touches", "0"],
+        ["--frobnicate", "1"],
+    ] {
+        let (ensemble, model) = (place.text("ensemble.json"), place.text("model.palpate"));
+        let (code, message) = refusal(&[&["export", &ensemble, "-o", &model], &wrong[..]].concat());
+        assert_eq!(code, 2, "{message}");
+        assert_eq!(std::fs::read(place.path("model.palpate")).unwrap(), before);
+    }
+}
+
+#[test]
+fn leaves_beyond_reason_are_refused_at_export_and_nothing_is_written() {
+    let place = Place::new();
+    let mut huge = ensemble();
+    huge.trees[0].nodes[1] = Node::Leaf(vec![1e30, 0.0]);
+    huge.save(place.path("huge.json")).unwrap();
+    let (code, message) =
+        refusal(&["export", &place.text("huge.json"), "-o", &place.text("huge.palpate"), "--leaf", "f32"]);
+    assert_eq!(code, 1);
+    assert!(message.contains("huge.json") && message.contains("1e30"), "{message}");
+    assert!(!place.path("huge.palpate").exists());
+}

@@ -1,0 +1,115 @@
+//! Pins the model format: these bytes are what version 1 means (`shared/FORMAT.md`).
+
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::ensemble::{Ensemble, Node, Output, Tree};
+use palpate_onboard::Model;
+use palpate_shared::{ContactTime, Descriptor, Touch};
+
+/// Two trees over curvature: κ < 1000.5 (missing left), then slope < -3 (missing right) on the right; and one split.
+fn ensemble() -> Ensemble {
+    let split =
+        |feature, threshold, missing_left, left, right| Node::Split { feature, threshold, missing_left, left, right };
+    let leaf = |a: f32, b: f32| Node::Leaf(vec![a, b]);
+    let first = vec![
+        split(0, 1000.5, true, 1, 2),
+        leaf(1.0, -1.0),
+        split(1, -3.0, false, 3, 4),
+        leaf(0.5, 0.25),
+        leaf(-0.5, 0.0),
+    ];
+    let second = vec![split(0, 70000.0, true, 1, 2), leaf(0.125, 0.0), leaf(-0.125, 0.0625)];
+    Ensemble {
+        descriptor: Descriptor::Curvature,
+        objects: vec!["ab".into(), "c".into()],
+        base_margins: vec![0.5, -0.5],
+        trees: [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
+    }
+}
+
+/// Compiles with the version and the ensemble's hash, which may change with a release, set to zero.
+fn body(leaf: Leaf, layout: Layout) -> String {
+    let compiled = compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap();
+    let version = env!("CARGO_PKG_VERSION");
+    let text = 96;
+    assert_eq!(&compiled.bytes[text + 1..text + 1 + version.len()], version.as_bytes());
+    let bytes = &compiled.bytes[text + 1 + version.len()..compiled.bytes.len() - 4];
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn the_header_is_pinned() {
+    let settings = Settings { leaf: Leaf::I8, layout: Some(Layout::Complete), ..Settings::default() };
+    let compiled = compile(&ensemble(), &settings).unwrap();
+    let mut header = compiled.bytes[..96].to_vec();
+    header[72..80].fill(0);
+    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
+    let rows: Vec<String> = header.chunks(16).map(hex).collect();
+    assert_eq!(rows, HEADER);
+}
+
+#[test]
+fn the_sections_of_every_layout_are_pinned() {
+    let bodies = SECTIONS.map(|(leaf, layout, _)| body(leaf, layout));
+    assert_eq!(bodies, SECTIONS.map(|(.., expected)| expected));
+}
+
+#[test]
+fn a_golden_model_gives_the_margins_worked_out_by_hand() {
+    let touches = [
+        // κ = 80000, slope = 20000: right, right; right.
+        (Touch::from_micros([30_000, 0, 50_000]), [0.5 - 0.5 - 0.125, -0.5 + 0.0 + 0.0625]),
+        // κ = 100, slope = 100: left; left.
+        (Touch::from_micros([0, 0, 100]), [0.5 + 1.0 + 0.125, -0.5 - 1.0]),
+        // κ missing, slope missing: left; left.
+        (Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]), [1.625, -1.5]),
+    ];
+    for (leaf, layout, _) in SECTIONS {
+        let compiled = compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap();
+        let model = Model::new(&compiled.bytes).unwrap();
+        for (touch, expected) in touches {
+            let mut margins = [0; 2];
+            model.margins(&touch, &mut margins);
+            for (margin, expected) in margins.into_iter().zip(expected) {
+                let margin = f64::from(margin) * f64::from(model.unit());
+                assert!((margin - expected).abs() <= f64::from(model.margin_error()), "{margin} for {expected}");
+            }
+        }
+    }
+}
+
+const HEADER: [&str; 6] = [
+    "50 4c 50 54 01 00 01 00 b6 00 00 00 01 00 01 01",
+    "02 00 02 00 02 00 00 00 03 00 00 00 05 00 00 00",
+    "00 00 80 3c 29 3b aa b8 05 00 00 00 00 00 00 00",
+    "eb 57 0a d4 fa 95 02 00 c8 00 00 00 00 00 c0 3f",
+    "00 00 20 41 0b 00 00 00 00 00 00 00 00 00 00 00",
+    "07 00 00 00 0c 00 00 00 0c 00 00 00 00 00 00 00",
+];
+
+const SECTIONS: [(Leaf, Layout, &str); 5] = [
+    (
+        Leaf::I8,
+        Layout::Complete,
+        "02 61 62 01 63 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 01 00 00 00 01 00 00 00 02 00 00 00 01 00 00 00 01 00 00 01 01 00 00 01 00 00 00 00 88 80 78 84 c0 40 c0 40 a0 90 60 80",
+    ),
+    (
+        Leaf::I16,
+        Layout::Compact,
+        "02 61 62 01 63 00 02 00 00 00 fe ff ff 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 80 00 00 00 80 ff 40 00 00 04 00 fc 00 02 00 01 00 fe 00 00",
+    ),
+    (
+        Leaf::I8,
+        Layout::Wide,
+        "02 61 62 01 63 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 fd ff ff ff e9 03 00 00 70 11 01 00 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 02 00 00 00 02 00 00 01 01 00 00 00 01 00 00 00 00 00 88 80 78 84 c0 40 a0 90 60 80",
+    ),
+    (
+        Leaf::I8,
+        Layout::Grid,
+        "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 03 02 01 01 01 01 e9 03 00 70 11 01 fd e8 20 e8 20 e8 20 c8 70 88 60 88 60 b8 74 78 64 78 64 e8 20 e8 20 e8 20",
+    ),
+    (
+        Leaf::F32,
+        Layout::Compact,
+        "02 61 62 01 63 00 00 00 3f 00 00 00 bf 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 00 00 00 00 02 00 00 00 02 00 00 00 00 01 00 00 01 00 00 01 00 00 00 80 3f 00 00 80 bf 00 00 00 3f 00 00 80 3e 00 00 00 bf 00 00 00 00 00 00 00 3e 00 00 00 00 00 00 00 be 00 00 80 3d",
+    ),
+];

@@ -1,0 +1,141 @@
+//! Bytes that are not a model are refused, and bytes that pass can be walked.
+
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate_onboard::{Model, ModelError, Recognizer, Stopping};
+use palpate_shared::Descriptor;
+use palpate_shared::format::{HEADER_LENGTH, checksum};
+use palpate_tests::random::{self, Shape};
+
+/// A small model in each layout and leaf type.
+fn models() -> Vec<Vec<u8>> {
+    let shape = Shape {
+        descriptor: Descriptor::Curvature,
+        objects: 3,
+        trees: 4,
+        depth: 3,
+        each: true,
+        thresholds: 6,
+        leaf: 1.0,
+    };
+    let mut models = Vec::new();
+    for each in [true, false] {
+        let ensemble = random::ensemble(Shape { each, ..shape }, 5);
+        for &leaf in Leaf::ALL {
+            for &layout in Layout::ALL {
+                let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+                models.push(compile(&ensemble, &settings).unwrap().bytes);
+            }
+        }
+    }
+    models
+}
+
+/// Walks a model with touches that reach all over it.
+fn walk(model: &Model<'_>) {
+    let Ok(mut recognizer) = Recognizer::<256>::new(model, Stopping::from_model(model)) else { return };
+    for touch in random::touches(40, 3) {
+        recognizer.push(&touch);
+        recognizer.push_features(&[i32::MIN, i32::MAX]);
+        recognizer.posterior(0);
+    }
+    for object in 0..model.object_count() {
+        model.object_name(object);
+    }
+}
+
+fn with_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
+    let body = bytes.len() - 4;
+    let sum = checksum(&bytes[..body]);
+    bytes[body..].copy_from_slice(&sum.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn every_truncation_is_refused_and_says_so() {
+    for bytes in models() {
+        for length in 0..bytes.len() {
+            let error = Model::new(&bytes[..length]).unwrap_err();
+            assert!(matches!(error, ModelError::Length { found, .. } if found == length), "{length}: {error:?}");
+            assert!(error.to_string().contains("truncated"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn bytes_after_the_end_are_refused() {
+    for mut bytes in models() {
+        bytes.push(0);
+        assert!(matches!(Model::new(&bytes), Err(ModelError::Length { .. })));
+    }
+}
+
+#[test]
+fn every_change_of_a_single_byte_is_refused() {
+    for mut bytes in models() {
+        for position in 0..bytes.len() {
+            let right = bytes[position];
+            for wrong in
+                (0..=255).filter(|&wrong| wrong != right).step_by(if position < HEADER_LENGTH { 1 } else { 37 })
+            {
+                bytes[position] = wrong;
+                assert!(Model::new(&bytes).is_err(), "byte {position}: {right} changed to {wrong}");
+            }
+            bytes[position] = right;
+        }
+        Model::new(&bytes).unwrap();
+    }
+}
+
+#[test]
+fn a_change_with_a_right_checksum_is_refused_or_can_be_walked() {
+    let mut accepted = 0;
+    for bytes in models() {
+        for position in 0..bytes.len() - 4 {
+            for wrong in [0, 1, 2, 3, 6, 8, 16, 127, 128, 254, 255] {
+                let mut bytes = bytes.clone();
+                bytes[position] = wrong;
+                let bytes = with_checksum(bytes);
+                if let Ok(model) = Model::new(&bytes) {
+                    accepted += 1;
+                    walk(&model);
+                }
+            }
+        }
+    }
+    assert!(accepted > 1000, "{accepted} changed models were accepted");
+}
+
+#[test]
+fn another_version_is_refused_by_name_before_anything_else() {
+    let mut bytes = models().remove(0);
+    bytes[4] = 2;
+    bytes.truncate(200);
+    assert_eq!(Model::new(&bytes).unwrap_err(), ModelError::Version(2));
+    assert!(ModelError::Version(2).to_string().contains("version 2"));
+}
+
+#[test]
+fn something_else_is_called_something_else() {
+    for bytes in [&b"{\"learner\":"[..], b"P", b"PLP0", b"\0\0\0\0\0"] {
+        let error = Model::new(bytes).unwrap_err();
+        let expected = if b"PLPT".starts_with(bytes) { "truncated" } else { "not a Palpate model" };
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn a_model_is_read_at_any_alignment() {
+    for bytes in models() {
+        let margins = |bytes: &[u8]| {
+            let model = Model::new(bytes).unwrap();
+            let mut margins = [0; 3];
+            let touches = random::touches(50, 1);
+            touches.iter().map(|touch| (model.margins(touch, &mut margins), margins).1).collect::<Vec<_>>()
+        };
+        let expected = margins(&bytes);
+        for offset in 1..8 {
+            let shifted = [vec![0; offset], bytes.clone()].concat();
+            assert_eq!(margins(&shifted[offset..]), expected);
+        }
+    }
+}
