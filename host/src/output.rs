@@ -4,6 +4,26 @@ use crate::error::{Error, Result};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
+/// How the temporary names begin and end.
+const PREFIX: &str = ".palpate-";
+const SUFFIX: &str = ".tmp";
+
+/// Removes the temporary files that killed writers left in a directory. Only for one who knows that nobody else is
+/// writing into it.
+///
+/// # Errors
+/// [`Error::Io`] naming the directory or the file.
+pub fn remove_leftovers(directory: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(directory).map_err(|error| Error::io(directory, "list", error))? {
+        let entry = entry.map_err(|error| Error::io(directory, "list", error))?;
+        let name = entry.file_name();
+        if name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX)) {
+            std::fs::remove_file(entry.path()).map_err(|error| Error::io(entry.path(), "remove", error))?;
+        }
+    }
+    Ok(())
+}
+
 /// Writes `path` through `fill`: to a temporary name beside it, flushed to the disk, then renamed, so that neither an
 /// error nor a power cut leaves a half-written file, and an older file stays until the new one is complete. Missing
 /// directories above it are made.
@@ -23,7 +43,7 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Re
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = builder.prefix(".palpate-").suffix(".tmp").tempfile_in(directory).map_err(io)?;
+    let file = builder.prefix(PREFIX).suffix(SUFFIX).tempfile_in(directory).map_err(io)?;
     let mut writer = BufWriter::with_capacity(1 << 16, file);
     fill(&mut writer).map_err(io)?;
     let file = writer.into_inner().map_err(|e| io(e.into_error()))?;
@@ -77,6 +97,17 @@ pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_killed_writer_left_is_removed_and_nothing_else() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in [".palpate-x1y2.tmp", "fork.txt", ".lock"] {
+            std::fs::write(directory.path().join(name), "").unwrap();
+        }
+        remove_leftovers(directory.path()).unwrap();
+        assert!(!directory.path().join(".palpate-x1y2.tmp").exists());
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 2);
+    }
 
     #[test]
     fn an_error_while_writing_keeps_the_old_file_and_leaves_no_other() {

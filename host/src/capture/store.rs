@@ -9,6 +9,7 @@ use super::Settings;
 use crate::dataset::Format;
 use crate::dataset::manifest::{Entry, Manifest};
 use crate::error::{Error, Result};
+use crate::output;
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -33,6 +34,7 @@ impl Store {
     pub(super) fn open(directory: &Path, settings: &Settings, names: impl Iterator<Item = String>) -> Result<Self> {
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
         let lock = lock(directory)?;
+        output::remove_leftovers(directory)?;
         let wanted = Manifest::new(settings, names);
         let found = Manifest::read(directory);
         let manifest = if settings.resume {
