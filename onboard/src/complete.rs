@@ -28,7 +28,7 @@ pub(crate) fn add(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leaves: &mut 
         let Some(columns) = take(&mut columns, block << depth) else { return };
         let Some(thresholds) = take(&mut thresholds, block << depth) else { return };
         walk_block(depth, columns, thresholds, ranks, &mut reached);
-        let Some(block_leaves) = take(leaves, sum.leaf_length() * block << depth) else { return };
+        let Some(block_leaves) = take(leaves, (sum.leaf_length() * block) << depth) else { return };
         sum.add_complete(block_leaves, reached.get(..block).unwrap_or_default());
         trees -= block;
     }

@@ -68,7 +68,7 @@ pub(crate) fn model(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelE
             return Err(wrong);
         }
         shift = group.shift;
-        range = range.saturating_add(u64::from(group.trees) * largest_leaf << group.shift);
+        range = range.saturating_add((u64::from(group.trees) * largest_leaf) << group.shift);
         let leaf = model.leaf.size() * if group.object.is_none() { values } else { 1 };
         let fits = match model.layout {
             Layout::Complete if (1..=MAX_COMPLETE_DEPTH).contains(&group.depth) => {
@@ -105,8 +105,11 @@ fn axes(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelError> {
         take(&mut cuts, axis.cuts_length()).ok_or(ModelError::Section { offset: model.offset(model.cuts) })?;
     }
     // Wide splits number thresholds of four bytes throughout; the others have axes.
-    let ends =
-        if model.layout == Layout::Wide { model.axes.is_empty() && cuts.len() % 4 == 0 } else { cuts.is_empty() };
+    let ends = if model.layout == Layout::Wide {
+        model.axes.is_empty() && cuts.len().is_multiple_of(4)
+    } else {
+        cuts.is_empty()
+    };
     if ends { Ok(()) } else { Err(ModelError::Section { offset: model.offset(cuts) }) }
 }
 

@@ -120,7 +120,7 @@ impl<'a> Forest<'a> {
     fn check_range(&self) -> Result<()> {
         for object in 0..self.objects() {
             let range = self.range(object);
-            if !(range <= MARGIN_RANGE) {
+            if range.is_nan() || range > MARGIN_RANGE {
                 let largest = self.trees.iter().map(|tree| tree.largest).fold(self.base[object].abs(), f32::max);
                 return Err(wrong(format!(
                     "the margin of object {object} can reach {range:e} nats (the largest single value is {largest:e}), beyond the {MARGIN_RANGE} that a model can hold"
