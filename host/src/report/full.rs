@@ -140,3 +140,111 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
     facts.extend(stages.iter().map(|(name, seconds)| (name.clone(), format!("{seconds:.1} s"))));
     facts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::output::write_bytes;
+    use std::collections::BTreeSet;
+    use std::fmt::Write;
+
+    /// Three ellipsoids with hills, as OBJ files.
+    fn meshes(directory: &Path) -> Vec<String> {
+        for (name, sides) in [("ball", [1.0, 1.0, 1.0]), ("cigar", [1.0, 0.3, 0.3]), ("disc", [1.0, 1.0, 0.2])] {
+            let globe = Mesh::globe(10);
+            let mut text = String::new();
+            for vertex in &globe.vertices {
+                let [x, y, z] = [0, 1, 2].map(|axis| vertex[axis] * sides[axis]);
+                writeln!(text, "v {x} {y} {z}").unwrap();
+            }
+            for [a, b, c] in globe.triangles.iter().map(|triangle| triangle.map(|index| index + 1)) {
+                writeln!(text, "f {a} {b} {c}").unwrap();
+            }
+            write_bytes(&directory.join(format!("{name}.obj")), text.as_bytes()).unwrap();
+        }
+        vec![directory.to_str().unwrap().to_string()]
+    }
+
+    fn tiny(sources: Vec<String>) -> Settings {
+        Settings {
+            touches: 400,
+            folds_used: 2,
+            paper_rounds: 3,
+            levels: 4,
+            many_groups: 20,
+            noise_levels: 3,
+            limit_touches: 1_000,
+            limit_rounds: 3,
+            growth_objects: vec![2, 3],
+            growth_triangles: vec![100, 1_000],
+            growth_touches: 400,
+            instances: vec![1],
+            test_instances: 1,
+            instance_touches: 200,
+            ..Settings::quick(sources, 1)
+        }
+    }
+
+    #[test]
+    fn a_report_has_every_figure_and_its_files_and_resumes_without_measuring_again() {
+        let place = tempfile::tempdir().unwrap();
+        let sources = meshes(&place.path().join("meshes"));
+        let directory = place.path().join("report");
+        let settings = tiny(sources);
+        let written = full(&settings, &directory, false).unwrap();
+        let html = std::fs::read_to_string(directory.join("index.html")).unwrap();
+        let files: BTreeSet<String> =
+            written.files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect();
+        for figure in [
+            "curvature",
+            "accuracy",
+            "accuracy-objects",
+            "confusion",
+            "signal-to-noise",
+            "noise",
+            "noise-objects",
+            "noise-confusion",
+            "limit-curves",
+            "sequential-trade",
+            "sequential-objects",
+            "reliability",
+            "cost-bytes",
+            "cost-time",
+            "growth-objects-figure",
+            "growth-triangles",
+            "generalisation",
+        ] {
+            assert!(html.contains(&format!("<figure id=\"{figure}\">")), "{figure}");
+            for extension in ["svg", "csv"] {
+                assert!(files.contains(&format!("{figure}.{extension}")), "{figure}.{extension}");
+            }
+        }
+        assert!(files.contains("published.csv") && files.contains("summary.json"));
+        assert!(!html.contains("NaN"), "a number is none");
+        assert_eq!(html.matches("<img ").count(), 3);
+
+        // Stages are taken as they are, their times too; a cut-off stage is measured again, and nothing else.
+        let again = full(&settings, &directory, true).unwrap();
+        assert_eq!((&again.stages, &again.summary), (&written.stages, &written.summary));
+        let kept = |name: &str| {
+            let stages = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
+            stages.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with(name)).unwrap()
+        };
+        std::fs::remove_file(kept("growth-")).unwrap();
+        let cut = full(&settings, &directory, true).unwrap();
+        let differ = written.stages.iter().zip(&cut.stages).filter(|(a, b)| a != b).map(|(a, _)| a.0.as_str());
+        assert_eq!(differ.collect::<Vec<_>>(), ["growth"]);
+    }
+
+    #[test]
+    fn one_object_is_refused_before_anything_is_written() {
+        let place = tempfile::tempdir().unwrap();
+        let sources = meshes(place.path());
+        let one = vec![format!("{}/ball.obj", sources[0])];
+        let directory = place.path().join("report");
+        let error = full(&tiny(one), &directory, false).unwrap_err();
+        assert!(error.to_string().contains("only one object"), "{error}");
+        assert!(!directory.exists());
+    }
+}
