@@ -149,6 +149,11 @@ impl<'a> Context<'a> {
         train::Settings { noise: NOISE, ..self.ours() }
     }
 
+    /// The objects, ready to be touched.
+    pub(super) fn scenes(&self) -> &[Scene] {
+        &self.scenes
+    }
+
     /// The objects' names.
     pub(super) fn names(&self) -> Vec<String> {
         self.objects.iter().map(|object| object.name.clone()).collect()

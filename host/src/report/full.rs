@@ -6,6 +6,7 @@ use super::page::{Page, Section};
 use super::settings::Settings;
 use super::{
     calibration, cost, cross_validation, generalisation, growth, limit, noise, objects, published, sequential,
+    simulator,
 };
 use crate::error::{Error, Result};
 use crate::output::write_json;
@@ -76,6 +77,8 @@ pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Writt
     let members = cache.stage("cost", || cost::measure(&context, get_large()?))?;
     note("cost", members.seconds);
     drop(large);
+    let engines = cache.stage("simulator", || simulator::measure(&context))?;
+    note("simulator", engines.seconds);
     let growth = cache.stage("growth", || growth::measure(&context))?;
     note("growth", growth.seconds);
     let instances = cache.stage("generalisation", || generalisation::measure(&context))?;
@@ -84,6 +87,8 @@ pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Writt
     let summary = published::summary(&context, &folds.result, &noisy.result, &limit.result, &sequences.result);
     let mut first = Section::new("summary", "The paper's numbers beside ours");
     first.table(published::table(&context, &summary));
+    let mut costs = cost::section(&context, &members.result)?;
+    simulator::add(&context, &engines.result, &mut costs)?;
     let sections = vec![
         first,
         objects::section(&context)?,
@@ -92,7 +97,7 @@ pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Writt
         limit::section(&context, &limit.result)?,
         sequential::section(&context, &sequences.result)?,
         calibration::section(&context, &calibration.result)?,
-        cost::section(&context, &members.result)?,
+        costs,
         growth::section(&context, &growth.result)?,
         generalisation::section(&context, &instances.result)?,
     ];
@@ -145,23 +150,16 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
-    use crate::output::write_bytes;
+    use crate::obj;
+    use crate::output::write_whole;
     use std::collections::BTreeSet;
-    use std::fmt::Write;
 
     /// Three ellipsoids with hills, as OBJ files.
     fn meshes(directory: &Path) -> Vec<String> {
         for (name, sides) in [("ball", [1.0, 1.0, 1.0]), ("cigar", [1.0, 0.3, 0.3]), ("disc", [1.0, 1.0, 0.2])] {
-            let globe = Mesh::globe(10);
-            let mut text = String::new();
-            for vertex in &globe.vertices {
-                let [x, y, z] = [0, 1, 2].map(|axis| vertex[axis] * sides[axis]);
-                writeln!(text, "v {x} {y} {z}").unwrap();
-            }
-            for [a, b, c] in globe.triangles.iter().map(|triangle| triangle.map(|index| index + 1)) {
-                writeln!(text, "f {a} {b} {c}").unwrap();
-            }
-            write_bytes(&directory.join(format!("{name}.obj")), text.as_bytes()).unwrap();
+            let mut mesh = Mesh::globe(10);
+            mesh.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= sides[axis]));
+            write_whole(&directory.join(format!("{name}.obj")), |out| obj::write(&mesh, out)).unwrap();
         }
         vec![directory.to_str().unwrap().to_string()]
     }
@@ -211,6 +209,7 @@ mod tests {
             "reliability",
             "cost-bytes",
             "cost-time",
+            "simulator-figure",
             "growth-objects-figure",
             "growth-triangles",
             "generalisation",

@@ -24,6 +24,7 @@ pub mod scale;
 mod sequential;
 mod settings;
 pub mod short;
+mod simulator;
 pub mod statistics;
 pub mod table;
 

@@ -10,8 +10,8 @@ use crate::approach::{Approach, Probe};
 use crate::error::Result;
 use crate::random;
 use crate::scene::Scene;
-use crate::sweep::narrow::double::{self, Triangle};
 use crate::sweep::narrow::Motion;
+use crate::sweep::narrow::double::{self, Triangle};
 use crate::sweep::{Exact, Plain, Precision, Single};
 use glam::DVec3;
 use rand::RngExt;
@@ -112,9 +112,9 @@ fn every_triangle(triangles: &[Triangle], cast: &Cast, radius: f64) -> Option<f6
     let reach = triangles.iter().flatten().map(|corner| corner.length()).fold(0.0, f64::max) + radius;
     let skipped = (-cast.origin.dot(cast.direction) - reach).max(0.0);
     let motion = Motion { origin: cast.origin + cast.direction * skipped, direction: cast.direction, radius };
-    let first = triangles.iter().fold(f64::INFINITY, |first, triangle| {
-        double::first_contact(&motion, triangle, first).unwrap_or(first)
-    });
+    let first = triangles
+        .iter()
+        .fold(f64::INFINITY, |first, triangle| double::first_contact(&motion, triangle, first).unwrap_or(first));
     first.is_finite().then_some(first + skipped)
 }
 
@@ -151,8 +151,8 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
     // An error of nothing has no logarithm.
     let shown = |error: f64| error.max(1e-17);
     let top = engines.iter().map(|engine| shown(engine.largest_error)).fold(1e-6, f64::max);
-    let mut chart =
-        Chart::new("casts a second", x, "largest time error (s)", Scale::logarithmic(3e-18, top * 10.0)).sized(660, 330);
+    let mut chart = Chart::new("casts a second", x, "largest time error (s)", Scale::logarithmic(3e-18, top * 10.0))
+        .sized(660, 330);
     let mut data =
         Data::new(["decided in", "casts a second", "casts compared", "missed", "false contacts", "largest error (s)"]);
     for (index, engine) in engines.iter().enumerate() {
