@@ -31,6 +31,7 @@ mod preorder;
 mod ranks;
 mod recognizer;
 mod snapshot;
+pub mod station;
 mod stopping;
 mod validate;
 

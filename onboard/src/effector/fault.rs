@@ -2,6 +2,7 @@
 
 use super::Finger;
 use core::fmt;
+use palpate_shared::link::Event;
 
 /// A fault of the effector, and which finger has it. The driver goes on: every other touch is still reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -30,6 +31,26 @@ impl Fault {
             }
             Self::Overrun => None,
         }
+    }
+}
+
+/// As the link tells it.
+impl From<Fault> for Event {
+    fn from(fault: Fault) -> Self {
+        let kind = match fault {
+            Fault::Stuck(_) => 0,
+            Fault::Bouncing(_) => 1,
+            Fault::Silent(_) => 2,
+            Fault::Unreadable(_) => 3,
+            Fault::Overrun => 4,
+        };
+        let finger = match fault.finger() {
+            Some(Finger::First) => 0,
+            Some(Finger::Middle) => 1,
+            Some(Finger::Last) => 2,
+            None => u8::MAX,
+        };
+        Self::Fault { kind, finger }
     }
 }
 

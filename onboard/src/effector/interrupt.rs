@@ -20,6 +20,11 @@ impl<A: InputPin, B: InputPin, C: InputPin> Watcher<A, B, C> {
         Self { fingers, lost: false }
     }
 
+    /// The pins, to clear the interrupt's cause.
+    pub const fn pins(&mut self) -> (&mut A, &mut B, &mut C) {
+        self.fingers.pins()
+    }
+
     /// Call it in the interrupt of any of the three pins, after clearing the interrupt's cause, and once at the start.
     ///
     /// Cost: about 100 instructions and the reading of three pins; never waits. An edge that does not fit into the

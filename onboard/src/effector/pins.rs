@@ -30,6 +30,11 @@ impl<A: InputPin, B: InputPin, C: InputPin> Fingers<A, B, C> {
         Self { first, middle, last, active, closed: [false; 3], unreadable: [false; 3] }
     }
 
+    /// The pins, to clear an interrupt's cause.
+    pub const fn pins(&mut self) -> (&mut A, &mut B, &mut C) {
+        (&mut self.first, &mut self.middle, &mut self.last)
+    }
+
     /// The pins again.
     pub fn into_pins(self) -> (A, B, C) {
         (self.first, self.middle, self.last)

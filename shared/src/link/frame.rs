@@ -1,8 +1,8 @@
 //! Messages in frames: postcard, CRC-32, COBS.
 
 use super::message::Message;
+use crate::format::checksum;
 use cobs::{DecodeResult, DecoderState};
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 /// The version of frames and messages. A frame of another version is not read.
 pub const VERSION: u8 = 1;
@@ -17,9 +17,6 @@ const DECODED_MAX: usize = HEADER + MESSAGE_MAX + TRAILER;
 
 /// The longest frame on the line: COBS adds a byte at the front, and 0x00 stands at either end.
 pub const FRAME_MAX: usize = DECODED_MAX + 3;
-
-/// Without a table: 1 KB of flash saved, and the line is slower than the chip.
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// A message and the session it belongs to.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +65,7 @@ fn fill(frame: &Frame<'_>, plain: &mut [u8; DECODED_MAX]) -> Option<usize> {
     let room = rest.get_mut(..MESSAGE_MAX)?;
     let length = HEADER + postcard::to_slice(&frame.message, room).ok()?.len();
     let (covered, rest) = plain.split_at_mut_checked(length)?;
-    *rest.first_chunk_mut::<TRAILER>()? = CRC.checksum(covered).to_le_bytes();
+    *rest.first_chunk_mut::<TRAILER>()? = checksum(covered).to_le_bytes();
     Some(length + TRAILER)
 }
 
@@ -129,9 +126,9 @@ impl Decoder {
 }
 
 fn parse(plain: &[u8]) -> Result<Frame<'_>, FrameError> {
-    let (covered, checksum) = plain.split_last_chunk::<TRAILER>().ok_or(FrameError::Garbled)?;
+    let (covered, stated) = plain.split_last_chunk::<TRAILER>().ok_or(FrameError::Garbled)?;
     let (&[version, low, high], message) = covered.split_first_chunk::<HEADER>().ok_or(FrameError::Garbled)?;
-    if CRC.checksum(covered) != u32::from_le_bytes(*checksum) {
+    if checksum(covered) != u32::from_le_bytes(*stated) {
         return Err(FrameError::Garbled);
     }
     if version != VERSION {

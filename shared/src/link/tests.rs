@@ -56,7 +56,7 @@ impl Device for Notebook {
     }
 
     fn commit(&mut self) -> Outcome {
-        let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&self.staged);
+        let checksum = crate::format::checksum(&self.staged);
         if (self.staged.len() as u32, checksum) != self.announced {
             return Outcome::Refused(Refusal::Checksum);
         }
@@ -277,7 +277,7 @@ fn a_model_arrives_whole_over_a_bad_line_and_a_wrong_one_leaves_the_old() {
     let faults = Faults { byte_changed: 0.002, frame_lost: 0.05, frame_doubled: 0.05, delay: 5_000, ..CLEAN };
     let mut rig = Rig::new(faults, 3);
     let model: Vec<u8> = (0..5_000_u32).map(|i| ((i * i) >> 3) as u8).collect();
-    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&model);
+    let checksum = crate::format::checksum(&model);
     let load = |rig: &mut Rig, checksum| {
         let length = model.len() as u32;
         rig.command(Command::Begin { payload: Payload::Model, length, checksum });
@@ -408,7 +408,7 @@ fn frames_of_another_version_are_not_read() {
     assert!(decode(&bytes)[0].is_ok());
     // Version 2 with a checksum of its own.
     let mut plain = vec![2, 7, 0, 4, 1];
-    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&plain);
+    let checksum = crate::format::checksum(&plain);
     plain.extend(checksum.to_le_bytes());
     let mut encoded = [0; 32];
     let length = cobs::encode(&plain, &mut encoded);
@@ -512,7 +512,7 @@ proptest! {
         for message in messages {
             let mut plain = vec![VERSION, 0, 0];
             plain.extend(message);
-            let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&plain);
+            let checksum = crate::format::checksum(&plain);
             plain.extend(checksum.to_le_bytes());
             let mut encoded = vec![0; 200];
             let length = cobs::encode(&plain, &mut encoded);

@@ -1,0 +1,26 @@
+//! A recogniser at the end of a link: everything that a chip's program needs but the chip itself.
+//!
+//! ```text
+//! transport ──► DeviceEnd ──► Station ──► Recognizer
+//!                               │
+//!                               └──► Memory: two places for models, two for records
+//! ```
+//!
+//! [`serve`] is the whole program of a chip that recognises touches from a host. A chip with fingers of its own pushes
+//! their touches into a [`Station`] and tells the host of them.
+//!
+//! # Power cuts
+//!
+//! After every command the [`Station`] writes a record (evidence, progress of the link, which model is in use) into the
+//! older one of two places, with a counter and a checksum. Whenever the power goes, one of the two is whole, and the chip
+//! goes on from it: the host repeats what is not in it, and the link sees to it that nothing is counted twice. That
+//! needs memory that keeps its content: battery-backed or FRAM, or RAM where resets but no power cuts are to be survived.
+
+mod memory;
+mod record;
+mod serve;
+mod session;
+
+pub use memory::Memory;
+pub use serve::serve;
+pub use session::Station;

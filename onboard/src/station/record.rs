@@ -1,0 +1,101 @@
+//! What a chip remembers through a power cut.
+
+use core::sync::atomic::{Ordering, compiler_fence};
+use palpate_shared::format::checksum;
+use palpate_shared::link::{Payload, Progress};
+use serde::{Deserialize, Serialize};
+
+/// Which model is in use; bytes of it where it was loaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Source {
+    BuiltIn,
+    First(u32),
+    Second(u32),
+}
+
+impl Source {
+    pub(super) const fn with_length(self, length: u32) -> Self {
+        match self {
+            Self::BuiltIn => Self::BuiltIn,
+            Self::First(_) => Self::First(length),
+            Self::Second(_) => Self::Second(length),
+        }
+    }
+}
+
+/// What is arriving in chunks, and how much of it is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Staged {
+    pub(super) payload: Payload,
+    pub(super) length: u32,
+    pub(super) checksum: u32,
+    pub(super) received: u32,
+}
+
+/// A record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Record<'a> {
+    counter: u32,
+    pub(super) source: Source,
+    pub(super) staged: Option<Staged>,
+    pub(super) progress: Progress,
+    /// The recogniser's snapshot.
+    pub(super) evidence: &'a [u8],
+}
+
+/// Length and checksum stand before the record.
+const HEADER: usize = 6;
+
+/// Two places for records, written in turns.
+#[derive(Debug)]
+pub(super) struct Records<'a> {
+    places: [&'a mut [u8]; 2],
+    /// Counter of the newest record.
+    counter: u32,
+}
+
+impl<'a> Records<'a> {
+    pub(super) fn new(places: [&'a mut [u8]; 2]) -> Self {
+        let counter = newest(&places).map_or(0, |record| record.counter);
+        Self { places, counter }
+    }
+
+    /// The newest whole record.
+    pub(super) fn newest(&self) -> Option<Record<'_>> {
+        newest(&self.places)
+    }
+
+    /// Writes a record over the older one. One that does not fit is not written, and the older ones stay.
+    pub(super) fn write(&mut self, source: Source, staged: Option<Staged>, progress: &Progress, evidence: &[u8]) {
+        let counter = self.counter.wrapping_add(1);
+        let [even, odd] = &mut self.places;
+        let place = if counter.is_multiple_of(2) { even } else { odd };
+        let Some((header, body)) = place.split_first_chunk_mut::<HEADER>() else { return };
+        let record = Record { counter, source, staged, progress: progress.clone(), evidence };
+        let Some(written) = postcard::to_slice(&record, body).ok() else { return };
+        let Ok(length) = u16::try_from(written.len()) else { return };
+        let [c0, c1, c2, c3] = checksum(written).to_le_bytes();
+        let [l0, l1] = length.to_le_bytes();
+        *header = [l0, l1, c0, c1, c2, c3];
+        self.counter = counter;
+        // The power may go at any moment from here on: what was written must not be put off.
+        compiler_fence(Ordering::SeqCst);
+    }
+}
+
+fn newest<'p>(places: &'p [&mut [u8]; 2]) -> Option<Record<'p>> {
+    let [even, odd] = places.each_ref().map(|place| read(place));
+    match (even, odd) {
+        (Some(even), Some(odd)) if odd.counter.wrapping_sub(even.counter) >> 31 == 0 => Some(odd),
+        (even, odd) => even.or(odd),
+    }
+}
+
+fn read(place: &[u8]) -> Option<Record<'_>> {
+    let (&[l0, l1, c0, c1, c2, c3], body) = place.split_first_chunk::<HEADER>()?;
+    let written = body.get(..usize::from(u16::from_le_bytes([l0, l1])))?;
+    if checksum(written) != u32::from_le_bytes([c0, c1, c2, c3]) {
+        return None;
+    }
+    postcard::from_bytes(written).ok()
+}
