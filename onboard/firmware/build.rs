@@ -1,4 +1,5 @@
-//! Hands memory.x and cortex-m-rt's linker script to the linker, and the benchmark's models to the benchmark.
+//! Hands memory.x and cortex-m-rt's linker script to the linker, the built-in model to the images, and the benchmark's
+//! models to the benchmark.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
@@ -11,7 +12,24 @@ fn main() -> io::Result<()> {
     // Here and not in .cargo/config.toml, where RUSTFLAGS would override them.
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     println!("cargo::rustc-link-arg-bins=--nmagic");
+    built_in(&out)?;
     models(&out.join("bench"))
+}
+
+/// The model in `PALPATE_MODEL`; without one there is an empty one, which is refused when the image starts.
+fn built_in(out: &Path) -> io::Result<()> {
+    println!("cargo::rerun-if-env-changed=PALPATE_MODEL");
+    let model = match env::var_os("PALPATE_MODEL").map(PathBuf::from) {
+        Some(model) => fs::canonicalize(model)?,
+        None => {
+            let empty = out.join("empty.palpate");
+            fs::write(&empty, [])?;
+            empty
+        }
+    };
+    println!("cargo::rerun-if-changed={}", model.display());
+    println!("cargo::rustc-env=PALPATE_MODEL={}", model.display());
+    Ok(())
 }
 
 /// What `palpate-tests`' `bench-models` writes.

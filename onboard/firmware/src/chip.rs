@@ -1,7 +1,8 @@
 //! The only place with `unsafe`: what the chip and the linker know and Rust does not.
 #![allow(unsafe_code)]
 
-use core::ptr::{addr_of, read_volatile, write_volatile};
+use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
+use core::sync::atomic::{AtomicBool, Ordering};
 
 // Symbols that cortex-m-rt's linker script defines; only their addresses mean anything.
 unsafe extern "C" {
@@ -15,6 +16,9 @@ unsafe extern "C" {
     static __ebss: u32;
     static __sheap: u32;
     static _stack_start: u32;
+    // From memory.x.
+    static mut _retained_start: u8;
+    static _retained_end: u8;
 }
 
 /// The address of a linker symbol. Taking it reads nothing.
@@ -71,4 +75,110 @@ pub fn used_stack(area: Painted) -> usize {
 /// Bytes of stack in use by the caller now, from the top of RAM down.
 pub fn stack_depth() -> usize {
     address!(_stack_start) - cortex_m::register::msp::read() as usize
+}
+
+/// The memory that keeps its content through a reset, once.
+///
+/// # Panics
+/// The second time.
+pub fn take_retained() -> &'static mut [u8] {
+    static TAKEN: AtomicBool = AtomicBool::new(false);
+    // A load and a store, as thumbv6m has no swap; interrupts do not call this.
+    assert!(!TAKEN.load(Ordering::Relaxed), "the retained memory is taken once");
+    TAKEN.store(true, Ordering::Relaxed);
+    let length = addr_of!(_retained_end) as usize - addr_of!(_retained_start) as usize;
+    // SAFETY: memory.x sets this region aside, so nothing else lies in it, and it is handed out once. It is RAM, so
+    // whatever it holds are bytes.
+    unsafe { core::slice::from_raw_parts_mut(addr_of_mut!(_retained_start), length) }
+}
+
+/// An interrupt's number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interrupt(u16);
+
+/// UART 0 has received a byte.
+pub const UART_RECEIVED: Interrupt = Interrupt(0);
+/// A pin has changed: the first GPIO port's combined interrupt.
+pub const PIN_CHANGED: Interrupt = Interrupt(6);
+
+impl Interrupt {
+    /// The interrupt with this number, as `DefaultHandler` is told it.
+    pub const fn from_number(number: i16) -> Self {
+        Self(number as u16)
+    }
+}
+
+// SAFETY: the number is what the NVIC counts from 0, for every number.
+unsafe impl cortex_m::interrupt::InterruptNumber for Interrupt {
+    fn number(self) -> u16 {
+        self.0
+    }
+}
+
+/// Lets an interrupt come.
+pub fn unmask(interrupt: Interrupt) {
+    // SAFETY: unmasking can break a critical section that was made by masking; the images make theirs with PRIMASK.
+    unsafe { cortex_m::peripheral::NVIC::unmask(interrupt) };
+}
+
+/// Holds an interrupt back.
+pub fn mask(interrupt: Interrupt) {
+    cortex_m::peripheral::NVIC::mask(interrupt);
+}
+
+/// The registers of a UART (CMSDK APB UART).
+#[derive(Clone, Copy, Debug)]
+pub struct UartRegisters {
+    base: usize,
+}
+
+impl UartRegisters {
+    /// The link's UART.
+    pub const FIRST: Self = Self { base: 0x4000_4000 };
+    /// The UART over which a host plays the pins.
+    pub const SECOND: Self = Self { base: 0x4000_5000 };
+
+    const DATA: usize = 0x0;
+    const STATE: usize = 0x4;
+    const CONTROL: usize = 0x8;
+    const INTERRUPT: usize = 0xc;
+    const BAUD_DIVIDER: usize = 0x10;
+
+    const TRANSMIT_FULL: u32 = 1;
+    const RECEIVE_FULL: u32 = 2;
+
+    fn load(self, register: usize) -> u32 {
+        // SAFETY: both bases are those of UARTs of the machine, which have these registers; reading them is harmless.
+        unsafe { read_volatile((self.base + register) as *const u32) }
+    }
+
+    fn store(self, register: usize, value: u32) {
+        // SAFETY: as above, and any value may be written: a UART reaches no memory.
+        unsafe { write_volatile((self.base + register) as *mut u32, value) };
+    }
+
+    /// Transmitter, receiver and the receive interrupt on.
+    pub fn enable(self, baud_divider: u32) {
+        self.store(Self::BAUD_DIVIDER, baud_divider);
+        self.store(Self::CONTROL, 0b1011);
+    }
+
+    /// A received byte.
+    pub fn read(self) -> Option<u8> {
+        (self.load(Self::STATE) & Self::RECEIVE_FULL != 0).then(|| self.load(Self::DATA) as u8)
+    }
+
+    /// Sends a byte, if the one before is gone.
+    pub fn write(self, byte: u8) -> bool {
+        let free = self.load(Self::STATE) & Self::TRANSMIT_FULL == 0;
+        if free {
+            self.store(Self::DATA, u32::from(byte));
+        }
+        free
+    }
+
+    /// Takes the receive interrupt's cause away.
+    pub fn clear_received(self) {
+        self.store(Self::INTERRUPT, 2);
+    }
 }

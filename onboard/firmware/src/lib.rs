@@ -4,6 +4,8 @@
 //! |---|---|
 //! | [`meter`] | counts instructions and stack, for benchmarks |
 //! | [`sections`] | flash and RAM of the running image, by section |
+//! | [`uart`] | the UART, received by interrupt |
+//! | [`pins`] | three pins that a host plays |
 //! | [`chip`] | the only place with `unsafe`: registers, linker symbols, the stack |
 //!
 //! Under emulation an image prints through semihosting ([`println!`]) and ends with [`exit`]; a panic or a fault ends
@@ -12,7 +14,9 @@
 
 pub mod chip;
 pub mod meter;
+pub mod pins;
 pub mod sections;
+pub mod uart;
 
 pub use cortex_m_semihosting::{hprint as print, hprintln as println};
 

@@ -1,0 +1,104 @@
+//! Recognises from three switches on three pins, and tells a host of every touch and fault over the UART
+//! (`palpate watch`). A verdict ends an object; the next touch begins another.
+//!
+//! The model is built in: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`.
+#![no_std]
+#![no_main]
+
+use core::cell::RefCell;
+use cortex_m_rt::{entry, exception};
+use critical_section::Mutex;
+use embedded_io::{Read, ReadReady, Write};
+use heapless::spsc::{Producer, Queue};
+use palpate_firmware::chip::{self, Interrupt};
+use palpate_firmware::pins::{Pin, PlayedClock, Player};
+use palpate_firmware::uart::{self, Uart};
+use palpate_onboard::Model;
+use palpate_onboard::effector::{Active, Edge, Effector, Fault, Fingers, Settings, Watcher, drain};
+use palpate_onboard::station::Station;
+use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Progress, TouchMessage};
+
+static MODEL: &[u8] = include_bytes!(env!("PALPATE_MODEL"));
+/// Objects that the model may have.
+const OBJECTS: usize = 16;
+
+/// What the pin interrupt needs.
+struct Interrupted {
+    watcher: Watcher<Pin, Pin, Pin>,
+    edges: Producer<'static, Edge>,
+    fault: Option<Fault>,
+}
+
+static INTERRUPTED: Mutex<RefCell<Option<Interrupted>>> = Mutex::new(RefCell::new(None));
+
+#[entry]
+fn main() -> ! {
+    let Ok(model) = Model::new(MODEL) else {
+        palpate_firmware::println!("no model is built in: build with PALPATE_MODEL=/path/to/model.palpate");
+        palpate_firmware::fail()
+    };
+    let mut uart = Uart::take();
+    let mut player = Player::new();
+    let mut station = Station::<OBJECTS>::new(&model);
+    let mut end = DeviceEnd::new(Progress::NONE);
+    let mut effector = Effector::new(Settings::default());
+
+    let Some(queue) = cortex_m::singleton!(: Queue<Edge, 64> = Queue::new()) else { palpate_firmware::fail() };
+    let (edges, mut received) = queue.split();
+    let watcher = Watcher::new(Fingers::new(Pin(0), Pin(1), Pin(2), Active::High));
+    critical_section::with(|cs| INTERRUPTED.replace(cs, Some(Interrupted { watcher, edges, fault: None })));
+    chip::unmask(chip::PIN_CHANGED);
+    end.tell(Event::Started, |frame| send(&mut uart, frame));
+
+    loop {
+        player.play();
+        if let Ok(true) = uart.read_ready() {
+            let mut buffer = [0; 32];
+            let count = uart.read(&mut buffer).unwrap_or(0);
+            let mut answer = |frame: &[u8]| send(&mut uart, frame);
+            end.receive(buffer.get(..count).unwrap_or_default(), &mut station, &mut answer);
+        }
+        let unreadable = critical_section::with(|cs| INTERRUPTED.borrow_ref_mut(cs).as_mut()?.fault.take());
+        let event = match drain(&mut effector, &mut received, &PlayedClock) {
+            Ok(Some(touch)) => station.push(&touch, true).map(|verdict| {
+                if verdict.decision != Decision::Undecided {
+                    station.reset();
+                }
+                Event::Touch { touch: TouchMessage::from(&touch), verdict }
+            }),
+            Ok(None) => unreadable.map(Event::from),
+            Err(fault) => Some(fault.into()),
+        };
+        if let Some(event) = event {
+            end.tell(event, |frame| send(&mut uart, frame));
+        }
+    }
+}
+
+fn send(uart: &mut Uart, frame: &[u8]) {
+    match uart.write_all(frame) {
+        Ok(()) => {}
+    }
+}
+
+/// One of the three pins has changed.
+fn pin_changed() {
+    critical_section::with(|cs| {
+        let mut interrupted = INTERRUPTED.borrow_ref_mut(cs);
+        let Some(Interrupted { watcher, edges, fault }) = interrupted.as_mut() else { return };
+        if let Err(unreadable) = watcher.interrupt(&PlayedClock, edges) {
+            *fault = Some(unreadable);
+        }
+    });
+}
+
+/// Every interrupt comes here, so that the image needs no table of its own for each chip.
+#[allow(unsafe_code)] // cortex-m-rt wants the word; nothing in it needs it.
+#[exception]
+unsafe fn DefaultHandler(number: i16) {
+    match Interrupt::from_number(number) {
+        chip::UART_RECEIVED => uart::received(),
+        chip::PIN_CHANGED => pin_changed(),
+        _ => {}
+    }
+}

@@ -1,0 +1,37 @@
+//! Recognises touches that a host sends over the UART: `palpate link` at the other end.
+//!
+//! A model comes from the host (`palpate link PORT --load model.palpate`) and lies in RAM that keeps its content through
+//! resets, as do the records that let it go on after one.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::{entry, exception};
+use palpate_firmware::chip::{self, Interrupt};
+use palpate_firmware::uart::{self, Uart};
+use palpate_onboard::station::{Memory, serve};
+
+/// Objects that a model may have.
+const OBJECTS: usize = 16;
+
+#[entry]
+fn main() -> ! {
+    let mut uart = Uart::take();
+    let retained = chip::take_retained();
+    let (first_record, rest) = retained.split_at_mut(Memory::record_length(OBJECTS));
+    let (second_record, rest) = rest.split_at_mut(Memory::record_length(OBJECTS));
+    let (first_model, second_model) = rest.split_at_mut(rest.len() / 2);
+    let memory = Memory { built_in: &[], models: [first_model, second_model], records: [first_record, second_record] };
+    match serve::<OBJECTS, _>(memory, &mut uart) {
+        // The UART has no end.
+        Ok(()) => palpate_firmware::fail(),
+    }
+}
+
+/// Every interrupt comes here, so that the image needs no table of its own for each chip.
+#[allow(unsafe_code)] // cortex-m-rt wants the word; nothing in it needs it.
+#[exception]
+unsafe fn DefaultHandler(number: i16) {
+    if Interrupt::from_number(number) == chip::UART_RECEIVED {
+        uart::received();
+    }
+}

@@ -1,0 +1,84 @@
+//! Three pins that a host plays, and the clock that goes with them: QEMU's mps2 machines have GPIO ports that nothing
+//! can drive from outside, so a port register and its interrupt are emulated here, and all after them is what runs on a
+//! board.
+//!
+//! The host sends six bytes for each edge over the second UART: finger (0, 1, 2), level (0, 1), time in microseconds (u32,
+//! little endian). The time counts as the clock's, the level is put into the port register, and the pin interrupt is
+//! pended, as a port does. Finger 3 is no edge: time passes.
+
+use crate::chip::{PIN_CHANGED, UartRegisters};
+use crate::uart::BAUD_DIVIDER;
+use core::convert::Infallible;
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m::peripheral::NVIC;
+use embedded_hal::digital::{ErrorType, InputPin};
+use palpate_onboard::effector::Clock;
+
+/// The port's levels, a bit a pin.
+static PORT: AtomicU32 = AtomicU32::new(0);
+/// Microseconds.
+static TIME: AtomicU32 = AtomicU32::new(0);
+
+/// A pin of the emulated port.
+pub struct Pin(pub u8);
+
+impl ErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl InputPin for Pin {
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        Ok(PORT.load(Ordering::Relaxed) >> (self.0 & 31) & 1 == 1)
+    }
+
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        self.is_high().map(|high| !high)
+    }
+}
+
+/// The clock that the host plays.
+pub struct PlayedClock;
+
+impl Clock for PlayedClock {
+    fn micros(&self) -> u32 {
+        TIME.load(Ordering::Relaxed)
+    }
+}
+
+/// The host's hand on the pins.
+pub struct Player {
+    received: [u8; 6],
+    count: usize,
+}
+
+impl Default for Player {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Player {
+    /// Begins to listen.
+    pub fn new() -> Self {
+        UartRegisters::SECOND.enable(BAUD_DIVIDER);
+        Self { received: [0; 6], count: 0 }
+    }
+
+    /// Plays one edge, if one has come, and says whether it did.
+    pub fn play(&mut self) -> bool {
+        while let Some(slot) = self.received.get_mut(self.count) {
+            let Some(byte) = UartRegisters::SECOND.read() else { return false };
+            *slot = byte;
+            self.count += 1;
+        }
+        self.count = 0;
+        let [finger, level, t0, t1, t2, t3] = self.received;
+        TIME.store(u32::from_le_bytes([t0, t1, t2, t3]), Ordering::Relaxed);
+        if finger < 3 {
+            let levels = PORT.load(Ordering::Relaxed) & !(1 << finger);
+            PORT.store(levels | u32::from(level & 1) << finger, Ordering::Relaxed);
+            NVIC::pend(PIN_CHANGED);
+        }
+        true
+    }
+}
