@@ -18,6 +18,7 @@ pub mod ensemble;
 pub mod error;
 pub mod evaluate;
 pub mod folds;
+pub mod link;
 pub mod mesh;
 pub mod model_file;
 pub mod noise;
@@ -38,5 +39,6 @@ mod synthetic;
 pub mod train;
 pub mod tune;
 pub mod view;
+pub mod watch;
 
 pub use error::{Error, Result};

@@ -50,6 +50,10 @@ commands! {
     Parity => parity,
     /// Remake the whole evaluation: every figure, the limit, speed against error
     Report => report,
+    /// Recognise on a chip at the end of a line
+    Link => link,
+    /// Look on while a chip recognises
+    Watch => watch,
 }
 
 /// Recognise objects by touch: virtual touches, boosted trees, a model of a few kilobytes for a microcontroller.

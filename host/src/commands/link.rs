@@ -1,0 +1,267 @@
+use palpate::dataset::Dataset;
+use palpate::link::{
+    ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, stream,
+};
+use palpate::output::{print, print_json};
+use palpate::{Error, Result, progress};
+use palpate_onboard::Model;
+use palpate_shared::link::{Decision, HostSettings};
+use std::io::BufReader;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What `link` and `watch` have in common: where the chip is, and which touches it gets.
+#[derive(clap::Args)]
+pub(crate) struct Reach {
+    /// Load this model into the chip first; it is checked there before it is used
+    #[arg(long, value_name = "FILE")]
+    pub(crate) load: Option<PathBuf>,
+    /// Touches of one object before the next one comes
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    pub(crate) sequence: usize,
+    /// Touches in all, from a data set [default: as many as it holds]
+    #[arg(long, value_name = "N")]
+    pub(crate) touches: Option<u64>,
+    /// Speed of a serial port
+    #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
+    baud: u32,
+    /// Image that the emulator runs [default: onboard/firmware/target/thumbv7em-none-eabihf/release/uart]
+    #[arg(long, value_name = "ELF")]
+    firmware: Option<PathBuf>,
+    /// Make the line bad: probability that a byte is lost, changed, that a frame is doubled, and delay in ms
+    #[arg(long, value_name = "LOST,CHANGED,DOUBLED,MS")]
+    bad_line: Option<Faults>,
+    /// Seed of the bad line
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+impl Reach {
+    /// Opens a session, and loads the model if there is one to load.
+    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<Vec<u8>>)> {
+        let model = self.load.as_deref().map(read_model).transpose()?;
+        let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
+        let mut transport = port.open(self.baud, &emulator)?;
+        let mut settings = HostSettings::default();
+        if let Some(faults) = self.bad_line {
+            transport = transport.with_faults(faults, self.seed);
+            // A bad line fails often: try for longer, and sooner.
+            settings = HostSettings { retry: 50_000, attempts: 200 };
+        }
+        let mut connection = Connection::open(transport, settings)?;
+        if let Some(bytes) = &model {
+            let bar = progress::bar("loading", bytes.len() as u64);
+            connection.load(bytes, |done| bar.set_position(done as u64))?;
+        }
+        Ok((connection, model))
+    }
+
+    /// The touches in `source`: a data set's directory, a file of lines, or `-` for standard input.
+    pub(crate) fn steps(&self, source: &Path) -> Result<Steps> {
+        if source.as_os_str() == "-" {
+            return Ok(Steps::lines(Box::new(BufReader::new(std::io::stdin())), Path::new("standard input")));
+        }
+        if source.is_dir() {
+            let dataset = Dataset::read(source)?;
+            let count = self.touches.unwrap_or(dataset.len() as u64);
+            return Ok(Steps::sequences(dataset, self.sequence, count));
+        }
+        let file = std::fs::File::open(source).map_err(|e| Error::io(source, "read the touches", e))?;
+        Ok(Steps::lines(Box::new(BufReader::new(file)), source))
+    }
+}
+
+/// Reads a compiled model, and says what is wrong with it before the chip has to.
+pub(crate) fn read_model(path: &Path) -> Result<Vec<u8>> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read the model", e))?;
+    Model::new(&bytes).map_err(|e| Error::file(path, e.to_string(), "Make one with: palpate export."))?;
+    Ok(bytes)
+}
+
+/// What is on the chip, or an error that says how to change that.
+pub(crate) fn chip_model(connection: &mut Connection) -> Result<ChipModel> {
+    let name = connection.transport().name().to_owned();
+    let model = connection.model()?;
+    model.ok_or_else(|| Error::file(name, "the chip has no model", "Give it one: --load model.palpate."))
+}
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate link /dev/ttyACM0                                  what is on the chip?
+  palpate link /dev/ttyACM0 --load model.palpate             put a model into it
+  palpate link /dev/ttyACM0 touches/                         recognise a data set's touches
+  echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -         recognise touches as they are typed
+  palpate link emulator --load model.palpate --parity touches/ --touches 10000
+  palpate link emulator --load model.palpate --parity touches/ --bad-line 0.001,0.001,0.01,5
+
+The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station.
+A touch is a line of three contact times in seconds (- where missing), as in a data set; an empty line begins another
+object. Every touch is counted exactly once, however bad the line.")]
+pub(crate) struct Arguments {
+    /// A serial port, tcp://host:port, or emulator
+    port: Port,
+    /// Touches to recognise: a data set's directory, a file of lines, or - for standard input
+    source: Option<PathBuf>,
+    /// Recognise a data set's touches, and hold every verdict, posterior and evidence against the host's recogniser
+    #[arg(long, value_name = "DIR", conflicts_with = "source")]
+    parity: Option<PathBuf>,
+    /// The model to compare with, if it is on the chip already
+    #[arg(long, value_name = "FILE", conflicts_with = "load")]
+    model: Option<PathBuf>,
+    /// Write what happens to a file that palpate watch can follow
+    #[arg(long, value_name = "FILE")]
+    journal: Option<PathBuf>,
+    /// Print the summary as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    reach: Reach,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let named = arguments.model.as_deref().map(read_model).transpose()?;
+    if arguments.parity.is_some() && named.is_none() && arguments.reach.load.is_none() {
+        let fix = "Give it with --model, or load it with --load.";
+        return Err(Error::argument("parity needs the model that the chip has", fix));
+    }
+    let steps = match arguments.parity.as_ref().or(arguments.source.as_ref()) {
+        Some(source) => Some(arguments.reach.steps(source)?),
+        None => None,
+    };
+    let (mut connection, loaded) = arguments.reach.open(&arguments.port)?;
+    let chip = chip_model(&mut connection)?;
+    let mut printer = Printer::new(&chip, arguments.json, arguments.journal.as_deref())?;
+    let Some(steps) = steps else { return printer.model(&arguments.port) };
+
+    let bytes = named.or(loaded);
+    let model = match &bytes {
+        Some(bytes) => {
+            Some(Model::new(bytes).map_err(|e| Error::data(e.to_string(), "Make one with: palpate export."))?)
+        }
+        None => None,
+    };
+    let bar = match steps.count() {
+        Some(count) => progress::bar("touching", count),
+        None => progress::spinner("touching"),
+    };
+    let interactive = steps.count().is_none();
+    let summary = stream(&mut connection, steps, &chip, model.as_ref(), |_, update| {
+        if matches!(update, Update::Touch { .. }) {
+            bar.inc(1);
+        }
+        bar.suspend(|| printer.update(&update, interactive))?;
+        Ok(ControlFlow::Continue(()))
+    })?;
+    bar.finish_and_clear();
+    printer.summary(&summary)?;
+    match summary.first_difference {
+        Some(first) if arguments.parity.is_some() => {
+            let what = format!("{} of {} touches differ; the first: {first}", summary.differences, summary.compared);
+            Err(Error::data(what, "Report this as a bug, with the model and the touches."))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints what happens, and writes it to a journal.
+struct Printer<'c> {
+    chip: &'c ChipModel,
+    json: bool,
+    journal: Option<Journal>,
+    start: Instant,
+    object: Option<String>,
+}
+
+impl<'c> Printer<'c> {
+    fn new(chip: &'c ChipModel, json: bool, journal: Option<&Path>) -> Result<Self> {
+        let mut journal = journal.map(Journal::create).transpose()?;
+        if let Some(journal) = &mut journal {
+            let info = chip.info;
+            journal.write(&Entry::Model {
+                objects: chip.names.clone(),
+                length: info.length,
+                checksum: info.checksum,
+            })?;
+        }
+        Ok(Self { chip, json, journal, start: Instant::now(), object: None })
+    }
+
+    fn model(&self, port: &Port) -> Result<()> {
+        let info = self.chip.info;
+        if self.json {
+            return print_json(&Entry::Model {
+                objects: self.chip.names.clone(),
+                length: info.length,
+                checksum: info.checksum,
+            });
+        }
+        let descriptor = info.descriptor().map_or("other features", |descriptor| descriptor.name());
+        print(&format!(
+            "{port}: a model of {} bytes, checksum {:08x}, {descriptor}, {} objects: {}\n",
+            info.length,
+            info.checksum,
+            self.chip.names.len(),
+            self.chip.names.join(", ")
+        ))
+    }
+
+    fn name(&self, object: u8) -> &str {
+        self.chip.names.get(usize::from(object)).map_or("?", String::as_str)
+    }
+
+    fn update(&mut self, update: &Update, every_touch: bool) -> Result<()> {
+        let entry = Entry::of(update, self.chip, self.start.elapsed());
+        if let (Some(journal), Some(entry)) = (&mut self.journal, &entry) {
+            journal.write(entry)?;
+        }
+        match update {
+            Update::Object(name) => self.object.clone_from(name),
+            Update::Touch { verdict, decided, .. } if !self.json && (*decided || every_touch) => {
+                let posterior = verdict.detail.map_or(0, |detail| detail.posterior());
+                let posterior = posterior as f64 / (1_u64 << 56) as f64;
+                let said = match verdict.decision {
+                    Decision::Recognised(object) => format!("recognised {}", self.name(object)),
+                    Decision::Unknown => "unknown".into(),
+                    _ => format!("most likely {}", self.name(verdict.best)),
+                };
+                let truth = self.object.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
+                let touches = verdict.touches;
+                let s = if touches == 1 { "" } else { "es" };
+                print(&format!("{truth}{said} after {touches} touch{s}, posterior {posterior:.4}\n"))?;
+            }
+            Update::Event(event, missed) if !self.json => print(&format!("the chip: {event:?}, {missed} missed\n"))?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn summary(&mut self, summary: &Summary) -> Result<()> {
+        if let Some(journal) = &mut self.journal {
+            let garbled = summary.garbled + summary.chip_garbled;
+            journal.write(&Entry::Link { resent: summary.resent, garbled, missed: summary.missed_events })?;
+        }
+        if self.json {
+            return print_json(summary);
+        }
+        let Summary { touches, compared, differences, right, wrong, undecided, .. } = summary;
+        let mut text = format!("{touches} touches in {:.1} s, {:.0} a second\n", summary.seconds, summary.rate());
+        if right + wrong + undecided > 0 {
+            text += &format!("objects: {right} recognised rightly, {wrong} wrongly, {undecided} not\n");
+        }
+        if *compared > 0 {
+            text += &format!("held against the host: {compared} touches, {differences} differences\n");
+        }
+        text += &format!(
+            "link: {} frames sent, {} again; garbled {} here and {} there; {} commands came twice, {} too early\n",
+            summary.sent,
+            summary.resent,
+            summary.garbled,
+            summary.chip_garbled,
+            summary.chip_repeated,
+            summary.chip_early
+        );
+        print(&text)
+    }
+}
