@@ -85,7 +85,7 @@ fn follow(path: &Path) -> Result<()> {
     let mut journal = Follow::open(path)?;
     let mut show = Show::open(path.display().to_string())?;
     loop {
-        while let Some(entry) = journal.next()? {
+        while let Some(entry) = journal.next_entry()? {
             show.take(entry)?;
             if show.is_due() && show.show()?.is_break() {
                 return Ok(());

@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_serial_port_that_is_not_there_is_named() {
-        let error = Port::Serial("/dev/no-such-port".into()).open(115_200, &Emulator::default()).unwrap_err();
+        let error = Port::Serial("/dev/no-such-port".into()).open(115_200, &Emulator::default()).err().unwrap();
         assert!(error.to_string().starts_with("/dev/no-such-port: cannot open the serial port"), "{error}");
     }
 }

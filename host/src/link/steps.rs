@@ -63,7 +63,7 @@ impl Steps {
     ///
     /// # Errors
     /// When a line is not a touch.
-    pub fn next(&mut self) -> Result<Option<Step>> {
+    pub fn next_step(&mut self) -> Result<Option<Step>> {
         match self {
             Self::Sequences { dataset, length, left, at: (sequence, touch) } => {
                 if *left == 0 {
@@ -114,7 +114,7 @@ mod tests {
         let dataset = Dataset { objects: vec![object("a", 10), object("b", 20)] };
         let mut steps = Steps::sequences(dataset, 2, 7);
         let mut seen = Vec::new();
-        while let Some(step) = steps.next().unwrap() {
+        while let Some(step) = steps.next_step().unwrap() {
             seen.push(match step {
                 Step::Object(name) => name.unwrap(),
                 Step::Touch(touch) => touch.times()[1].micros().unwrap().to_string(),
@@ -127,11 +127,11 @@ mod tests {
     fn lines_are_touches_and_an_empty_line_ends_an_object() {
         let text: &[u8] = b"0.03 0 0.05\n\n0 - 0.1\nnonsense\n";
         let mut steps = Steps::lines(Box::new(text), Path::new("touches.txt"));
-        assert_eq!(steps.next().unwrap(), Some(Step::Touch(Touch::from_micros([30_000, 0, 50_000]))));
-        assert_eq!(steps.next().unwrap(), Some(Step::Object(None)));
-        assert!(matches!(steps.next().unwrap(), Some(Step::Touch(touch)) if !touch.is_full()));
-        let error = steps.next().unwrap_err().to_string();
+        assert_eq!(steps.next_step().unwrap(), Some(Step::Touch(Touch::from_micros([30_000, 0, 50_000]))));
+        assert_eq!(steps.next_step().unwrap(), Some(Step::Object(None)));
+        assert!(matches!(steps.next_step().unwrap(), Some(Step::Touch(touch)) if !touch.is_full()));
+        let error = steps.next_step().unwrap_err().to_string();
         assert!(error.starts_with("touches.txt:4:"), "{error}");
-        assert_eq!(steps.next().unwrap(), None);
+        assert_eq!(steps.next_step().unwrap(), None);
     }
 }

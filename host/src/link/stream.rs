@@ -108,10 +108,10 @@ pub fn stream(
     let mut more = true;
     let start = Instant::now();
     while more || pending.is_some() || !run.under_way.is_empty() {
-        while connection.has_room() && (pending.is_some() || more) && !(one_by_one && !run.under_way.is_empty()) {
+        while connection.has_room() && (pending.is_some() || more) && (!one_by_one || run.under_way.is_empty()) {
             let step = match pending.take() {
                 Some(step) => Some(step),
-                None => steps.next()?,
+                None => steps.next_step()?,
             };
             let Some(step) = step else {
                 more = false;

@@ -30,7 +30,7 @@ impl Follow {
     ///
     /// # Errors
     /// When a line is not an entry.
-    pub fn next(&mut self) -> Result<Option<Entry>> {
+    pub fn next_entry(&mut self) -> Result<Option<Entry>> {
         let read = self.reader.read_line(&mut self.partial);
         read.map_err(|source| Error::io(&self.path, "read the journal", source))?;
         if !self.partial.ends_with('\n') {
@@ -55,13 +55,13 @@ mod tests {
     fn lines_are_read_once_they_are_complete_and_wrong_ones_are_named() {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         let mut follow = Follow::open(file.path()).unwrap();
-        assert_eq!(follow.next().unwrap(), None);
+        assert_eq!(follow.next_entry().unwrap(), None);
         write!(file, r#"{{"is":"object","na"#).unwrap();
-        assert_eq!(follow.next().unwrap(), None);
+        assert_eq!(follow.next_entry().unwrap(), None);
         writeln!(file, r#"me":"spoon"}}"#).unwrap();
-        assert_eq!(follow.next().unwrap(), Some(Entry::Object { name: Some("spoon".into()) }));
-        assert_eq!(follow.next().unwrap(), None);
+        assert_eq!(follow.next_entry().unwrap(), Some(Entry::Object { name: Some("spoon".into()) }));
+        assert_eq!(follow.next_entry().unwrap(), None);
         writeln!(file, "nonsense").unwrap();
-        assert!(follow.next().unwrap_err().to_string().contains(":2: not a journal's entry"));
+        assert!(follow.next_entry().unwrap_err().to_string().contains(":2: not a journal's entry"));
     }
 }
