@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn many_objects_show_the_likeliest() {
         let rows = text(&view(100), 80, 24);
-        assert!(rows[1].contains("82 more objects hidden"), "{rows:#?}");
+        assert!(rows[1].contains("83 more objects hidden"), "{rows:#?}");
         assert!(rows[2].contains("object3 "), "{rows:#?}");
     }
 
