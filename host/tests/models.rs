@@ -69,6 +69,9 @@ fn an_ensemble_and_its_compiled_model_evaluate_side_by_side() {
         assert!(figures["per_object"]["fork"]["5"].is_number());
         assert!(figures["sequential"]["mean_touches"].as_f64() >= Some(1.0));
     }
+    let noisy = ["evaluate", "model.palpate", "data", "--at", "5,20", "--groups", "100", "--json", "--noise", "200ms"];
+    let noisy: Value = serde_json::from_str(&succeeds(at, &noisy)).unwrap();
+    assert!(noisy["accuracy"]["20"].as_f64() < figures[1]["accuracy"]["20"].as_f64());
     let table = succeeds(at, &["evaluate", "model.palpate", "data"]);
     assert!(table.contains("bowl") && table.contains("Stopping at an error rate of 0.01"), "{table}");
 }

@@ -1,7 +1,7 @@
 use palpate::dataset::Dataset;
 use palpate::evaluate::{self, Evaluation, Margins, Settings};
 use palpate::model_file::ModelFile;
-use palpate::{Result, output};
+use palpate::{Result, noise, output};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -16,7 +16,8 @@ Evaluate on touches that the model was not trained on: capture them with another
 Examples:
   palpate capture builtin -o unseen --touches 2000 --seed 2
   palpate evaluate model.palpate unseen
-  palpate evaluate ensemble.json unseen --at 10,30 --json")]
+  palpate evaluate ensemble.json unseen --at 10,30 --json
+  palpate evaluate model.palpate unseen --noise 5ms")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
@@ -34,7 +35,10 @@ pub(crate) struct Arguments {
     /// Give up after so many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
     max_touches: Option<u32>,
-    /// Seed of the drawing
+    /// Add Gaussian noise to the contact times first: standard deviation, such as 5ms [default: none]
+    #[arg(long, value_parser = super::train::microseconds, value_name = "DURATION")]
+    noise: Option<f64>,
+    /// Seed of the drawing, and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the figures as JSON
@@ -44,7 +48,12 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
-    let dataset = Dataset::read(&arguments.directory)?;
+    let mut dataset = Dataset::read(&arguments.directory)?;
+    if let Some(deviation) = arguments.noise {
+        for object in &mut dataset.objects {
+            object.touches = noise::noisy(&object.name, &object.touches, deviation, arguments.seed);
+        }
+    }
     let spinner = palpate::progress::spinner("evaluating");
     let evaluation = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?;

@@ -167,7 +167,7 @@ pub(super) fn descriptor(name: &str) -> Result<Descriptor, String> {
 }
 
 /// A duration such as `5ms`, `300us` or `0.005s`, in microseconds.
-fn microseconds(text: &str) -> Result<f64, String> {
+pub(super) fn microseconds(text: &str) -> Result<f64, String> {
     // Longest unit first: every one of them ends in `s`.
     let units = [("us", 1.0), ("ms", 1e3), ("s", 1e6)];
     let (number, unit) = units
