@@ -32,8 +32,8 @@ fn built_in(out: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// What `palpate-tests`' `bench-models` writes.
-const BENCH: [&str; 10] = [
+/// What `palpate-tests`' `bench_models` writes.
+const BENCH: [&str; 14] = [
     "one-i16.palpate",
     "one-compact.palpate",
     "each100-i16.palpate",
@@ -43,6 +43,10 @@ const BENCH: [&str; 10] = [
     "each40-compact.palpate",
     "grid-i8.palpate",
     "grid-i16.palpate",
+    "identity.palpate",
+    "identity.bin",
+    "one-nodes.bin",
+    "one-irithyll.bin",
     "touches.bin",
 ];
 

@@ -1,3 +1,4 @@
 //! What the tests between the floors share.
 
+pub mod identity;
 pub mod random;

@@ -1,5 +1,6 @@
 //! What the evaluator costs on this chip, layout by layout: instructions and stack a touch, margins alone and with
-//! evidence and stopping.
+//! evidence and stopping; and beside the first model the same trees in irithyll-core and as a plain array of eight-byte
+//! nodes with f32 compares.
 #![no_std]
 #![no_main]
 
@@ -64,6 +65,63 @@ fn main() -> ! {
             stack
         );
     }
+    peers(&mut meter, &touches);
     println!("state: {} bytes of recogniser, {} of model", size_of::<Recognizer<10>>(), size_of::<Model>());
     exit()
+}
+
+/// Bytes that may be read as words.
+#[repr(align(4))]
+struct Aligned<T: ?Sized>(T);
+
+static NODES: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/bench/one-nodes.bin")));
+static IRITHYLL: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/bench/one-irithyll.bin")));
+
+/// The 1000 one-output trees in other evaluators.
+fn peers(meter: &mut Meter, touches: &[Touch]) {
+    let rows = [0; TOUCHES].map(|_: u8| [0.0_f32; 3]);
+    let mut rows = rows;
+    for (row, touch) in rows.iter_mut().zip(touches) {
+        *row = touch.times().map(|time| time.micros().unwrap_or(0) as f32);
+    }
+    if NODES.0.is_empty() {
+        return;
+    }
+    let mut margins = [0.0; 10];
+    let cost = meter.mean(&rows, |row| eight_byte_nodes(&NODES.0, row, &mut margins));
+    println!("8-byte nodes     {:7} {:8}", NODES.0.len(), cost);
+    let mut views = [const { None }; 10];
+    let mut rest: &'static [u8] = &IRITHYLL.0;
+    for view in &mut views {
+        let Some((length, bytes)) = rest.split_first_chunk::<4>() else { palpate_firmware::fail() };
+        let (part, after) = bytes.split_at(u32::from_le_bytes(*length) as usize);
+        *view = irithyll_core::EnsembleView::from_bytes(part).ok();
+        rest = after;
+    }
+    let cost = meter.mean(&rows, |row| views.iter().flatten().map(|view| view.predict(row)).sum::<f32>());
+    println!("irithyll-core    {:7} {:8}", IRITHYLL.0.len(), cost);
+}
+
+/// Walks trees of eight-byte nodes, a hundred an object.
+fn eight_byte_nodes(mut bytes: &[u8], row: &[f32; 3], margins: &mut [f32; 10]) {
+    for margin in margins {
+        *margin = 0.5;
+        for _ in 0..100 {
+            let Some((count, rest)) = bytes.split_first_chunk::<4>() else { return };
+            let (nodes, rest) = rest.split_at(8 * u32::from_le_bytes(*count) as usize);
+            let (nodes, _) = nodes.as_chunks::<8>();
+            bytes = rest;
+            let mut index = 0;
+            loop {
+                let [a, b, c, d, feature, _, e, f] = nodes[index];
+                let value = f32::from_le_bytes([a, b, c, d]);
+                if feature == 255 {
+                    *margin += value;
+                    break;
+                }
+                index =
+                    if row[usize::from(feature)] < value { index + 1 } else { usize::from(u16::from_le_bytes([e, f])) };
+            }
+        }
+    }
 }

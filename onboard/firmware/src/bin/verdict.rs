@@ -1,0 +1,31 @@
+//! The recogniser alone, verdicts only: links only if nothing in it can panic; its size is what recognition takes.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+use cortex_m_rt::entry;
+use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_shared::Touch;
+
+#[path = "../no_panic.rs"]
+mod no_panic;
+
+#[entry]
+fn main() -> ! {
+    // A model and touches that the compiler knows nothing about.
+    let bytes: &'static [u8] = black_box(&[]);
+    if let Ok(model) = Model::new(bytes) {
+        let stopping = Stopping::from_model(&model);
+        if let Ok(mut recognizer) = Recognizer::<10>::new(&model, stopping) {
+            loop {
+                let touch = Touch::from_micros(black_box([0, 1, 2]));
+                if black_box(recognizer.push(&touch)) != Verdict::Undecided {
+                    recognizer.reset();
+                }
+            }
+        }
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

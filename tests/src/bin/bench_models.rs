@@ -1,0 +1,179 @@
+//! Writes what the firmware's benchmarks and its test of bit-identity are built with:
+//!
+//! ```text
+//! cargo run --release -p palpate-tests --bin bench_models -- OUT          random ensembles of the usual shapes
+//! cargo run --release -p palpate-tests --bin bench_models -- OUT DATA     trained on touches that `palpate capture` made
+//! ```
+//!
+//! `OUT` then holds models, touches (three times of four bytes), the same trees for other evaluators, and for
+//! `identity.palpate` what this machine makes of ten thousand touches.
+
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::dataset::Dataset;
+use palpate::ensemble::{Ensemble, Node, Output};
+use palpate::train::{self, train};
+use palpate::{Error, Result};
+use palpate_onboard::{Model, Recognizer, Stopping};
+use palpate_shared::{Descriptor, Touch};
+use palpate_tests::identity;
+use palpate_tests::random::{self, Shape};
+use std::path::{Path, PathBuf};
+
+fn main() -> Result<()> {
+    let mut arguments = std::env::args_os().skip(1).map(PathBuf::from);
+    let usage = || Error::argument("no directory to write to", "Usage: bench_models OUT [DATA].");
+    let out = arguments.next().ok_or_else(usage)?;
+    let data = arguments.next().map(|directory| Dataset::read(&directory)).transpose()?;
+    let one = ensemble(data.as_ref(), train::Settings::paper(), Descriptor::Times)?;
+    let compact = |rounds, depth, bins| train::Settings { rounds, depth, bins, ..train::Settings::compact() };
+    let each100 = ensemble(data.as_ref(), compact(100, 6, 256), Descriptor::Curvature)?;
+    let each40 = ensemble(data.as_ref(), compact(40, 5, 256), Descriptor::Curvature)?;
+    let table = ensemble(data.as_ref(), compact(60, 6, 64), Descriptor::Curvature)?;
+    let models = [
+        ("one-i16", &one, Leaf::I16, Layout::Complete),
+        ("one-compact", &one, Leaf::I16, Layout::Compact),
+        ("each100-i16", &each100, Leaf::I16, Layout::Complete),
+        ("each100-i8", &each100, Leaf::I8, Layout::Complete),
+        ("each40-i16", &each40, Leaf::I16, Layout::Complete),
+        ("each40-i8", &each40, Leaf::I8, Layout::Complete),
+        ("each40-compact", &each40, Leaf::I8, Layout::Compact),
+        ("grid-i8", &table, Leaf::I8, Layout::Grid),
+        ("grid-i16", &table, Leaf::I16, Layout::Grid),
+        ("identity", &each40, Leaf::I16, Layout::Complete),
+    ];
+    let touches = touches(data.as_ref());
+    write(&out.join("touches.bin"), &touches.iter().flat_map(times).collect::<Vec<u8>>())?;
+    for (name, ensemble, leaf, layout) in models {
+        let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() })?;
+        println!(
+            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes a split",
+            compiled.bytes.len(),
+            compiled.splits,
+            compiled.bytes.len() as f64 / compiled.splits as f64
+        );
+        write(&out.join(format!("{name}.palpate")), &compiled.bytes)?;
+        if name == "identity" {
+            write(&out.join("identity.bin"), &expected(&compiled.bytes, &touches)?)?;
+        }
+    }
+    write(&out.join("one-nodes.bin"), &eight_byte_nodes(&one))?;
+    write(&out.join("one-irithyll.bin"), &irithyll(&one))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    palpate::output::write_bytes(path, bytes)
+}
+
+/// Trained where there is data; otherwise random, of the same shape and without missing splits.
+fn ensemble(data: Option<&Dataset>, settings: train::Settings, descriptor: Descriptor) -> Result<Ensemble> {
+    if let Some(data) = data {
+        return train(data, &settings);
+    }
+    let each = settings.multi_output;
+    let trees = if each { settings.rounds } else { 10 * settings.rounds };
+    let thresholds = settings.bins.min(200);
+    let shape = Shape { descriptor, objects: 10, trees, depth: settings.depth, each, thresholds, leaf: 0.3 };
+    Ok(random::ensemble(shape, 1))
+}
+
+/// Ten thousand touches without a pose: of all objects in turn, or random.
+fn touches(data: Option<&Dataset>) -> Vec<Touch> {
+    let Some(data) = data else {
+        return random::touches(10_000, 1).iter().map(|touch| Touch::new(touch.times())).collect();
+    };
+    let objects = data.objects.len();
+    let touch = |index: usize| {
+        let touches = &data.objects[index % objects].touches;
+        Touch::new(touches[index / objects * 7 % touches.len()].times())
+    };
+    (0..10_000).map(touch).collect()
+}
+
+fn times(touch: &Touch) -> Vec<u8> {
+    touch.times().into_iter().flat_map(|time| time.micros().unwrap_or(u32::MAX).to_le_bytes()).collect()
+}
+
+fn expected(model: &[u8], touches: &[Touch]) -> Result<Vec<u8>> {
+    let wrong = |error: &dyn std::fmt::Display| Error::data(error.to_string(), "Report this as a bug.");
+    let model = Model::new(model).map_err(|error| wrong(&error))?;
+    let mut recognizer = Recognizer::<10>::new(&model, Stopping::from_model(&model)).map_err(|error| wrong(&error))?;
+    Ok(touches.iter().flat_map(|touch| identity::record(&model, &mut recognizer, touch)).collect())
+}
+
+/// A plain array: for each tree (grouped by object) its number of nodes as u32, then nodes of eight bytes: threshold or
+/// leaf as f32, feature (255: leaf), 0, index of the right child as u16; the left child is the next node.
+fn eight_byte_nodes(ensemble: &Ensemble) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for tree in by_object(ensemble) {
+        let mut nodes = Vec::new();
+        preorder(&tree.nodes, 0, &mut nodes);
+        bytes.extend((nodes.len() as u32).to_le_bytes());
+        for (value, feature, right) in nodes {
+            bytes.extend(f32::to_le_bytes(value));
+            bytes.extend([feature, 0]);
+            bytes.extend(u16::to_le_bytes(right));
+        }
+    }
+    bytes
+}
+
+fn preorder(nodes: &[Node], index: usize, out: &mut Vec<(f32, u8, u16)>) {
+    match &nodes[index] {
+        Node::Leaf(values) => out.push((values[0], 255, 0)),
+        Node::Split { feature, threshold, left, right, .. } => {
+            let place = out.len();
+            out.push((*threshold, *feature as u8, 0));
+            preorder(nodes, *left, out);
+            out[place].2 = out.len() as u16;
+            preorder(nodes, *right, out);
+        }
+    }
+}
+
+fn by_object(ensemble: &Ensemble) -> Vec<&palpate::ensemble::Tree> {
+    let mut trees: Vec<_> = ensemble.trees.iter().collect();
+    trees.sort_by_key(|tree| match tree.output {
+        Output::One(object) => object,
+        Output::Each => 0,
+    });
+    trees
+}
+
+/// The same trees in irithyll-core's format, an ensemble an object, each after its length as u32. It goes right where a
+/// feature is greater than the threshold, so thresholds are the next smaller f32.
+fn irithyll(ensemble: &Ensemble) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let objects = ensemble.objects.len();
+    for object in 0..objects {
+        let trees: Vec<_> = ensemble.trees.iter().filter(|tree| tree.output == Output::One(object)).collect();
+        let mut table = Vec::new();
+        let mut nodes = Vec::new();
+        for tree in &trees {
+            table.extend((tree.nodes.len() as u32).to_le_bytes());
+            table.extend((nodes.len() as u32).to_le_bytes());
+            for node in &tree.nodes {
+                let (value, left, right, flags) = match node {
+                    Node::Leaf(values) => (values[0], 0, 0, 0x8000),
+                    Node::Split { feature, threshold, left, right, .. } => {
+                        (threshold.next_down(), *left as u16, *right as u16, *feature as u16)
+                    }
+                };
+                nodes.extend(value.to_le_bytes());
+                nodes.extend(left.to_le_bytes());
+                nodes.extend(right.to_le_bytes());
+                nodes.extend(flags.to_le_bytes());
+                nodes.extend([0, 0]);
+            }
+        }
+        let mut part = b"IRIT".to_vec();
+        for number in [1, trees.len() as u16, ensemble.descriptor.feature_count() as u16, 0] {
+            part.extend(number.to_le_bytes());
+        }
+        part.extend(ensemble.base_margins[object].to_le_bytes());
+        part.extend(table);
+        part.extend(nodes);
+        bytes.extend((part.len() as u32).to_le_bytes());
+        bytes.extend(part);
+    }
+    bytes
+}
