@@ -17,13 +17,14 @@ const BLOCK: usize = 32;
 /// Adds up a group of complete trees, and moves `nodes` and `leaves` behind it.
 ///
 /// Cost: five instructions a step, and about ten a tree; then the leaves.
+#[inline(never)]
 pub(crate) fn add(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leaves: &mut &[u8], sum: &mut Sum<'_>) {
     let depth = group.depth;
     let mut trees = usize::try_from(group.trees).unwrap_or(0);
     let Some(mut columns) = take(nodes, trees << depth) else { return };
     let Some(mut thresholds) = take(nodes, trees << depth) else { return };
+    let mut reached = [0; BLOCK];
     while trees > 0 {
-        let mut reached = [0; BLOCK];
         let block = trees.min(BLOCK);
         let Some(columns) = take(&mut columns, block << depth) else { return };
         let Some(thresholds) = take(&mut thresholds, block << depth) else { return };

@@ -10,6 +10,7 @@ use palpate_shared::format::Axis;
 /// Adds the margins of the cell that the features fall into.
 ///
 /// Cost: two binary searches of about ten instructions a step, and five an object.
+#[inline(never)]
 pub(crate) fn add(model: &Model<'_>, features: &[i32], sum: &mut Sum<'_>) {
     let mut cuts = model.cuts;
     let mut cell = 0;

@@ -134,20 +134,27 @@ const PACKED: usize = 256;
 #[inline(never)]
 fn add_ten(margins: &mut [i32; 10], leaves: &[u8], reached: &[u16], row: usize) {
     const EVEN: u32 = 0x00ff_00ff;
-    let (mut ac, mut bd, mut eg, mut fh, mut ij) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
+    // Sums of whole words, and of every other byte: their difference is the rest, and no word is taken apart twice.
+    let (mut abcd, mut bd, mut efgh, mut fh, mut i, mut j) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
     for &leaf in reached {
         let Some(values) = leaves.get(usize::from(leaf) * row..).and_then(<[_]>::first_chunk::<10>) else { break };
-        let [a, b, c, d, e, f, g, h, i, j] = *values;
-        let abcd = u32::from_le_bytes([a, b, c, d]);
-        let efgh = u32::from_le_bytes([e, f, g, h]);
-        ac = ac.wrapping_add(abcd & EVEN);
-        bd = bd.wrapping_add(abcd >> 8 & EVEN);
-        eg = eg.wrapping_add(efgh & EVEN);
-        fh = fh.wrapping_add(efgh >> 8 & EVEN);
-        ij = ij.wrapping_add(u32::from_le_bytes([i, 0, j, 0]));
+        // Taken as words: byte by byte the compiler would load them so.
+        let ([first, second], rest) = values.as_chunks::<4>() else { break };
+        let Some(&[v8, v9]) = rest.first_chunk() else { break };
+        let word = u32::from_le_bytes(*first);
+        abcd = abcd.wrapping_add(word);
+        bd = bd.wrapping_add(word >> 8 & EVEN);
+        let word = u32::from_le_bytes(*second);
+        efgh = efgh.wrapping_add(word);
+        fh = fh.wrapping_add(word >> 8 & EVEN);
+        i = i.wrapping_add(u32::from(v8));
+        j = j.wrapping_add(u32::from(v9));
     }
+    let ac = abcd.wrapping_sub(bd << 8);
+    let eg = efgh.wrapping_sub(fh << 8);
     let bias = i32::try_from(reached.len()).unwrap_or(0).wrapping_mul(128);
-    let sums = [low(ac), low(bd), high(ac), high(bd), low(eg), low(fh), high(eg), high(fh), low(ij), high(ij)];
+    let sums =
+        [low(ac), low(bd), high(ac), high(bd), low(eg), low(fh), high(eg), high(fh), i.cast_signed(), j.cast_signed()];
     for (margin, sum) in margins.iter_mut().zip(sums) {
         *margin = margin.wrapping_add(sum).wrapping_sub(bias);
     }

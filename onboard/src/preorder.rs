@@ -14,6 +14,7 @@ use palpate_shared::format::Group;
 /// threshold, splits in the left subtree.
 ///
 /// Cost: about twelve instructions a step, 30 a tree; then the leaves.
+#[inline(never)]
 pub(crate) fn add_compact(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leaves: &mut &[u8], sum: &mut Sum<'_>) {
     for _ in 0..group.trees {
         let Some((leaf, splits)) = tree(nodes, |[column, threshold, left]: [u8; 3]| {
@@ -30,6 +31,7 @@ pub(crate) fn add_compact(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leave
 /// missing value goes (1 = left), the threshold's number, splits in the left subtree.
 ///
 /// Cost: about 25 instructions a step, 30 a tree; then the leaves.
+#[inline(never)]
 pub(crate) fn add_wide(
     model: &Model<'_>,
     group: &Group,

@@ -57,15 +57,15 @@ pub(crate) fn rank(cuts: &[u8], width: u8, value: i32) -> u8 {
 }
 
 fn rank_of_width<const WIDTH: usize>(cuts: &[u8], value: i32) -> usize {
-    let (mut cuts, _) = cuts.as_chunks::<WIDTH>();
+    let (cuts, _) = cuts.as_chunks::<WIDTH>();
     let mut rank = 0;
-    while let Some((lower, [middle, upper @ ..])) = cuts.split_at_checked(cuts.len() / 2) {
-        cuts = if signed(middle) <= value {
-            rank += lower.len() + 1;
-            upper
-        } else {
-            lower
-        };
+    let mut step = 128;
+    while step > 0 {
+        // Were the thresholds from here to the next step's end passed?
+        if cuts.get(rank + step - 1).is_some_and(|cut| signed(cut) <= value) {
+            rank += step;
+        }
+        step /= 2;
     }
     rank
 }

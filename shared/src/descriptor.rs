@@ -109,45 +109,41 @@ impl Descriptor {
     ///
     /// Cost: about 60 instructions on a Cortex-M. Cannot fail.
     pub fn features(self, touch: &Touch) -> Features {
-        let mut features = Features { values: [MISSING_FEATURE; MAX_FEATURES], len: 0 };
-        let mut push = |value: i32| {
-            if let Some(slot) = features.values.get_mut(usize::from(features.len)) {
-                *slot = value;
-                features.len += 1;
-            }
-        };
+        const NONE: i32 = MISSING_FEATURE;
+        let [first, middle, last] = touch.times().map(within_limit);
         if self == Self::Times {
-            touch.times().into_iter().for_each(|time| push(time_feature(time)));
-            return features;
+            let [first, middle, last] = [first, middle, last].map(|time| time.map_or(NONE, clamp));
+            return Features { values: [first, middle, last, NONE, NONE, NONE, NONE, NONE], len: 3 };
         }
-        let [first, middle, last] = touch.times().map(|t| t.micros().map(i64::from));
-        let slope = first.zip(last).map(|(first, last)| last - first);
-        push(clamp(first.zip(middle).zip(last).map(|((a, b), c)| a - 2 * b + c)));
-        push(clamp(slope.map(i64::abs)));
-        if !self.needs_pose() {
-            return features;
+        let mut values = [NONE; MAX_FEATURES];
+        let [curvature, slope, posed @ ..] = &mut values;
+        if let (Some(first), Some(last)) = (first, last) {
+            *slope = clamp((last - first).abs());
+            *curvature = middle.map_or(NONE, |middle| clamp(first - 2 * middle + last));
         }
-        let Some(Pose { direction, alignment }) = touch.pose() else {
-            (2..self.feature_count()).for_each(|_| push(MISSING_FEATURE));
-            return features;
+        let len = match self {
+            Self::Times | Self::Curvature => 2,
+            Self::Gravity => 4,
+            Self::Oriented => 8,
         };
-        let alignment = canonical_alignment(alignment, touch.times());
-        let vertical = if self == Self::Gravity { 2.. } else { 0.. };
-        for component in [direction, alignment] {
-            component.into_iter().skip(vertical.start).for_each(|cosine| push(i32::from(cosine)));
+        if let (true, Some(Pose { direction, alignment })) = (self.needs_pose(), touch.pose()) {
+            let alignment = canonical_alignment(alignment, touch.times());
+            let [x, y, z] = direction.map(i32::from);
+            let [u, v, w] = alignment.map(i32::from);
+            *posed = if self == Self::Gravity { [z, w, NONE, NONE, NONE, NONE] } else { [x, y, z, u, v, w] };
         }
-        features
+        Features { values, len }
     }
 }
 
-fn time_feature(time: ContactTime) -> i32 {
-    clamp(time.micros().map(i64::from))
+/// A contact time in microseconds; what is later than 2^28 (268 s) counts as that, so that sums of times fit an i32.
+fn within_limit(time: ContactTime) -> Option<i32> {
+    const LIMIT: u32 = 1 << 28;
+    time.micros().map(|micros| micros.min(LIMIT).cast_signed())
 }
 
-fn clamp(value: Option<i64>) -> i32 {
-    let limit = i64::from(FEATURE_LIMIT);
-    // The clamped value fits an i32, so the conversion cannot fail.
-    value.map_or(MISSING_FEATURE, |v| i32::try_from(v.clamp(-limit, limit)).unwrap_or(MISSING_FEATURE))
+fn clamp(value: i32) -> i32 {
+    value.clamp(-FEATURE_LIMIT, FEATURE_LIMIT)
 }
 
 /// The alignment counted from the finger that touched first to the one that touched last (a missing contact counts as

@@ -91,7 +91,7 @@ fn finest(unit: f32, fits: impl Fn(f32) -> bool) -> Option<f32> {
 
 /// How many times a tree's unit may be doubled: bytes need it to be exact, for two bytes it would only make groups.
 fn max_shift(leaf: LeafType) -> u32 {
-    if leaf == LeafType::I8 { 4 } else { 0 }
+    if leaf == LeafType::I8 { 2 } else { 0 }
 }
 
 /// The largest integer of a leaf type.
