@@ -5,21 +5,20 @@
 //! the start is out of reach, and one at a distance from the path is touched late. Slack makes up for the rounding, so
 //! a triangle that is thrown out is surely not touched; of those that stay, most are.
 
-#![allow(clippy::needless_range_loop, reason = "arrays of lanes side by side, by index, are what vectorises")]
-
 use super::budget::BOX;
 use super::narrow::{Motion, Triangle};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
-/// How many triangles a pack holds: two SSE registers' worth of lanes, one of AVX.
-pub(super) const LANES: usize = 8;
+/// How many triangles a pack holds.
+pub(super) const LANES: usize = 2 * WIDTH;
 
-type Lanes = [f32; LANES];
+/// How many lanes a register of the baseline instruction sets has; `glam` keeps a [`Vec4`] in one.
+pub(super) const WIDTH: usize = 4;
 
-/// Up to eight triangles, corner by corner, axis by axis; free lanes repeat the first triangle.
+/// Up to eight triangles, in two halves of four: corner by corner, axis by axis. Free lanes repeat the first triangle.
 #[derive(Clone, Debug)]
 pub(super) struct Pack {
-    corners: [[Lanes; 3]; 3],
+    halves: [[[Vec4; 3]; 3]; 2],
     /// Index of the first triangle; the others follow it.
     pub(super) first: u32,
     /// How many lanes are in use.
@@ -28,63 +27,67 @@ pub(super) struct Pack {
 
 impl Pack {
     pub(super) fn new(triangles: &[Triangle], first: u32) -> Self {
-        let mut corners = [[[0.0; LANES]; 3]; 3];
+        let mut halves = [[[Vec4::ZERO; 3]; 3]; 2];
         for lane in 0..LANES {
             let triangle = triangles.get(lane).unwrap_or(&triangles[0]);
-            for (corner, place) in corners.iter_mut().zip(triangle) {
+            for (corner, place) in halves[lane / WIDTH].iter_mut().zip(triangle) {
                 for (axis, value) in corner.iter_mut().zip(place.to_array()) {
-                    axis[lane] = value as f32;
+                    axis[lane % WIDTH] = value as f32;
                 }
             }
         }
-        Self { corners, first, count: triangles.len() as u32 }
+        Self { halves, first, count: triangles.len() as u32 }
     }
 
     /// For each triangle, that the sphere may touch it at once.
     #[inline]
-    pub(super) fn unknown(&self) -> Lanes {
+    pub(super) fn unknown(&self) -> [f32; LANES] {
         std::array::from_fn(|lane| if lane < self.count as usize { 0.0 } else { f32::INFINITY })
     }
 
     /// For each triangle, a distance before which the sphere does not touch it; infinite if it does not before `limit`.
     #[inline]
-    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> Lanes {
-        let u = self.corners.each_ref().map(|corner| ray.along(corner, 0));
-        let v = self.corners.each_ref().map(|corner| ray.along(corner, 1));
-        let w = self.corners.each_ref().map(|corner| ray.along(corner, 2));
-        let end = if limit < f32::INFINITY { limit } else { 0.0 };
-        let open = limit == f32::INFINITY;
-        let mut earliest = [0.0; LANES];
-        let margin_squared = ray.margin * ray.margin;
-        for lane in 0..LANES {
-            let (us, vs, ws) = (u.map(|c| c[lane]), v.map(|c| c[lane]), w.map(|c| c[lane]));
-            // The triangle's bounding rectangle, at its distance from the path, is met where the sphere is round.
-            let beside = bigger(bigger(least(us), -greatest(us)), 0.0);
-            let above = bigger(bigger(least(vs), -greatest(vs)), 0.0);
-            let reach = margin_squared - (beside * beside + above * above);
-            let mut out = (reach < 0.0) | (greatest(ws) < -ray.margin);
-            for (from, to, opposite) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
-                let (eu, ev) = (us[to] - us[from], vs[to] - vs[from]);
-                // Where the path and the opposite corner stand across this edge, times its length.
-                let path = ev * us[from] - eu * vs[from];
-                let corner = eu * (vs[opposite] - vs[from]) - ev * (us[opposite] - us[from]);
-                let beyond = bigger(path - bigger(corner, 0.0), smaller(corner, 0.0) - path);
-                out |= (beyond > 0.0) & (beyond * beyond > margin_squared * (eu * eu + ev * ev));
-            }
-            // With the sphere at the limit, in the direction of the triangle's middle: if that points forward and all of
-            // the triangle lies beyond the radius, the sphere has not reached it there, nor before.
-            let (mu, mv, mw) = (us[0] + us[1] + us[2], vs[0] + vs[1] + vs[2], ws[0] + ws[1] + ws[2] - 3.0 * end);
-            let along = |corner: usize| us[corner] * mu + vs[corner] * mv + (ws[corner] - end) * mw;
-            let nearest = least([along(0), along(1), along(2)]);
-            let square = mu * mu + mv * mv + mw * mw;
-            out |= !open & (mw >= 0.0) & (nearest > 0.0) & (nearest * nearest > margin_squared * square);
-            let entry = least(ws) - bigger(reach, 0.0).sqrt();
-            earliest[lane] = if out { f32::INFINITY } else { bigger(entry, 0.0) };
+    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> [f32; LANES] {
+        let mut earliest = [f32::INFINITY; LANES];
+        let used = self.count as usize;
+        for (half, places) in self.halves.iter().zip(earliest.chunks_exact_mut(WIDTH)).take(used.div_ceil(WIDTH)) {
+            places.copy_from_slice(&half_earliest(half, ray, limit).to_array());
         }
-        // Free lanes repeat the first triangle.
-        earliest[self.count as usize..].fill(f32::INFINITY);
+        earliest[used..].fill(f32::INFINITY);
         earliest
     }
+}
+
+#[inline]
+fn half_earliest(corners: &[[Vec4; 3]; 3], ray: &Ray, limit: f32) -> Vec4 {
+    let us = corners.each_ref().map(|corner| ray.along(corner, 0));
+    let vs = corners.each_ref().map(|corner| ray.along(corner, 1));
+    let ws = corners.each_ref().map(|corner| ray.along(corner, 2));
+    let (zero, infinite) = (Vec4::ZERO, Vec4::INFINITY);
+    let margin_squared = Vec4::splat(ray.margin * ray.margin);
+    // The triangle's bounding rectangle, at its distance from the path, is met where the sphere is round.
+    let beside = least(us).max(-greatest(us)).max(zero);
+    let above = least(vs).max(-greatest(vs)).max(zero);
+    let reach = margin_squared - (beside * beside + above * above);
+    let mut out = reach.cmplt(zero) | greatest(ws).cmplt(Vec4::splat(-ray.margin));
+    for (from, to, opposite) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+        let (eu, ev) = (us[to] - us[from], vs[to] - vs[from]);
+        // Where the path and the opposite corner stand across this edge, times its length.
+        let path = ev * us[from] - eu * vs[from];
+        let corner = eu * (vs[opposite] - vs[from]) - ev * (us[opposite] - us[from]);
+        let beyond = (path - corner.max(zero)).max(corner.min(zero) - path);
+        out |= beyond.cmpgt(zero) & (beyond * beyond).cmpgt(margin_squared * (eu * eu + ev * ev));
+    }
+    if limit < f32::INFINITY {
+        // With the sphere at the limit, in the direction of the triangle's middle: if that points forward and all of the
+        // triangle lies beyond the radius, the sphere has not reached it there, nor before.
+        let ends = ws.map(|w| w - limit);
+        let (mu, mv, mw) = (us[0] + us[1] + us[2], vs[0] + vs[1] + vs[2], ends[0] + ends[1] + ends[2]);
+        let nearest = least([0, 1, 2].map(|corner| us[corner] * mu + vs[corner] * mv + ends[corner] * mw));
+        let square = mu * mu + mv * mv + mw * mw;
+        out |= mw.cmpge(zero) & nearest.cmpgt(zero) & (nearest * nearest).cmpgt(margin_squared * square);
+    }
+    Vec4::select(out, infinite, (least(ws) - reach.max(zero).sqrt()).max(zero))
 }
 
 /// A motion as the f32 tests need it.
@@ -121,19 +124,9 @@ impl Ray {
     /// Of boxes, given by their centre and half their sides: where the centre is along one of the axes, and how far
     /// the box reaches from there.
     #[inline]
-    pub(super) fn extent<const N: usize>(
-        &self,
-        [x, y, z]: &[[f32; N]; 3],
-        [a, b, c]: &[[f32; N]; 3],
-        axis: usize,
-    ) -> ([f32; N], [f32; N]) {
-        let (direction, offset, size) = (self.axes[axis], self.offsets[axis], self.axes[axis].abs());
-        let (mut centre, mut reach) = ([0.0; N], [0.0; N]);
-        for lane in 0..N {
-            centre[lane] = x[lane] * direction.x + y[lane] * direction.y + z[lane] * direction.z - offset;
-            reach[lane] = a[lane] * size.x + b[lane] * size.y + c[lane] * size.z;
-        }
-        (centre, reach)
+    pub(super) fn extent(&self, centre: &[Vec4; 3], [x, y, z]: &[Vec4; 3], axis: usize) -> [Vec4; 2] {
+        let size = self.axes[axis].abs();
+        [self.along(centre, axis), *x * size.x + *y * size.y + *z * size.z]
     }
 
     /// Unit vector of the motion.
@@ -143,33 +136,18 @@ impl Ray {
     }
 
     #[inline]
-    fn along(&self, [x, y, z]: &[Lanes; 3], axis: usize) -> Lanes {
-        let (direction, offset) = (self.axes[axis], self.offsets[axis]);
-        let mut along = [0.0; LANES];
-        for lane in 0..LANES {
-            along[lane] = x[lane] * direction.x + y[lane] * direction.y + z[lane] * direction.z - offset;
-        }
-        along
+    fn along(&self, [x, y, z]: &[Vec4; 3], axis: usize) -> Vec4 {
+        let direction = self.axes[axis];
+        *x * direction.x + *y * direction.y + *z * direction.z - self.offsets[axis]
     }
 }
 
-// Comparisons instead of f32::min and max: they compile to one instruction, and nothing here is NaN.
 #[inline]
-pub(super) fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
+fn least([a, b, c]: [Vec4; 3]) -> Vec4 {
+    a.min(b).min(c)
 }
 
 #[inline]
-pub(super) fn bigger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-#[inline]
-fn least([a, b, c]: [f32; 3]) -> f32 {
-    smaller(smaller(a, b), c)
-}
-
-#[inline]
-fn greatest([a, b, c]: [f32; 3]) -> f32 {
-    bigger(bigger(a, b), c)
+fn greatest([a, b, c]: [Vec4; 3]) -> Vec4 {
+    a.max(b).max(c)
 }

@@ -1,24 +1,19 @@
 //! The bounding volume hierarchy: built by `obvhs`, then flattened to four children a node.
 
-#![allow(clippy::needless_range_loop, reason = "arrays of lanes side by side, by index, are what vectorises")]
-
 use super::Precision;
 use super::narrow::{Motion, Triangle};
-use super::pack::{LANES, Pack, Ray, bigger, smaller};
-use glam::{DVec3, Vec3A};
+use super::pack::{LANES, Pack, Ray, WIDTH};
+use glam::{BVec4A, DVec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-
-/// How many children a node has: the lanes of an SSE register.
-const WIDTH: usize = 4;
 
 /// Boxes of four children in f32, axis by axis, and where the children are. An unused child has a box that nothing
 /// meets.
 #[derive(Clone, Debug)]
 struct Node {
-    centre: [[f32; WIDTH]; 3],
+    centre: [Vec4; 3],
     /// Half the box's sides.
-    half: [[f32; WIDTH]; 3],
+    half: [Vec4; 3],
     children: [u32; WIDTH],
 }
 
@@ -90,43 +85,40 @@ impl Tree {
 }
 
 impl Node {
-    const EMPTY: Self = Self { centre: [[0.0; WIDTH]; 3], half: [[-1e30; WIDTH]; 3], children: [0; WIDTH] };
+    const EMPTY: Self = Self { centre: [Vec4::ZERO; 3], half: [Vec4::splat(-1e30); 3], children: [0; WIDTH] };
 
     /// Puts the children that the sphere may touch before `limit` on the stack, the nearest on top.
     #[inline]
     fn visit(&self, ray: &Ray, limit: f32, stack: &mut Vec<(f32, u32)>) {
-        let mut near = [0.0_f32; WIDTH];
-        let mut far = [limit; WIDTH];
+        let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(limit));
         for axis in 0..3 {
-            let (origin, inverse, margin) = (ray.origin[axis], ray.inverse[axis], ray.margin);
-            for child in 0..WIDTH {
-                let middle = (self.centre[axis][child] - origin) * inverse;
-                let half = (self.half[axis][child] + margin) * inverse.abs();
-                near[child] = bigger(near[child], middle - half);
-                far[child] = smaller(far[child], middle + half);
-            }
+            let middle = (self.centre[axis] - ray.origin[axis]) * ray.inverse[axis];
+            let half = (self.half[axis] + ray.margin) * ray.inverse[axis].abs();
+            near = near.max(middle - half);
+            far = far.min(middle + half);
         }
         // A box that is inflated like that has corners where the sphere is round. Seen along the motion, a box at a
         // distance from the path is met later than its depth says, or never: on fine meshes this is what keeps the
         // search to the few triangles about the point of contact.
         let [beside, above, depth] = [0, 1, 2].map(|axis| ray.extent(&self.centre, &self.half, axis));
-        for child in 0..WIDTH {
-            let u = bigger(beside.0[child].abs() - beside.1[child], 0.0);
-            let v = bigger(above.0[child].abs() - above.1[child], 0.0);
-            let reach = ray.margin * ray.margin - (u * u + v * v);
-            let entry = depth.0[child] - depth.1[child] - bigger(reach, 0.0).sqrt();
-            near[child] = if reach < 0.0 { f32::INFINITY } else { bigger(near[child], entry) };
+        let u = (beside[0].abs() - beside[1]).max(Vec4::ZERO);
+        let v = (above[0].abs() - above[1]).max(Vec4::ZERO);
+        let reach = Vec4::splat(ray.margin * ray.margin) - (u * u + v * v);
+        near = near.max(depth[0] - depth[1] - reach.max(Vec4::ZERO).sqrt());
+        let mut met = near.cmple(far) & reach.cmpge(Vec4::ZERO);
+        if limit < f32::INFINITY {
+            met &= !self.passed(ray, limit);
         }
-        let passed = if limit < f32::INFINITY { self.passed(ray, limit) } else { [false; WIDTH] };
+        let (mut met, near) = (met.bitmask(), near.to_array());
         let bottom = stack.len();
-        for child in 0..WIDTH {
-            if near[child] <= far[child] && !passed[child] {
-                let mut place = stack.len();
-                stack.push((near[child], self.children[child]));
-                while place > bottom && stack[place - 1].0 < near[child] {
-                    stack.swap(place - 1, place);
-                    place -= 1;
-                }
+        while met != 0 {
+            let child = met.trailing_zeros() as usize;
+            met &= met - 1;
+            let mut place = stack.len();
+            stack.push((near[child], self.children[child]));
+            while place > bottom && stack[place - 1].0 < near[child] {
+                stack.swap(place - 1, place);
+                place -= 1;
             }
         }
     }
@@ -134,18 +126,16 @@ impl Node {
     /// Which boxes the sphere has not reached when it has gone as far as `limit`: from there, all of the box lies beyond
     /// the radius in a direction that points forward, and so from everywhere before it.
     #[inline]
-    fn passed(&self, ray: &Ray, limit: f32) -> [bool; WIDTH] {
+    fn passed(&self, ray: &Ray, limit: f32) -> BVec4A {
         let end = ray.origin + ray.direction() * limit;
-        let (mut square, mut forward) = ([0.0_f32; WIDTH], [0.0_f32; WIDTH]);
+        let (mut square, mut forward) = (Vec4::ZERO, Vec4::ZERO);
         for axis in 0..3 {
-            for child in 0..WIDTH {
-                let way = self.centre[axis][child] - end[axis];
-                let gap = bigger(way.abs() - self.half[axis][child], 0.0).copysign(way);
-                square[child] += gap * gap;
-                forward[child] += gap * ray.direction()[axis];
-            }
+            let way = self.centre[axis] - end[axis];
+            let gap = (way.abs() - self.half[axis]).max(Vec4::ZERO).copysign(way);
+            square += gap * gap;
+            forward += gap * ray.direction()[axis];
         }
-        std::array::from_fn(|child| (forward[child] >= 0.0) & (square[child] > ray.margin * ray.margin))
+        forward.cmpge(Vec4::ZERO) & square.cmpgt(Vec4::splat(ray.margin * ray.margin))
     }
 }
 
@@ -196,7 +186,7 @@ impl Flattened<'_> {
                 let (low, high) = (aabb.min[axis], aabb.max[axis]);
                 let centre = (low + high) / 2.0;
                 place.centre[axis][child] = centre;
-                place.half[axis][child] = bigger(high - centre, centre - low);
+                place.half[axis][child] = (high - centre).max(centre - low);
             }
             place.children[child] = link;
         }
