@@ -12,21 +12,16 @@ fn main() -> io::Result<()> {
     // Here and not in .cargo/config.toml, where RUSTFLAGS would override them.
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     println!("cargo::rustc-link-arg-bins=--nmagic");
-    built_in(&out)?;
+    built_in()?;
     models(&out.join("bench"))
 }
 
-/// The model in `PALPATE_MODEL`; without one there is an empty one, which is refused when the image starts.
-fn built_in(out: &Path) -> io::Result<()> {
+/// The model that the images have built in, unless `PALPATE_MODEL` names another.
+const MODEL: &str = "../../models/household.palpate";
+
+fn built_in() -> io::Result<()> {
     println!("cargo::rerun-if-env-changed=PALPATE_MODEL");
-    let model = match env::var_os("PALPATE_MODEL").map(PathBuf::from) {
-        Some(model) => fs::canonicalize(model)?,
-        None => {
-            let empty = out.join("empty.palpate");
-            fs::write(&empty, [])?;
-            empty
-        }
-    };
+    let model = fs::canonicalize(env::var_os("PALPATE_MODEL").unwrap_or_else(|| MODEL.into()))?;
     println!("cargo::rerun-if-changed={}", model.display());
     println!("cargo::rustc-env=PALPATE_MODEL={}", model.display());
     Ok(())

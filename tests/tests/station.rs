@@ -5,10 +5,9 @@ use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate_onboard::station::{Memory, serve};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
-use palpate_shared::format::checksum;
 use palpate_shared::link::{
     CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, Message, Outcome, Payload, Query,
-    Refusal,
+    Refusal, checksum,
 };
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::random::{self, Shape};

@@ -81,3 +81,13 @@ impl Cli {
             .run()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn every_commands_arguments_are_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

@@ -21,7 +21,7 @@ pub(crate) struct Arguments {
     /// A serial port, tcp://host:port, emulator, or a journal that palpate link writes
     source: String,
     /// Touches to recognise: a data set's directory, a file of lines, or - for standard input
-    touches: Option<PathBuf>,
+    data: Option<PathBuf>,
     #[command(flatten)]
     reach: Reach,
 }
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let port: Port = arguments.source.parse().map_err(|what: String| {
         Error::argument(format!("{}: {what}", arguments.source), "See palpate help watch.")
     })?;
-    let steps = arguments.touches.as_deref().map(|source| arguments.reach.steps(source)).transpose()?;
+    let steps = arguments.data.as_deref().map(|source| arguments.reach.steps(source)).transpose()?;
     let (mut connection, loaded) = arguments.reach.open(&port)?;
     let chip = chip_model(&mut connection)?;
     let mut show = Show::open(port.to_string())?;

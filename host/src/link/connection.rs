@@ -2,10 +2,9 @@
 
 use super::Transport;
 use crate::error::{Error, Result};
-use palpate_shared::format::checksum;
 use palpate_shared::link::{
     Answer, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo, Outcome, Payload, Query,
-    Refusal, Statistics,
+    Refusal, Statistics, checksum,
 };
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};

@@ -1,8 +1,7 @@
 //! What a chip remembers through a power cut.
 
 use core::sync::atomic::{Ordering, compiler_fence};
-use palpate_shared::format::checksum;
-use palpate_shared::link::{Payload, Progress};
+use palpate_shared::link::{Payload, Progress, checksum};
 use serde::{Deserialize, Serialize};
 
 /// Which model is in use; bytes of it where it was loaded.

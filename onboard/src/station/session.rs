@@ -3,8 +3,9 @@
 use super::record::{Records, Source, Staged};
 use crate::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
 use palpate_shared::Touch;
-use palpate_shared::format::checksum;
-use palpate_shared::link::{Decision, Detail, Device, ModelInfo, Outcome, Payload, Progress, Refusal, VerdictMessage};
+use palpate_shared::link::{
+    Decision, Detail, Device, ModelInfo, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
+};
 
 /// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: for each object what one
 /// object alone would take.

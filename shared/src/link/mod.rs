@@ -36,7 +36,7 @@ mod host;
 mod message;
 
 pub use device::{Device, DeviceEnd, Progress};
-pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
+pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, checksum, encode};
 pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
 pub use message::{
     Answer, Command, Decision, Detail, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,

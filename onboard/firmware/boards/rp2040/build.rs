@@ -12,15 +12,9 @@ fn main() -> io::Result<()> {
     println!("cargo::rustc-link-arg-bins=--nmagic");
 
     println!("cargo::rerun-if-env-changed=PALPATE_MODEL");
-    let model = match env::var_os("PALPATE_MODEL").map(PathBuf::from) {
-        Some(model) => fs::canonicalize(model)?,
-        None => {
-            println!("cargo::warning=no model: build with PALPATE_MODEL=/path/to/model.palpate");
-            let empty = out.join("empty.palpate");
-            fs::write(&empty, [])?;
-            empty
-        }
-    };
+    // The household objects, unless PALPATE_MODEL names another model.
+    let model = env::var_os("PALPATE_MODEL").unwrap_or_else(|| "../../../../models/household.palpate".into());
+    let model = fs::canonicalize(model)?;
     println!("cargo::rerun-if-changed={}", model.display());
     println!("cargo::rustc-env=PALPATE_MODEL={}", model.display());
     Ok(())

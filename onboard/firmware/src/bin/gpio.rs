@@ -1,7 +1,7 @@
 //! Recognises from three switches on three pins, and tells a host of every touch and fault over the UART
 //! (`palpate watch`). A verdict ends an object; the next touch begins another.
 //!
-//! The model is built in: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`.
+//! The model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`.
 #![no_std]
 #![no_main]
 

@@ -6,7 +6,7 @@
 //! | GP0, GP1 | UART to the host, 115,200 baud: `palpate watch /dev/ttyUSB0` |
 //! | GP25 | the Pico's LED: lit from a recognition to the next touch |
 //!
-//! Build with `PALPATE_MODEL=/path/to/model.palpate cargo run --release`. For another probe than the model's: its measures
+//! Another model: `PALPATE_MODEL=/path/to/model.palpate cargo run --release`. For another probe than the model's: its measures
 //! in [`PROBE`] and [`MODEL_PROBE`].
 #![no_std]
 #![no_main]
