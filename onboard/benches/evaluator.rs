@@ -235,7 +235,7 @@ struct Words {
 
 impl Words {
     fn new(bytes: &[u8]) -> Self {
-        let mut buffer = Vec::with_capacity(bytes.len() + 4);
+        let mut buffer = Vec::<u8>::with_capacity(bytes.len() + 4);
         let start = buffer.as_ptr().align_offset(4);
         buffer.resize(start, 0);
         buffer.extend(bytes);
