@@ -36,7 +36,8 @@ impl Scale {
         let largest: Vec<f64> = forest.trees.iter().map(|tree| f64::from(tree.largest)).collect();
         let all = largest.iter().copied().fold(0.0, f64::max);
         // From the finest unit to the coarsest, the first that some tree needs and whose sums stay in range.
-        (0..=max_shift(leaf)).rev().find_map(|shift| {
+        // Leaves too large for any of these take as many shifts as they need.
+        (0..=max_shift(leaf)).rev().chain(max_shift(leaf) + 1..=16).find_map(|shift| {
             let unit = unit_for(all, most * f64::from(1 << shift))?;
             let shifts: Vec<u8> = largest.iter().map(|&value| shift_for(value, most * f64::from(unit))).collect();
             let needed =
