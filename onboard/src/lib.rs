@@ -37,6 +37,7 @@ mod validate;
 
 pub use error::ModelError;
 pub use evidence::Posterior;
+pub use exp::exp2_negative;
 pub use model::Model;
 pub use palpate_shared as shared;
 pub use recognizer::{CapacityError, Recognizer, Verdict};
