@@ -48,12 +48,18 @@ fn dataset(count: usize) -> Dataset {
     Dataset { objects: (0..OBJECTS).map(object).collect() }
 }
 
+/// On a good line nothing has to be sent again, however busy the machine that emulates the chip.
+const PATIENT: HostSettings = HostSettings { retry: 5_000_000, attempts: 10 };
+/// Where much is lost.
+const HASTY: HostSettings = HostSettings { retry: 50_000, attempts: 200 };
+
 /// Streams touches to an emulated chip that gets `model` first, and holds it against the host.
 fn parity(
     target: &str,
     model: &[u8],
     touches: u64,
     faults: Option<Faults>,
+    settings: HostSettings,
     mut each: impl FnMut(&mut Connection, &Update),
 ) -> Summary {
     let firmware = build("uart", target, None);
@@ -61,7 +67,7 @@ fn parity(
     if let Some(faults) = faults {
         transport = transport.with_faults(faults, 1);
     }
-    let mut connection = Connection::open(transport, HostSettings { retry: 50_000, attempts: 200 }).unwrap();
+    let mut connection = Connection::open(transport, settings).unwrap();
     connection.load(model, |_| ()).unwrap();
     let chip = connection.model().unwrap().unwrap();
     let host = Model::new(model).unwrap();
@@ -78,7 +84,7 @@ fn parity(
 fn ten_thousand_touches_give_the_hosts_verdicts_on_both_chips_and_for_both_descriptors() {
     for target in [M4F, M0] {
         for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
-            let summary = parity(target, &model(descriptor, 1), 10_000, None, |_, _| ());
+            let summary = parity(target, &model(descriptor, 1), 10_000, None, PATIENT, |_, _| ());
             eprintln!("{target}, {}: {:.0} touches a second", descriptor.name(), summary.rate());
             assert_eq!((summary.touches, summary.compared, summary.differences), (10_000, 10_000, 0), "{summary:?}");
             assert_eq!((summary.resent, summary.garbled, summary.chip_garbled), (0, 0, 0), "{summary:?}");
@@ -90,7 +96,7 @@ fn ten_thousand_touches_give_the_hosts_verdicts_on_both_chips_and_for_both_descr
 #[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
 fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
     let faults = "0.0005,0.0005,0.01,2".parse().unwrap();
-    let summary = parity(M4F, &model(Descriptor::Curvature, 1), 10_000, Some(faults), |_, _| ());
+    let summary = parity(M4F, &model(Descriptor::Curvature, 1), 10_000, Some(faults), HASTY, |_, _| ());
     eprintln!("{summary:?}");
     assert_eq!((summary.touches, summary.compared, summary.differences), (10_000, 10_000, 0), "{summary:?}");
     assert!(summary.resent > 100 && summary.garbled > 100 && summary.chip_garbled > 100, "{summary:?}");
@@ -103,7 +109,7 @@ fn a_chip_that_is_reset_a_hundred_times_loses_and_doubles_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (mut resets, mut wait) = (0, 50);
     let mut started = 0;
-    let summary = parity(M4F, &model(Descriptor::Curvature, 1), 20_000, None, |connection, update| {
+    let summary = parity(M4F, &model(Descriptor::Curvature, 1), 20_000, None, PATIENT, |connection, update| {
         started += u32::from(matches!(update, Update::Event(Event::Started, _)));
         wait -= 1;
         if wait <= 0 && resets < 100 {
@@ -123,12 +129,12 @@ fn a_chip_that_is_reset_a_hundred_times_loses_and_doubles_nothing() {
 fn soak_the_emulated_chip_neither_drifts_nor_loses_a_frame() {
     let touches = std::env::var("PALPATE_SOAK").map_or(30_000, |count| count.parse().unwrap());
     let mut events = 0;
-    let summary = parity(M4F, &model(Descriptor::Curvature, 1), touches, None, |_, update| {
+    let summary = parity(M4F, &model(Descriptor::Curvature, 1), touches, None, PATIENT, |_, update| {
         events += u32::from(matches!(update, Update::Event(..)));
     });
     eprintln!("{:.0} touches a second, {summary:?}", summary.rate());
     assert_eq!((summary.touches, summary.compared, summary.differences), (touches, touches, 0), "{summary:?}");
-    assert_eq!((summary.resent, summary.garbled, summary.chip_garbled, events), (0, 0, 0, 1), "{summary:?}");
+    assert_eq!((summary.resent, summary.garbled, summary.chip_garbled, events), (0, 0, 0, 0), "{summary:?}");
 }
 
 /// Edges as a host plays them: finger, level, time.
@@ -186,7 +192,8 @@ fn edges_on_pins_become_the_hosts_verdicts() {
         let mut expected = vec![Event::Started];
         let model = Model::new(&bytes).unwrap();
         let mut host = Station::<OBJECTS>::new(&model);
-        recording.wait(now);
+        // From power-up at 0 to there in steps that the driver can follow: less than half a turn of the clock.
+        [now / 3, now / 3 * 2, now].into_iter().for_each(|at| recording.wait(at));
         now = now.wrapping_add(50_000);
         let in_time = |touch: &Touch| touch.times().iter().all(|t| t.micros().is_none_or(|micros| micros < 390_000));
         let touches = random::touches(6_000, 9);

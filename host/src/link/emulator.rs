@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// What to start for the port `emulator`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,7 +66,9 @@ impl Emulator {
             return Err(Error::data("the emulator has no serial line", "Report this as a bug."));
         };
         let running = Running { child, directory: Some(directory) };
-        Ok(Transport::new("emulator".into(), stdout, stdin).with_emulator(running))
+        // The emulated UART writes each byte by itself: waking up for each would cost more than all the rest.
+        let gather = Duration::from_micros(300);
+        Ok(Transport::new("emulator".into(), stdout, stdin, gather).with_emulator(running))
     }
 }
 

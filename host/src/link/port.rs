@@ -55,7 +55,7 @@ impl Port {
                 let stream = TcpStream::connect(address).map_err(io)?;
                 stream.set_nodelay(true).map_err(io)?;
                 let reader = stream.try_clone().map_err(io)?;
-                Ok(Transport::new(self.to_string(), reader, stream))
+                Ok(Transport::new(self.to_string(), reader, stream, Duration::ZERO))
             }
             Self::Emulator => emulator.start(),
         }
@@ -72,7 +72,7 @@ fn open_serial(name: &str, baud: u32) -> Result<Transport> {
     };
     let port = serialport::new(name, baud).timeout(Duration::from_millis(100)).open().map_err(wrong)?;
     let reader = port.try_clone().map_err(wrong)?;
-    Ok(Transport::new(name.into(), Patient(reader), SerialWriter(port)))
+    Ok(Transport::new(name.into(), Patient(reader), SerialWriter(port), Duration::ZERO))
 }
 
 /// A serial port that is quiet has nothing to read yet; it has not failed.

@@ -31,12 +31,21 @@ impl Drop for Running {
 }
 
 impl Transport {
-    /// A transport of a reader, which a thread of its own waits on, and a writer; `name` is for errors.
-    pub fn new(name: String, mut reader: impl Read + Send + 'static, writer: impl Write + Send + 'static) -> Self {
+    /// A transport of a reader, which a thread of its own waits on, and a writer; `name` is for errors. `gather` is how
+    /// long bytes may pile up before they are read, where they come one by one.
+    pub fn new(
+        name: String,
+        mut reader: impl Read + Send + 'static,
+        writer: impl Write + Send + 'static,
+        gather: Duration,
+    ) -> Self {
         let (sender, received) = crossbeam_channel::unbounded();
         std::thread::spawn(move || {
             let mut buffer = [0; 4096];
             loop {
+                if !gather.is_zero() {
+                    std::thread::sleep(gather);
+                }
                 let read = match reader.read(&mut buffer) {
                     Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
                     Ok(count) => Ok(buffer.get(..count).unwrap_or_default().to_vec()),

@@ -96,8 +96,10 @@ pub fn take_retained() -> &'static mut [u8] {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interrupt(u16);
 
-/// UART 0 has received a byte.
-pub const UART_RECEIVED: Interrupt = Interrupt(0);
+/// The link's UART has received a byte.
+pub const LINK_RECEIVED: Interrupt = Interrupt(0);
+/// The UART over which a host plays the pins has received a byte.
+pub const PINS_RECEIVED: Interrupt = Interrupt(2);
 /// A pin has changed: the first GPIO port's combined interrupt.
 pub const PIN_CHANGED: Interrupt = Interrupt(6);
 
@@ -124,6 +126,16 @@ pub fn unmask(interrupt: Interrupt) {
 /// Holds an interrupt back.
 pub fn mask(interrupt: Interrupt) {
     cortex_m::peripheral::NVIC::mask(interrupt);
+}
+
+/// Sleeps until an interrupt, unless there is something to do already. With interrupts held back none can come between the
+/// look and the sleep, and a pending one ends the sleep.
+pub fn sleep_unless(busy: impl FnOnce() -> bool) {
+    critical_section::with(|_| {
+        if !busy() {
+            cortex_m::asm::wfi();
+        }
+    });
 }
 
 /// The registers of a UART (CMSDK APB UART).

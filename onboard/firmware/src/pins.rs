@@ -6,8 +6,8 @@
 //! little endian). The time counts as the clock's, the level is put into the port register, and the pin interrupt is
 //! pended, as a port does. Finger 3 is no edge: time passes.
 
-use crate::chip::{PIN_CHANGED, UartRegisters};
-use crate::uart::BAUD_DIVIDER;
+use crate::chip::PIN_CHANGED;
+use crate::uart::{Port, Uart};
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
@@ -47,6 +47,7 @@ impl Clock for PlayedClock {
 
 /// The host's hand on the pins.
 pub struct Player {
+    uart: Uart,
     received: [u8; 6],
     count: usize,
 }
@@ -60,14 +61,18 @@ impl Default for Player {
 impl Player {
     /// Begins to listen.
     pub fn new() -> Self {
-        UartRegisters::SECOND.enable(BAUD_DIVIDER);
-        Self { received: [0; 6], count: 0 }
+        Self { uart: Uart::take(Port::Pins), received: [0; 6], count: 0 }
+    }
+
+    /// Whether the host has sent something.
+    pub fn is_ready(&self) -> bool {
+        self.uart.is_ready()
     }
 
     /// Plays one edge, if one has come, and says whether it did.
     pub fn play(&mut self) -> bool {
         while let Some(slot) = self.received.get_mut(self.count) {
-            let Some(byte) = UartRegisters::SECOND.read() else { return false };
+            let Some(byte) = self.uart.receive() else { return false };
             *slot = byte;
             self.count += 1;
         }

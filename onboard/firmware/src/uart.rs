@@ -1,6 +1,6 @@
-//! The mps2 machines' first UART as an [`embedded_io`] transport: received by interrupt, sent by waiting.
+//! The mps2 machines' UARTs as [`embedded_io`] transports: received by interrupt, sent by waiting.
 
-use crate::chip::{self, UartRegisters};
+use crate::chip::{self, Interrupt, UartRegisters};
 use core::cell::RefCell;
 use core::convert::Infallible;
 use critical_section::Mutex;
@@ -11,48 +11,99 @@ use heapless::spsc::{Consumer, Producer, Queue};
 const WAITING: usize = 256;
 
 /// Cycles of the 25 MHz clock for a bit at 115,200 baud.
-pub const BAUD_DIVIDER: u32 = 217;
+const BAUD_DIVIDER: u32 = 217;
 
-const LINK: UartRegisters = UartRegisters::FIRST;
+/// One of the machine's UARTs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// The link to the host.
+    Link,
+    /// Where a host plays the pins.
+    Pins,
+}
 
-/// The interrupt's end of the queue.
-static RECEIVER: Mutex<RefCell<Option<Producer<'static, u8>>>> = Mutex::new(RefCell::new(None));
+type Receiver = Mutex<RefCell<Option<Producer<'static, u8>>>>;
 
-/// The UART.
+/// The interrupts' ends of the queues.
+static LINK: Receiver = Mutex::new(RefCell::new(None));
+static PINS: Receiver = Mutex::new(RefCell::new(None));
+
+impl Port {
+    const fn registers(self) -> UartRegisters {
+        match self {
+            Self::Link => UartRegisters::FIRST,
+            Self::Pins => UartRegisters::SECOND,
+        }
+    }
+
+    const fn interrupt(self) -> Interrupt {
+        match self {
+            Self::Link => chip::LINK_RECEIVED,
+            Self::Pins => chip::PINS_RECEIVED,
+        }
+    }
+
+    const fn receiver(self) -> &'static Receiver {
+        match self {
+            Self::Link => &LINK,
+            Self::Pins => &PINS,
+        }
+    }
+
+    /// The receive interrupt.
+    pub fn received(self) {
+        critical_section::with(|cs| {
+            let mut receiver = self.receiver().borrow_ref_mut(cs);
+            let Some(queue) = receiver.as_mut() else { return };
+            self.registers().clear_received();
+            while queue.ready() {
+                match self.registers().read() {
+                    Some(byte) => drop(queue.enqueue(byte)),
+                    None => return,
+                }
+            }
+            // The queue is full: the byte waits in the UART until the main loop has made room.
+            chip::mask(self.interrupt());
+        });
+    }
+}
+
+/// A UART in use.
 pub struct Uart {
+    port: Port,
     received: Consumer<'static, u8>,
 }
 
 impl Uart {
-    /// Sets the UART up, once.
+    /// Sets a UART up, once.
     ///
     /// # Panics
     /// The second time.
-    pub fn take() -> Self {
-        let queue = cortex_m::singleton!(: Queue<u8, WAITING> = Queue::new()).expect("the UART is taken once");
-        let (producer, received) = queue.split();
-        critical_section::with(|cs| RECEIVER.replace(cs, Some(producer)));
-        LINK.enable(BAUD_DIVIDER);
-        chip::unmask(chip::UART_RECEIVED);
-        Self { received }
+    pub fn take(port: Port) -> Self {
+        let queue = match port {
+            Port::Link => cortex_m::singleton!(: Queue<u8, WAITING> = Queue::new()),
+            Port::Pins => cortex_m::singleton!(: Queue<u8, WAITING> = Queue::new()),
+        };
+        let (producer, received) = queue.expect("a UART is taken once").split();
+        critical_section::with(|cs| port.receiver().replace(cs, Some(producer)));
+        port.registers().enable(BAUD_DIVIDER);
+        chip::unmask(port.interrupt());
+        Self { port, received }
     }
-}
 
-/// The UART's receive interrupt.
-pub fn received() {
-    critical_section::with(|cs| {
-        let mut receiver = RECEIVER.borrow_ref_mut(cs);
-        let Some(queue) = receiver.as_mut() else { return };
-        LINK.clear_received();
-        while queue.ready() {
-            match LINK.read() {
-                Some(byte) => drop(queue.enqueue(byte)),
-                None => return,
-            }
+    /// A received byte, without waiting.
+    pub fn receive(&mut self) -> Option<u8> {
+        let byte = self.received.dequeue();
+        if byte.is_none() {
+            chip::unmask(self.port.interrupt());
         }
-        // The queue is full: the byte waits in the UART until the main loop has made room.
-        chip::mask(chip::UART_RECEIVED);
-    });
+        byte
+    }
+
+    /// Whether a byte has been received.
+    pub fn is_ready(&self) -> bool {
+        self.received.ready()
+    }
 }
 
 impl ErrorType for Uart {
@@ -67,35 +118,29 @@ impl Read for Uart {
         loop {
             let mut count = 0;
             while let Some(slot) = buffer.get_mut(count)
-                && let Some(byte) = self.received.dequeue()
+                && let Some(byte) = self.receive()
             {
                 *slot = byte;
                 count += 1;
             }
-            chip::unmask(chip::UART_RECEIVED);
             if count > 0 {
                 return Ok(count);
             }
-            // With interrupts held back none can come between the look and the sleep; a pending one ends the sleep.
-            critical_section::with(|_| {
-                if !self.received.ready() {
-                    cortex_m::asm::wfi();
-                }
-            });
+            chip::sleep_unless(|| self.is_ready());
         }
     }
 }
 
 impl embedded_io::ReadReady for Uart {
     fn read_ready(&mut self) -> Result<bool, Infallible> {
-        Ok(self.received.ready())
+        Ok(self.is_ready())
     }
 }
 
 impl Write for Uart {
     fn write(&mut self, buffer: &[u8]) -> Result<usize, Infallible> {
         let Some(&byte) = buffer.first() else { return Ok(0) };
-        while !LINK.write(byte) {}
+        while !self.port.registers().write(byte) {}
         Ok(1)
     }
 

@@ -327,6 +327,13 @@ impl HostEnd {
                     return;
                 }
                 self.next_event = Some(sequence.wrapping_add(1));
+                if event == Event::Started {
+                    // What was on its way to the chip when it was reset is gone.
+                    self.send_again(self.oldest, now, send);
+                    if let Some((_, question)) = &mut self.question {
+                        question.again(now, &mut self.statistics, send);
+                    }
+                }
                 self.statistics.missed_events += u64::from(missed);
                 incoming(Incoming::Event { event, missed });
             }

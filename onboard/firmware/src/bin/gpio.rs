@@ -12,7 +12,7 @@ use embedded_io::{Read, ReadReady, Write};
 use heapless::spsc::{Producer, Queue};
 use palpate_firmware::chip::{self, Interrupt};
 use palpate_firmware::pins::{Pin, PlayedClock, Player};
-use palpate_firmware::uart::{self, Uart};
+use palpate_firmware::uart::{Port, Uart};
 use palpate_onboard::Model;
 use palpate_onboard::effector::{Active, Edge, Effector, Fault, Fingers, Settings, Watcher, drain};
 use palpate_onboard::station::Station;
@@ -37,7 +37,7 @@ fn main() -> ! {
         palpate_firmware::println!("no model is built in: build with PALPATE_MODEL=/path/to/model.palpate");
         palpate_firmware::fail()
     };
-    let mut uart = Uart::take();
+    let mut uart = Uart::take(Port::Link);
     let mut player = Player::new();
     let mut station = Station::<OBJECTS>::new(&model);
     let mut end = DeviceEnd::new(Progress::NONE);
@@ -51,7 +51,7 @@ fn main() -> ! {
     end.tell(Event::Started, |frame| send(&mut uart, frame));
 
     loop {
-        player.play();
+        let played = player.play();
         if let Ok(true) = uart.read_ready() {
             let mut buffer = [0; 32];
             let count = uart.read(&mut buffer).unwrap_or(0);
@@ -69,8 +69,11 @@ fn main() -> ! {
             Ok(None) => unreadable.map(Event::from),
             Err(fault) => Some(fault.into()),
         };
-        if let Some(event) = event {
-            end.tell(event, |frame| send(&mut uart, frame));
+        match event {
+            Some(event) => end.tell(event, |frame| send(&mut uart, frame)),
+            // On a board: wake up every millisecond as well, for what is due without an edge.
+            None if !played => chip::sleep_unless(|| player.is_ready() || uart.is_ready() || received.ready()),
+            None => {}
         }
     }
 }
@@ -97,7 +100,8 @@ fn pin_changed() {
 #[exception]
 unsafe fn DefaultHandler(number: i16) {
     match Interrupt::from_number(number) {
-        chip::UART_RECEIVED => uart::received(),
+        chip::LINK_RECEIVED => Port::Link.received(),
+        chip::PINS_RECEIVED => Port::Pins.received(),
         chip::PIN_CHANGED => pin_changed(),
         _ => {}
     }

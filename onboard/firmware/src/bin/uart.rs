@@ -7,7 +7,7 @@
 
 use cortex_m_rt::{entry, exception};
 use palpate_firmware::chip::{self, Interrupt};
-use palpate_firmware::uart::{self, Uart};
+use palpate_firmware::uart::{Port, Uart};
 use palpate_onboard::station::{Memory, serve};
 
 /// Objects that a model may have.
@@ -15,7 +15,7 @@ const OBJECTS: usize = 16;
 
 #[entry]
 fn main() -> ! {
-    let mut uart = Uart::take();
+    let mut uart = Uart::take(Port::Link);
     let retained = chip::take_retained();
     let (first_record, rest) = retained.split_at_mut(Memory::record_length(OBJECTS));
     let (second_record, rest) = rest.split_at_mut(Memory::record_length(OBJECTS));
@@ -31,7 +31,7 @@ fn main() -> ! {
 #[allow(unsafe_code)] // cortex-m-rt wants the word; nothing in it needs it.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {
-    if Interrupt::from_number(number) == chip::UART_RECEIVED {
-        uart::received();
+    if Interrupt::from_number(number) == chip::LINK_RECEIVED {
+        Port::Link.received();
     }
 }

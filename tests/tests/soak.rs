@@ -1,0 +1,135 @@
+//! A day of touches, shortened: the chip's whole program in one process, the host in another, the link between them.
+//!
+//! 100,000 touches; `PALPATE_SOAK=1000000 cargo test --release -p palpate-tests --test soak` for a million.
+
+use palpate::compile::{Leaf, Settings, compile};
+use palpate::dataset::{Dataset, ObjectTouches};
+use palpate::link::{Connection, Emulator, Port, Steps, Update, stream};
+use palpate_onboard::Model;
+use palpate_onboard::station::{Memory, serve};
+use palpate_shared::Descriptor;
+use palpate_shared::link::HostSettings;
+use palpate_tests::random::{self, Shape};
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::ops::ControlFlow;
+use std::process::{Command, Stdio};
+
+const OBJECTS: usize = 10;
+/// Tells the process that is the chip where its host is.
+const HOST: &str = "PALPATE_SOAK_HOST";
+
+/// A stream of the standard library's as the chip's transport.
+struct Wire(TcpStream);
+
+impl embedded_io::ErrorType for Wire {
+    type Error = std::io::Error;
+}
+
+impl embedded_io::Read for Wire {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        self.0.read(buffer)
+    }
+}
+
+impl embedded_io::Write for Wire {
+    fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
+        self.0.write(buffer)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+/// Passes on what it gets, until either end is gone.
+fn pass(mut from: TcpStream, mut to: TcpStream) {
+    let _ = std::io::copy(&mut from, &mut to);
+    let _ = to.shutdown(std::net::Shutdown::Both);
+}
+
+/// Not a test of its own: this is the chip, when the soak starts this program again.
+#[test]
+fn the_chips_process() {
+    let Ok(host) = std::env::var(HOST) else { return };
+    let mut wire = Wire(TcpStream::connect(host).unwrap());
+    wire.0.set_nodelay(true).unwrap();
+    let [mut a, mut b] = [(); 2].map(|()| vec![0; 100_000]);
+    let [mut c, mut d] = [(); 2].map(|()| vec![0; Memory::record_length(OBJECTS)]);
+    let memory = Memory { built_in: &[], models: [&mut a, &mut b], records: [&mut c, &mut d] };
+    serve::<OBJECTS, _>(memory, &mut wire).unwrap();
+}
+
+/// Resident memory of a process in bytes, where the system tells.
+fn memory(process: &str) -> Option<u64> {
+    let pages = std::fs::read_to_string(format!("/proc/{process}/statm")).ok()?;
+    pages.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)
+}
+
+#[test]
+fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
+    let count: u64 = std::env::var("PALPATE_SOAK").map_or(100_000, |count| count.parse().unwrap());
+    let shape = Shape {
+        descriptor: Descriptor::Oriented,
+        objects: OBJECTS,
+        trees: 20,
+        depth: 5,
+        each: true,
+        thresholds: 200,
+        leaf: 0.02,
+    };
+    let settings = Settings { leaf: Leaf::I16, ..Settings::default() };
+    let bytes = compile(&random::ensemble(shape, 1), &settings).unwrap().bytes;
+    let model = Model::new(&bytes).unwrap();
+
+    // The chip connects to us, and palpate link connects to what passes its bytes on.
+    let chips_end = TcpListener::bind("127.0.0.1:0").unwrap();
+    let hosts_end = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut chip = Command::new(std::env::current_exe().unwrap());
+    chip.args(["--exact", "the_chips_process"]).env(HOST, chips_end.local_addr().unwrap().to_string());
+    let mut chip = chip.stdout(Stdio::null()).spawn().unwrap();
+    let (to_chip, _) = chips_end.accept().unwrap();
+    to_chip.set_nodelay(true).unwrap();
+    let port = Port::Tcp(hosts_end.local_addr().unwrap().to_string());
+    let passing = std::thread::spawn(move || {
+        let (to_host, _) = hosts_end.accept().unwrap();
+        to_host.set_nodelay(true).unwrap();
+        let (from_host, from_chip) = (to_host.try_clone().unwrap(), to_chip.try_clone().unwrap());
+        let up = std::thread::spawn(move || pass(from_chip, to_host));
+        pass(from_host, to_chip);
+        up.join().unwrap();
+    });
+
+    let transport = port.open(115_200, &Emulator::default()).unwrap();
+    let mut connection = Connection::open(transport, HostSettings { retry: 5_000_000, attempts: 10 }).unwrap();
+    connection.load(&bytes, |_| ()).unwrap();
+    let described = connection.model().unwrap().unwrap();
+    let object =
+        |index: usize| ObjectTouches { name: format!("object {index}"), touches: random::touches(997, index as u64) };
+    let dataset = Dataset { objects: (0..OBJECTS).map(object).collect() };
+    let (mut early, mut done, mut events) = ([None; 2], 0_u64, 0);
+    let processes = ["self".to_owned(), chip.id().to_string()];
+    let summary =
+        stream(&mut connection, Steps::sequences(dataset, 300, count), &described, Some(&model), |_, update| {
+            done += u64::from(matches!(update, Update::Touch { .. }));
+            events += u32::from(matches!(update, Update::Event(..)));
+            if done == count / 10 && early[0].is_none() {
+                early = processes.each_ref().map(|process| memory(process));
+            }
+            Ok(ControlFlow::Continue(()))
+        })
+        .unwrap();
+    let late = processes.each_ref().map(|process| memory(process));
+    drop(connection);
+    passing.join().unwrap();
+    assert!(chip.wait().unwrap().success(), "the chip's process");
+
+    eprintln!("{:.0} touches a second; memory {early:?} then {late:?}; {summary:?}", summary.rate());
+    assert_eq!((summary.touches, summary.compared, summary.differences), (count, count, 0), "{summary:?}");
+    assert_eq!((summary.resent, summary.garbled, summary.chip_garbled), (0, 0, 0), "{summary:?}");
+    assert_eq!((summary.chip_repeated, summary.chip_early, events), (0, 0, 0), "{summary:?}");
+    for (early, late) in early.into_iter().zip(late) {
+        let Some((early, late)) = early.zip(late) else { continue };
+        assert!(late < early + (1 << 20), "memory grew from {early} to {late} bytes");
+    }
+}
