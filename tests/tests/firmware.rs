@@ -87,7 +87,7 @@ fn ten_thousand_touches_give_the_hosts_verdicts_on_both_chips_and_for_both_descr
             let summary = parity(target, &model(descriptor, 1), 10_000, None, PATIENT, |_, _| ());
             eprintln!("{target}, {}: {:.0} touches a second", descriptor.name(), summary.rate());
             assert_eq!((summary.touches, summary.compared, summary.differences), (10_000, 10_000, 0), "{summary:?}");
-            assert_eq!((summary.resent, summary.garbled, summary.chip_garbled), (0, 0, 0), "{summary:?}");
+            assert_eq!((summary.chip_repeated, summary.garbled, summary.chip_garbled), (0, 0, 0), "{summary:?}");
         }
     }
 }
@@ -134,7 +134,7 @@ fn soak_the_emulated_chip_neither_drifts_nor_loses_a_frame() {
     });
     eprintln!("{:.0} touches a second, {summary:?}", summary.rate());
     assert_eq!((summary.touches, summary.compared, summary.differences), (touches, touches, 0), "{summary:?}");
-    assert_eq!((summary.resent, summary.garbled, summary.chip_garbled, events), (0, 0, 0, 0), "{summary:?}");
+    assert_eq!((summary.chip_repeated, summary.garbled, summary.chip_garbled, events), (0, 0, 0, 0), "{summary:?}");
 }
 
 /// Edges as a host plays them: finger, level, time.

@@ -126,7 +126,7 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
 
     eprintln!("{:.0} touches a second; memory {early:?} then {late:?}; {summary:?}", summary.rate());
     assert_eq!((summary.touches, summary.compared, summary.differences), (count, count, 0), "{summary:?}");
-    assert_eq!((summary.resent, summary.garbled, summary.chip_garbled), (0, 0, 0), "{summary:?}");
+    assert_eq!((summary.garbled, summary.chip_garbled), (0, 0), "{summary:?}");
     assert_eq!((summary.chip_repeated, summary.chip_early, events), (0, 0, 0), "{summary:?}");
     for (early, late) in early.into_iter().zip(late) {
         let Some((early, late)) = early.zip(late) else { continue };

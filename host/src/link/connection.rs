@@ -225,9 +225,10 @@ impl Connection {
             let offset = u32::try_from(index * CHUNK).unwrap_or(u32::MAX);
             Command::Chunk { offset, bytes }
         });
-        let mut commands = std::iter::once(begin).chain(chunks).chain([Command::Commit]).peekable();
+        let mut commands = std::iter::once(begin).chain(chunks).chain([Command::Commit]);
+        let total = bytes.len().div_ceil(CHUNK) + 2;
         let mut done = 0_usize;
-        while commands.peek().is_some() || !self.is_idle() {
+        while done < total {
             while self.has_room()
                 && let Some(command) = commands.next()
             {
