@@ -3,7 +3,7 @@
 use super::Precision;
 use super::narrow::{Motion, Triangle};
 use super::pack::{LANES, Pack, Ray, WIDTH};
-use glam::{BVec4A, DVec3, Vec3A, Vec4};
+use glam::{BVec4A, DVec3, Vec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
@@ -19,6 +19,14 @@ struct Node {
 
 /// A child that is a pack has this bit set.
 const PACK: u32 = 1 << 31;
+
+/// A child that may have to be looked into.
+struct Open {
+    /// The sphere does not touch it before this.
+    near: f32,
+    node: u32,
+    child: u32,
+}
 
 /// A tree over the triangles of a surface.
 #[derive(Clone, Debug)]
@@ -59,24 +67,30 @@ impl Tree {
         let mut limit = first as f32;
         // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this.
         let mut stack = Vec::with_capacity(96);
-        stack.push((0.0_f32, 0_u32));
-        while let Some((near, child)) = stack.pop() {
+        self.nodes[0].visit(0, &ray, limit, &mut stack);
+        while let Some(Open { near, node, child }) = stack.pop() {
             if near > limit {
+                break;
+            }
+            // The limit may have come nearer since the child was put there.
+            let parent = &self.nodes[node as usize];
+            if parent.has_passed(child, &ray, limit) {
                 continue;
             }
-            if child & PACK != 0 {
-                let pack = &self.packs[(child & !PACK) as usize];
-                let mut earliest = if P::REJECT { pack.earliest(&ray, limit) } else { pack.unknown() };
-                while let Some(lane) = pop_least(&mut earliest, limit) {
-                    let triangle = &triangles[pack.first as usize + lane];
-                    if let Some(distance) = P::first_contact(motion, triangle, first) {
-                        first = distance;
-                        // Rounded up, and with room for the boxes' own rounding.
-                        limit = first as f32 + 2.0 * (ray.margin - motion.radius as f32);
-                    }
+            let link = parent.children[child as usize];
+            if link & PACK == 0 {
+                self.nodes[link as usize].visit(link, &ray, limit, &mut stack);
+                continue;
+            }
+            let pack = &self.packs[(link & !PACK) as usize];
+            let mut earliest = if P::REJECT { pack.earliest(&ray, limit) } else { pack.unknown() };
+            while let Some(lane) = pop_least(&mut earliest, limit) {
+                let triangle = &triangles[pack.first as usize + lane];
+                if let Some(distance) = P::first_contact(motion, triangle, first) {
+                    first = distance;
+                    // Rounded up, and with room for the boxes' own rounding.
+                    limit = first as f32 + 2.0 * (ray.margin - motion.radius as f32);
                 }
-            } else {
-                self.nodes[child as usize].visit(&ray, limit, &mut stack);
             }
         }
         let is_contact = if motion.direction == DVec3::ZERO { first == 0.0 } else { first < f64::INFINITY };
@@ -87,9 +101,9 @@ impl Tree {
 impl Node {
     const EMPTY: Self = Self { centre: [Vec4::ZERO; 3], half: [Vec4::splat(-1e30); 3], children: [0; WIDTH] };
 
-    /// Puts the children that the sphere may touch before `limit` on the stack, the nearest on top.
+    /// Puts the children that the sphere may touch before `limit` on the stack, which has the nearest of all on top.
     #[inline]
-    fn visit(&self, ray: &Ray, limit: f32, stack: &mut Vec<(f32, u32)>) {
+    fn visit(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Open>) {
         let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(limit));
         for axis in 0..3 {
             let middle = (self.centre[axis] - ray.origin[axis]) * ray.inverse[axis];
@@ -109,14 +123,14 @@ impl Node {
         if limit < f32::INFINITY {
             met &= !self.passed(ray, limit);
         }
-        let (mut met, near) = (met.bitmask(), near.to_array());
-        let bottom = stack.len();
+        let (mut met, nears) = (met.bitmask(), near.to_array());
         while met != 0 {
-            let child = met.trailing_zeros() as usize;
+            let child = met.trailing_zeros();
             met &= met - 1;
+            let near = nears[child as usize];
             let mut place = stack.len();
-            stack.push((near[child], self.children[child]));
-            while place > bottom && stack[place - 1].0 < near[child] {
+            stack.push(Open { near, node: index, child });
+            while place > 0 && stack[place - 1].near < near {
                 stack.swap(place - 1, place);
                 place -= 1;
             }
@@ -136,6 +150,18 @@ impl Node {
             forward += gap * ray.direction()[axis];
         }
         forward.cmpge(Vec4::ZERO) & square.cmpgt(Vec4::splat(ray.margin * ray.margin))
+    }
+
+    /// The same for one child.
+    #[inline]
+    fn has_passed(&self, child: u32, ray: &Ray, limit: f32) -> bool {
+        if limit == f32::INFINITY {
+            return false;
+        }
+        let lane = |axes: &[Vec4; 3]| Vec3::from(axes.each_ref().map(|axis| axis.as_ref()[child as usize]));
+        let way = lane(&self.centre) - (ray.origin + ray.direction() * limit);
+        let gap = (way.abs() - lane(&self.half)).max(Vec3::ZERO).copysign(way);
+        gap.dot(ray.direction()) >= 0.0 && gap.length_squared() > ray.margin * ray.margin
     }
 }
 
