@@ -158,7 +158,7 @@ fn convert(part: &Path, done: &Path, object: &str) -> Result<()> {
     let unfinished = done.with_extension("parquet.part");
     let io = |error| stopped(&unfinished, error);
     let file = File::create(&unfinished).map_err(io)?;
-    crate::dataset::parquet::write(&unfinished, &file, object, crate::dataset::lines(part)?)?;
+    crate::dataset::parquet::write(&unfinished, &file, object, crate::dataset::text::lines(part)?)?;
     file.sync_all().map_err(io)?;
     std::fs::rename(&unfinished, done).map_err(io)?;
     std::fs::remove_file(part).map_err(|error| Error::io(part, "remove the converted touches", error))

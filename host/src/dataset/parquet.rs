@@ -3,7 +3,7 @@
 //! A row a touch: `object` (string), `t1`, `t2`, `t3` (seconds, null where a finger never touched), `direction` and
 //! `alignment` (lists of three, null where unknown). Row groups of about a million rows.
 
-use super::{contact_time, to_q15};
+use super::text::{contact_time, to_q15};
 use crate::error::{Error, Result};
 use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use parquet::basic::Compression;

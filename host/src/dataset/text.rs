@@ -1,0 +1,203 @@
+//! Touches as text: a line a touch.
+//!
+//! A line holds three contact times in seconds, a missing contact as `-`, and optionally the probe's direction and
+//! alignment (six numbers). Fields are separated by spaces or commas. The published data set has the same format.
+
+use crate::error::{Error, Result};
+use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// The touches of a text, one after the other; blank lines are skipped, and errors name `path`.
+///
+/// Memory: that of the longest line.
+pub fn touches(mut text: impl BufRead, path: &Path) -> impl Iterator<Item = Result<Touch>> {
+    let (mut bytes, mut line) = (Vec::new(), 0);
+    std::iter::from_fn(move || {
+        loop {
+            bytes.clear();
+            line += 1;
+            match text.read_until(b'\n', &mut bytes) {
+                Err(error) => return Some(Err(Error::io(path, "read the touches", error))),
+                Ok(0) => return None,
+                Ok(_) => {}
+            }
+            let wrong = |what| Error::line(path, line, what, "Correct the line, or capture the object anew.");
+            match std::str::from_utf8(&bytes).map(str::trim) {
+                Err(_) => return Some(Err(wrong("not text (no UTF-8)".to_owned()))),
+                Ok("") => {}
+                Ok(text) => return Some(parse_touch(text).map_err(wrong)),
+            }
+        }
+    })
+}
+
+/// The touches of a text file, one after the other.
+///
+/// # Errors
+/// When the file cannot be opened; then each line that is wrong.
+pub fn lines(path: &Path) -> Result<impl Iterator<Item = Result<Touch>>> {
+    let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+    Ok(touches(BufReader::with_capacity(1 << 16, file), path))
+}
+
+/// Reads the touches of one text file; blank lines are skipped.
+///
+/// # Errors
+/// When the file cannot be read, holds no touch, or has a wrong line.
+pub fn read(path: &Path) -> Result<Vec<Touch>> {
+    let touches = lines(path)?.collect::<Result<Vec<_>>>()?;
+    if touches.is_empty() {
+        return Err(Error::file(path, "no touches in it", "Capture the object anew, or remove the file."));
+    }
+    Ok(touches)
+}
+
+/// Reads one line: three contact times in seconds on any common clock (`-` where missing), rounded to whole
+/// microseconds and shifted so that the first contact is 0, and optionally direction and alignment.
+///
+/// # Errors
+/// What is wrong with the line, without a full stop.
+pub fn parse_touch(line: &str) -> Result<Touch, String> {
+    let mut fields = [""; 9];
+    let mut count = 0;
+    for field in line.split(|c: char| c == ',' || c.is_whitespace()).filter(|field| !field.is_empty()) {
+        if let Some(slot) = fields.get_mut(count) {
+            *slot = field;
+        }
+        count += 1;
+    }
+    if count != 3 && count != 9 {
+        return Err(format!("{count} fields where a touch has three times, or three times and six direction cosines"));
+    }
+    let [a, b, c, pose @ ..] = fields;
+    let touch = Touch::new([parse_time(a)?, parse_time(b)?, parse_time(c)?]);
+    if count == 3 {
+        return Ok(touch);
+    }
+    let [dx, dy, dz, ax, ay, az] = pose;
+    let direction = parse_unit("direction", [dx, dy, dz])?;
+    let alignment = parse_unit("alignment", [ax, ay, az])?;
+    Ok(touch.with_pose(Pose { direction, alignment }))
+}
+
+/// The longest contact time that a touch can hold, in microseconds.
+const LONGEST: f64 = (u32::MAX - 1) as f64;
+
+fn parse_time(field: &str) -> Result<ContactTime, String> {
+    if field == "-" {
+        return Ok(ContactTime::MISSING);
+    }
+    contact_time(parse_number(field)?)
+}
+
+/// Finite seconds as whole microseconds.
+pub(super) fn contact_time(seconds: f64) -> Result<ContactTime, String> {
+    if seconds < 0.0 {
+        return Err(format!("the time {seconds} is negative"));
+    }
+    let micros = (seconds * 1e6).round();
+    if micros > LONGEST {
+        return Err(format!("the time {seconds} is longer than the 4294 s that a touch can hold"));
+    }
+    Ok(ContactTime::from_micros(micros as u32))
+}
+
+/// A unit vector in Q15. Vectors shorter or longer than 1 by more than 1 % are refused.
+fn parse_unit(what: &str, fields: [&str; 3]) -> Result<[i16; 3], String> {
+    let [x, y, z] = fields;
+    let vector = [parse_number(x)?, parse_number(y)?, parse_number(z)?];
+    let length = vector.iter().map(|c| c * c).sum::<f64>().sqrt();
+    if (length - 1.0).abs() > 0.01 {
+        return Err(format!("the {what} has length {length:.3} where a unit vector has 1"));
+    }
+    Ok(vector.map(to_q15))
+}
+
+fn parse_number(field: &str) -> Result<f64, String> {
+    let number: f64 = field.parse().map_err(|_| format!("{field:?} is not a number"))?;
+    if number.is_finite() { Ok(number) } else { Err(format!("{field} is not finite")) }
+}
+
+/// A direction cosine as the nearest Q15 number.
+pub fn to_q15(cosine: f64) -> i16 {
+    let one = f64::from(Q15_ONE);
+    (cosine * one).round().clamp(-one, one) as i16
+}
+
+/// Appends the line of a touch with its line end: times with six decimals, and with `pose` the direction and alignment
+/// (six decimals, enough to find each Q15 number again). [`parse_touch`] gives the same touch back.
+pub fn write_touch(line: &mut String, touch: &Touch, pose: bool) {
+    let mut separator = "";
+    for time in touch.times() {
+        // Writing to a string cannot fail.
+        let _ = match time.micros() {
+            Some(micros) => write!(line, "{separator}{}.{:06}", micros / 1_000_000, micros % 1_000_000),
+            None => write!(line, "{separator}-"),
+        };
+        separator = " ";
+    }
+    if let (true, Some(Pose { direction, alignment })) = (pose, touch.pose()) {
+        for cosine in direction.into_iter().chain(alignment) {
+            let _ = write!(line, " {:.6}", f64::from(cosine) / f64::from(Q15_ONE));
+        }
+    }
+    line.push('\n');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(touch: &Touch, pose: bool) -> String {
+        let mut line = String::new();
+        write_touch(&mut line, touch, pose);
+        line
+    }
+
+    #[test]
+    fn times_are_rounded_to_whole_microseconds_and_start_at_zero() {
+        let touch = parse_touch("0.0300005 0.01, 0.5").unwrap();
+        assert_eq!(touch.times().map(|t| t.micros()), [Some(20_001), Some(0), Some(490_000)]);
+        assert_eq!(parse_touch("0,1e-6,-").unwrap().times().map(|t| t.micros()), [Some(0), Some(1), None]);
+    }
+
+    #[test]
+    fn lines_are_written_as_the_published_data_set_has_them() {
+        assert_eq!(written(&Touch::from_micros([0, 123_456, 12_000_001]), true), "0.000000 0.123456 12.000001\n");
+        assert_eq!(written(&parse_touch("- - -").unwrap(), false), "- - -\n");
+    }
+
+    #[test]
+    fn every_q15_cosine_survives_a_round_trip() {
+        for q in -Q15_ONE..=Q15_ONE {
+            let rest = to_q15((1.0 - (f64::from(q) / f64::from(Q15_ONE)).powi(2)).max(0.0).sqrt());
+            let touch = Touch::from_micros([0, 1, 4_294_967_294])
+                .with_pose(Pose { direction: [q, rest, 0], alignment: [0, rest, q] });
+            assert_eq!(parse_touch(&written(&touch, true)).unwrap(), touch);
+        }
+    }
+
+    #[test]
+    fn wrong_lines_are_refused_with_what_is_wrong() {
+        for (line, what) in [
+            ("", "0 fields"),
+            ("0 1", "2 fields"),
+            ("0 1 2 3", "4 fields"),
+            ("0 0 0 1 0 0 1 0 0 0", "10 fields"),
+            ("0 -0.1 0", "the time -0.1 is negative"),
+            ("0 nan 0", "nan is not finite"),
+            ("0 inf 0", "inf is not finite"),
+            ("0 1e9 0", "longer than"),
+            ("0 x 0", "\"x\" is not a number"),
+            ("0 0 0 1 1 0 1 0 0", "the direction has length 1.414"),
+            ("0 0 0 1 0 0 0 0 0", "the alignment has length 0.000"),
+            ("0 0 0 - 0 0 0 0 0", "\"-\" is not a number"),
+        ] {
+            let error = parse_touch(line).unwrap_err();
+            assert!(error.contains(what), "{line:?}: {error}");
+        }
+    }
+}
