@@ -1,16 +1,51 @@
-//! Any bytes offered as an OBJ file give an error or a mesh whose indices are in range, finite, and not larger than the
-//! file's size accounts for.
+//! Any bytes offered as an OBJ file give an error or a mesh whose indices are in range, and take memory in proportion to
+//! their length; a mesh can be touched.
 #![no_main]
+#![allow(dead_code, unreachable_pub, reason = "parts of the host crate, without all that it depends on")]
 
+#[path = "../../host/src/error.rs"]
+mod error;
+#[path = "../../host/src/mesh.rs"]
+mod mesh;
+#[path = "../../host/src/obj.rs"]
+mod obj;
+#[path = "../../host/src/scene.rs"]
+mod scene;
+#[path = "../../host/src/sweep/mod.rs"]
+mod sweep;
+
+use glam::DVec3;
 use libfuzzer_sys::fuzz_target;
-use palpate::scene::Scene;
+use peak_alloc::PeakAlloc;
 use std::path::Path;
 
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// What any text may take, and what each of its bytes may: a vertex of a polygon is two bytes of text, and an index, a
+/// corner, a node of the ear clipping and their growing vectors in memory.
+const BASE: usize = 1 << 20;
+const EACH: usize = 256;
+
 fuzz_target!(|bytes: &[u8]| {
-    let Ok(mesh) = palpate::obj::parse(bytes, Path::new("fuzz.obj")) else { return };
-    // A vertex takes at least `v 0 0 0`, a corner of a face at least two bytes.
-    assert!(mesh.vertices.len() <= bytes.len() && mesh.triangles.len() <= bytes.len());
-    assert!(mesh.vertices.iter().flatten().all(|coordinate| coordinate.is_finite()));
-    assert!(mesh.triangles.iter().flatten().all(|&index| (index as usize) < mesh.vertices.len()));
-    let _ = Scene::new(&mesh, 10.0);
+    let before = MEMORY.current_usage();
+    MEMORY.reset_peak_usage();
+    let parsed = obj::parse(bytes, Path::new("fuzz.obj"));
+    let taken = MEMORY.peak_usage() - before;
+    assert!(taken <= BASE + EACH * bytes.len(), "{taken} bytes of memory for {} bytes of text", bytes.len());
+    if let Ok(mesh) = parsed {
+        assert!(mesh.triangles.iter().flatten().all(|&index| (index as usize) < mesh.vertices.len()));
+        assert!(mesh.vertices.iter().flatten().all(|coordinate| coordinate.is_finite()));
+        let scene = scene::Scene::new(&mesh, 10.0).expect("a mesh that was read has an extent");
+        for corner in scene.triangles().take(4).flatten() {
+            // Aimed at a corner, a sphere touches that or something before it.
+            let start = DVec3::new(9.0, 8.0, 7.0);
+            let time = scene.first_contact(start, corner - start, 0.15);
+            assert!(time.is_some_and(|time| (0.0..=1.0).contains(&time)), "{corner}: {time:?}");
+        }
+        let mut text = Vec::new();
+        obj::write(&mesh, &mut text).expect("memory takes it");
+        let again = obj::parse(text.as_slice(), Path::new("again.obj")).expect("what was written can be read");
+        assert_eq!(again.triangles.len(), mesh.triangles.len());
+    }
 });

@@ -1,12 +1,37 @@
-//! Any line offered as a touch gives an error or a touch that is the same once written and read again.
+//! Any bytes offered as touches give errors that name their line, or touches that are written and read back the same;
+//! memory grows with the longest line only.
 #![no_main]
+#![allow(dead_code, unreachable_pub, reason = "parts of the host crate, without all that it depends on")]
+
+#[path = "../../host/src/error.rs"]
+mod error;
+#[path = "../../host/src/dataset/text.rs"]
+mod text;
 
 use libfuzzer_sys::fuzz_target;
-use palpate::dataset::{parse_touch, write_touch};
+use peak_alloc::PeakAlloc;
+use std::path::Path;
 
-fuzz_target!(|line: &str| {
-    let Ok(touch) = parse_touch(line) else { return };
-    let mut written = String::new();
-    write_touch(&mut written, &touch, touch.pose().is_some());
-    assert_eq!(parse_touch(written.trim_end()), Ok(touch));
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+fuzz_target!(|bytes: &[u8]| {
+    let longest = bytes.split(|&byte| byte == b'\n').map(<[u8]>::len).max().unwrap_or(0);
+    let before = MEMORY.current_usage();
+    MEMORY.reset_peak_usage();
+    let mut previous = None;
+    for touch in text::touches(bytes, Path::new("fuzz.txt")) {
+        match touch {
+            Err(error) => assert!(error.to_string().starts_with("fuzz.txt:"), "{error}"),
+            Ok(touch) => {
+                let mut line = String::new();
+                text::write_touch(&mut line, &touch, true);
+                assert_eq!(text::parse_touch(&line), Ok(touch), "{line}");
+                previous = Some(touch);
+            }
+        }
+    }
+    drop(previous);
+    let taken = MEMORY.peak_usage() - before;
+    assert!(taken <= 4096 + 16 * longest, "{taken} bytes of memory for lines of at most {longest}");
 });
