@@ -224,7 +224,10 @@ fn hessboost(ensemble: &Ensemble) -> BoostedModel {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = directory.path().join("ensemble.json");
     ensemble.save(&path).expect("a saved ensemble");
-    BoostedModel::load(&path, ModelFormat::XgboostJson).expect("a model that hessboost reads")
+    // hessboost reads a list only, as XGBoost 3 writes it.
+    let text = std::fs::read_to_string(&path).expect("the saved ensemble");
+    let text = text.replace("\"base_score\":\"5E-1\"", "\"base_score\":\"[5E-1]\"");
+    BoostedModel::decode(text, ModelFormat::XgboostJson).expect("a model that hessboost reads")
 }
 
 /// Bytes that start on a word's boundary, as irithyll-core wants them.
