@@ -1,8 +1,8 @@
 //! `cargo bench -p palpate --bench sweep`: the swept spheres against parry3d, on the same casts in the same run; speed
 //! against error; how the cost grows with the mesh; and the ten real objects, where `PALPATE_SHARED` leads to them.
 //!
-//! Rates are the best of three rounds of one thread (one for parry3d), in processor time where the system tells it (so that what else runs
-//! on the machine does not count), except where it says otherwise.
+//! Rates are the best of three rounds of one thread (one for parry3d), in processor time where the system tells it (so that what
+//! else runs on the machine does not count), except where it says otherwise.
 
 use glam::DVec3;
 use palpate::approach::{Approach, Probe};

@@ -4,6 +4,7 @@
 //! throws out those that it cannot (`pack`), and the rest is decided in f64 ([`narrow`]).
 
 pub mod budget;
+mod flat;
 pub mod narrow;
 mod pack;
 mod tree;

@@ -277,6 +277,40 @@ fn random_casts_agree_with_brute_force_and_with_advancing_step_by_step() {
 }
 
 #[test]
+fn meshes_that_are_fine_against_the_sphere_agree_with_brute_force() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    // Smooth, bumpy, folded so sharply that mean normals say nothing, and flat.
+    let smooth = globe(30);
+    let bumpy = smooth.iter().map(|triangle| triangle.map(|corner| corner * (1.0 + 0.03 * libm::sin(1e3 * corner.x))));
+    let folded = smooth.iter().map(|triangle| triangle.map(|corner| corner + DVec3::Z * libm::sin(40.0 * corner.x)));
+    let flat = smooth.iter().map(|triangle| triangle.map(|corner| corner.with_z(0.25 * corner.x)));
+    let meshes: [Vec<Triangle>; 4] = [smooth.clone(), bumpy.collect(), folded.collect(), flat.collect()];
+    for mesh in &meshes {
+        let surface = Surface::new(mesh.clone());
+        let mut contacts = 0;
+        for round in 0..600 {
+            let radius = [0.3, 1.0, 3.0][round % 3];
+            let (mut origin, direction) = random_cast(&mut rng);
+            if round % 4 == 0 {
+                // Past a corner, hardly.
+                let corner = mesh[rng.random_range(0..mesh.len())][0];
+                let aside = corner.cross(direction).normalize_or(DVec3::Z).cross(direction);
+                let clearance = 10.0_f64.powf(rng.random_range(-9.0..-1.0)) * if rng.random() { 1.0 } else { -1.0 };
+                origin = corner + aside * (radius + clearance) - direction * 12.0;
+            }
+            let (found, expected) =
+                (surface.first_contact(origin, direction, radius), brute(mesh, origin, direction, radius));
+            assert_eq!(found.is_some(), expected.is_some(), "{origin} {direction} {radius}");
+            if let Some((found, expected)) = found.zip(expected) {
+                assert!((found - expected).abs() < 1e-11, "{origin} {direction} {radius}: {found} {expected}");
+                contacts += 1;
+            }
+        }
+        assert!((200..590).contains(&contacts), "{contacts}");
+    }
+}
+
+#[test]
 fn random_soups_of_triangles_agree_with_brute_force() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     for round in 0..300 {

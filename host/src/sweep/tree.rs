@@ -1,9 +1,10 @@
 //! The bounding volume hierarchy: built by `obvhs`, then flattened to four children a node.
 
 use super::Precision;
+use super::flat::Flats;
 use super::narrow::{Motion, Triangle};
 use super::pack::{LANES, Pack, Ray, WIDTH};
-use glam::{BVec4A, DVec3, Vec3, Vec3A, Vec4};
+use glam::{BVec4A, DVec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
@@ -24,6 +25,8 @@ const PACK: u32 = 1 << 31;
 struct Open {
     /// The sphere does not touch it before this.
     near: f32,
+    /// What is expected to be touched first is looked into first.
+    expected: f32,
     node: u32,
     child: u32,
 }
@@ -32,8 +35,15 @@ struct Open {
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     nodes: Vec<Node>,
+    /// For each node.
+    flats: Vec<Flats>,
     packs: Vec<Pack>,
+    /// Half the longest side of a pack's box, on average.
+    grain: f32,
 }
+
+/// Where the sphere is this many times as large as the packs, many boxes touch it that the surface in them does not.
+const FINE: f32 = 2.0;
 
 struct Bounds(Aabb);
 
@@ -54,36 +64,47 @@ impl Tree {
             bvh: &bvh,
             triangles: &triangles,
             ordered: Vec::with_capacity(triangles.len()),
-            tree: Self { nodes: Vec::new(), packs: Vec::new() },
+            tree: Self { nodes: Vec::new(), flats: Vec::new(), packs: Vec::new(), grain: 0.0 },
         };
         flattened.add_node(0);
+        flattened.tree.grain /= flattened.tree.packs.len() as f32;
         (flattened.ordered, flattened.tree)
     }
 
     /// The distance that the sphere travels until it touches one of the triangles.
     pub(super) fn first_contact<P: Precision>(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
         let ray = Ray::new(motion);
+        if ray.margin > FINE * self.grain {
+            self.search::<P, true>(triangles, motion, &ray)
+        } else {
+            self.search::<P, false>(triangles, motion, &ray)
+        }
+    }
+
+    /// `IS_FINE`: what lies flat in the boxes is worth a look.
+    fn search<P: Precision, const IS_FINE: bool>(
+        &self,
+        triangles: &[Triangle],
+        motion: &Motion,
+        ray: &Ray,
+    ) -> Option<f64> {
         let mut first = if motion.direction == DVec3::ZERO { f64::MIN_POSITIVE } else { f64::INFINITY };
         let mut limit = first as f32;
         // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this.
         let mut stack = Vec::with_capacity(96);
-        self.nodes[0].visit(0, &ray, limit, &mut stack);
-        while let Some(Open { near, node, child }) = stack.pop() {
-            if near > limit {
-                break;
-            }
+        self.visit::<IS_FINE>(0, ray, limit, &mut stack);
+        while let Some(Open { near, node, child, .. }) = stack.pop() {
             // The limit may have come nearer since the child was put there.
-            let parent = &self.nodes[node as usize];
-            if parent.has_passed(child, &ray, limit) {
+            if near > limit || self.passed::<IS_FINE>(node, ray, limit).test(child as usize) {
                 continue;
             }
-            let link = parent.children[child as usize];
+            let link = self.nodes[node as usize].children[child as usize];
             if link & PACK == 0 {
-                self.nodes[link as usize].visit(link, &ray, limit, &mut stack);
+                self.visit::<IS_FINE>(link, ray, limit, &mut stack);
                 continue;
             }
             let pack = &self.packs[(link & !PACK) as usize];
-            let mut earliest = if P::REJECT { pack.earliest(&ray, limit) } else { pack.unknown() };
+            let mut earliest = if P::REJECT { pack.earliest(ray, limit) } else { pack.unknown() };
             while let Some(lane) = pop_least(&mut earliest, limit) {
                 let triangle = &triangles[pack.first as usize + lane];
                 if let Some(distance) = P::first_contact(motion, triangle, first) {
@@ -96,14 +117,54 @@ impl Tree {
         let is_contact = if motion.direction == DVec3::ZERO { first == 0.0 } else { first < f64::INFINITY };
         is_contact.then_some(first)
     }
+
+    /// Puts the node's children that the sphere may touch before `limit` on the stack, which has the one that is expected
+    /// to be touched first on top.
+    #[inline]
+    fn visit<const IS_FINE: bool>(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Open>) {
+        let node = &self.nodes[index as usize];
+        let (mut near, mut met) = node.met(ray, limit);
+        let mut expected = near;
+        if IS_FINE {
+            let reach = self.flats[index as usize].reach(&node.centre, ray, near);
+            (near, expected) = (reach.near, reach.expected);
+            met &= near.cmple(Vec4::splat(limit));
+        }
+        if limit < f32::INFINITY {
+            met &= !self.passed::<IS_FINE>(index, ray, limit);
+        }
+        let (mut met, near, expected) = (met.bitmask(), near.to_array(), expected.to_array());
+        while met != 0 {
+            let child = met.trailing_zeros();
+            met &= met - 1;
+            let open = Open { near: near[child as usize], expected: expected[child as usize], node: index, child };
+            let mut place = stack.len();
+            stack.push(open);
+            while place > 0 && stack[place - 1].expected < expected[child as usize] {
+                stack.swap(place - 1, place);
+                place -= 1;
+            }
+        }
+    }
+
+    /// Which children the sphere has not reached when it has gone as far as `limit`, nor before.
+    #[inline]
+    fn passed<const IS_FINE: bool>(&self, index: u32, ray: &Ray, limit: f32) -> BVec4A {
+        let node = &self.nodes[index as usize];
+        let mut passed = node.passed(ray, limit);
+        if IS_FINE {
+            passed |= self.flats[index as usize].passed(&node.centre, ray, limit);
+        }
+        passed
+    }
 }
 
 impl Node {
     const EMPTY: Self = Self { centre: [Vec4::ZERO; 3], half: [Vec4::splat(-1e30); 3], children: [0; WIDTH] };
 
-    /// Puts the children that the sphere may touch before `limit` on the stack, which has the nearest of all on top.
+    /// For each child, a distance before which the sphere does not touch its box, and whether it may before `limit`.
     #[inline]
-    fn visit(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Open>) {
+    fn met(&self, ray: &Ray, limit: f32) -> (Vec4, BVec4A) {
         let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(limit));
         for axis in 0..3 {
             let middle = (self.centre[axis] - ray.origin[axis]) * ray.inverse[axis];
@@ -119,22 +180,7 @@ impl Node {
         let v = (above[0].abs() - above[1]).max(Vec4::ZERO);
         let reach = Vec4::splat(ray.margin * ray.margin) - (u * u + v * v);
         near = near.max(depth[0] - depth[1] - reach.max(Vec4::ZERO).sqrt());
-        let mut met = near.cmple(far) & reach.cmpge(Vec4::ZERO);
-        if limit < f32::INFINITY {
-            met &= !self.passed(ray, limit);
-        }
-        let (mut met, nears) = (met.bitmask(), near.to_array());
-        while met != 0 {
-            let child = met.trailing_zeros();
-            met &= met - 1;
-            let near = nears[child as usize];
-            let mut place = stack.len();
-            stack.push(Open { near, node: index, child });
-            while place > 0 && stack[place - 1].near < near {
-                stack.swap(place - 1, place);
-                place -= 1;
-            }
-        }
+        (near, near.cmple(far) & reach.cmpge(Vec4::ZERO))
     }
 
     /// Which boxes the sphere has not reached when it has gone as far as `limit`: from there, all of the box lies beyond
@@ -151,18 +197,6 @@ impl Node {
         }
         forward.cmpge(Vec4::ZERO) & square.cmpgt(Vec4::splat(ray.margin * ray.margin))
     }
-
-    /// The same for one child.
-    #[inline]
-    fn has_passed(&self, child: u32, ray: &Ray, limit: f32) -> bool {
-        if limit == f32::INFINITY {
-            return false;
-        }
-        let lane = |axes: &[Vec4; 3]| Vec3::from(axes.each_ref().map(|axis| axis.as_ref()[child as usize]));
-        let way = lane(&self.centre) - (ray.origin + ray.direction() * limit);
-        let gap = (way.abs() - lane(&self.half)).max(Vec3::ZERO).copysign(way);
-        gap.dot(ray.direction()) >= 0.0 && gap.length_squared() > ray.margin * ray.margin
-    }
 }
 
 /// The lane with the least value, if that is at most `limit`; it does not come again.
@@ -178,7 +212,9 @@ fn pop_least(values: &mut [f32; LANES], limit: f32) -> Option<usize> {
     (least <= limit && least < f32::INFINITY).then_some(lane)
 }
 
-const PARAMETERS: obvhs::BvhBuildParams = obvhs::BvhBuildParams::fast_build();
+/// Full packs rather than many.
+const PARAMETERS: obvhs::BvhBuildParams =
+    obvhs::BvhBuildParams { collapse_traversal_cost: 8.0, ..obvhs::BvhBuildParams::fast_build() };
 
 struct Flattened<'a> {
     bvh: &'a Bvh2,
@@ -204,8 +240,10 @@ impl Flattened<'_> {
         }
         let index = self.tree.nodes.len();
         self.tree.nodes.push(Node::EMPTY);
+        self.tree.flats.push(Flats::UNKNOWN);
         for (child, member) in members.into_iter().enumerate() {
             let aabb = *node(member).aabb();
+            let first = self.ordered.len();
             let link = if node(member).is_leaf() { self.add_pack(member) } else { self.add_node(member) };
             let place = &mut self.tree.nodes[index];
             for axis in 0..3 {
@@ -215,6 +253,8 @@ impl Flattened<'_> {
                 place.half[axis][child] = (high - centre).max(centre - low);
             }
             place.children[child] = link;
+            let centre = [0, 1, 2].map(|axis| f64::from(place.centre[axis][child])).into();
+            self.tree.flats[index].set(child, &self.ordered[first..], centre);
         }
         index as u32
     }
@@ -225,6 +265,8 @@ impl Flattened<'_> {
         for index in leaf.first_index..leaf.first_index + leaf.prim_count {
             self.ordered.push(self.triangles[self.bvh.primitive_indices[index as usize] as usize]);
         }
+        let side = leaf.aabb().max - leaf.aabb().min;
+        self.tree.grain += side.max_element() / 2.0;
         self.tree.packs.push(Pack::new(&self.ordered[first..], first as u32));
         (self.tree.packs.len() - 1) as u32 | PACK
     }
