@@ -14,6 +14,7 @@ mod tests;
 
 use glam::DVec3;
 use narrow::{Motion, Triangle, double, single};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use tree::Tree;
 
 /// How the triangles of a leaf are decided: the choices that there are between speed and error.
@@ -97,11 +98,11 @@ impl Surface {
         for corner in triangles.iter_mut().flatten() {
             *corner = (*corner - centre) / unit;
         }
-        let (triangles, tree) = Tree::new(triangles);
+        let (triangles, tree) = Tree::new(without_repeats(triangles));
         Self { centre, unit, half: (high - low) / (2.0 * unit), triangles, tree }
     }
 
-    /// The triangles, in the order of the tree.
+    /// The triangles, in the order of the tree; one that the mesh repeats comes once.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = Triangle> + '_ {
         self.triangles.iter().map(|triangle| triangle.map(|corner| corner * self.unit + self.centre))
     }
@@ -160,4 +161,32 @@ impl Surface {
         }
         (near <= far).then_some(near)
     }
+}
+
+/// Leaves out triangles that have the corners of an earlier one. They change no contact, but many boxes that coincide
+/// cost the tree's builder a time that grows with the square of their number.
+fn without_repeats(mut triangles: Vec<Triangle>) -> Vec<Triangle> {
+    let corners = |triangle: &Triangle| {
+        let mut corners = triangle.map(|corner| corner.to_array().map(|value| (value + 0.0).to_bits()));
+        corners.sort_unstable();
+        corners
+    };
+    let hash = BuildHasherDefault::<DefaultHasher>::default();
+    let mut order: Vec<(u64, u32)> =
+        triangles.iter().zip(0..).map(|(triangle, index)| (hash.hash_one(corners(triangle)), index)).collect();
+    order.sort_unstable();
+    let mut repeats = vec![false; triangles.len()];
+    for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
+        let mut kept: Vec<[[u64; 3]; 3]> = Vec::new();
+        for &(_, index) in same {
+            let corners = corners(&triangles[index as usize]);
+            repeats[index as usize] = kept.contains(&corners);
+            if !repeats[index as usize] {
+                kept.push(corners);
+            }
+        }
+    }
+    let mut repeats = repeats.into_iter();
+    triangles.retain(|_| repeats.next() == Some(false));
+    triangles
 }

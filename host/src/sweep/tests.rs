@@ -127,6 +127,17 @@ fn winding_and_duplicates_make_no_difference() {
 }
 
 #[test]
+fn three_hundred_thousand_copies_of_a_triangle_count_as_one() {
+    let turned = |index: usize| std::array::from_fn(|corner| FLOOR[(corner * (1 + index % 2) + index) % 3]);
+    let mut copies: Vec<Triangle> = (0..300_000).map(turned).collect();
+    copies.push(FLOOR.map(|corner| corner + DVec3::Z));
+    let surface = Surface::new(copies);
+    assert_eq!(surface.triangles().len(), 2);
+    assert_eq!(surface.first_contact(at(0.0, 0.0, 3.0), at(0.0, 0.0, -1.0), 0.5), Some(1.5));
+    assert_eq!(surface.first_contact(at(0.0, 0.0, -3.0), at(0.0, 0.0, 1.0), 0.5), Some(2.5));
+}
+
+#[test]
 fn far_starts_keep_their_digits() {
     for distance in [1e3, 1e5, 1e9] {
         let found = contact(&[FLOOR], at(0.25, 0.5, distance), at(0.0, 0.0, -1.0), 0.5).unwrap();

@@ -7,6 +7,9 @@ use super::pack::{LANES, Pack, Ray, WIDTH};
 use glam::{BVec4A, DVec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::leaf_collapser::collapse;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Boxes of four children in f32, axis by axis, and where the children are. An unused child has a box that nothing
 /// meets.
@@ -57,8 +60,7 @@ impl Tree {
     /// The tree over these triangles, and the triangles in its order.
     pub(super) fn new(triangles: Vec<Triangle>) -> (Vec<Triangle>, Self) {
         let bounds: Vec<Bounds> = triangles.iter().map(bounds).collect();
-        let parameters = obvhs::BvhBuildParams { max_prims_per_leaf: LANES as u32, ..PARAMETERS };
-        let bvh = obvhs::bvh2::builder::build_bvh2(&bounds, parameters, &mut Default::default());
+        let bvh = build(&bounds);
         drop(bounds);
         let mut flattened = Flattened {
             bvh: &bvh,
@@ -212,9 +214,15 @@ fn pop_least(values: &mut [f32; LANES], limit: f32) -> Option<usize> {
     (least <= limit && least < f32::INFINITY).then_some(lane)
 }
 
-/// Full packs rather than many.
-const PARAMETERS: obvhs::BvhBuildParams =
-    obvhs::BvhBuildParams { collapse_traversal_cost: 8.0, ..obvhs::BvhBuildParams::fast_build() };
+/// As obvhs's fast preset, but with full packs rather than many.
+fn build(bounds: &[Bounds]) -> Bvh2 {
+    let indices = (0..bounds.len() as u32).collect();
+    let mut builder = PlocBuilder::with_capacity(bounds.len());
+    let mut bvh = builder.build(PlocSearchDistance::Low, bounds, indices, SortPrecision::U64, 2);
+    ReinsertionOptimizer::default().run(&mut bvh, 0.02, None);
+    collapse(&mut bvh, LANES as u32, 8.0);
+    bvh
+}
 
 struct Flattened<'a> {
     bvh: &'a Bvh2,
