@@ -14,6 +14,7 @@ pub mod capture;
 pub mod cast;
 pub mod compile;
 pub mod dataset;
+pub mod emulated;
 pub mod ensemble;
 pub mod error;
 pub mod evaluate;

@@ -7,6 +7,7 @@ use super::limit::Large;
 use super::page::{Figure, Section};
 use super::scale::{Scale, short_number};
 use super::table::{Cell, Data, Table};
+use super::work::Work;
 use crate::compile::{self, Leaf};
 use crate::ensemble::Ensemble;
 use crate::error::Result;
@@ -33,8 +34,8 @@ pub(super) struct Member {
     pub(super) bytes: usize,
     /// Nanoseconds a touch on this machine.
     pub(super) nanoseconds: f64,
-    /// Instructions a touch on a Cortex-M4F, from the compiler's model of the evaluator.
-    pub(super) instructions: u64,
+    /// Instructions a touch on the chips.
+    pub(super) work: Work,
     /// The largest difference to the ensemble's margins over the test touches, in nats.
     pub(super) margin_error: f64,
     /// What the model states.
@@ -46,9 +47,6 @@ pub(super) struct Member {
     /// Touches of a fixed number from which on errors stay at or below 1 %.
     pub(super) to_1_percent: Option<usize>,
 }
-
-/// Instructions on a Cortex-M0+ for each on a Cortex-M4F, as measured for the same coding under emulation.
-const M0_RATIO: f64 = 1.48;
 
 /// Trees, depth and bins of the family.
 const FAMILY: [(usize, usize, usize); 8] =
@@ -117,7 +115,7 @@ fn member(
         layout: compiled.layout.name().into(),
         bytes: compiled.bytes.len(),
         nanoseconds: nanoseconds(&model, touches),
-        instructions: compiled.instructions,
+        work: Work::of(compiled, touches)?,
         margin_error: margin_error(&model, ensemble, touches),
         stated_error: f64::from(compiled.margin_error),
         at_10: curve.accuracy(10).value,
@@ -169,13 +167,14 @@ fn frontier(members: &[Member]) -> Vec<&Member> {
 /// The figure and the table.
 pub(super) fn section(context: &Context, members: &[Member]) -> Result<Section> {
     let mut section = Section::new("cost", "Speed against error");
-    section.text(
-        "A family of models, trained on the first fold and tested on the large capture. Instructions are the export's own \
-         estimate for a Cortex-M4F, from a model of the evaluator (modelled, not measured); on a Cortex-M0+ the same coding \
-         takes about 1.48 times as many. Nanoseconds are of this machine, one thread.",
-    );
+    section.text(format!(
+        "A family of models, trained on the first fold and tested on the large capture. Nanoseconds are of this machine, \
+         one thread. {}",
+        members.first().map_or("", |member| member.work.explanation())
+    ));
     section.figure(figure(context, members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
     section.figure(figure(context, members, "cost-time", "nanoseconds a touch, this machine", |m| m.nanoseconds)?);
+    section.figure(figure(context, members, "cost-work", "instructions a touch, Cortex-M4F", |m| m.work.m4f as f64)?);
     section.table(table(context, members));
     Ok(section)
 }
@@ -248,6 +247,8 @@ fn figure(
 }
 
 fn table(context: &Context, members: &[Member]) -> Table {
+    let how = members.first().map_or("modelled", |member| member.work.how());
+    let chips = ["M4F", "M0+"].map(|chip| format!("instructions, {chip} ({how})"));
     let mut data = Data::new([
         "model",
         "frontier",
@@ -255,8 +256,8 @@ fn table(context: &Context, members: &[Member]) -> Table {
         "layout",
         "bytes",
         "ns a touch",
-        "instructions, M4F (modelled)",
-        "instructions, M0+ (modelled)",
+        &chips[0],
+        &chips[1],
         "largest margin error (nats)",
         "stated bound (nats)",
         "accuracy at 10",
@@ -273,8 +274,8 @@ fn table(context: &Context, members: &[Member]) -> Table {
             member.layout.as_str().into(),
             Cell::count(member.bytes),
             Cell::Number(member.nanoseconds, 0),
-            Cell::count(member.instructions),
-            Cell::Number(member.instructions as f64 * M0_RATIO, 0),
+            Cell::count(member.work.m4f),
+            Cell::count(member.work.m0_plus),
             Cell::Number(member.margin_error, 5),
             Cell::Number(member.stated_error, 5),
             Cell::Percent(member.at_10, 1),
@@ -307,7 +308,7 @@ mod tests {
             layout: String::new(),
             bytes,
             nanoseconds: 1.0,
-            instructions: 1,
+            work: Work { m4f: 1, m0_plus: 1, measured: true },
             margin_error: 0.0,
             stated_error: 0.0,
             at_10,

@@ -6,6 +6,7 @@ use super::context::{Context, compiled, opened, touch};
 use super::page::{Figure, Section};
 use super::scale::Scale;
 use super::table::{Cell, Data, Table};
+use super::work::Work;
 use crate::dataset::Dataset;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
@@ -13,6 +14,7 @@ use crate::folds;
 use crate::mesh::{Mesh, Object};
 use crate::scene::Scene;
 use crate::{capture, train};
+use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -36,8 +38,8 @@ pub(super) struct Objects {
     pub(super) train: f64,
     /// Bytes of the compiled model.
     pub(super) bytes: usize,
-    /// Modelled instructions a touch.
-    pub(super) instructions: u64,
+    /// Instructions a touch on the chips.
+    pub(super) work: Work,
     /// Accuracy after ten touches.
     pub(super) at_10: f64,
     /// Accuracy after sixty touches.
@@ -90,13 +92,15 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let train = began.elapsed().as_secs_f64();
     let compiled = compiled(&ensemble)?;
     let model = opened(&compiled.bytes)?;
+    let touches: Vec<Touch> =
+        split.test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
     let curve = Margins::new(Candidate::Compiled(&model), &split.test)?.curve(60, 100, settings.seed)?;
     Ok(Objects {
         count: objects.len(),
         capture,
         train,
         bytes: compiled.bytes.len(),
-        instructions: compiled.instructions,
+        work: Work::of(&compiled, &touches)?,
         at_10: curve.accuracy(10).value,
         at_60: curve.accuracy(60).value,
     })
@@ -147,6 +151,7 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
         chart.svg()
     };
     let of = |value: fn(&Objects) -> f64| growth.objects.iter().map(value).collect::<Vec<f64>>();
+    let how = how(growth);
     let panels = vec![
         panel(
             "Time",
@@ -158,9 +163,9 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
         )?,
         panel("Size", "bytes", &[("model", colour::OURS, Shape::Disc, of(|o| o.bytes as f64))])?,
         panel(
-            "Work (modelled)",
+            &format!("Work ({how})"),
             "instructions a touch, M4F",
-            &[("model", colour::OURS, Shape::Disc, of(|o| o.instructions as f64))],
+            &[("model", colour::OURS, Shape::Disc, of(|o| o.work.m4f as f64))],
         )?,
     ];
     Ok(Figure {
@@ -173,13 +178,17 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
     })
 }
 
+fn how(growth: &Growth) -> &'static str {
+    growth.objects.first().map_or("modelled", |objects| objects.work.how())
+}
+
 fn objects_data(growth: &Growth) -> Data {
     let mut data = Data::new([
         "objects",
         "capture (s)",
         "training (s)",
         "bytes",
-        "instructions, M4F (modelled)",
+        &format!("instructions, M4F ({})", how(growth)),
         "accuracy at 10",
         "accuracy at 60",
     ]);
@@ -189,7 +198,7 @@ fn objects_data(growth: &Growth) -> Data {
             Cell::Number(objects.capture, 2),
             Cell::Number(objects.train, 2),
             Cell::count(objects.bytes),
-            Cell::count(objects.instructions),
+            Cell::count(objects.work.m4f),
             Cell::Percent(objects.at_10, 1),
             Cell::Percent(objects.at_60, 1),
         ]);

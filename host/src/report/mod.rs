@@ -27,6 +27,7 @@ pub mod short;
 mod simulator;
 pub mod statistics;
 pub mod table;
+mod work;
 
 pub use full::{Written, full};
 pub use page::{Block, Figure, Page, Section};

@@ -62,7 +62,7 @@ impl Settings {
             groups: 10,
             many_groups: 300,
             noise_levels: 41,
-            noise_folds: 3,
+            noise_folds: 10,
             limit_touches: 300_000,
             limit_rounds: 80,
             growth_objects: vec![2, 5, 10, 20, 50, 100],

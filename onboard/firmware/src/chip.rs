@@ -92,6 +92,13 @@ pub fn take_retained() -> &'static mut [u8] {
     unsafe { core::slice::from_raw_parts_mut(addr_of_mut!(_retained_start), length) }
 }
 
+/// The emulated machines' external RAM, 16 MB of it, where QEMU's `-device loader,addr=0x21000000` puts what an image is
+/// to work on. Only for images that run nowhere else.
+pub fn loaded() -> &'static [u8] {
+    // SAFETY: both machines have RAM there, which memory.x does not mention, so nobody writes to it; RAM holds bytes.
+    unsafe { core::slice::from_raw_parts(core::ptr::without_provenance(0x2100_0000), 16 << 20) }
+}
+
 /// An interrupt's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interrupt(u16);
