@@ -12,41 +12,41 @@ pub(crate) struct Sum<'a> {
     pub(crate) object: Option<u8>,
 }
 
+/// A byte is this much more than the value that it stands for.
+const BIAS: i32 = 128;
+
 impl Sum<'_> {
     /// Bytes of a leaf in the present group.
     pub(crate) fn leaf_length(&self) -> usize {
         self.leaf.size() * if self.object.is_some() { 1 } else { self.margins.len() }
     }
 
-    /// Adds one leaf.
+    /// Adds one leaf; bytes with their bias.
     pub(crate) fn add(&mut self, leaf: &[u8]) {
+        self.add_reached(leaf, &[0]);
+    }
+
+    /// Adds the leaves with these numbers; bytes with their bias.
+    ///
+    /// Cost: four or five instructions a value and twelve a leaf.
+    pub(crate) fn add_reached(&mut self, leaves: &[u8], reached: &[u16]) {
         let leaf_type = self.leaf;
         let margins = self.of_group();
         match leaf_type {
-            LeafType::I8 => add_values(margins, leaf, add_i8),
-            LeafType::I16 => add_values(margins, leaf, add_i16),
-            LeafType::F32 => add_values(margins, leaf, add_f32),
+            LeafType::I8 => add_i8_leaves(margins, leaves, reached),
+            LeafType::I16 => add_i16_leaves(margins, leaves, reached),
+            LeafType::F32 => add_f32_leaves(margins, leaves, reached),
         }
     }
 
-    /// Adds the leaves with these numbers.
-    pub(crate) fn add_complete(&mut self, leaves: &[u8], reached: &[u16]) {
-        let each = self.object.is_none();
-        let leaf_type = self.leaf;
-        let margins = self.of_group();
-        if each {
-            match leaf_type {
-                LeafType::I8 => add_each_i8(margins, leaves, reached),
-                LeafType::I16 => add_each(margins, leaves, reached, add_i16),
-                LeafType::F32 => add_each(margins, leaves, reached, add_f32),
-            }
-        } else if let Some(margin) = margins.first_mut() {
-            *margin = match leaf_type {
-                LeafType::I8 => add_reached(*margin, leaves.as_chunks().0, reached, 1, add_i8),
-                LeafType::I16 => add_reached(*margin, leaves.as_chunks().0, reached, 1, add_i16),
-                LeafType::F32 => add_reached(*margin, leaves.as_chunks().0, reached, 1, add_f32),
-            };
+    /// Takes the bias of `count` leaves off, or says how much it is where every object has it.
+    pub(crate) fn settle(&mut self, count: u32) -> i32 {
+        let bias = if self.leaf == LeafType::I8 { BIAS.wrapping_mul(count.cast_signed()) } else { 0 };
+        if self.object.is_none() {
+            return bias;
         }
+        self.of_group().iter_mut().for_each(|margin| *margin = margin.wrapping_sub(bias));
+        0
     }
 
     /// The margins that leaves of the present group add to.
@@ -58,13 +58,55 @@ impl Sum<'_> {
     }
 }
 
-/// A byte is 128 more than its value.
-fn add_i8(sum: i32, [value]: [u8; 1]) -> i32 {
-    sum.wrapping_add(i32::from(value) - 128)
+#[inline(never)]
+fn add_i8_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
+    add_leaves(margins, leaves, reached, |sum, [value]| sum.wrapping_add(i32::from(value)), add_ten_i8);
 }
 
-fn add_i16(sum: i32, value: [u8; 2]) -> i32 {
-    sum.wrapping_add(i32::from(i16::from_le_bytes(value)))
+#[inline(never)]
+fn add_i16_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
+    let add = |sum: i32, value| sum.wrapping_add(i32::from(i16::from_le_bytes(value)));
+    add_leaves(margins, leaves, reached, add, add_ten_i16);
+}
+
+/// Whether the chip loads words from anywhere (Cortex-M3 and up: the same that have atomic operations), and takes them
+/// apart while it adds; a Cortex-M0+ puts words together byte by byte.
+const WORDS: bool = cfg!(target_has_atomic = "32");
+
+#[inline(always)]
+fn add_ten_i8(margins: &mut [i32; 10], values: &[u8; 10]) {
+    let (&[first, second], &[s, t]) = values.as_chunks() else { return };
+    let &[k, l, m, n, o, p, q, r, ..] = values;
+    let (first, second) = (u32::from_le_bytes(first), u32::from_le_bytes(second));
+    let byte = |word: u32, shift: u32, alone: u8| {
+        if WORDS { (word >> shift & 0xff).cast_signed() } else { i32::from(alone) }
+    };
+    let [a, b, c, d, e, f, g, h, i, j] = margins;
+    *a = a.wrapping_add(byte(first, 0, k));
+    *b = b.wrapping_add(byte(first, 8, l));
+    *c = c.wrapping_add(byte(first, 16, m));
+    *d = d.wrapping_add(byte(first, 24, n));
+    *e = e.wrapping_add(byte(second, 0, o));
+    *f = f.wrapping_add(byte(second, 8, p));
+    *g = g.wrapping_add(byte(second, 16, q));
+    *h = h.wrapping_add(byte(second, 24, r));
+    *i = i.wrapping_add(i32::from(s));
+    *j = j.wrapping_add(i32::from(t));
+}
+
+#[inline(always)]
+fn add_ten_i16([a, b, c, d, e, f, g, h, i, j]: &mut [i32; 10], values: &[u8; 20]) {
+    let (&[v, w, x, y, z], _) = values.as_chunks() else { return };
+    let add = |even: &mut i32, odd: &mut i32, word: [u8; 4]| {
+        let word = i32::from_le_bytes(word);
+        *even = even.wrapping_add(word << 16 >> 16);
+        *odd = odd.wrapping_add(word >> 16);
+    };
+    add(a, b, v);
+    add(c, d, w);
+    add(e, f, x);
+    add(g, h, y);
+    add(i, j, z);
 }
 
 #[cfg(feature = "f32-leaves")]
@@ -72,136 +114,50 @@ fn add_f32(sum: i32, value: [u8; 4]) -> i32 {
     (f32::from_bits(sum.cast_unsigned()) + f32::from_le_bytes(value)).to_bits().cast_signed()
 }
 
+#[cfg(feature = "f32-leaves")]
+#[inline(never)]
+fn add_f32_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
+    add_leaves(margins, leaves, reached, add_f32, |margins, values: &[u8; 40]| {
+        let (values, _) = values.as_chunks();
+        margins.iter_mut().zip(values).for_each(|(margin, value)| *margin = add_f32(*margin, *value));
+    });
+}
+
 /// Models with f32 leaves are refused when they are opened.
 #[cfg(not(feature = "f32-leaves"))]
-const fn add_f32(sum: i32, _: [u8; 4]) -> i32 {
-    sum
-}
+const fn add_f32_leaves(_: &mut [i32], _: &[u8], _: &[u16]) {}
 
-fn add_values<const SIZE: usize>(margins: &mut [i32], leaf: &[u8], add: impl Fn(i32, [u8; SIZE]) -> i32) {
-    for (margin, value) in margins.iter_mut().zip(leaf.as_chunks().0) {
-        *margin = add(*margin, *value);
-    }
-}
-
-/// Adds the leaves that were reached, a few objects at a time.
-fn add_each<const SIZE: usize>(
-    margins: &mut [i32],
-    leaves: &[u8],
+/// Adds leaves with a value for each of `margins`, ten objects (`TEN` bytes) at a time.
+#[inline(always)]
+fn add_leaves<const SIZE: usize, const TEN: usize>(
+    mut margins: &mut [i32],
+    mut leaves: &[u8],
     reached: &[u16],
     add: impl Fn(i32, [u8; SIZE]) -> i32 + Copy,
+    add_ten: impl Fn(&mut [i32; 10], &[u8; TEN]) + Copy,
 ) {
-    let (mut leaves, _) = leaves.as_chunks();
-    let row = margins.len();
-    let (fives, rest) = margins.as_chunks_mut();
-    for margins in fives {
-        *margins = add_five(*margins, leaves, reached, row, add);
-        leaves = leaves.get(5..).unwrap_or_default();
-    }
-    for margin in rest {
-        *margin = add_reached(*margin, leaves, reached, row, add);
-        leaves = leaves.get(1..).unwrap_or_default();
-    }
-}
-
-/// As [`add_each`], ten objects at a time as pairs of 16-bit sums: half the registers, and a word a load.
-fn add_each_i8(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
-    let row = margins.len();
-    let mut values = leaves;
-    let (tens, rest) = margins.as_chunks_mut();
-    for margins in tens {
-        for block in reached.chunks(PACKED) {
-            add_ten(margins, values, block, row);
+    // As two bytes: then the compiler sees that ends of leaves cannot overflow.
+    let length = usize::from(u16::try_from(margins.len() * SIZE).unwrap_or(0));
+    while margins.len() >= 10 {
+        let Some((ten, rest)) = core::mem::take(&mut margins).split_first_chunk_mut() else { return };
+        for &leaf in reached {
+            let start = usize::from(leaf) * length;
+            let Some(values) = leaves.get(start..start + TEN).and_then(<[_]>::first_chunk) else { return };
+            add_ten(ten, values);
         }
-        values = values.get(10..).unwrap_or_default();
+        leaves = leaves.get(TEN..).unwrap_or_default();
+        margins = rest;
     }
-    let (fives, rest) = rest.as_chunks_mut();
-    for margins in fives {
-        *margins = add_five(*margins, values.as_chunks().0, reached, row, add_i8);
-        values = values.get(5..).unwrap_or_default();
+    for margin in margins {
+        let mut sum = *margin;
+        for &leaf in reached {
+            let start = usize::from(leaf) * length;
+            let Some(&value) = leaves.get(start..start + SIZE).and_then(<[_]>::first_chunk) else { return };
+            sum = add(sum, value);
+        }
+        *margin = sum;
+        leaves = leaves.get(SIZE..).unwrap_or_default();
     }
-    for margin in rest {
-        *margin = add_reached(*margin, values.as_chunks().0, reached, row, add_i8);
-        values = values.get(1..).unwrap_or_default();
-    }
-}
-
-/// As many bytes as 16 bits can add up.
-const PACKED: usize = 256;
-
-/// Adds ten objects' values of the leaves that were reached, at most [`PACKED`]. Bytes are 128 more than their
-/// values, so they add up without a sign, two sums to a word.
-#[inline(never)]
-fn add_ten(margins: &mut [i32; 10], leaves: &[u8], reached: &[u16], row: usize) {
-    const EVEN: u32 = 0x00ff_00ff;
-    // Sums of whole words, and of every other byte: their difference is the rest, and no word is taken apart twice.
-    let (mut abcd, mut bd, mut efgh, mut fh, mut i, mut j) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
-    for &leaf in reached {
-        let Some(values) = leaves.get(usize::from(leaf) * row..).and_then(<[_]>::first_chunk::<10>) else { break };
-        // Taken as words: byte by byte the compiler would load them so.
-        let ([first, second], rest) = values.as_chunks::<4>() else { break };
-        let Some(&[v8, v9]) = rest.first_chunk() else { break };
-        let word = u32::from_le_bytes(*first);
-        abcd = abcd.wrapping_add(word);
-        bd = bd.wrapping_add(word >> 8 & EVEN);
-        let word = u32::from_le_bytes(*second);
-        efgh = efgh.wrapping_add(word);
-        fh = fh.wrapping_add(word >> 8 & EVEN);
-        i = i.wrapping_add(u32::from(v8));
-        j = j.wrapping_add(u32::from(v9));
-    }
-    let ac = abcd.wrapping_sub(bd << 8);
-    let eg = efgh.wrapping_sub(fh << 8);
-    let bias = i32::try_from(reached.len()).unwrap_or(0).wrapping_mul(128);
-    let sums =
-        [low(ac), low(bd), high(ac), high(bd), low(eg), low(fh), high(eg), high(fh), i.cast_signed(), j.cast_signed()];
-    for (margin, sum) in margins.iter_mut().zip(sums) {
-        *margin = margin.wrapping_add(sum).wrapping_sub(bias);
-    }
-}
-
-/// The sum in the lower half of a word.
-fn low(pair: u32) -> i32 {
-    (pair & 0xffff).cast_signed()
-}
-
-/// The sum in the upper half of a word.
-fn high(pair: u32) -> i32 {
-    (pair >> 16).cast_signed()
-}
-
-/// Adds five objects' values of the leaves that were reached. Not inlined, so that the sums stay in registers.
-#[inline(never)]
-fn add_five<const SIZE: usize>(
-    [mut a, mut b, mut c, mut d, mut e]: [i32; 5],
-    leaves: &[[u8; SIZE]],
-    reached: &[u16],
-    row: usize,
-    add: impl Fn(i32, [u8; SIZE]) -> i32,
-) -> [i32; 5] {
-    for &leaf in reached {
-        let Some(values) = leaves.get(usize::from(leaf) * row..).and_then(<[_]>::first_chunk) else { break };
-        let [v, w, x, y, z] = *values;
-        (a, b, c, d, e) = (add(a, v), add(b, w), add(c, x), add(d, y), add(e, z));
-    }
-    [a, b, c, d, e]
-}
-
-/// Adds one object's values of the leaves that were reached.
-#[inline(never)]
-fn add_reached<const SIZE: usize>(
-    margin: i32,
-    leaves: &[[u8; SIZE]],
-    reached: &[u16],
-    row: usize,
-    add: impl Fn(i32, [u8; SIZE]) -> i32,
-) -> i32 {
-    let mut sum = margin;
-    for &leaf in reached {
-        let Some(&value) = leaves.get(usize::from(leaf) * row) else { break };
-        sum = add(sum, value);
-    }
-    sum
 }
 
 #[cfg(test)]
@@ -213,12 +169,30 @@ mod tests {
         let mut margins = [0, 5];
         let mut sum = Sum { margins: &mut margins, leaf: LeafType::I8, object: None };
         sum.add(&[0, 255]);
+        let bias = sum.settle(1);
         sum.leaf = LeafType::I16;
         sum.add(&[0x00, 0x80, 0xff, 0x7f]);
         sum.object = Some(1);
         sum.add(&[0xff, 0xff]);
         sum.object = Some(9);
         sum.add(&[1, 0]);
-        assert_eq!(margins, [-128 - 32768, 5 + 127 + 32767 - 1]);
+        sum.settle(1);
+        assert_eq!(margins, [bias - 128 - 32768, bias + 5 + 127 + 32767 - 1]);
+    }
+
+    #[test]
+    fn leaves_of_any_number_of_values_are_added_value_by_value() {
+        for objects in 1..23_usize {
+            let leaves: std::vec::Vec<u8> = (0..4 * 2 * objects).map(|i| (i * 37 % 251) as u8).collect();
+            let mut margins = std::vec![7; objects];
+            Sum { margins: &mut margins, leaf: LeafType::I16, object: None }.add_reached(&leaves, &[2, 0, 3]);
+            for (object, margin) in margins.iter().enumerate() {
+                let value = |leaf: usize| {
+                    let at = 2 * (leaf * objects + object);
+                    i32::from(i16::from_le_bytes([leaves[at], leaves[at + 1]]))
+                };
+                assert_eq!(*margin, 7 + value(2) + value(0) + value(3));
+            }
+        }
     }
 }

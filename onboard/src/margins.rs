@@ -2,8 +2,7 @@
 
 use crate::leaves::Sum;
 use crate::model::Model;
-use crate::ranks::ranks;
-use crate::{complete, fixed, grid, preorder};
+use crate::{complete, fixed, grid, preorder, ranks};
 use palpate_shared::format::{Group, Layout, LeafType};
 use palpate_shared::{Features, Touch};
 
@@ -49,51 +48,61 @@ impl Model<'_> {
     /// Adds up all trees: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
-        let (base, _) = self.base.as_chunks();
-        let bases = base.iter().map(|&base| i32::from_le_bytes(base));
         let float = self.leaf == LeafType::F32;
-        margins.fill(0);
         if float {
-            margins.iter_mut().zip(bases.clone()).for_each(|(margin, base)| *margin = base);
+            self.add_bases(margins, |_, base| base);
+        } else {
+            margins.fill(0);
         }
-        self.add_trees(features, &mut Sum { margins, leaf: self.leaf, object: None });
+        let mut sum = Sum { margins, leaf: self.leaf, object: None };
+        if self.layout == Layout::Grid {
+            grid::add(self, features, &mut sum);
+            return Some(margins);
+        }
+        let bias = self.add_trees(features, &mut sum);
         if !float {
-            margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base));
+            self.add_bases(margins, |margin, base| margin.wrapping_add(base).wrapping_sub(bias));
         }
         Some(margins)
     }
 
-    /// Adds the leaves of all groups. Groups come with the largest shift first, so that all that was added before is
-    /// shifted on the way.
-    fn add_trees(&self, features: &[i32], sum: &mut Sum<'_>) {
-        if self.layout == Layout::Grid {
-            return grid::add(self, features, sum);
+    /// Replaces each margin by what `add` makes of it and its object's base margin.
+    #[inline(always)]
+    fn add_bases(&self, margins: &mut [i32], add: impl Fn(i32, i32) -> i32) {
+        for (margin, base) in margins.iter_mut().zip(self.base.as_chunks().0) {
+            *margin = add(*margin, i32::from_le_bytes(*base));
         }
-        let ranks = ranks(self, features);
+    }
+
+    /// Adds the leaves of all groups, and says how far every margin is too large. Groups come with the largest shift
+    /// first, so that all that was added before is shifted on the way.
+    fn add_trees(&self, features: &[i32], sum: &mut Sum<'_>) -> i32 {
+        let mut ranks = [0; 256];
+        ranks::rank(self, features, &mut ranks);
+        let mut reached = [0; complete::BLOCK];
         let (mut nodes, mut leaves) = (self.nodes, self.leaves);
-        let mut shift = 0;
+        let (mut shift, mut bias) = (0, 0_i32);
+        let shift_all = |margins: &mut [i32], bias: &mut i32, shift: u8| {
+            if shift > 0 {
+                *bias = bias.wrapping_shl(shift.into());
+                margins.iter_mut().for_each(|margin| *margin = margin.wrapping_shl(shift.into()));
+            }
+        };
         for &bytes in self.groups.as_chunks().0 {
             let Some(group) = Group::from_bytes(bytes) else { continue };
-            shift_all(sum.margins, shift, group.shift);
+            shift_all(sum.margins, &mut bias, u8::saturating_sub(shift, group.shift));
             shift = group.shift;
             sum.object = group.object;
             match self.layout {
-                Layout::Complete => complete::add(&group, &ranks, &mut nodes, &mut leaves, sum),
+                Layout::Complete => complete::add(&group, &ranks, &mut reached, &mut nodes, &mut leaves, sum),
                 Layout::Wide => preorder::add_wide(self, &group, features, &mut nodes, &mut leaves, sum),
                 Layout::Compact | Layout::Grid => {
                     preorder::add_compact(&group, &ranks, &mut nodes, &mut leaves, sum);
                 }
             }
+            bias = bias.wrapping_add(sum.settle(group.trees));
         }
-        shift_all(sum.margins, shift, 0);
-    }
-}
-
-/// Turns multiples of 2^`from` into multiples of 2^`to`.
-fn shift_all(margins: &mut [i32], from: u8, to: u8) {
-    if from > to {
-        for margin in margins {
-            *margin = margin.wrapping_shl(u32::from(from - to));
-        }
+        shift_all(sum.margins, &mut bias, shift);
+        bias
     }
 }

@@ -1,43 +1,31 @@
 //! Features to ranks: where each value stands among the thresholds, looked up once a touch.
 
-use crate::bytes::{signed, take};
 use crate::model::Model;
 use palpate_shared::MISSING_FEATURE;
-use palpate_shared::format::{Axis, Columns};
 
 /// The rank of every column; beyond the model's columns, 0.
 pub(crate) type Ranks = [u8; 256];
 
 /// Ranks of a row of features in all of the model's columns.
 ///
-/// Cost: about ten instructions a step of a binary search in each axis's thresholds.
-pub(crate) fn ranks(model: &Model<'_>, features: &[i32]) -> Ranks {
-    let mut ranks = [0; 256];
+/// Cost: about 13 instructions a step of a binary search in each axis's thresholds on a Cortex-M4, 24 on a Cortex-M0+,
+/// and 150.
+pub(crate) fn rank(model: &Model<'_>, features: &[i32], ranks: &mut Ranks) {
     let mut columns = ranks.iter_mut();
-    let mut put = |rank: u8| {
-        if let Some(column) = columns.next() {
-            *column = rank;
-        }
-    };
-    let mut cuts = model.cuts;
-    for &bytes in model.axes.as_chunks().0 {
-        let Some(axis) = Axis::from_bytes(bytes) else { continue };
-        let Some(cuts) = take(&mut cuts, axis.cuts_length()) else { continue };
-        let value = at_or_missing(features, axis.feature);
-        let (left, right) = if value == MISSING_FEATURE {
-            (0, 255)
-        } else {
-            let rank = rank(cuts, axis.width, value);
-            (rank, rank)
-        };
-        if axis.columns != Columns::MissingRight {
-            put(left);
-        }
-        if axis.columns != Columns::MissingLeft {
-            put(right);
+    let mut cuts = Cuts::new(model);
+    for &[feature, axis_columns, width, count] in model.axes.as_chunks().0 {
+        let window = cuts.next(width, count);
+        let value = at_or_missing(features, feature);
+        let there = if value == MISSING_FEATURE { None } else { Some(rank_in(window, width, value)) };
+        // The bits of `Columns`: where a missing value goes left, and right.
+        for (bit, missing) in [(1, 0), (2, u8::MAX)] {
+            if axis_columns & bit != 0
+                && let Some(column) = columns.next()
+            {
+                *column = there.unwrap_or(missing);
+            }
         }
     }
-    ranks
 }
 
 /// The feature's value, or missing beyond the end of a row.
@@ -45,27 +33,44 @@ pub(crate) fn at_or_missing(features: &[i32], feature: u8) -> i32 {
     features.get(usize::from(feature)).copied().unwrap_or(MISSING_FEATURE)
 }
 
-/// How many of an axis's thresholds are at or below `value`.
-pub(crate) fn rank(cuts: &[u8], width: u8, value: i32) -> u8 {
-    let rank = match width {
-        1 => rank_of_width::<1>(cuts, value),
-        2 => rank_of_width::<2>(cuts, value),
-        3 => rank_of_width::<3>(cuts, value),
-        _ => rank_of_width::<4>(cuts, value),
-    };
-    u8::try_from(rank).unwrap_or(u8::MAX)
+/// The thresholds of a model's axes, one after the other.
+pub(crate) struct Cuts<'m> {
+    /// The model's bytes.
+    bytes: &'m [u8],
+    /// Where the next axis's thresholds start.
+    next: usize,
 }
 
-fn rank_of_width<const WIDTH: usize>(cuts: &[u8], value: i32) -> usize {
-    let (cuts, _) = cuts.as_chunks::<WIDTH>();
-    let mut rank = 0;
-    let mut step = 128;
+impl<'m> Cuts<'m> {
+    pub(crate) fn new(model: &Model<'m>) -> Self {
+        Self { bytes: model.bytes, next: model.offset(model.cuts) }
+    }
+
+    /// The thresholds of the next axis, which has `count` of them of `width` bytes, and as many of the model's bytes
+    /// before them as make a word of the first: so each is read as the upper end of a word, whatever its width.
+    #[inline(always)]
+    pub(crate) fn next(&mut self, width: u8, count: u8) -> &'m [u8] {
+        let start = self.next.wrapping_add(usize::from(width)).wrapping_sub(4);
+        self.next = self.next.wrapping_add(usize::from(width) * usize::from(count));
+        self.bytes.get(start..self.next).unwrap_or_default()
+    }
+}
+
+/// How many of an axis's thresholds (see [`Cuts::next`]) are at or below `value`.
+#[inline(never)]
+pub(crate) fn rank_in(window: &[u8], width: u8, value: i32) -> u8 {
+    let width = usize::from(width);
+    let below = u32::try_from(32_usize.wrapping_sub(8 * width) & 31).unwrap_or(0);
+    let mut rank = 0_u8;
+    let mut step = 128_u8;
     while step > 0 {
         // Were the thresholds from here to the next step's end passed?
-        if cuts.get(rank + step - 1).is_some_and(|cut| signed(cut) <= value) {
-            rank += step;
+        let last = usize::from(rank | step - 1) * width;
+        let last = window.get(last..last + 4).and_then(<[u8]>::first_chunk);
+        if last.is_some_and(|word| i32::from_le_bytes(*word) >> below <= value) {
+            rank |= step;
         }
-        step /= 2;
+        step >>= 1;
     }
     rank
 }
@@ -73,6 +78,13 @@ fn rank_of_width<const WIDTH: usize>(cuts: &[u8], value: i32) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The rank among thresholds of `width` bytes, with something else before them.
+    fn rank(cuts: &[u8], width: u8, value: i32) -> u8 {
+        let bytes = [&[0xa5; 4], cuts].concat();
+        let mut axes = Cuts { bytes: &bytes, next: 4 };
+        rank_in(axes.next(width, u8::try_from(cuts.len() / usize::from(width)).unwrap()), width, value)
+    }
 
     #[test]
     fn a_rank_counts_the_thresholds_at_or_below_a_value() {

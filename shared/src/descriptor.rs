@@ -107,43 +107,48 @@ impl Descriptor {
 
     /// The features of a touch, clamped to ±[`FEATURE_LIMIT`].
     ///
-    /// Cost: about 60 instructions on a Cortex-M. Cannot fail.
+    /// Cost: about 50 instructions on a Cortex-M without a pose. Cannot fail.
     pub fn features(self, touch: &Touch) -> Features {
         const NONE: i32 = MISSING_FEATURE;
-        let [first, middle, last] = touch.times().map(within_limit);
+        let [first, middle, last] = touch.times();
+        let (first, middle, last) = (within_limit(first), within_limit(middle), within_limit(last));
         if self == Self::Times {
-            let [first, middle, last] = [first, middle, last].map(|time| time.map_or(NONE, clamp));
-            return Features { values: [first, middle, last, NONE, NONE, NONE, NONE, NONE], len: 3 };
+            return Features { values: [clamp(first), clamp(middle), clamp(last), NONE, NONE, NONE, NONE, NONE], len: 3 };
         }
-        let mut values = [NONE; MAX_FEATURES];
-        let [curvature, slope, posed @ ..] = &mut values;
-        if let (Some(first), Some(last)) = (first, last) {
-            *slope = clamp((last - first).abs());
-            *curvature = middle.map_or(NONE, |middle| clamp(first - 2 * middle + last));
+        let (mut curvature, mut slope) = (NONE, NONE);
+        if first != NONE && last != NONE {
+            slope = clamp((last - first).abs());
+            if middle != NONE {
+                curvature = clamp(first - 2 * middle + last);
+            }
+        }
+        if let (true, Some(Pose { direction, alignment })) = (self.needs_pose(), touch.pose()) {
+            let [x, y, z] = direction.map(i32::from);
+            let [u, v, w] = canonical_alignment(alignment, touch.times()).map(i32::from);
+            return match self {
+                Self::Gravity => Features { values: [curvature, slope, z, w, NONE, NONE, NONE, NONE], len: 4 },
+                _ => Features { values: [curvature, slope, x, y, z, u, v, w], len: 8 },
+            };
         }
         let len = match self {
-            Self::Times | Self::Curvature => 2,
             Self::Gravity => 4,
             Self::Oriented => 8,
+            _ => 2,
         };
-        if let (true, Some(Pose { direction, alignment })) = (self.needs_pose(), touch.pose()) {
-            let alignment = canonical_alignment(alignment, touch.times());
-            let [x, y, z] = direction.map(i32::from);
-            let [u, v, w] = alignment.map(i32::from);
-            *posed = if self == Self::Gravity { [z, w, NONE, NONE, NONE, NONE] } else { [x, y, z, u, v, w] };
-        }
-        Features { values, len }
+        Features { values: [curvature, slope, NONE, NONE, NONE, NONE, NONE, NONE], len }
     }
 }
 
-/// A contact time in microseconds; what is later than 2^28 (268 s) counts as that, so that sums of times fit an i32.
-fn within_limit(time: ContactTime) -> Option<i32> {
+/// A contact time in microseconds; what is later than 2^28 (268 s) counts as that, so that sums of times fit an i32; a
+/// missing one is [`MISSING_FEATURE`].
+fn within_limit(time: ContactTime) -> i32 {
     const LIMIT: u32 = 1 << 28;
-    time.micros().map(|micros| micros.min(LIMIT).cast_signed())
+    time.micros().map_or(MISSING_FEATURE, |micros| micros.min(LIMIT).cast_signed())
 }
 
+/// A feature within its limits; a missing one stays missing.
 fn clamp(value: i32) -> i32 {
-    value.clamp(-FEATURE_LIMIT, FEATURE_LIMIT)
+    if value == MISSING_FEATURE { value } else { value.clamp(-FEATURE_LIMIT, FEATURE_LIMIT) }
 }
 
 /// The alignment counted from the finger that touched first to the one that touched last (a missing contact counts as

@@ -1,9 +1,13 @@
 //! Writes what the firmware's benchmarks and its test of bit-identity are built with:
 //!
 //! ```text
-//! cargo run --release -p palpate-tests --bin bench_models -- OUT          random ensembles of the usual shapes
-//! cargo run --release -p palpate-tests --bin bench_models -- OUT DATA     trained on touches that `palpate capture` made
+//! cargo run --release -- run ../shared/objects -o RUN
+//! cargo run --release -p palpate-tests --bin bench_models -- OUT RUN     what `palpate run` trained, and its kin
+//! cargo run --release -p palpate-tests --bin bench_models -- OUT         random ensembles of the same shapes
 //! ```
+//!
+//! The 1000 one-output trees are the run's own (`paper.json`); the multi-output ensembles are trained on its touches
+//! with its settings, but for the number of trees and their depth.
 //!
 //! `OUT` then holds models, touches (three times of four bytes), the same trees for other evaluators, and for
 //! `identity.palpate` what this machine makes of ten thousand touches.
@@ -11,6 +15,7 @@
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::dataset::Dataset;
 use palpate::ensemble::{Ensemble, Node, Output};
+use palpate::folds::{self, Split};
 use palpate::train::{self, train};
 use palpate::{Error, Result};
 use palpate_onboard::{Model, Recognizer, Stopping};
@@ -21,14 +26,19 @@ use std::path::{Path, PathBuf};
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args_os().skip(1).map(PathBuf::from);
-    let usage = || Error::argument("no directory to write to", "Usage: bench_models OUT [DATA].");
+    let usage = || Error::argument("no directory to write to", "Usage: bench_models OUT [RUN].");
     let out = arguments.next().ok_or_else(usage)?;
-    let data = arguments.next().map(|directory| Dataset::read(&directory)).transpose()?;
-    let one = ensemble(data.as_ref(), train::Settings::paper(), Descriptor::Times)?;
+    let run = arguments.next();
+    let data = run.as_ref().map(|run| split(run)).transpose()?;
+    let trained = data.as_ref().map(|data| &data.train);
+    let one = match &run {
+        Some(run) => Ensemble::load(run.join("paper.json"))?,
+        None => ensemble(None, train::Settings::paper(), Descriptor::Times)?,
+    };
     let compact = |rounds, depth, bins| train::Settings { rounds, depth, bins, ..train::Settings::compact() };
-    let each100 = ensemble(data.as_ref(), compact(100, 6, 256), Descriptor::Curvature)?;
-    let each40 = ensemble(data.as_ref(), compact(40, 5, 256), Descriptor::Curvature)?;
-    let table = ensemble(data.as_ref(), compact(60, 6, 64), Descriptor::Curvature)?;
+    let each100 = ensemble(trained, compact(100, 6, 256), Descriptor::Curvature)?;
+    let each40 = ensemble(trained, compact(40, 5, 256), Descriptor::Curvature)?;
+    let table = ensemble(trained, compact(60, 6, 64), Descriptor::Curvature)?;
     let models = [
         ("one-i16", &one, Leaf::I16, Layout::Complete),
         ("one-compact", &one, Leaf::I16, Layout::Compact),
@@ -41,7 +51,7 @@ fn main() -> Result<()> {
         ("grid-i16", &table, Leaf::I16, Layout::Grid),
         ("identity", &each40, Leaf::I16, Layout::Complete),
     ];
-    let touches = touches(data.as_ref());
+    let touches = touches(data.as_ref().map(|data| &data.test));
     write(&out.join("touches.bin"), &touches.iter().flat_map(times).collect::<Vec<u8>>())?;
     for (name, ensemble, leaf, layout) in models {
         let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() })?;
@@ -62,6 +72,12 @@ fn main() -> Result<()> {
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     palpate::output::write_bytes(path, bytes)
+}
+
+/// A run's touches, trained and tested on.
+fn split(run: &Path) -> Result<Split> {
+    let settings = palpate::run::Settings::default();
+    folds::split(&Dataset::read(&run.join("data"))?, settings.test_share, settings.capture.seed)
 }
 
 /// Trained where there is data; otherwise random, of the same shape and without missing splits.
