@@ -7,6 +7,7 @@ pub(crate) fn at<T: Copy + Default>(slice: &[T], index: usize) -> T {
 }
 
 /// Splits `count` bytes off the front of `bytes`, or `None` when there are fewer.
+#[inline(never)]
 pub(crate) fn take<'a>(bytes: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
     let (front, rest) = bytes.split_at_checked(count)?;
     *bytes = rest;

@@ -13,7 +13,7 @@ pub(crate) struct Sum<'a> {
 }
 
 /// A byte is this much more than the value that it stands for.
-const BIAS: i32 = 128;
+pub(crate) const BIAS: i32 = 128;
 
 impl Sum<'_> {
     /// Bytes of a leaf in the present group.

@@ -3,7 +3,7 @@
 use crate::leaves::Sum;
 use crate::model::Model;
 use crate::{complete, fixed, grid, preorder, ranks};
-use palpate_shared::format::{Group, Layout, LeafType};
+use palpate_shared::format::{Group, Layout};
 use palpate_shared::{Features, Touch};
 
 impl Model<'_> {
@@ -22,7 +22,7 @@ impl Model<'_> {
     /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where there is none; a short row is filled up with those.
     pub fn margins_of(&self, features: &[i32], margins: &mut [i32]) -> bool {
         let Some(margins) = self.sum(features, margins) else { return false };
-        if self.leaf == LeafType::F32 {
+        if self.is_float() {
             for margin in margins {
                 *margin = fixed::q16_from_f32_bits(margin.cast_unsigned());
             }
@@ -35,7 +35,7 @@ impl Model<'_> {
     #[cfg(feature = "f32-leaves")]
     pub fn f32_margins_of(&self, features: &[i32], margins: &mut [f32]) -> bool {
         let mut bits = [0; 256];
-        if self.leaf != LeafType::F32 || margins.len() != self.object_count() {
+        if !self.is_float() || margins.len() != self.object_count() {
             return false;
         }
         let Some(bits) = self.sum(features, &mut bits) else { return false };
@@ -48,19 +48,18 @@ impl Model<'_> {
     /// Adds up all trees: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
-        let float = self.leaf == LeafType::F32;
-        if float {
+        if self.layout == Layout::Grid {
+            grid::look_up(self, features, margins);
+            return Some(margins);
+        }
+        if self.is_float() {
             self.add_bases(margins, |_, base| base);
         } else {
             margins.fill(0);
         }
         let mut sum = Sum { margins, leaf: self.leaf, object: None };
-        if self.layout == Layout::Grid {
-            grid::add(self, features, &mut sum);
-            return Some(margins);
-        }
         let bias = self.add_trees(features, &mut sum);
-        if !float {
+        if !self.is_float() {
             self.add_bases(margins, |margin, base| margin.wrapping_add(base).wrapping_sub(bias));
         }
         Some(margins)

@@ -18,9 +18,7 @@ pub struct Model<'a> {
     pub(crate) groups: &'a [u8],
     pub(crate) nodes: &'a [u8],
     pub(crate) leaves: &'a [u8],
-    pub(crate) unit_bits: u32,
     pub(crate) objects: u16,
-    pub(crate) unit_shift: u8,
     pub(crate) layout: Layout,
     pub(crate) leaf: LeafType,
     pub(crate) descriptor: Option<Descriptor>,
@@ -33,10 +31,22 @@ impl<'a> Model<'a> {
     ///
     /// # Errors
     /// [`ModelError`], for bytes that are truncated, too many, of another version, changed, or meaningless.
+    #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
+        let mut model = Self::read(bytes);
+        if let Ok(opened) = &model
+            && let Err(error) = validate::model(opened)
+        {
+            model = Err(error);
+        }
+        model
+    }
+
+    /// Finds the sections.
+    #[inline(never)]
+    fn read(bytes: &'a [u8]) -> Result<Self, ModelError> {
         let found = bytes.len();
-        let magic = bytes.get(..MAGIC.len().min(found)).unwrap_or_default();
-        if !MAGIC.starts_with(magic) {
+        if bytes.iter().zip(MAGIC).any(|(&byte, magic)| byte != magic) {
             return Err(ModelError::NotAModel);
         }
         let Some((header, mut rest)) = Header::split(bytes) else {
@@ -66,26 +76,30 @@ impl<'a> Model<'a> {
         section(length(header.text_length()))?;
         let base = section(4 * usize::from(objects))?;
         section(4 * usize::from(objects))?;
-        let model = Self {
-            bytes,
-            base,
-            axes: section(4 * usize::from(header.axes()))?,
-            cuts: section(length(header.cuts_length()))?,
-            groups: section(8 * usize::from(header.groups()))?,
-            nodes: section(length(header.nodes_length()))?,
-            leaves: section(length(header.leaves_length()))?,
-            unit_bits: header.unit_bits(),
-            objects,
-            unit_shift: header.unit_shift(),
-            layout: Layout::from_code(header.layout()).ok_or(ModelError::Field { offset: 6 })?,
-            leaf: LeafType::from_code(header.leaf()).ok_or(ModelError::Field { offset: 7 })?,
-            descriptor: validate::descriptor(&header)?,
-        };
+        let axes = section(4 * usize::from(header.axes()))?;
+        let cuts = section(length(header.cuts_length()))?;
+        let groups = section(8 * usize::from(header.groups()))?;
+        let nodes = section(length(header.nodes_length()))?;
+        let leaves = section(length(header.leaves_length()))?;
+        let layout = Layout::from_code(header.layout()).ok_or(ModelError::Field { offset: 6 })?;
+        let leaf = LeafType::from_code(header.leaf()).ok_or(ModelError::Field { offset: 7 })?;
+        let descriptor = validate::descriptor(&header).map_err(|offset| ModelError::Field { offset })?;
         if rest.len() != CHECKSUM_LENGTH {
             return Err(ModelError::Section { offset: found - rest.len() });
         }
-        validate::model(&model, &header)?;
-        Ok(model)
+        Ok(Self {
+            bytes,
+            base,
+            axes,
+            cuts,
+            groups,
+            nodes,
+            leaves,
+            objects,
+            layout,
+            leaf,
+            descriptor,
+        })
     }
 
     /// The header.
@@ -124,6 +138,11 @@ impl<'a> Model<'a> {
         self.leaf
     }
 
+    /// Whether margins are added in f32; never without the feature `f32-leaves`, so that no code for it is linked.
+    pub(crate) const fn is_float(&self) -> bool {
+        cfg!(feature = "f32-leaves") && matches!(self.leaf, LeafType::F32)
+    }
+
     /// What features are compared as.
     pub fn key(&self) -> Key {
         Key::from_code(self.header().key()).unwrap_or(Key::Whole)
@@ -157,11 +176,6 @@ impl<'a> Model<'a> {
     /// The evidence for an object before any touch, in units of a margin.
     pub fn prior(&self, object: usize) -> i32 {
         at_i32(self.priors(), object)
-    }
-
-    /// What an object's margin starts from, in units of a margin (integer leaves) or as the bits of an f32.
-    pub(crate) fn base(&self, object: usize) -> i32 {
-        at_i32(self.base, object)
     }
 
     /// Where a section starts.

@@ -60,11 +60,11 @@ fn tree<const SIZE: usize>(nodes: &mut &[u8], split: impl Fn([u8; SIZE]) -> (boo
     let (&count, rest) = nodes.split_first_chunk()?;
     *nodes = rest;
     let count = usize::from(u16::from_le_bytes(count));
-    let (splits, _) = take(nodes, count * SIZE)?.as_chunks();
+    let splits = take(nodes, count * SIZE)?;
     let (mut position, mut leaf, mut below) = (0_usize, 0, count);
     // The position grows with every step, so this ends even where the subtrees' sizes contradict each other.
     while below > 0 {
-        let Some(&bytes) = splits.get(position) else { break };
+        let Some(&bytes) = splits.get(position * SIZE..).and_then(<[u8]>::first_chunk) else { break };
         let (right, left) = split(bytes);
         position += 1;
         if right {

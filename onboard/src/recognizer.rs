@@ -158,7 +158,8 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.verdict
     }
 
-    const fn unit(&self) -> Unit {
-        Unit { bits: self.model.unit_bits, shift: self.model.unit_shift }
+    fn unit(&self) -> Unit {
+        let header = self.model.header();
+        Unit { bits: header.unit_bits(), shift: header.unit_shift() }
     }
 }

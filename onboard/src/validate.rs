@@ -11,23 +11,25 @@ use palpate_shared::format::{
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
 
-/// The header's descriptor, `None` for rows of features.
-pub(crate) fn descriptor(header: &Header<'_>) -> Result<Option<Descriptor>, ModelError> {
+/// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.
+pub(crate) fn descriptor(header: &Header<'_>) -> Result<Option<Descriptor>, usize> {
     if header.descriptor() == RAW_FEATURES {
         return Ok(None);
     }
-    let descriptor = Descriptor::from_code(header.descriptor()).ok_or(ModelError::Field { offset: 12 })?;
+    let descriptor = Descriptor::from_code(header.descriptor()).ok_or(12_usize)?;
     if usize::from(header.last_feature()) + 1 != descriptor.feature_count() {
-        return Err(ModelError::Field { offset: 15 });
+        return Err(15);
     }
     if header.key() != Key::Whole.code() {
-        return Err(ModelError::Field { offset: 13 });
+        return Err(13);
     }
     Ok(Some(descriptor))
 }
 
 /// Everything else: the numbers of the header, the axes, the groups, and the lengths of splits and leaves.
-pub(crate) fn model(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelError> {
+#[inline(never)]
+pub(crate) fn model(model: &Model<'_>) -> Result<(), ModelError> {
+    let header = &model.header();
     if Key::from_code(header.key()).is_none() {
         return Err(ModelError::Field { offset: 13 });
     }
@@ -52,12 +54,14 @@ pub(crate) fn model(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelE
         section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
         section(model.groups.is_empty(), model.groups)?;
     }
-    let largest_leaf: u64 = match model.leaf {
-        LeafType::I8 => 1 << 7,
-        LeafType::I16 => 1 << 15,
+    // The largest leaf, as a power of two.
+    let leaf_bits = match model.leaf {
+        LeafType::I8 => 7,
+        LeafType::I16 => 15,
         LeafType::F32 => 0,
     };
-    let mut range: u64 = 1 << 20;
+    let limit = MARGIN_LIMIT.unsigned_abs();
+    let (mut range, mut largest_base) = (1_u32 << 20, 0);
     let mut shift = MAX_SHIFT;
     for (index, &bytes) in model.groups.as_chunks().0.iter().enumerate() {
         let wrong = ModelError::Field { offset: model.offset(model.groups) + Group::LENGTH * index };
@@ -68,7 +72,13 @@ pub(crate) fn model(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelE
             return Err(wrong);
         }
         shift = group.shift;
-        range = range.saturating_add((u64::from(group.trees) * largest_leaf) << group.shift);
+        if model.leaf != LeafType::F32 {
+            // Shifted at most by 15 + MAX_SHIFT; a right shift of the limit cannot overflow as one of the trees could.
+            if group.trees > (limit >> leaf_bits) >> shift {
+                return Err(ModelError::MarginRange);
+            }
+            range = range.saturating_add(group.trees << (leaf_bits + shift & 31));
+        }
         let leaf = model.leaf.size() * if group.object.is_none() { values } else { 1 };
         let fits = match model.layout {
             Layout::Complete if (1..=MAX_COMPLETE_DEPTH).contains(&group.depth) => {
@@ -83,11 +93,11 @@ pub(crate) fn model(model: &Model<'_>, header: &Header<'_>) -> Result<(), ModelE
     section(nodes.is_empty(), nodes)?;
     section(leaves.is_empty(), leaves)?;
     if model.leaf != LeafType::F32 {
-        for object in 0..values {
-            range = range.max(u64::from(model.base(object).unsigned_abs()).saturating_add(range));
+        for &base in model.base.as_chunks().0 {
+            largest_base = largest_base.max(i32::from_le_bytes(base).unsigned_abs());
         }
     }
-    if range > u64::from(MARGIN_LIMIT.unsigned_abs()) { Err(ModelError::MarginRange) } else { Ok(()) }
+    if range.saturating_add(largest_base) > limit { Err(ModelError::MarginRange) } else { Ok(()) }
 }
 
 /// Every axis is of a feature that there is, columns can be numbered in a byte, thresholds fill their section.
@@ -122,10 +132,14 @@ fn grid_cells(model: &Model<'_>) -> Option<usize> {
 }
 
 fn complete_group(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], leaf: usize) -> Option<()> {
-    let slots = 1_usize << group.depth.min(MAX_COMPLETE_DEPTH);
     let trees = usize::try_from(group.trees).ok()?;
-    take(nodes, trees.checked_mul(2 * slots)?)?;
-    take(leaves, trees.checked_mul(slots)?.checked_mul(leaf)?)?;
+    // Two bytes a slot; compared like this nothing can overflow.
+    if trees > nodes.len() >> 1 >> (group.depth & 15) {
+        return None;
+    }
+    let slots = trees << (group.depth & 15);
+    take(nodes, 2 * slots)?;
+    take(leaves, slots.checked_mul(leaf)?)?;
     Some(())
 }
 

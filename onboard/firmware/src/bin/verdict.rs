@@ -14,9 +14,10 @@ mod no_panic;
 fn main() -> ! {
     // A model and touches that the compiler knows nothing about.
     let bytes: &'static [u8] = black_box(&[]);
-    if let Ok(model) = Model::new(bytes) {
-        let stopping = Stopping::from_model(&model);
-        if let Ok(mut recognizer) = Recognizer::<10>::new(&model, stopping) {
+    // By reference: moved out of their results they would be copied.
+    if let Ok(model) = &Model::new(bytes) {
+        let stopping = Stopping::from_model(model);
+        if let Ok(recognizer) = &mut Recognizer::<10>::new(model, stopping) {
             loop {
                 let touch = Touch::from_micros(black_box([0, 1, 2]));
                 if black_box(recognizer.push(&touch)) != Verdict::Undecided {
