@@ -22,8 +22,16 @@ impl Sum<'_> {
     }
 
     /// Adds one leaf; bytes with their bias.
+    ///
+    /// Cost: eight instructions a value, and 15.
     pub(crate) fn add(&mut self, leaf: &[u8]) {
-        self.add_reached(leaf, &[0]);
+        let leaf_type = self.leaf;
+        let margins = self.of_group();
+        match leaf_type {
+            LeafType::I8 => add_values(margins, leaf, add_i8),
+            LeafType::I16 => add_values(margins, leaf, add_i16),
+            LeafType::F32 => add_f32_leaves(margins, leaf, &[0]),
+        }
     }
 
     /// Adds the leaves with these numbers; bytes with their bias.
@@ -58,15 +66,28 @@ impl Sum<'_> {
     }
 }
 
+fn add_i8(sum: i32, [value]: [u8; 1]) -> i32 {
+    sum.wrapping_add(i32::from(value))
+}
+
+fn add_i16(sum: i32, value: [u8; 2]) -> i32 {
+    sum.wrapping_add(i32::from(i16::from_le_bytes(value)))
+}
+
+fn add_values<const SIZE: usize>(margins: &mut [i32], leaf: &[u8], add: impl Fn(i32, [u8; SIZE]) -> i32) {
+    for (margin, value) in margins.iter_mut().zip(leaf.as_chunks().0) {
+        *margin = add(*margin, *value);
+    }
+}
+
 #[inline(never)]
 fn add_i8_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
-    add_leaves(margins, leaves, reached, |sum, [value]| sum.wrapping_add(i32::from(value)), add_ten_i8);
+    add_leaves(margins, leaves, reached, add_i8, add_ten_i8);
 }
 
 #[inline(never)]
 fn add_i16_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
-    let add = |sum: i32, value| sum.wrapping_add(i32::from(i16::from_le_bytes(value)));
-    add_leaves(margins, leaves, reached, add, add_ten_i16);
+    add_leaves(margins, leaves, reached, add_i16, add_ten_i16);
 }
 
 /// Whether the chip loads words from anywhere (Cortex-M3 and up: the same that have atomic operations), and takes them

@@ -87,19 +87,7 @@ impl<'a> Model<'a> {
         if rest.len() != CHECKSUM_LENGTH {
             return Err(ModelError::Section { offset: found - rest.len() });
         }
-        Ok(Self {
-            bytes,
-            base,
-            axes,
-            cuts,
-            groups,
-            nodes,
-            leaves,
-            objects,
-            layout,
-            leaf,
-            descriptor,
-        })
+        Ok(Self { bytes, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf, descriptor })
     }
 
     /// The header.

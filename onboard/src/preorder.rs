@@ -3,7 +3,6 @@
 //! A tree is the number of its splits, then the splits, each with the number of splits in its left subtree; its leaves
 //! stand in order, so going right passes as many leaves as splits, and one.
 
-use crate::bytes::take;
 use crate::leaves::Sum;
 use crate::model::Model;
 use crate::ranks::{Ranks, at_or_missing};
@@ -58,20 +57,20 @@ pub(crate) fn add_wide(
 /// leaf and the number of splits.
 fn tree<const SIZE: usize>(nodes: &mut &[u8], split: impl Fn([u8; SIZE]) -> (bool, usize)) -> Option<(usize, usize)> {
     let (&count, rest) = nodes.split_first_chunk()?;
-    *nodes = rest;
     let count = usize::from(u16::from_le_bytes(count));
-    let splits = take(nodes, count * SIZE)?;
-    let (mut position, mut leaf, mut below) = (0_usize, 0, count);
-    // The position grows with every step, so this ends even where the subtrees' sizes contradict each other.
+    let (mut splits, rest) = rest.split_at_checked(count * SIZE)?;
+    *nodes = rest;
+    let (mut leaf, mut below) = (0, count);
+    // Splits get fewer with every step, so this ends even where the subtrees' sizes contradict each other.
     while below > 0 {
-        let Some(&bytes) = splits.get(position * SIZE..).and_then(<[u8]>::first_chunk) else { break };
+        let Some((&bytes, after)) = splits.split_first_chunk() else { break };
         let (right, left) = split(bytes);
-        position += 1;
         if right {
-            position += left;
+            splits = after.get(left * SIZE..).unwrap_or_default();
             leaf += left + 1;
             below = below.saturating_sub(left + 1);
         } else {
+            splits = after;
             below = left;
         }
     }
@@ -80,8 +79,9 @@ fn tree<const SIZE: usize>(nodes: &mut &[u8], split: impl Fn([u8; SIZE]) -> (boo
 
 fn add_leaf(leaf: usize, splits: usize, leaves: &mut &[u8], sum: &mut Sum<'_>) {
     let length = sum.leaf_length();
-    let Some(leaves) = take(leaves, (splits + 1) * length) else { return };
-    if let Some(leaf) = leaves.get(leaf * length..).and_then(|rest| rest.get(..length)) {
+    let Some((tree, rest)) = leaves.split_at_checked((splits + 1) * length) else { return };
+    *leaves = rest;
+    if let Some(leaf) = tree.get(leaf * length..leaf * length + length) {
         sum.add(leaf);
     }
 }

@@ -64,7 +64,7 @@ pub(crate) fn rank_in(window: &[u8], width: u8, value: i32) -> u8 {
     let (mut rank, mut step) = (0_u32, 128_u32);
     while step > 0 {
         // Were the thresholds from here to the next step's end passed?
-        let [last, ..] = (rank | step - 1).to_le_bytes();
+        let [last, ..] = (rank | (step - 1)).to_le_bytes();
         let last = usize::from(last) * width;
         let last = window.get(last..last + 4).and_then(<[u8]>::first_chunk);
         if last.is_some_and(|word| i32::from_le_bytes(*word) >> below <= value) {

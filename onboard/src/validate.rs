@@ -77,7 +77,7 @@ pub(crate) fn model(model: &Model<'_>) -> Result<(), ModelError> {
             if group.trees > (limit >> leaf_bits) >> shift {
                 return Err(ModelError::MarginRange);
             }
-            range = range.saturating_add(group.trees << (leaf_bits + shift & 31));
+            range = range.saturating_add(group.trees << ((leaf_bits + shift) & 31));
         }
         let leaf = model.leaf.size() * if group.object.is_none() { values } else { 1 };
         let fits = match model.layout {

@@ -113,7 +113,10 @@ impl Descriptor {
         let [first, middle, last] = touch.times();
         let (first, middle, last) = (within_limit(first), within_limit(middle), within_limit(last));
         if self == Self::Times {
-            return Features { values: [clamp(first), clamp(middle), clamp(last), NONE, NONE, NONE, NONE, NONE], len: 3 };
+            return Features {
+                values: [clamp(first), clamp(middle), clamp(last), NONE, NONE, NONE, NONE, NONE],
+                len: 3,
+            };
         }
         let (mut curvature, mut slope) = (NONE, NONE);
         if first != NONE && last != NONE {
