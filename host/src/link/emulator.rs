@@ -53,7 +53,7 @@ impl Emulator {
         } else {
             "none".into()
         };
-        command.arg("-monitor").arg(monitor).arg("-kernel").arg(&self.firmware);
+        command.args(["-monitor", "none", "-qmp"]).arg(monitor).arg("-kernel").arg(&self.firmware);
         let spawned = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
         let mut child = spawned.map_err(|source| match source.kind() {
             ErrorKind::NotFound => {
@@ -74,29 +74,33 @@ impl Emulator {
 
 const MONITOR: &str = "monitor";
 
-/// Gives a command to the emulator's monitor.
+/// Resets the chip, as its reset button does, and returns when that has happened: over QEMU's machine protocol, a line of
+/// JSON for each command, answer and event.
 #[cfg(unix)]
-pub(super) fn command(directory: &Path, line: &str) -> Result<()> {
+pub(super) fn reset(directory: &Path) -> Result<()> {
     use std::io::{BufRead, BufReader, Write};
     let path = directory.join(MONITOR);
     let io = |source| Error::io(&path, "reset the emulated chip", source);
     let mut monitor = std::os::unix::net::UnixStream::connect(&path).map_err(io)?;
-    let mut answers = BufReader::new(monitor.try_clone().map_err(io)?);
-    writeln!(monitor, "{line}\ninfo version").map_err(io)?;
-    // The greeting, the echoes; the version comes after the command is done.
-    let mut answer = String::new();
-    loop {
-        answer.clear();
-        if answers.read_line(&mut answer).map_err(io)? == 0 || answer.trim_end().ends_with("info version") {
-            break;
+    monitor.set_read_timeout(Some(Duration::from_secs(30))).map_err(io)?;
+    let mut lines = BufReader::new(monitor.try_clone().map_err(io)?).lines();
+    let mut wait_for = |key: &str, value: Option<&str>| -> std::io::Result<()> {
+        for line in &mut lines {
+            let message: serde_json::Value = serde_json::from_str(&line?)?;
+            if message.get(key).is_some_and(|found| value.is_none_or(|value| found == value)) {
+                return Ok(());
+            }
         }
-    }
-    answer.clear();
-    answers.read_line(&mut answer).map_err(io)?;
-    Ok(())
+        Err(ErrorKind::UnexpectedEof.into())
+    };
+    wait_for("QMP", None).map_err(io)?;
+    writeln!(monitor, r#"{{"execute":"qmp_capabilities"}}"#).map_err(io)?;
+    wait_for("return", None).map_err(io)?;
+    writeln!(monitor, r#"{{"execute":"system_reset"}}"#).map_err(io)?;
+    wait_for("event", Some("RESET")).map_err(io)
 }
 
 #[cfg(not(unix))]
-pub(super) fn command(_: &Path, _: &str) -> Result<()> {
+pub(super) fn reset(_: &Path) -> Result<()> {
     Err(Error::data("the emulator cannot be reset from here", "Run this on Linux or macOS."))
 }

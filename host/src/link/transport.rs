@@ -87,7 +87,7 @@ impl Transport {
         let Some(directory) = directory else {
             return Err(Error::data(format!("{} has no reset", self.name), "Use the emulator."));
         };
-        super::emulator::command(directory.path(), "system_reset")
+        super::emulator::reset(directory.path())
     }
 
     /// Sends bytes, at once or, on a bad line, when they are due.
