@@ -76,6 +76,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             }
         },
     }
+    if show.has_quit {
+        return Ok(());
+    }
     show.look(&mut connection, &chip, false)?;
     show.finish()
 }
@@ -103,12 +106,14 @@ fn follow(path: &Path) -> Result<()> {
 struct Show {
     view: View,
     screen: Option<Screen>,
+    /// The user has seen enough.
+    has_quit: bool,
 }
 
 impl Show {
     fn open(source: String) -> Result<Self> {
         let screen = std::io::stdout().is_terminal().then(Screen::open).transpose()?;
-        Ok(Self { view: View::new(source), screen })
+        Ok(Self { view: View::new(source), screen, has_quit: false })
     }
 
     fn take(&mut self, entry: Entry) -> Result<()> {
@@ -141,7 +146,8 @@ impl Show {
 
     fn show(&mut self) -> Result<ControlFlow<()>> {
         let Some(screen) = &mut self.screen else { return Ok(ControlFlow::Continue(())) };
-        Ok(if screen.show(&self.view)? { ControlFlow::Continue(()) } else { ControlFlow::Break(()) })
+        self.has_quit |= !screen.show(&self.view)?;
+        Ok(if self.has_quit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
     /// Keeps the last view until the user has seen enough.
