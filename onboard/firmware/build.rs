@@ -28,18 +28,21 @@ fn built_in() -> io::Result<()> {
 }
 
 /// What `palpate-tests`' `bench_models` writes.
-const BENCH: [&str; 14] = [
+const BENCH: [&str; 17] = [
     "one-i16.palpate",
     "one-compact.palpate",
+    "one-d3.palpate",
     "each100-i16.palpate",
     "each100-i8.palpate",
     "each40-i16.palpate",
     "each40-i8.palpate",
     "each40-compact.palpate",
+    "each20-d7.palpate",
     "grid-i8.palpate",
     "grid-i16.palpate",
     "identity.palpate",
     "identity.bin",
+    "estimates.bin",
     "one-nodes.bin",
     "one-irithyll.bin",
     "touches.bin",

@@ -2,6 +2,7 @@
 
 use super::axes::{Axes, cuts_bytes, visit, width};
 use super::cells::Cells;
+use super::cost;
 use super::forest::{Branch, Branches, Forest};
 use super::quantise::Scale;
 use crate::ensemble::Output;
@@ -278,11 +279,12 @@ fn complete(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<
         nodes.append(&mut columns);
         nodes.append(&mut thresholds);
         groups.push(group(run, u8::try_from(depth).ok()?));
-        instructions += run.trees.len() * (15 + 5 * depth + leaf_instructions(forest, run));
+        let shifted = groups.len() > 1;
+        instructions += cost::complete_group(run.trees.len(), depth, values(forest, run), shifted);
     }
     let (records, cuts) = records(axes);
-    let ranking = 300 + 100 * axes.axes.len();
-    Some((records, cuts, groups, nodes, (instructions + ranking) as u64))
+    instructions += cost::touch(axes.axes.len(), forest.objects());
+    Some((records, cuts, groups, nodes, instructions as u64))
 }
 
 /// Writes a branch into the slots below `slot`, `levels` deep; a leaf further up is repeated, and the splits above its
@@ -311,13 +313,13 @@ fn compact(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<'
     if !fits_narrow(forest, axes) {
         return None;
     }
-    let (groups, nodes, steps) = preorder(forest, runs, leaves, |split, nodes| {
+    let (groups, nodes) = preorder(forest, runs, leaves, |split, nodes| {
         let (column, threshold) = axes.place(split);
         nodes.extend([column as u8, threshold, split.left_splits as u8]);
     })?;
     let (records, cuts) = records(axes);
-    let ranking = 300 + 100 * axes.axes.len();
-    let instructions = trees_instructions(forest, runs, 30) + 12 * steps + ranking;
+    let instructions =
+        cost::touch(axes.axes.len(), forest.objects()) + trees_instructions(forest, runs, cost::COMPACT_STEP);
     Some((records, cuts, groups, nodes, instructions as u64))
 }
 
@@ -332,36 +334,35 @@ fn wide(forest: &Forest<'_>, runs: &[Run], leaves: &mut Leaves<'_>) -> Option<St
     if cuts.len() > 1 << 16 {
         return None;
     }
-    let (groups, nodes, steps) = preorder(forest, runs, leaves, |split, nodes| {
+    let (groups, nodes) = preorder(forest, runs, leaves, |split, nodes| {
         let number = cuts.partition_point(|&cut| cut < split.cut) as u16;
         nodes.extend([split.feature, u8::from(split.missing_left)]);
         nodes.extend(number.to_le_bytes());
         nodes.extend((split.left_splits as u16).to_le_bytes());
     })?;
-    let instructions = trees_instructions(forest, runs, 30) + 25 * steps;
+    let instructions = cost::touch(0, forest.objects()) + trees_instructions(forest, runs, cost::WIDE_STEP);
     let cuts = cuts.into_iter().flat_map(i32::to_le_bytes).collect();
     Some((Vec::new(), cuts, groups, nodes, instructions as u64))
 }
 
-/// Writes trees in preorder, and says how many steps all walks take together.
+/// Writes trees in preorder.
 fn preorder<'f>(
     forest: &'f Forest<'f>,
     runs: &[Run],
     leaves: &mut Leaves<'_>,
     put: impl Fn(&super::forest::Split<'f>, &mut Vec<u8>),
-) -> Option<(Vec<Group>, Vec<u8>, usize)> {
-    let (mut groups, mut nodes, mut steps) = (Vec::new(), Vec::new(), 0);
+) -> Option<(Vec<Group>, Vec<u8>)> {
+    let (mut groups, mut nodes) = (Vec::new(), Vec::new());
     for run in runs {
         for &tree in &run.trees {
             let tree = &forest.trees[tree];
             nodes.extend(u16::try_from(tree.splits).ok()?.to_le_bytes());
             visit(&tree.root, &mut |split| put(split, &mut nodes));
             each_leaf(&tree.root, &mut |values| leaves.push(values, run.shift));
-            steps += tree.depth;
         }
         groups.push(group(run, 0));
     }
-    Some((groups, nodes, steps))
+    Some((groups, nodes))
 }
 
 fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option<Parts> {
@@ -394,7 +395,7 @@ fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option<Parts> {
         base: vec![0; forest.objects()],
         unit: scale.unit,
         margin_error: round_up(worst),
-        instructions: 250 + 5 * forest.objects() as u64,
+        instructions: cost::grid(forest.objects()) as u64,
     })
 }
 
@@ -418,10 +419,24 @@ fn group(run: &Run, depth: u8) -> Group {
     Group { depth, shift: run.shift, object: run.object, trees: run.trees.len() as u32 }
 }
 
-fn leaf_instructions(forest: &Forest<'_>, run: &Run) -> usize {
-    if run.object.is_some() { 5 } else { 10 + 5 * forest.objects() }
+/// Values of a leaf.
+fn values(forest: &Forest<'_>, run: &Run) -> usize {
+    if run.object.is_some() { 1 } else { forest.objects() }
 }
 
-fn trees_instructions(forest: &Forest<'_>, runs: &[Run], tree: usize) -> usize {
-    runs.iter().map(|run| run.trees.len() * (tree + leaf_instructions(forest, run))).sum()
+fn trees_instructions(forest: &Forest<'_>, runs: &[Run], step: f64) -> usize {
+    let of_run = |run: &Run| {
+        let values = values(forest, run);
+        let trees = run.trees.iter().map(|&tree| expected_steps(&forest.trees[tree].root));
+        trees.map(|steps| cost::preorder_tree(steps, step, values)).sum::<usize>()
+    };
+    runs.iter().map(of_run).sum()
+}
+
+/// Steps to a leaf, if either side of a split is as likely.
+fn expected_steps(branch: &Branch<'_>) -> f64 {
+    match branch {
+        Branch::Leaf(_) => 0.0,
+        Branch::Split(split) => 1.0 + (expected_steps(&split.left) + expected_steps(&split.right)) / 2.0,
+    }
 }

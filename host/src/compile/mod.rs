@@ -7,6 +7,7 @@
 
 mod axes;
 mod cells;
+mod cost;
 mod file;
 mod forest;
 mod layout;
@@ -74,7 +75,8 @@ pub struct Compiled {
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
-    /// About how many instructions a touch takes on a Cortex-M4, by a model of the evaluator.
+    /// About how many instructions a touch takes on a Cortex-M4F, by a model of the evaluator that the firmware's
+    /// `evaluator` holds against what it counts: right to 15 %.
     pub instructions: u64,
 }
 

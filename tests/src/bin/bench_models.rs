@@ -9,7 +9,7 @@
 //! The 1000 one-output trees are the run's own (`paper.json`); the multi-output ensembles are trained on its touches
 //! with its settings, but for the number of trees and their depth.
 //!
-//! `OUT` then holds models, touches (three times of four bytes), the same trees for other evaluators, and for
+//! `OUT` then holds models, what the exporter's model of the evaluator says that they cost, touches (three times of four bytes), the same trees for other evaluators, and for
 //! `identity.palpate` what this machine makes of ten thousand touches.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
@@ -38,34 +38,43 @@ fn main() -> Result<()> {
     let compact = |rounds, depth, bins| train::Settings { rounds, depth, bins, ..train::Settings::compact() };
     let each100 = ensemble(trained, compact(100, 6, 256), Descriptor::Curvature)?;
     let each40 = ensemble(trained, compact(40, 5, 256), Descriptor::Curvature)?;
+    let deep = ensemble(trained, compact(20, 7, 256), Descriptor::Curvature)?;
+    let few = train::Settings { rounds: 20, depth: 3, ..train::Settings::paper() };
+    let shallow = ensemble(trained, few, Descriptor::Times)?;
     let table = ensemble(trained, compact(60, 6, 64), Descriptor::Curvature)?;
     let models = [
         ("one-i16", &one, Leaf::I16, Layout::Complete),
         ("one-compact", &one, Leaf::I16, Layout::Compact),
+        ("one-d3", &shallow, Leaf::I16, Layout::Complete),
         ("each100-i16", &each100, Leaf::I16, Layout::Complete),
         ("each100-i8", &each100, Leaf::I8, Layout::Complete),
         ("each40-i16", &each40, Leaf::I16, Layout::Complete),
         ("each40-i8", &each40, Leaf::I8, Layout::Complete),
         ("each40-compact", &each40, Leaf::I8, Layout::Compact),
+        ("each20-d7", &deep, Leaf::I8, Layout::Complete),
         ("grid-i8", &table, Leaf::I8, Layout::Grid),
         ("grid-i16", &table, Leaf::I16, Layout::Grid),
         ("identity", &each40, Leaf::I16, Layout::Complete),
     ];
     let touches = touches(data.as_ref().map(|data| &data.test));
     write(&out.join("touches.bin"), &touches.iter().flat_map(times).collect::<Vec<u8>>())?;
+    let mut estimates = Vec::new();
     for (name, ensemble, leaf, layout) in models {
         let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() })?;
         println!(
-            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes a split",
+            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes a split, {} instructions a touch by the stated model",
             compiled.bytes.len(),
             compiled.splits,
-            compiled.bytes.len() as f64 / compiled.splits as f64
+            compiled.bytes.len() as f64 / compiled.splits as f64,
+            compiled.instructions
         );
         write(&out.join(format!("{name}.palpate")), &compiled.bytes)?;
+        estimates.extend((compiled.instructions as u32).to_le_bytes());
         if name == "identity" {
             write(&out.join("identity.bin"), &expected(&compiled.bytes, &touches)?)?;
         }
     }
+    write(&out.join("estimates.bin"), &estimates)?;
     write(&out.join("one-nodes.bin"), &eight_byte_nodes(&one))?;
     write(&out.join("one-irithyll.bin"), &irithyll(&one))
 }

@@ -1,0 +1,95 @@
+//! Firmware images made of the recogniser alone: they link although a panic could not, hold no float code, and take the
+//! flash that is stated.
+//!
+//! They are built for thumbv6m-none-eabi, so these tests only run where they are asked for:
+//! `cargo test -p palpate-tests --test images -- --ignored --nocapture`, which `.ci/firmware` does.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const TARGET: &str = "thumbv6m-none-eabi";
+
+/// Builds an image; it links only if nothing in it can panic, since its panic handler calls what is defined nowhere.
+fn image(name: &str, features: &[&str]) -> Image {
+    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../onboard/firmware");
+    let mut command = Command::new(env!("CARGO"));
+    command.current_dir(&firmware).args(["build", "--locked", "--release", "--quiet", "--no-default-features"]);
+    command.args(["--target", TARGET, "--bin", name]).args(features);
+    assert!(command.status().expect("cargo runs").success(), "the image {name} does not link");
+    let path: PathBuf = [firmware.as_path(), "target".as_ref(), TARGET.as_ref(), "release".as_ref(), name.as_ref()]
+        .into_iter()
+        .collect();
+    Image::read(&std::fs::read(path).expect("the image"))
+}
+
+/// What an ELF file says about itself.
+struct Image {
+    /// Bytes of all sections that stand in flash.
+    flash: usize,
+    symbols: Vec<String>,
+}
+
+impl Image {
+    /// Reads a 32-bit little-endian ELF file.
+    fn read(elf: &[u8]) -> Self {
+        let half = |at: usize| usize::from(u16::from_le_bytes([elf[at], elf[at + 1]]));
+        let word = |at: usize| u32::from_le_bytes(elf[at..at + 4].try_into().unwrap()) as usize;
+        assert_eq!(elf[..6], *b"\x7fELF\x01\x01");
+        let sections: Vec<usize> = (0..half(48)).map(|index| word(32) + index * half(46)).collect();
+        let (kind, flags, start, length) =
+            (|s: usize| word(s + 4), |s: usize| word(s + 8), |s: usize| word(s + 16), |s: usize| word(s + 20));
+        // PROGBITS and ALLOC.
+        let flash = sections.iter().filter(|&&s| kind(s) == 1 && flags(s) & 2 != 0).map(|&s| length(s)).sum();
+        let mut symbols = Vec::new();
+        for &table in sections.iter().filter(|&&s| kind(s) == 2) {
+            let names = start(sections[word(table + 24)]);
+            for symbol in (start(table)..start(table) + length(table)).step_by(16) {
+                let name = elf[names + word(symbol)..].split(|&byte| byte == 0).next().unwrap_or_default();
+                symbols.push(String::from_utf8_lossy(name).into_owned());
+            }
+        }
+        Self { flash, symbols }
+    }
+
+    /// Symbols of software floating point: the ABI's names, and those of compiler-builtins.
+    fn float_code(&self) -> Vec<&String> {
+        let abi = ["__aeabi_f", "__aeabi_d", "__aeabi_cf", "__aeabi_cd", "2f", "2d", "sf2", "df2", "sf3", "df3"];
+        let of_abi = |name: &str| {
+            let (starts, ends) = abi.split_at(4);
+            name.starts_with("__")
+                && name != "__aeabi_div0"
+                && name != "__aeabi_dmb"
+                && (starts.iter().any(|start| name.starts_with(start)) || ends.iter().any(|end| name.ends_with(end)))
+        };
+        self.symbols.iter().filter(|name| of_abi(name) || name.contains("17compiler_builtins5float")).collect()
+    }
+}
+
+#[test]
+#[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
+fn an_image_of_verdicts_alone_cannot_panic_and_holds_no_float_code() {
+    let image = image("verdict", &[]);
+    println!("verdicts alone: {} bytes of flash", image.flash);
+    assert!(image.symbols.iter().any(|name| name.contains("palpate_onboard")), "the image has no symbols");
+    assert!(!image.symbols.iter().any(|name| name.contains("panic")), "panicking code is linked");
+    assert_eq!(image.float_code(), Vec::<&String>::new());
+    assert!(image.flash <= 9 * 1024, "{} bytes of flash", image.flash);
+}
+
+#[test]
+#[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
+fn an_image_with_posteriors_cannot_panic_and_holds_no_float_code() {
+    let image = image("posterior", &[]);
+    println!("with posteriors: {} bytes of flash", image.flash);
+    assert!(!image.symbols.iter().any(|name| name.contains("panic")), "panicking code is linked");
+    assert_eq!(image.float_code(), Vec::<&String>::new());
+    assert!(image.flash <= 10 * 1024, "{} bytes of flash", image.flash);
+}
+
+#[test]
+#[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
+fn float_code_would_be_found() {
+    let image = image("verdict", &["--features", "f32-leaves"]);
+    println!("verdicts, also of f32 leaves: {} bytes of flash", image.flash);
+    assert!(image.float_code().iter().any(|name| *name == "__aeabi_fadd"), "{:?}", image.float_code());
+}
