@@ -13,7 +13,7 @@ the limits. Chosen on touches held out from training, measured on others again.
 
 Examples:
   palpate tune data --max-bytes 16K -o model.palpate
-  palpate tune data --max-bytes 16K --max-instructions 500 -o fast.palpate
+  palpate tune data --max-bytes 16K --max-instructions 600 -o fast.palpate
   palpate tune data --json")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
