@@ -5,7 +5,7 @@
 //! that stops after the fewest touches at the wanted error rate, of those within the limits. Its own figures come from a
 //! third share of the touches, which chose nothing.
 //!
-//! Instructions a touch are those of the exporter's model of the evaluator on a Cortex-M4
+//! Instructions a touch are those of the exporter's model of the evaluator on a Cortex-M4F
 //! ([`crate::compile::Compiled::instructions`]).
 
 mod family;
@@ -78,7 +78,7 @@ pub struct Row {
     pub layout: Option<&'static str>,
     /// Size of the model.
     pub bytes: Option<usize>,
-    /// Instructions a touch on a Cortex-M4, from the exporter's model of the evaluator.
+    /// Instructions a touch on a Cortex-M4F, from the exporter's model of the evaluator.
     pub instructions: Option<u64>,
     /// Accuracy after 10 and 30 touches, as far as the held-out touches go.
     pub accuracy: BTreeMap<usize, f64>,

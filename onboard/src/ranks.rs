@@ -46,11 +46,11 @@ impl<'m> Cuts<'m> {
         Self { bytes: model.bytes, next: model.offset(model.cuts) }
     }
 
-    /// The thresholds of the next axis, which has `count` of them of `width` bytes, and as many of the model's bytes
-    /// before them as make a word of the first: so each is read as the upper end of a word, whatever its width.
+    /// The thresholds of the next axis, which has `count` of them of `width` bytes, and the four bytes of the model before
+    /// them: so each threshold is read as the upper end of a word, whatever its width.
     #[inline(always)]
     pub(crate) fn next(&mut self, width: u8, count: u8) -> &'m [u8] {
-        let start = self.next.wrapping_add(usize::from(width)).wrapping_sub(4);
+        let start = self.next.wrapping_sub(4);
         self.next = self.next.wrapping_add(usize::from(width) * usize::from(count));
         self.bytes.get(start..self.next).unwrap_or_default()
     }
@@ -63,9 +63,10 @@ pub(crate) fn rank_in(window: &[u8], width: u8, value: i32) -> u8 {
     let below = u32::try_from(32_usize.wrapping_sub(8 * width) & 31).unwrap_or(0);
     let (mut rank, mut step) = (0_u32, 128_u32);
     while step > 0 {
-        // Were the thresholds from here to the next step's end passed?
-        let [last, ..] = (rank | (step - 1)).to_le_bytes();
-        let last = usize::from(last) * width;
+        // Were the thresholds from here to the next step's end passed? A word that ends where a threshold does starts
+        // as far behind the window's start as that many thresholds are long.
+        let [passed, ..] = (rank | step).to_le_bytes();
+        let last = usize::from(passed) * width;
         let last = window.get(last..last + 4).and_then(<[u8]>::first_chunk);
         if last.is_some_and(|word| i32::from_le_bytes(*word) >> below <= value) {
             rank |= step;

@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
     /// The most bytes of the model, such as 16K
     #[arg(long, value_parser = bytes, value_name = "BYTES")]
     max_bytes: Option<usize>,
-    /// The most instructions a touch on a Cortex-M4
+    /// The most instructions a touch on a Cortex-M4F
     #[arg(long, value_name = "COUNT")]
     max_instructions: Option<u64>,
     /// Which features a touch is turned into
@@ -108,7 +108,7 @@ fn table(tuned: &Tuned) -> String {
     _ = write!(
         text,
         "\n* the best that fits; on touches that did not choose it: {}; stops after {:.1} touches, {:.2} % wrong.\n\
-         Instructions a touch on a Cortex-M4, by the exporter's model of the evaluator. The last line is the full model \
+         Instructions a touch on a Cortex-M4F, by the exporter's model of the evaluator. The last line is the full model \
          without limits.\n",
         accuracy.join(", "),
         tuned.test.sequential.mean_touches,

@@ -9,7 +9,7 @@ const TOUCH: usize = 450;
 const AXIS: usize = 165;
 /// An object's margin and base margin.
 const OBJECT: usize = 12;
-/// A group of trees, or what it has beyond a block of 64.
+/// A group of trees, or what it has beyond a block of 128.
 const BLOCK: usize = 160;
 /// Shifting what was added before.
 const SHIFT: usize = 60;
@@ -25,7 +25,7 @@ pub(super) fn complete_group(trees: usize, depth: usize, values: usize, shifted:
     let walk = if (4..=6).contains(&depth) { 12 + 6 * depth } else { 18 + 13 * depth };
     // Ten values are added together, others alone.
     let leaf = 44 * (values / 10) + 12 * (values % 10);
-    trees.div_ceil(64) * BLOCK + trees * (walk + leaf) + if shifted { SHIFT } else { 0 }
+    trees.div_ceil(128) * BLOCK + trees * (walk + leaf) + if shifted { SHIFT } else { 0 }
 }
 
 /// A tree in preorder: steps to the leaf that is reached on average, and its values.
