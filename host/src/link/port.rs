@@ -4,7 +4,7 @@ use super::{Emulator, Transport};
 use crate::error::{Error, Result};
 use std::fmt;
 use std::io::{ErrorKind, Read, Write};
-use std::net::TcpStream;
+use std::net::{Shutdown, TcpStream};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -55,7 +55,7 @@ impl Port {
                 let stream = TcpStream::connect(address).map_err(io)?;
                 stream.set_nodelay(true).map_err(io)?;
                 let reader = stream.try_clone().map_err(io)?;
-                Ok(Transport::new(self.to_string(), reader, stream, Duration::ZERO))
+                Ok(Transport::new(self.to_string(), reader, TcpWriter(stream), Duration::ZERO))
             }
             Self::Emulator => emulator.start(),
         }
@@ -73,6 +73,25 @@ fn open_serial(name: &str, baud: u32) -> Result<Transport> {
     let port = serialport::new(name, baud).timeout(Duration::from_millis(100)).open().map_err(wrong)?;
     let reader = port.try_clone().map_err(wrong)?;
     Ok(Transport::new(name.into(), Patient(reader), SerialWriter(port), Duration::ZERO))
+}
+
+/// Hangs up when it is dropped: the thread that reads has the stream open too, and waits in it.
+struct TcpWriter(TcpStream);
+
+impl Drop for TcpWriter {
+    fn drop(&mut self) {
+        let _ = self.0.shutdown(Shutdown::Both);
+    }
+}
+
+impl Write for TcpWriter {
+    fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
+        self.0.write(buffer)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// A serial port that is quiet has nothing to read yet; it has not failed.
@@ -118,6 +137,17 @@ mod tests {
         assert_eq!(port("tcp://localhost:4000"), Ok(Port::Tcp("localhost:4000".into())));
         assert_eq!(port("/dev/ttyACM0"), Ok(Port::Serial("/dev/ttyACM0".into())));
         assert!(port("http://localhost").is_err() && port("tcp://localhost").is_err());
+    }
+
+    #[test]
+    fn a_dropped_transport_hangs_up() {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = Port::Tcp(listener.local_addr().unwrap().to_string());
+        let transport = port.open(115_200, &Emulator::default()).unwrap();
+        let (mut chip, _) = listener.accept().unwrap();
+        chip.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        drop(transport);
+        assert_eq!(chip.read(&mut [0]).unwrap(), 0);
     }
 
     #[test]
