@@ -7,16 +7,16 @@
 //! trees, a byte each, then the thresholds likewise: as two pointers that move together, they need no arithmetic between
 //! the loads.
 
-use crate::bytes::{at, take};
+use crate::bytes::at;
 use crate::leaves::Sum;
 use crate::ranks::Ranks;
 use core::hint::black_box;
 use palpate_shared::format::Group;
 
 /// Trees walked before their leaves are added: a few, so that code for walking is not repeated for every type of leaf.
-pub(crate) const BLOCK: usize = 128;
+pub(crate) const BLOCK: usize = 64;
 
-/// Numbers of leaves.
+/// Numbers of leaves, counted through all trees of a block.
 pub(crate) type Reached = [u16; BLOCK];
 
 /// Adds up a group of complete trees, and moves `nodes` and `leaves` behind it.
@@ -33,8 +33,10 @@ pub(crate) fn add(
     let depth = group.depth;
     let mut trees = usize::try_from(group.trees).unwrap_or(0);
     let leaf_length = sum.leaf_length();
-    let Some(mut columns) = take(nodes, trees << depth) else { return };
-    let Some(mut thresholds) = take(nodes, trees << depth) else { return };
+    let slots = trees << depth;
+    let Some((mut columns, rest)) = nodes.split_at_checked(slots) else { return };
+    let Some((mut thresholds, rest)) = rest.split_at_checked(slots) else { return };
+    *nodes = rest;
     while trees > 0 {
         let block = trees.min(BLOCK);
         let slots = block << depth;
@@ -71,22 +73,23 @@ fn walk_fixed<const DEPTH: usize, const SLOTS: usize>(
     reached: &mut [u16],
 ) {
     let trees = columns.as_chunks::<SLOTS>().0.iter().zip(thresholds.as_chunks::<SLOTS>().0);
-    let mut first = 0;
+    // As two bytes, or the compiler would find columns by it.
+    let mut first = low(SLOTS).wrapping_neg();
     for (leaf, (columns, thresholds)) in reached.iter_mut().zip(trees) {
         // Otherwise the compiler addresses both by one running offset, which costs an addition a step on a Cortex-M.
         let thresholds = if cfg!(target_arch = "arm") { black_box(thresholds) } else { thresholds };
-        *leaf = first + leaf_of::<DEPTH, SLOTS>(columns, thresholds, ranks);
-        first += 1 << DEPTH;
+        *leaf = first.wrapping_add(low(last_slot::<DEPTH, SLOTS>(columns, thresholds, ranks)));
+        first = first.wrapping_add(low(SLOTS));
     }
 }
 
-/// The leaf of a tree. The compiler sees that a slot after s steps is below 2^(s + 1), and leaves out the bounds checks.
+/// The slot below the tree that is reached. The compiler sees that a slot after s steps is below 2^(s + 1), and leaves out the bounds checks.
 #[inline(always)]
-fn leaf_of<const DEPTH: usize, const SLOTS: usize>(
+fn last_slot<const DEPTH: usize, const SLOTS: usize>(
     columns: &[u8; SLOTS],
     thresholds: &[u8; SLOTS],
     ranks: &Ranks,
-) -> u16 {
+) -> usize {
     let mut slot = usize::from(at(columns, 0)) & 1;
     // Written out, so that the steps are not left as a loop where size is optimised for.
     slot = if DEPTH > 0 { step(columns, thresholds, ranks, slot) } else { slot };
@@ -94,8 +97,7 @@ fn leaf_of<const DEPTH: usize, const SLOTS: usize>(
     slot = if DEPTH > 2 { step(columns, thresholds, ranks, slot) } else { slot };
     slot = if DEPTH > 3 { step(columns, thresholds, ranks, slot) } else { slot };
     slot = if DEPTH > 4 { step(columns, thresholds, ranks, slot) } else { slot };
-    slot = if DEPTH > 5 { step(columns, thresholds, ranks, slot) } else { slot };
-    u16::try_from(slot & (SLOTS - 1)).unwrap_or(0)
+    if DEPTH > 5 { step(columns, thresholds, ranks, slot) } else { slot }
 }
 
 /// Trees of any depth.
@@ -103,15 +105,22 @@ fn leaf_of<const DEPTH: usize, const SLOTS: usize>(
 fn walk_any(depth: u8, columns: &[u8], thresholds: &[u8], ranks: &Ranks, reached: &mut [u16]) {
     let slots = 1_usize << (depth & 15);
     let trees = columns.chunks_exact(slots).zip(thresholds.chunks_exact(slots));
-    let mut first = 0;
+    let mut first = low(slots).wrapping_neg();
     for (leaf, (columns, thresholds)) in reached.iter_mut().zip(trees) {
         let mut slot = 1;
         while slot < slots {
             slot = step(columns, thresholds, ranks, slot);
         }
-        *leaf = u16::try_from(first + slot - slots).unwrap_or(0);
-        first += slots;
+        *leaf = first.wrapping_add(low(slot));
+        first = first.wrapping_add(low(slots));
     }
+}
+
+/// A number below 2^16.
+#[inline(always)]
+fn low(number: usize) -> u16 {
+    let [a, b, ..] = number.to_le_bytes();
+    u16::from_le_bytes([a, b])
 }
 
 /// From a slot to one of its children.

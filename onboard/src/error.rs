@@ -36,8 +36,13 @@ pub enum ModelError {
     },
     /// Margins could grow beyond [`MARGIN_LIMIT`](palpate_shared::format::MARGIN_LIMIT).
     MarginRange,
-    /// Leaves are f32, and this crate was built without its feature `f32-leaves`.
-    FloatLeaves,
+    /// This crate was built without the feature that reads such a model.
+    NotBuiltIn {
+        /// Where the model states its layout or its type of leaf.
+        offset: usize,
+        /// The feature's name.
+        feature: &'static str,
+    },
 }
 
 impl ModelError {
@@ -47,9 +52,8 @@ impl ModelError {
             Self::Length { expected, found } => usize::try_from(expected).unwrap_or(found).min(found),
             Self::NotAModel => 0,
             Self::Version(_) => 4,
-            Self::FloatLeaves => 7,
             Self::Checksum { .. } | Self::MarginRange => 8,
-            Self::Field { offset } | Self::Section { offset } => offset,
+            Self::Field { offset } | Self::Section { offset } | Self::NotBuiltIn { offset, .. } => offset,
         }
     }
 }
@@ -73,7 +77,9 @@ impl fmt::Display for ModelError {
             Self::Field { .. } => f.write_str("a field of the model has a value that means nothing"),
             Self::Section { .. } => f.write_str("a section of the model does not have the length that it should have"),
             Self::MarginRange => f.write_str("the model's margins could overflow"),
-            Self::FloatLeaves => f.write_str("the model has f32 leaves, which this build cannot add"),
+            Self::NotBuiltIn { feature, .. } => {
+                write!(f, "this program was built without palpate-onboard's feature {feature}, which the model needs")
+            }
         }
     }
 }

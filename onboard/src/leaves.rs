@@ -1,5 +1,8 @@
 //! Adding up leaves.
 
+use crate::built_in;
+use crate::complete;
+use core::sync::atomic::{Ordering, compiler_fence};
 use palpate_shared::format::LeafType;
 
 /// Margins under construction, in units (integer leaves) or as the bits of f32 values.
@@ -28,22 +31,29 @@ impl Sum<'_> {
         let leaf_type = self.leaf;
         let margins = self.of_group();
         match leaf_type {
-            LeafType::I8 => add_values(margins, leaf, add_i8),
-            LeafType::I16 => add_values(margins, leaf, add_i16),
-            LeafType::F32 => add_f32_leaves(margins, leaf, &[0]),
+            LeafType::I8 if built_in::leaf(LeafType::I8).1 => add_values(margins, leaf, add_i8),
+            LeafType::I16 if built_in::leaf(LeafType::I16).1 => add_values(margins, leaf, add_i16),
+            LeafType::F32 if built_in::leaf(LeafType::F32).1 => {
+                let length = leaf.len();
+                add_f32_leaves(margins, &Reached { leaves: leaf, reached: &[0], length });
+            }
+            _ => {}
         }
     }
 
     /// Adds the leaves with these numbers; bytes with their bias.
     ///
-    /// Cost: four or five instructions a value and twelve a leaf.
+    /// Cost: two to four instructions a value on a Cortex-M4, five on a Cortex-M0+, and twelve a leaf.
     pub(crate) fn add_reached(&mut self, leaves: &[u8], reached: &[u16]) {
         let leaf_type = self.leaf;
         let margins = self.of_group();
+        let reached = Reached { leaves, reached, length: margins.len() * leaf_type.size() };
         match leaf_type {
-            LeafType::I8 => add_i8_leaves(margins, leaves, reached),
-            LeafType::I16 => add_i16_leaves(margins, leaves, reached),
-            LeafType::F32 => add_f32_leaves(margins, leaves, reached),
+            LeafType::I8 if built_in::leaf(LeafType::I8).1 => add_i8_leaves(margins, &reached),
+            LeafType::I16 if built_in::leaf(LeafType::I16).1 => add_i16_leaves(margins, &reached),
+            LeafType::F32 if built_in::leaf(LeafType::F32).1 => add_f32_leaves(margins, &reached),
+            // Refused when the model was opened.
+            _ => {}
         }
     }
 
@@ -80,54 +90,159 @@ fn add_values<const SIZE: usize>(margins: &mut [i32], leaf: &[u8], add: impl Fn(
     }
 }
 
-#[inline(never)]
-fn add_i8_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
-    add_leaves(margins, leaves, reached, add_i8, add_ten_i8);
+/// The leaves of a block of trees, and which of them are reached.
+struct Reached<'a, T = u8> {
+    leaves: &'a [T],
+    /// Numbers of leaves.
+    reached: &'a [u16],
+    /// Bytes, or values, of a leaf.
+    length: usize,
 }
 
-#[inline(never)]
-fn add_i16_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
-    add_leaves(margins, leaves, reached, add_i16, add_ten_i16);
+impl<'a, T> Reached<'a, T> {
+    /// Hands `SIZE` bytes or values of each leaf that is reached, from number `from` of a leaf on, to `each`.
+    #[inline(always)]
+    fn each<const SIZE: usize>(&self, from: usize, mut each: impl FnMut(&'a [T; SIZE])) {
+        let leaves = self.leaves.get(from..).unwrap_or_default();
+        for &leaf in self.reached {
+            let Some(values) = self.values(leaves, leaf) else { break };
+            each(values);
+        }
+    }
+
+    #[inline(always)]
+    fn values<const SIZE: usize>(&self, leaves: &'a [T], leaf: u16) -> Option<&'a [T; SIZE]> {
+        // As two bytes: then the compiler sees that ends of leaves cannot overflow.
+        let length = usize::from(u16::try_from(self.length).unwrap_or(0));
+        let start = usize::from(leaf) * length;
+        leaves.get(start..start + SIZE)?.first_chunk()
+    }
 }
 
-/// Whether the chip loads words from anywhere (Cortex-M3 and up: the same that have atomic operations), and takes them
-/// apart while it adds; a Cortex-M0+ puts words together byte by byte.
+/// Whether the chip loads words from anywhere, and has registers for sums (Cortex-M3 and up: the same that have atomic
+/// operations). A Cortex-M0+ puts words together byte by byte, and adds to margins in memory.
 const WORDS: bool = cfg!(target_has_atomic = "32");
 
+/// Adds values of `SIZE` bytes, those of `FEW` objects (`BYTES` bytes) together, the last ones object by object.
 #[inline(always)]
-fn add_ten_i8(margins: &mut [i32; 10], values: &[u8; 10]) {
-    let (&[first, second], &[s, t]) = values.as_chunks() else { return };
-    let &[k, l, m, n, o, p, q, r, ..] = values;
-    let (first, second) = (u32::from_le_bytes(first), u32::from_le_bytes(second));
-    let byte = |word: u32, shift: u32, alone: u8| {
-        if WORDS { (word >> shift & 0xff).cast_signed() } else { i32::from(alone) }
+fn add_leaves<T: Copy, const SIZE: usize, const FEW: usize, const BYTES: usize>(
+    mut margins: &mut [i32],
+    reached: &Reached<'_, T>,
+    add: impl Fn(i32, [T; SIZE]) -> i32,
+    add_few: impl Fn(&mut [i32; FEW], usize),
+) {
+    let mut from = 0;
+    while margins.len() >= FEW {
+        let Some((few, rest)) = core::mem::take(&mut margins).split_first_chunk_mut() else { return };
+        add_few(few, from);
+        from += BYTES;
+        margins = rest;
+    }
+    add_last(margins, reached, from, add);
+}
+
+/// Adds values of `SIZE` bytes, from number `from` of a leaf on, object by object.
+#[inline(always)]
+fn add_last<T: Copy, const SIZE: usize>(
+    margins: &mut [i32],
+    reached: &Reached<'_, T>,
+    mut from: usize,
+    add: impl Fn(i32, [T; SIZE]) -> i32,
+) {
+    for margin in margins {
+        let mut sum = *margin;
+        reached.each(from, |value| sum = add(sum, *value));
+        *margin = sum;
+        from += SIZE;
+    }
+}
+
+#[inline(never)]
+fn add_i8_leaves(margins: &mut [i32], reached: &Reached<'_>) {
+    add_leaves::<_, 1, 10, 10>(margins, reached, add_i8, |ten, from| {
+        if WORDS {
+            add_ten_i8(ten, reached, from);
+        } else {
+            reached.each(from, |values: &[u8; 10]| add_each(ten, values));
+        }
+    });
+}
+
+/// Adds bytes in lanes of 16 bits, which hold a block of trees.
+#[inline(always)]
+fn add_ten_i8(margins: &mut [i32; 10], reached: &Reached<'_>, from: usize) {
+    const { assert!(complete::BLOCK <= 256) };
+    const LANES: u32 = 0x00ff_00ff;
+    let (mut a, mut b, mut c, mut d, mut e) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
+    reached.each(from, |values: &[u8; 10]| {
+        let (&[first, second], &[q, r]) = values.as_chunks() else { return };
+        let (first, second) = (u32::from_le_bytes(first), u32::from_le_bytes(second));
+        let third = u32::from(u16::from_le_bytes([q, r]));
+        a = a.wrapping_add(first & LANES);
+        b = b.wrapping_add(first >> 8 & LANES);
+        c = c.wrapping_add(second & LANES);
+        d = d.wrapping_add(second >> 8 & LANES);
+        e = e.wrapping_add((third | third << 8) & LANES);
+    });
+    let [f, g, h, i, j, k, l, m, n, o] = margins;
+    let add = |low: &mut i32, high: &mut i32, lanes: u32| {
+        *low = low.wrapping_add((lanes & 0xffff).cast_signed());
+        *high = high.wrapping_add((lanes >> 16).cast_signed());
     };
-    let [a, b, c, d, e, f, g, h, i, j] = margins;
-    *a = a.wrapping_add(byte(first, 0, k));
-    *b = b.wrapping_add(byte(first, 8, l));
-    *c = c.wrapping_add(byte(first, 16, m));
-    *d = d.wrapping_add(byte(first, 24, n));
-    *e = e.wrapping_add(byte(second, 0, o));
-    *f = f.wrapping_add(byte(second, 8, p));
-    *g = g.wrapping_add(byte(second, 16, q));
-    *h = h.wrapping_add(byte(second, 24, r));
-    *i = i.wrapping_add(i32::from(s));
-    *j = j.wrapping_add(i32::from(t));
+    add(f, h, a);
+    add(g, i, b);
+    add(j, l, c);
+    add(k, m, d);
+    add(n, o, e);
+}
+
+/// Adds a leaf to margins in memory.
+#[inline(always)]
+fn add_each<T: Copy + Into<i32>>([a, b, c, d, e, f, g, h, i, j]: &mut [i32; 10], values: &[T; 10]) {
+    // Otherwise the compiler keeps a copy of each on the stack. No instruction.
+    compiler_fence(Ordering::SeqCst);
+    let add = |margin: &mut i32, value: &T| *margin = margin.wrapping_add((*value).into());
+    let [k, l, m, n, o, p, q, r, s, t] = values;
+    add(a, k);
+    add(b, l);
+    add(c, m);
+    add(d, n);
+    add(e, o);
+    add(f, p);
+    add(g, q);
+    add(h, r);
+    add(i, s);
+    add(j, t);
+}
+
+#[inline(never)]
+fn add_i16_leaves(margins: &mut [i32], reached: &Reached<'_>) {
+    if WORDS {
+        add_leaves::<_, 2, 5, 10>(margins, reached, add_i16, |five, from| add_five_i16(five, reached, from));
+    } else if let Ok(leaves) = bytemuck::try_cast_slice(reached.leaves) {
+        let reached = Reached { leaves, reached: reached.reached, length: margins.len() };
+        let add = |sum: i32, [value]: [i16; 1]| sum.wrapping_add(i16::from_le(value).into());
+        add_leaves::<_, 1, 10, 10>(margins, &reached, add, |ten, from| {
+            reached.each(from, |values: &[i16; 10]| add_each(ten, values));
+        });
+    } else {
+        add_last(margins, reached, 0, add_i16);
+    }
 }
 
 #[inline(always)]
-fn add_ten_i16([a, b, c, d, e, f, g, h, i, j]: &mut [i32; 10], values: &[u8; 20]) {
-    let (&[v, w, x, y, z], _) = values.as_chunks() else { return };
-    let add = |even: &mut i32, odd: &mut i32, word: [u8; 4]| {
-        let word = i32::from_le_bytes(word);
-        *even = even.wrapping_add(word << 16 >> 16);
-        *odd = odd.wrapping_add(word >> 16);
-    };
-    add(a, b, v);
-    add(c, d, w);
-    add(e, f, x);
-    add(g, h, y);
-    add(i, j, z);
+fn add_five_i16(five: &mut [i32; 5], reached: &Reached<'_>, from: usize) {
+    let [mut a, mut b, mut c, mut d, mut e] = *five;
+    reached.each(from, |values: &[u8; 10]| {
+        let (&[first, second], &[q, r]) = values.as_chunks() else { return };
+        let (first, second) = (i32::from_le_bytes(first), i32::from_le_bytes(second));
+        a = a.wrapping_add(first << 16 >> 16);
+        b = b.wrapping_add(first >> 16);
+        c = c.wrapping_add(second << 16 >> 16);
+        d = d.wrapping_add(second >> 16);
+        e = add_i16(e, [q, r]);
+    });
+    *five = [a, b, c, d, e];
 }
 
 #[cfg(feature = "f32-leaves")]
@@ -137,49 +252,18 @@ fn add_f32(sum: i32, value: [u8; 4]) -> i32 {
 
 #[cfg(feature = "f32-leaves")]
 #[inline(never)]
-fn add_f32_leaves(margins: &mut [i32], leaves: &[u8], reached: &[u16]) {
-    add_leaves(margins, leaves, reached, add_f32, |margins, values: &[u8; 40]| {
-        let (values, _) = values.as_chunks();
-        margins.iter_mut().zip(values).for_each(|(margin, value)| *margin = add_f32(*margin, *value));
+fn add_f32_leaves(margins: &mut [i32], reached: &Reached<'_>) {
+    add_leaves::<_, 4, 5, 20>(margins, reached, add_f32, |five, from| {
+        reached.each::<20>(from, |values| {
+            let (values, _) = values.as_chunks();
+            five.iter_mut().zip(values).for_each(|(margin, value)| *margin = add_f32(*margin, *value));
+        });
     });
 }
 
 /// Models with f32 leaves are refused when they are opened.
 #[cfg(not(feature = "f32-leaves"))]
-const fn add_f32_leaves(_: &mut [i32], _: &[u8], _: &[u16]) {}
-
-/// Adds leaves with a value for each of `margins`, ten objects (`TEN` bytes) at a time.
-#[inline(always)]
-fn add_leaves<const SIZE: usize, const TEN: usize>(
-    mut margins: &mut [i32],
-    mut leaves: &[u8],
-    reached: &[u16],
-    add: impl Fn(i32, [u8; SIZE]) -> i32 + Copy,
-    add_ten: impl Fn(&mut [i32; 10], &[u8; TEN]) + Copy,
-) {
-    // As two bytes: then the compiler sees that ends of leaves cannot overflow.
-    let length = usize::from(u16::try_from(margins.len() * SIZE).unwrap_or(0));
-    while margins.len() >= 10 {
-        let Some((ten, rest)) = core::mem::take(&mut margins).split_first_chunk_mut() else { return };
-        for &leaf in reached {
-            let start = usize::from(leaf) * length;
-            let Some(values) = leaves.get(start..start + TEN).and_then(<[_]>::first_chunk) else { return };
-            add_ten(ten, values);
-        }
-        leaves = leaves.get(TEN..).unwrap_or_default();
-        margins = rest;
-    }
-    for margin in margins {
-        let mut sum = *margin;
-        for &leaf in reached {
-            let start = usize::from(leaf) * length;
-            let Some(&value) = leaves.get(start..start + SIZE).and_then(<[_]>::first_chunk) else { return };
-            sum = add(sum, value);
-        }
-        *margin = sum;
-        leaves = leaves.get(SIZE..).unwrap_or_default();
-    }
-}
+const fn add_f32_leaves(_: &mut [i32], _: &Reached<'_>) {}
 
 #[cfg(test)]
 mod tests {

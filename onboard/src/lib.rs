@@ -16,6 +16,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod built_in;
 mod bytes;
 mod complete;
 pub mod effector;

@@ -1,5 +1,6 @@
 //! A touch to margins: the evaluator.
 
+use crate::built_in;
 use crate::leaves::Sum;
 use crate::model::Model;
 use crate::{complete, fixed, grid, preorder, ranks};
@@ -48,28 +49,34 @@ impl Model<'_> {
     /// Adds up all trees: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
-        if self.layout == Layout::Grid {
+        if built_in::layout(Layout::Grid).1 && self.layout == Layout::Grid {
             grid::look_up(self, features, margins);
             return Some(margins);
         }
-        if self.is_float() {
-            self.add_bases(margins, |_, base| base);
-        } else {
+        // Without a shift (the first is the largest), and always in f32, margins start from their base.
+        let shifted = self.groups.get(1).is_some_and(|&shift| shift > 0);
+        if shifted {
             margins.fill(0);
+        } else {
+            self.start(margins);
         }
         let mut sum = Sum { margins, leaf: self.leaf, object: None };
         let bias = self.add_trees(features, &mut sum);
-        if !self.is_float() {
-            self.add_bases(margins, |margin, base| margin.wrapping_add(base).wrapping_sub(bias));
+        if shifted {
+            for (margin, &base) in margins.iter_mut().zip(self.base.as_chunks().0) {
+                *margin = margin.wrapping_add(i32::from_le_bytes(base)).wrapping_sub(bias);
+            }
+        } else if bias != 0 {
+            margins.iter_mut().for_each(|margin| *margin = margin.wrapping_sub(bias));
         }
         Some(margins)
     }
 
-    /// Replaces each margin by what `add` makes of it and its object's base margin.
-    #[inline(always)]
-    fn add_bases(&self, margins: &mut [i32], add: impl Fn(i32, i32) -> i32) {
-        for (margin, base) in margins.iter_mut().zip(self.base.as_chunks().0) {
-            *margin = add(*margin, i32::from_le_bytes(*base));
+    /// Sets margins to their base.
+    fn start(&self, margins: &mut [i32]) {
+        match bytemuck::try_cast_slice(self.base) {
+            Ok(bases) => grid::put(margins, bases, |[base]: [i32; 1]| i32::from_le(base)),
+            Err(_) => grid::put(margins, self.base, i32::from_le_bytes),
         }
     }
 
@@ -93,11 +100,17 @@ impl Model<'_> {
             shift = group.shift;
             sum.object = group.object;
             match self.layout {
-                Layout::Complete => complete::add(&group, &ranks, &mut reached, &mut nodes, &mut leaves, sum),
-                Layout::Wide => preorder::add_wide(self, &group, features, &mut nodes, &mut leaves, sum),
-                Layout::Compact | Layout::Grid => {
+                Layout::Complete if built_in::layout(Layout::Complete).1 => {
+                    complete::add(&group, &ranks, &mut reached, &mut nodes, &mut leaves, sum);
+                }
+                Layout::Wide if built_in::layout(Layout::Wide).1 => {
+                    preorder::add_wide(self, &group, features, &mut nodes, &mut leaves, sum);
+                }
+                Layout::Compact if built_in::layout(Layout::Compact).1 => {
                     preorder::add_compact(&group, &ranks, &mut nodes, &mut leaves, sum);
                 }
+                // Refused when the model was opened.
+                _ => {}
             }
             bias = bias.wrapping_add(sum.settle(group.trees));
         }

@@ -1,5 +1,6 @@
 //! A model's bytes, checked once, then read in place.
 
+use crate::built_in;
 use crate::bytes::{at, take};
 use crate::error::ModelError;
 use crate::validate;
@@ -128,7 +129,7 @@ impl<'a> Model<'a> {
 
     /// Whether margins are added in f32; never without the feature `f32-leaves`, so that no code for it is linked.
     pub(crate) const fn is_float(&self) -> bool {
-        cfg!(feature = "f32-leaves") && matches!(self.leaf, LeafType::F32)
+        built_in::leaf(LeafType::F32).1 && matches!(self.leaf, LeafType::F32)
     }
 
     /// What features are compared as.

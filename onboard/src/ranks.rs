@@ -8,22 +8,31 @@ pub(crate) type Ranks = [u8; 256];
 
 /// Ranks of a row of features in all of the model's columns.
 ///
-/// Cost: about 13 instructions a step of a binary search in each axis's thresholds on a Cortex-M4, 24 on a Cortex-M0+,
-/// and 150.
+/// Cost: 9 instructions a step of a binary search in each axis's thresholds on a Cortex-M4, 11 on a Cortex-M0+, and 50 an
+/// axis; about 30 a step where thresholds are not aligned.
 pub(crate) fn rank(model: &Model<'_>, features: &[i32], ranks: &mut Ranks) {
-    let mut columns = ranks.iter_mut();
-    let mut cuts = Cuts::new(model);
+    let mut column = 0_u8;
+    let mut put = |rank: u8| {
+        if let Some(place) = ranks.get_mut(usize::from(column)) {
+            *place = rank;
+        }
+        column = column.wrapping_add(1);
+    };
+    let mut axes = Cuts(model.cuts);
     for &[feature, axis_columns, width, count] in model.axes.as_chunks().0 {
-        let window = cuts.next(width, count);
+        let cuts = axes.next(width, count);
         let value = at_or_missing(features, feature);
-        let there = if value == MISSING_FEATURE { None } else { Some(rank_in(window, width, value)) };
         // The bits of `Columns`: where a missing value goes left, and right.
-        for (bit, missing) in [(1, 0), (2, u8::MAX)] {
-            if axis_columns & bit != 0
-                && let Some(column) = columns.next()
-            {
-                *column = there.unwrap_or(missing);
-            }
+        let (mut left, mut right) = (0, u8::MAX);
+        if value != MISSING_FEATURE {
+            left = rank_in(cuts, width, value);
+            right = left;
+        }
+        if axis_columns & 1 != 0 {
+            put(left);
+        }
+        if axis_columns & 2 != 0 {
+            put(right);
         }
     }
 }
@@ -34,46 +43,69 @@ pub(crate) fn at_or_missing(features: &[i32], feature: u8) -> i32 {
 }
 
 /// The thresholds of a model's axes, one after the other.
-pub(crate) struct Cuts<'m> {
-    /// The model's bytes.
-    bytes: &'m [u8],
-    /// Where the next axis's thresholds start.
-    next: usize,
-}
+pub(crate) struct Cuts<'m>(pub(crate) &'m [u8]);
 
 impl<'m> Cuts<'m> {
-    pub(crate) fn new(model: &Model<'m>) -> Self {
-        Self { bytes: model.bytes, next: model.offset(model.cuts) }
-    }
-
-    /// The thresholds of the next axis, which has `count` of them of `width` bytes, and the four bytes of the model before
-    /// them: so each threshold is read as the upper end of a word, whatever its width.
+    /// The thresholds of the next axis, which has `count` of them of `width` bytes.
     #[inline(always)]
     pub(crate) fn next(&mut self, width: u8, count: u8) -> &'m [u8] {
-        let start = self.next.wrapping_sub(4);
-        self.next = self.next.wrapping_add(usize::from(width) * usize::from(count));
-        self.bytes.get(start..self.next).unwrap_or_default()
+        let length = usize::from(width) * usize::from(count);
+        let Some((cuts, rest)) = self.0.split_at_checked(length) else { return &[] };
+        self.0 = rest;
+        cuts
     }
 }
 
-/// How many of an axis's thresholds (see [`Cuts::next`]) are at or below `value`.
+/// How many of an axis's thresholds, of `width` bytes each, are at or below `value`.
+///
+/// Those of two or four bytes are loaded at once where they are aligned, as the exporter sees to if the model is.
 #[inline(never)]
-pub(crate) fn rank_in(window: &[u8], width: u8, value: i32) -> u8 {
-    let width = usize::from(width);
-    let below = u32::try_from(32_usize.wrapping_sub(8 * width) & 31).unwrap_or(0);
-    let (mut rank, mut step) = (0_u32, 128_u32);
+pub(crate) fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
+    if width == 2
+        && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
+    {
+        search(cuts, value, |cut| i16::from_le(cut).into())
+    } else if width == 4
+        && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
+    {
+        search(cuts, value, i32::from_le)
+    } else {
+        search_bytes(cuts, width.into(), value)
+    }
+}
+
+/// A binary search.
+#[inline(always)]
+fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32) -> u8 {
+    let mut step = 128;
+    while step > cuts.len() {
+        step >>= 1;
+    }
+    // The last threshold that was passed; before there is one, a threshold before the first.
+    let mut passed = usize::MAX;
     while step > 0 {
-        // Were the thresholds from here to the next step's end passed? A word that ends where a threshold does starts
-        // as far behind the window's start as that many thresholds are long.
-        let [passed, ..] = (rank | step).to_le_bytes();
-        let last = usize::from(passed) * width;
-        let last = window.get(last..last + 4).and_then(<[u8]>::first_chunk);
-        if last.is_some_and(|word| i32::from_le_bytes(*word) >> below <= value) {
+        let next = passed.wrapping_add(step);
+        if cuts.get(next).is_some_and(|cut| number(*cut) <= value) {
+            passed = next;
+        }
+        step >>= 1;
+    }
+    let [rank, ..] = passed.wrapping_add(1).to_le_bytes();
+    rank
+}
+
+/// The same for thresholds of any width that stand anywhere.
+fn search_bytes(cuts: &[u8], width: usize, value: i32) -> u8 {
+    let (mut rank, mut step) = (0_u8, 128_u8);
+    while step > 0 {
+        let end = usize::from(rank | step) * width;
+        let number =
+            |cut: &[u8]| Some(cut.iter().rfold(-i32::from(cut.last()? >> 7), |sum, byte| sum << 8 | i32::from(*byte)));
+        if cuts.get(end.wrapping_sub(width)..end).and_then(number).is_some_and(|number| number <= value) {
             rank |= step;
         }
         step >>= 1;
     }
-    let [rank, ..] = rank.to_le_bytes();
     rank
 }
 
@@ -81,11 +113,11 @@ pub(crate) fn rank_in(window: &[u8], width: u8, value: i32) -> u8 {
 mod tests {
     use super::*;
 
-    /// The rank among thresholds of `width` bytes, with something else before them.
+    /// The rank among thresholds of `width` bytes.
     fn rank(cuts: &[u8], width: u8, value: i32) -> u8 {
-        let bytes = [&[0xa5; 4], cuts].concat();
-        let mut axes = Cuts { bytes: &bytes, next: 4 };
-        rank_in(axes.next(width, u8::try_from(cuts.len() / usize::from(width)).unwrap()), width, value)
+        let mut axes = Cuts(cuts);
+        let count = u8::try_from(cuts.len() / usize::from(width)).unwrap();
+        rank_in(axes.next(width, count), width, value)
     }
 
     #[test]
@@ -107,6 +139,9 @@ mod tests {
                 let bytes: std::vec::Vec<u8> =
                     cuts.iter().flat_map(|cut| cut.to_le_bytes().into_iter().take(usize::from(width))).collect();
                 assert_eq!(usize::from(rank(&bytes, width, value)), expected);
+                // Beside where it is aligned.
+                let shifted = [&[0; 1], &*bytes].concat();
+                assert_eq!(usize::from(rank(&shifted[1..], width, value)), expected);
             }
         }
     }

@@ -63,9 +63,14 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
         // κ missing, slope missing: left; left.
         (Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]), [1.625, -1.5]),
     ];
-    for (leaf, layout, _) in SECTIONS {
-        let compiled = compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap();
-        let model = Model::new(&compiled.bytes).unwrap();
+    let compiled = SECTIONS.map(|(leaf, layout, _)| {
+        compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap().bytes
+    });
+    let bytes = UNALIGNED.iter().flat_map(|row| row.split(' '));
+    let mut unaligned: Vec<u8> = bytes.map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect();
+    unaligned.extend(palpate_shared::format::checksum(&unaligned).to_le_bytes());
+    for bytes in compiled.iter().chain([&unaligned]) {
+        let model = Model::new(bytes).unwrap();
         for (touch, expected) in touches {
             let mut margins = [0; 2];
             model.margins(&touch, &mut margins);
@@ -77,39 +82,51 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
     }
 }
 
-const HEADER: [&str; 6] = [
+/// What exporters wrote before they aligned numbers: no zeros after the text, and thresholds of three bytes and of one.
+const UNALIGNED: [&str; 7] = [
     "50 4c 50 54 01 00 01 00 b6 00 00 00 01 00 01 01",
     "02 00 02 00 02 00 00 00 03 00 00 00 05 00 00 00",
     "00 00 80 3c 29 3b aa b8 05 00 00 00 00 00 00 00",
     "eb 57 0a d4 fa 95 02 00 c8 00 00 00 00 00 c0 3f",
     "00 00 20 41 0b 00 00 00 00 00 00 00 00 00 00 00",
     "07 00 00 00 0c 00 00 00 0c 00 00 00 00 00 00 00",
+    // The version, "0.1.0", and the sections.
+    "05 30 2e 31 2e 30 02 61 62 01 63 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 01 00 00 00 01 00 00 00 02 00 00 00 01 00 00 00 01 00 00 01 01 00 00 01 00 00 00 00 88 80 78 84 c0 40 c0 40 a0 90 60 80",
+];
+
+const HEADER: [&str; 6] = [
+    "50 4c 50 54 01 00 01 00 bc 00 00 00 01 00 01 01",
+    "02 00 02 00 02 00 00 00 03 00 00 00 05 00 00 00",
+    "00 00 80 3c 29 3b aa b8 05 00 00 00 00 00 00 00",
+    "eb 57 0a d4 fa 95 02 00 c8 00 00 00 00 00 c0 3f",
+    "00 00 20 41 0c 00 00 00 00 00 00 00 00 00 00 00",
+    "0c 00 00 00 0c 00 00 00 0c 00 00 00 00 00 00 00",
 ];
 
 const SECTIONS: [(Leaf, Layout, &str); 5] = [
     (
         Leaf::I8,
         Layout::Complete,
-        "02 61 62 01 63 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 01 00 00 00 01 00 00 00 02 00 00 00 01 00 00 00 01 00 00 01 01 00 00 01 00 00 00 00 88 80 78 84 c0 40 c0 40 a0 90 60 80",
+        "02 61 62 01 63 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 01 00 00 00 01 00 00 00 02 00 00 00 01 00 00 00 01 00 00 01 01 00 00 01 00 00 00 00 88 80 78 84 c0 40 c0 40 a0 90 60 80",
     ),
     (
         Leaf::I16,
         Layout::Compact,
-        "02 61 62 01 63 00 02 00 00 00 fe ff ff 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 80 00 00 00 80 ff 40 00 00 04 00 fc 00 02 00 01 00 fe 00 00",
+        "02 61 62 01 63 00 00 02 00 00 00 fe ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 80 00 00 00 80 ff 40 00 00 04 00 fc 00 02 00 01 00 fe 00 00",
     ),
     (
         Leaf::I8,
         Layout::Wide,
-        "02 61 62 01 63 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 fd ff ff ff e9 03 00 00 70 11 01 00 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 02 00 00 00 02 00 00 01 01 00 00 00 01 00 00 00 00 00 88 80 78 84 c0 40 a0 90 60 80",
+        "02 61 62 01 63 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 fd ff ff ff e9 03 00 00 70 11 01 00 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 02 00 00 00 02 00 00 01 01 00 00 00 01 00 00 00 00 00 88 80 78 84 c0 40 a0 90 60 80",
     ),
     (
         Leaf::I8,
         Layout::Grid,
-        "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 03 02 01 01 01 01 e9 03 00 70 11 01 fd e8 20 e8 20 e8 20 c8 70 88 60 88 60 b8 74 78 64 78 64 e8 20 e8 20 e8 20",
+        "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 04 02 01 01 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff e8 20 e8 20 e8 20 c8 70 88 60 88 60 b8 74 78 64 78 64 e8 20 e8 20 e8 20",
     ),
     (
         Leaf::F32,
         Layout::Compact,
-        "02 61 62 01 63 00 00 00 3f 00 00 00 bf 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 00 00 00 00 02 00 00 00 02 00 00 00 00 01 00 00 01 00 00 01 00 00 00 80 3f 00 00 80 bf 00 00 00 3f 00 00 80 3e 00 00 00 bf 00 00 00 00 00 00 00 3e 00 00 00 00 00 00 00 be 00 00 80 3d",
+        "02 61 62 01 63 00 00 00 00 3f 00 00 00 bf 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 02 00 00 00 02 00 00 00 00 01 00 00 01 00 00 01 00 00 00 80 3f 00 00 80 bf 00 00 00 3f 00 00 80 3e 00 00 00 bf 00 00 00 00 00 00 00 3e 00 00 00 00 00 00 00 be 00 00 80 3d",
     ),
 ];

@@ -9,12 +9,21 @@ use std::process::Command;
 
 const TARGET: &str = "thumbv6m-none-eabi";
 
+/// The features of images with one layout and one type of leaf, and of one with all but f32.
+const FEATURES: [&str; 5] = [
+    "grid,i8-leaves",
+    "compact,i8-leaves",
+    "complete,i8-leaves",
+    "complete,i16-leaves",
+    "compact,complete,grid,wide,i8-leaves,i16-leaves",
+];
+
 /// Builds an image; it links only if nothing in it can panic, since its panic handler calls what is defined nowhere.
-fn image(name: &str, features: &[&str]) -> Image {
+fn image(name: &str, features: &str) -> Image {
     let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../onboard/firmware");
     let mut command = Command::new(env!("CARGO"));
     command.current_dir(&firmware).args(["build", "--locked", "--release", "--quiet", "--no-default-features"]);
-    command.args(["--target", TARGET, "--bin", name]).args(features);
+    command.args(["--target", TARGET, "--bin", name, "--features", features]);
     assert!(command.status().expect("cargo runs").success(), "the image {name} does not link");
     let path: PathBuf = [firmware.as_path(), "target".as_ref(), TARGET.as_ref(), "release".as_ref(), name.as_ref()]
         .into_iter()
@@ -68,28 +77,31 @@ impl Image {
 #[test]
 #[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
 fn an_image_of_verdicts_alone_cannot_panic_and_holds_no_float_code() {
-    let image = image("verdict", &[]);
-    println!("verdicts alone: {} bytes of flash", image.flash);
-    assert!(image.symbols.iter().any(|name| name.contains("palpate_onboard")), "the image has no symbols");
-    assert!(!image.symbols.iter().any(|name| name.contains("panic")), "panicking code is linked");
-    assert_eq!(image.float_code(), Vec::<&String>::new());
-    assert!(image.flash <= 9 * 1024, "{} bytes of flash", image.flash);
+    holds_no_panic_and_no_float_code("verdict", 10_000);
 }
 
 #[test]
 #[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
 fn an_image_with_posteriors_cannot_panic_and_holds_no_float_code() {
-    let image = image("posterior", &[]);
-    println!("with posteriors: {} bytes of flash", image.flash);
-    assert!(!image.symbols.iter().any(|name| name.contains("panic")), "panicking code is linked");
-    assert_eq!(image.float_code(), Vec::<&String>::new());
-    assert!(image.flash <= 10 * 1024, "{} bytes of flash", image.flash);
+    holds_no_panic_and_no_float_code("posterior", 10_800);
+}
+
+/// Builds an image with each of the features, none of which may take more than `most` bytes of flash.
+fn holds_no_panic_and_no_float_code(name: &str, most: usize) {
+    for features in FEATURES {
+        let image = image(name, features);
+        println!("{name:9} {features:50} {} bytes of flash", image.flash);
+        assert!(image.symbols.iter().any(|name| name.contains("palpate_onboard")), "the image has no symbols");
+        assert!(!image.symbols.iter().any(|name| name.contains("panic")), "panicking code is linked");
+        assert_eq!(image.float_code(), Vec::<&String>::new());
+        assert!(image.flash <= most, "{} bytes of flash", image.flash);
+    }
 }
 
 #[test]
 #[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
 fn float_code_would_be_found() {
-    let image = image("verdict", &["--features", "f32-leaves"]);
+    let image = image("verdict", "complete,f32-leaves");
     println!("verdicts, also of f32 leaves: {} bytes of flash", image.flash);
     assert!(image.float_code().iter().any(|name| *name == "__aeabi_fadd"), "{:?}", image.float_code());
 }

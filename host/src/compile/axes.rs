@@ -60,15 +60,15 @@ impl Axes {
     }
 }
 
-/// The fewest bytes that hold every threshold.
+/// The fewest bytes that hold every threshold, of those that chips load at once, and such that the next axis's thresholds
+/// are aligned like these.
 pub(super) fn width(cuts: &[i32]) -> u8 {
-    let fits = |bits: u32| cuts.iter().all(|&cut| (-1_i64 << bits..1 << bits).contains(&i64::from(cut)));
-    match () {
-        () if fits(7) => 1,
-        () if fits(15) => 2,
-        () if fits(23) => 3,
-        () => 4,
-    }
+    let holds = |width: &u8| {
+        let limit = 1_i64 << (8 * width - 1);
+        (cuts.len() * usize::from(*width)).is_multiple_of(4)
+            && cuts.iter().all(|&cut| (-limit..limit).contains(&i64::from(cut)))
+    };
+    [1, 2].into_iter().find(holds).unwrap_or(4)
 }
 
 /// The thresholds' bytes.

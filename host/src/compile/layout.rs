@@ -280,7 +280,7 @@ fn complete(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<
         nodes.append(&mut thresholds);
         groups.push(group(run, u8::try_from(depth).ok()?));
         let shifted = groups.len() > 1;
-        instructions += cost::complete_group(run.trees.len(), depth, values(forest, run), shifted);
+        instructions += cost::complete_group(run.trees.len(), depth, leaves.leaf, values(forest, run), shifted);
     }
     let (records, cuts) = records(axes);
     instructions += cost::touch(axes.axes.len(), forest.objects());

@@ -17,10 +17,12 @@ pub(super) fn write(
     layout: Layout,
     parts: &Parts,
 ) -> Result<Vec<u8>> {
-    let text = text(ensemble)?;
+    let mut text = text(ensemble)?;
     let priors = priors(settings, forest.objects(), parts.unit)?;
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
+    // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
+    text.resize(text.len().next_multiple_of(4), 0);
     let length = HeaderBuilder::default().bytes().len()
         + text.len()
         + records

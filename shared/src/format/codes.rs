@@ -60,11 +60,8 @@ codes! {
 impl LeafType {
     /// Bytes a value.
     pub const fn size(self) -> usize {
-        match self {
-            Self::I8 => 1,
-            Self::I16 => 2,
-            Self::F32 => 4,
-        }
+        // 1, 2, 4: a shift, and not a table.
+        1 << self.code()
     }
 }
 

@@ -18,7 +18,11 @@ const STATED_WITHIN: u64 = 15;
 
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
-        [$(($name, include_bytes!(concat!(env!("OUT_DIR"), "/bench/", $name, ".palpate")))),*] as [(&str, &'static [u8]); _]
+        [$({
+            static MODEL: &Aligned<[u8]> =
+                &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/bench/", $name, ".palpate")));
+            ($name, &MODEL.0)
+        }),*] as [(&str, &'static [u8]); _]
     };
 }
 
