@@ -16,6 +16,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod aligned;
 mod built_in;
 mod bytes;
 mod complete;
@@ -36,6 +37,7 @@ pub mod station;
 mod stopping;
 mod validate;
 
+pub use aligned::Aligned;
 pub use error::ModelError;
 pub use evidence::Posterior;
 pub use exp::exp2_negative;

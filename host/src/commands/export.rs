@@ -76,7 +76,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         return output::print_json(&exported);
     }
     output::print(&format!(
-        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}), margins within {:.2e} nats\n",
+        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}), margins within {:.2e} nats\n\
+         A chip that reads no other models needs these features of palpate-onboard: {}, {}-leaves\n",
         arguments.output.display(),
         exported.bytes,
         exported.trees,
@@ -85,6 +86,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         exported.layout,
         exported.leaf,
         exported.margin_error,
+        exported.layout,
+        exported.leaf,
     ))
 }
 

@@ -16,7 +16,7 @@ use palpate_shared::link::{
 };
 use palpate_shared::{Descriptor, Pose, Touch};
 
-static MODEL: &[u8] = include_bytes!(env!("PALPATE_MODEL"));
+static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
 /// Objects that a model may have.
 const OBJECTS: usize = 16;
 

@@ -7,7 +7,7 @@
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use palpate_firmware::{exit, fail, meter, meter::Meter, println};
-use palpate_onboard::{Model, Recognizer, Stopping};
+use palpate_onboard::{Aligned, Model, Recognizer, Stopping, include_model};
 use palpate_shared::Touch;
 
 /// Touches that are averaged over.
@@ -18,11 +18,7 @@ const STATED_WITHIN: u64 = 15;
 
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
-        [$({
-            static MODEL: &Aligned<[u8]> =
-                &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/bench/", $name, ".palpate")));
-            ($name, &MODEL.0)
-        }),*] as [(&str, &'static [u8]); _]
+        [$(($name, include_model!(concat!(env!("OUT_DIR"), "/bench/", $name, ".palpate")))),*] as [(&str, &'static [u8]); _]
     };
 }
 
@@ -87,10 +83,6 @@ fn main() -> ! {
     }
     exit()
 }
-
-/// Bytes that may be read as words.
-#[repr(align(4))]
-struct Aligned<T: ?Sized>(T);
 
 static NODES: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/bench/one-nodes.bin")));
 static IRITHYLL: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/bench/one-irithyll.bin")));

@@ -18,7 +18,7 @@ use palpate_onboard::effector::{Active, Edge, Effector, Fault, Fingers, Settings
 use palpate_onboard::station::Station;
 use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Progress, TouchMessage};
 
-static MODEL: &[u8] = include_bytes!(env!("PALPATE_MODEL"));
+static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
 /// Objects that the model may have.
 const OBJECTS: usize = 16;
 

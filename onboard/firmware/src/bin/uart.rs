@@ -17,9 +17,11 @@ const OBJECTS: usize = 16;
 fn main() -> ! {
     let mut uart = Uart::take(Port::Link);
     let retained = chip::take_retained();
-    let (first_record, rest) = retained.split_at_mut(Memory::record_length(OBJECTS));
-    let (second_record, rest) = rest.split_at_mut(Memory::record_length(OBJECTS));
-    let (first_model, second_model) = rest.split_at_mut(rest.len() / 2);
+    // Aligned, as models are read fastest.
+    let record = Memory::record_length(OBJECTS).next_multiple_of(4);
+    let (first_record, rest) = retained.split_at_mut(record);
+    let (second_record, rest) = rest.split_at_mut(record);
+    let (first_model, second_model) = rest.split_at_mut(rest.len() / 8 * 4);
     let memory = Memory { built_in: &[], models: [first_model, second_model], records: [first_record, second_record] };
     match serve::<OBJECTS, _>(memory, &mut uart) {
         // The UART has no end.

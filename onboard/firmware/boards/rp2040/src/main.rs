@@ -30,7 +30,7 @@ use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Progress, TouchMe
 use panic_halt as _;
 use rp2040_hal as hal;
 
-static MODEL: &[u8] = include_bytes!(env!("PALPATE_MODEL"));
+static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
 /// Objects that the model may have.
 const OBJECTS: usize = 16;
 /// The crystal on a Pico.
