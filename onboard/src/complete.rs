@@ -53,6 +53,9 @@ pub(crate) fn add(
     }
 }
 
+/// Cortex-M, on which the compiler makes branches of comparisons.
+const ARM: bool = cfg!(target_arch = "arm");
+
 /// Walks trees, and numbers the leaves that are reached through all of them.
 fn walk(depth: u8, columns: &[u8], thresholds: &[u8], ranks: &Ranks, reached: &mut [u16]) {
     match depth {
@@ -76,14 +79,15 @@ fn walk_fixed<const DEPTH: usize, const SLOTS: usize>(
     // As two bytes, or the compiler would find columns by it.
     let mut first = low(SLOTS).wrapping_neg();
     for (leaf, (columns, thresholds)) in reached.iter_mut().zip(trees) {
-        // Otherwise the compiler addresses both by one running offset, which costs an addition a step on a Cortex-M.
-        let thresholds = if cfg!(target_arch = "arm") { black_box(thresholds) } else { thresholds };
+        // Otherwise the compiler addresses both by one running offset, which costs an addition a step.
+        let thresholds = black_box(thresholds);
         *leaf = first.wrapping_add(low(last_slot::<DEPTH, SLOTS>(columns, thresholds, ranks)));
         first = first.wrapping_add(low(SLOTS));
     }
 }
 
-/// The slot below the tree that is reached. The compiler sees that a slot after s steps is below 2^(s + 1), and leaves out the bounds checks.
+/// The slot below the tree that is reached. The compiler sees that a slot after s steps is below 2^(s + 1), and leaves out
+/// the bounds checks.
 #[inline(always)]
 fn last_slot<const DEPTH: usize, const SLOTS: usize>(
     columns: &[u8; SLOTS],
@@ -97,7 +101,9 @@ fn last_slot<const DEPTH: usize, const SLOTS: usize>(
     slot = if DEPTH > 2 { step(columns, thresholds, ranks, slot) } else { slot };
     slot = if DEPTH > 3 { step(columns, thresholds, ranks, slot) } else { slot };
     slot = if DEPTH > 4 { step(columns, thresholds, ranks, slot) } else { slot };
-    if DEPTH > 5 { step(columns, thresholds, ranks, slot) } else { slot }
+    slot = if DEPTH > 5 { step(columns, thresholds, ranks, slot) } else { slot };
+    // Elsewhere, the compiler would put it together a second time out of every step's direction.
+    if ARM { slot } else { black_box(slot) }
 }
 
 /// Trees of any depth.
@@ -126,6 +132,9 @@ fn low(number: usize) -> u16 {
 /// From a slot to one of its children.
 #[inline(always)]
 fn step(columns: &[u8], thresholds: &[u8], ranks: &Ranks, slot: usize) -> usize {
+    if !ARM {
+        return (slot << 1) + usize::from(at(ranks, usize::from(at(columns, slot))) > at(thresholds, slot));
+    }
     let rank = isize::from(i16::from(at(ranks, usize::from(at(columns, slot)))));
     // All ones for right, and not a comparison, of which the compiler would make branches.
     let right = (isize::from(i16::from(at(thresholds, slot))) - rank) >> 8;
