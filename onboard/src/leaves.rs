@@ -159,12 +159,17 @@ fn add_last<T: Copy, const SIZE: usize>(
 
 #[inline(never)]
 fn add_i8_leaves(margins: &mut [i32], reached: &Reached<'_>) {
+    if WORDS {
+        add_leaves::<_, 1, 10, 10>(margins, reached, add_i8, |ten, from| add_ten_i8(ten, reached, from));
+    } else {
+        add_i8_in_memory(margins, reached);
+    }
+}
+
+#[inline(always)]
+fn add_i8_in_memory(margins: &mut [i32], reached: &Reached<'_>) {
     add_leaves::<_, 1, 10, 10>(margins, reached, add_i8, |ten, from| {
-        if WORDS {
-            add_ten_i8(ten, reached, from);
-        } else {
-            reached.each(from, |values: &[u8; 10]| add_each(ten, values));
-        }
+        reached.each(from, |values: &[u8; 10]| add_each(ten, values));
     });
 }
 
@@ -219,7 +224,15 @@ fn add_each<T: Copy + Into<i32>>([a, b, c, d, e, f, g, h, i, j]: &mut [i32; 10],
 fn add_i16_leaves(margins: &mut [i32], reached: &Reached<'_>) {
     if WORDS {
         add_leaves::<_, 2, 5, 10>(margins, reached, add_i16, |five, from| add_five_i16(five, reached, from));
-    } else if let Ok(leaves) = bytemuck::try_cast_slice(reached.leaves) {
+    } else {
+        add_i16_in_memory(margins, reached);
+    }
+}
+
+/// Loads values at once where they are aligned.
+#[inline(always)]
+fn add_i16_in_memory(margins: &mut [i32], reached: &Reached<'_>) {
+    if let Ok(leaves) = bytemuck::try_cast_slice(reached.leaves) {
         let reached = Reached { leaves, reached: reached.reached, length: margins.len() };
         let add = |sum: i32, [value]: [i16; 1]| sum.wrapping_add(i16::from_le(value).into());
         add_leaves::<_, 1, 10, 10>(margins, &reached, add, |ten, from| {
@@ -283,6 +296,26 @@ mod tests {
         sum.add(&[1, 0]);
         sum.settle(1);
         assert_eq!(margins, [bias - 128 - 32768, bias + 5 + 127 + 32767 - 1]);
+    }
+
+    #[test]
+    fn a_chip_without_registers_for_sums_adds_the_same_aligned_or_not() {
+        for objects in 1..23_usize {
+            let values: std::vec::Vec<i16> = (0..4 * objects + 1).map(|i| (i * 7919 % 65_521) as i16).collect();
+            let bytes: std::vec::Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+            let shifted = [&[0; 1], &*bytes].concat();
+            let reached = |leaves, length| Reached { leaves, reached: &[2, 0, 3, 3], length };
+            let sums = |add: &dyn Fn(&mut [i32])| {
+                let mut margins = std::vec![7; objects];
+                add(&mut margins);
+                margins
+            };
+            let expected = sums(&|margins| add_i16_leaves(margins, &reached(&bytes, 2 * objects)));
+            assert_eq!(sums(&|margins| add_i16_in_memory(margins, &reached(&bytes, 2 * objects))), expected);
+            assert_eq!(sums(&|margins| add_i16_in_memory(margins, &reached(&shifted[1..], 2 * objects))), expected);
+            let expected = sums(&|margins| add_i8_leaves(margins, &reached(&bytes, objects)));
+            assert_eq!(sums(&|margins| add_i8_in_memory(margins, &reached(&bytes, objects))), expected);
+        }
     }
 
     #[test]
