@@ -2,21 +2,21 @@
 
 use palpate_shared::format::{Layout, LeafType};
 
-/// The feature that reads models of a layout, and whether it is built in.
-pub(crate) const fn layout(layout: Layout) -> (&'static str, bool) {
+/// Whether models of a layout are read.
+pub(crate) const fn layout(layout: Layout) -> bool {
     match layout {
-        Layout::Compact => ("compact", cfg!(feature = "compact")),
-        Layout::Complete => ("complete", cfg!(feature = "complete")),
-        Layout::Grid => ("grid", cfg!(feature = "grid")),
-        Layout::Wide => ("wide", cfg!(feature = "wide")),
+        Layout::Compact => cfg!(feature = "compact"),
+        Layout::Complete => cfg!(feature = "complete"),
+        Layout::Grid => cfg!(feature = "grid"),
+        Layout::Wide => cfg!(feature = "wide"),
     }
 }
 
-/// The feature that reads models of a type of leaf, and whether it is built in.
-pub(crate) const fn leaf(leaf: LeafType) -> (&'static str, bool) {
+/// Whether models with a type of leaf are read.
+pub(crate) const fn leaf(leaf: LeafType) -> bool {
     match leaf {
-        LeafType::I8 => ("i8-leaves", cfg!(feature = "i8-leaves")),
-        LeafType::I16 => ("i16-leaves", cfg!(feature = "i16-leaves")),
-        LeafType::F32 => ("f32-leaves", cfg!(feature = "f32-leaves")),
+        LeafType::I8 => cfg!(feature = "i8-leaves"),
+        LeafType::I16 => cfg!(feature = "i16-leaves"),
+        LeafType::F32 => cfg!(feature = "f32-leaves"),
     }
 }

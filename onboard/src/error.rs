@@ -38,10 +38,8 @@ pub enum ModelError {
     MarginRange,
     /// This crate was built without the feature that reads such a model.
     NotBuiltIn {
-        /// Where the model states its layout or its type of leaf.
+        /// Where the model states what is missing: 6 for its layout, 7 for its type of leaf.
         offset: usize,
-        /// The feature's name.
-        feature: &'static str,
     },
 }
 
@@ -53,7 +51,7 @@ impl ModelError {
             Self::NotAModel => 0,
             Self::Version(_) => 4,
             Self::Checksum { .. } | Self::MarginRange => 8,
-            Self::Field { offset } | Self::Section { offset } | Self::NotBuiltIn { offset, .. } => offset,
+            Self::Field { offset } | Self::Section { offset } | Self::NotBuiltIn { offset } => offset,
         }
     }
 }
@@ -77,8 +75,9 @@ impl fmt::Display for ModelError {
             Self::Field { .. } => f.write_str("a field of the model has a value that means nothing"),
             Self::Section { .. } => f.write_str("a section of the model does not have the length that it should have"),
             Self::MarginRange => f.write_str("the model's margins could overflow"),
-            Self::NotBuiltIn { feature, .. } => {
-                write!(f, "this program was built without palpate-onboard's feature {feature}, which the model needs")
+            Self::NotBuiltIn { offset } => {
+                let what = if *offset == 6 { "layout" } else { "type of leaf" };
+                write!(f, "this program was built without palpate-onboard's feature for the model's {what}")
             }
         }
     }

@@ -24,13 +24,13 @@ pub(crate) fn look_up(model: &Model<'_>, features: &[i32], margins: &mut [i32]) 
     }
     let leaves = model.leaves.get(cell * margins.len() * model.leaf.size()..).unwrap_or_default();
     match model.leaf {
-        LeafType::I8 if built_in::leaf(LeafType::I8).1 => {
+        LeafType::I8 if built_in::leaf(LeafType::I8) => {
             put(margins, leaves, |[value]: [u8; 1]| i32::from(value) - BIAS)
         }
-        LeafType::I16 if built_in::leaf(LeafType::I16).1 => {
+        LeafType::I16 if built_in::leaf(LeafType::I16) => {
             put(margins, leaves, |value: [u8; 2]| i16::from_le_bytes(value).into())
         }
-        LeafType::F32 if built_in::leaf(LeafType::F32).1 => {
+        LeafType::F32 if built_in::leaf(LeafType::F32) => {
             put(margins, leaves, |value: [u8; 4]| i32::from_le_bytes(value))
         }
         // Refused when the model was opened.

@@ -31,9 +31,9 @@ impl Sum<'_> {
         let leaf_type = self.leaf;
         let margins = self.of_group();
         match leaf_type {
-            LeafType::I8 if built_in::leaf(LeafType::I8).1 => add_values(margins, leaf, add_i8),
-            LeafType::I16 if built_in::leaf(LeafType::I16).1 => add_values(margins, leaf, add_i16),
-            LeafType::F32 if built_in::leaf(LeafType::F32).1 => {
+            LeafType::I8 if built_in::leaf(LeafType::I8) => add_values(margins, leaf, add_i8),
+            LeafType::I16 if built_in::leaf(LeafType::I16) => add_values(margins, leaf, add_i16),
+            LeafType::F32 if built_in::leaf(LeafType::F32) => {
                 let length = leaf.len();
                 add_f32_leaves(margins, &Reached { leaves: leaf, reached: &[0], length });
             }
@@ -49,9 +49,9 @@ impl Sum<'_> {
         let margins = self.of_group();
         let reached = Reached { leaves, reached, length: margins.len() * leaf_type.size() };
         match leaf_type {
-            LeafType::I8 if built_in::leaf(LeafType::I8).1 => add_i8_leaves(margins, &reached),
-            LeafType::I16 if built_in::leaf(LeafType::I16).1 => add_i16_leaves(margins, &reached),
-            LeafType::F32 if built_in::leaf(LeafType::F32).1 => add_f32_leaves(margins, &reached),
+            LeafType::I8 if built_in::leaf(LeafType::I8) => add_i8_leaves(margins, &reached),
+            LeafType::I16 if built_in::leaf(LeafType::I16) => add_i16_leaves(margins, &reached),
+            LeafType::F32 if built_in::leaf(LeafType::F32) => add_f32_leaves(margins, &reached),
             // Refused when the model was opened.
             _ => {}
         }

@@ -49,7 +49,7 @@ impl Model<'_> {
     /// Adds up all trees: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
-        if built_in::layout(Layout::Grid).1 && self.layout == Layout::Grid {
+        if built_in::layout(Layout::Grid) && self.layout == Layout::Grid {
             grid::look_up(self, features, margins);
             return Some(margins);
         }
@@ -100,13 +100,13 @@ impl Model<'_> {
             shift = group.shift;
             sum.object = group.object;
             match self.layout {
-                Layout::Complete if built_in::layout(Layout::Complete).1 => {
+                Layout::Complete if built_in::layout(Layout::Complete) => {
                     complete::add(&group, &ranks, &mut reached, &mut nodes, &mut leaves, sum);
                 }
-                Layout::Wide if built_in::layout(Layout::Wide).1 => {
+                Layout::Wide if built_in::layout(Layout::Wide) => {
                     preorder::add_wide(self, &group, features, &mut nodes, &mut leaves, sum);
                 }
-                Layout::Compact if built_in::layout(Layout::Compact).1 => {
+                Layout::Compact if built_in::layout(Layout::Compact) => {
                     preorder::add_compact(&group, &ranks, &mut nodes, &mut leaves, sum);
                 }
                 // Refused when the model was opened.

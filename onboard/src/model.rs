@@ -129,7 +129,7 @@ impl<'a> Model<'a> {
 
     /// Whether margins are added in f32; never without the feature `f32-leaves`, so that no code for it is linked.
     pub(crate) const fn is_float(&self) -> bool {
-        built_in::leaf(LeafType::F32).1 && matches!(self.leaf, LeafType::F32)
+        built_in::leaf(LeafType::F32) && matches!(self.leaf, LeafType::F32)
     }
 
     /// What features are compared as.
@@ -164,7 +164,7 @@ impl<'a> Model<'a> {
 
     /// The evidence for an object before any touch, in units of a margin.
     pub fn prior(&self, object: usize) -> i32 {
-        at_i32(self.priors(), object)
+        self.priors().get(object).map_or(0, |prior| i32::from_le_bytes(*prior))
     }
 
     /// Where a section starts.
@@ -172,9 +172,10 @@ impl<'a> Model<'a> {
         section.as_ptr().addr().saturating_sub(self.bytes.as_ptr().addr())
     }
 
-    fn priors(&self) -> &'a [u8] {
+    /// The evidence for each object before any touch.
+    pub(crate) fn priors(&self) -> &'a [[u8; 4]] {
         let start = HEADER_LENGTH + self.text_length() + self.base.len();
-        self.bytes.get(start..).unwrap_or_default()
+        self.bytes.get(start..start + self.base.len()).unwrap_or_default().as_chunks().0
     }
 
     fn text_length(&self) -> usize {
@@ -195,9 +196,4 @@ impl<'a> Model<'a> {
 fn next_text<'a>(text: &mut &'a [u8]) -> &'a [u8] {
     let length = usize::from(at(text, 0));
     take(text, 1).and_then(|_| take(text, length)).unwrap_or_default()
-}
-
-fn at_i32(bytes: &[u8], index: usize) -> i32 {
-    let (numbers, _) = bytes.as_chunks();
-    numbers.get(index).map_or(0, |number| i32::from_le_bytes(*number))
 }

@@ -121,8 +121,9 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// Forgets all touches, for the next object.
     pub fn reset(&mut self) {
-        for (object, evidence) in self.evidence.iter_mut().enumerate() {
-            *evidence = i64::from(self.model.prior(object));
+        let mut priors = self.model.priors().iter();
+        for evidence in &mut self.evidence {
+            *evidence = priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into());
         }
         self.touches = 0;
         self.verdict = Verdict::Undecided;

@@ -41,10 +41,9 @@ pub(crate) fn model(model: &Model<'_>) -> Result<(), ModelError> {
     if header.unit_shift() > 63 {
         return Err(ModelError::Field { offset: 40 });
     }
-    for (offset, (feature, built_in)) in [(6, built_in::layout(model.layout)), (7, built_in::leaf(model.leaf))] {
-        if !built_in {
-            return Err(ModelError::NotBuiltIn { offset, feature });
-        }
+    let built_in = built_in::layout(model.layout);
+    if !built_in || !built_in::leaf(model.leaf) {
+        return Err(ModelError::NotBuiltIn { offset: if built_in { 7 } else { 6 } });
     }
     axes(model, header)?;
     let section =
@@ -52,7 +51,7 @@ pub(crate) fn model(model: &Model<'_>) -> Result<(), ModelError> {
     let values = usize::from(model.objects);
     let mut nodes = model.nodes;
     let mut leaves = model.leaves;
-    if built_in::layout(Layout::Grid).1 && model.layout == Layout::Grid {
+    if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
         let cells = grid_cells(model).ok_or(ModelError::Section { offset: model.offset(model.axes) })?;
         section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
         section(model.groups.is_empty(), model.groups)?;
@@ -85,14 +84,14 @@ pub(crate) fn model(model: &Model<'_>) -> Result<(), ModelError> {
         let leaf = model.leaf.size() * if group.object.is_none() { values } else { 1 };
         let fits = match model.layout {
             Layout::Complete
-                if built_in::layout(Layout::Complete).1 && (1..=MAX_COMPLETE_DEPTH).contains(&group.depth) =>
+                if built_in::layout(Layout::Complete) && (1..=MAX_COMPLETE_DEPTH).contains(&group.depth) =>
             {
                 complete_group(&group, &mut nodes, &mut leaves, leaf)
             }
-            Layout::Compact if built_in::layout(Layout::Compact).1 && group.depth == 0 => {
+            Layout::Compact if built_in::layout(Layout::Compact) && group.depth == 0 => {
                 preorder_group(&group, &mut nodes, &mut leaves, leaf, 3)
             }
-            Layout::Wide if built_in::layout(Layout::Wide).1 && group.depth == 0 => {
+            Layout::Wide if built_in::layout(Layout::Wide) && group.depth == 0 => {
                 preorder_group(&group, &mut nodes, &mut leaves, leaf, 6)
             }
             _ => return Err(wrong),
