@@ -48,7 +48,7 @@ pub(crate) fn add(
         *leaves = rest;
         let Some(reached) = reached.get_mut(..block) else { return };
         walk(depth, block_columns, block_thresholds, ranks, reached);
-        sum.add_reached(block_leaves, reached);
+        sum.add_reached(block_leaves, reached, leaf_length);
         trees -= block;
     }
 }

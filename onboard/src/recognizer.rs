@@ -63,9 +63,9 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         if objects > N {
             return Err(CapacityError { objects, capacity: N });
         }
-        let mut recognizer = Self { model, stopping, evidence: [0; N], touches: 0, verdict: Verdict::Undecided };
-        recognizer.reset();
-        Ok(recognizer)
+        let mut priors = model.priors().iter();
+        let evidence = core::array::from_fn(|_| priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into()));
+        Ok(Self { model, stopping, evidence, touches: 0, verdict: Verdict::Undecided })
     }
 
     /// Takes in a touch.
