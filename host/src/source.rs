@@ -6,8 +6,8 @@ use crate::{obj, objects};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The objects of all `sources`, sorted by name. A source is `builtin` (the ten built-in objects), an OBJ file, or a
-/// directory, which is searched for OBJ files with its folders.
+/// The objects of all `sources`, sorted by name. A source is `builtin` (the ten built-in objects), the name of one of
+/// them, an OBJ file, or a directory, which is searched for OBJ files with its folders.
 ///
 /// An object is named after its file; in ShapeNet's layout (`<category>/<id>/models/model_normalized.obj`) after the
 /// category, or after category and id where the sources hold several of a category.
@@ -61,6 +61,8 @@ pub fn files(sources: &[String]) -> Result<Vec<Source>> {
             for object in objects::builtin() {
                 insert(&mut found, object.name.clone(), Source::BuiltIn(object))?;
             }
+        } else if objects::names().contains(&source.as_str()) && !Path::new(source).exists() {
+            insert(&mut found, source.clone(), Source::BuiltIn(objects::one(source)?))?;
         } else {
             let path = Path::new(source);
             let metadata = std::fs::metadata(path).map_err(|error| Error::io(path, "read the mesh", error))?;
@@ -159,6 +161,13 @@ mod tests {
         let one = place(one.path(), &["spoon.OBJ", "deep/er/fork.obj", "notes.txt"]);
         let two = place(two.path(), &["a cup.obj"]) + "/a cup.obj";
         assert_eq!(names(&[one, two]), ["a cup", "fork", "spoon"]);
+    }
+
+    #[test]
+    fn a_built_in_object_is_found_by_its_name_unless_a_file_has_it() {
+        assert_eq!(names(&["mouse".into(), "bowl".into()]), ["bowl", "mouse"]);
+        let error = objects(&["builtin".into(), "mouse".into()]).unwrap_err().to_string();
+        assert!(error.contains("two objects are called mouse"), "{error}");
     }
 
     #[test]

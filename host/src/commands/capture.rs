@@ -18,7 +18,7 @@ Examples:
   palpate capture meshes/ -o part2 --shard 2/8             the second of eight parts of the same data set
   palpate capture meshes/ -o touches --touches 100000000   long; if it is interrupted: the same with --resume")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin`, an OBJ file, or a directory that is searched for OBJ files
+    /// What to touch: `builtin` or a built-in object's name, an OBJ file, or a directory that is searched for OBJ files
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// The directory for the touches

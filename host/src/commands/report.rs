@@ -11,7 +11,7 @@ Examples:
   palpate report meshes/ -o report       your own OBJ files
   palpate report --resume                go on where an interrupted report was")]
 pub(crate) struct Arguments {
-    /// Where objects come from: `builtin`, an OBJ file, or a directory of OBJ files
+    /// Where objects come from: `builtin` or a built-in object's name, an OBJ file, or a directory of OBJ files
     #[arg(default_value = "builtin", value_name = "SOURCE")]
     sources: Vec<String>,
     /// Where the page, its figures and tables go

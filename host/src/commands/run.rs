@@ -12,7 +12,7 @@ Examples:
 Written into the output directory: data/ (the touches), paper.json and ensemble.json (the full models), paper.palpate
 and model.palpate (the compiled ones), summary.json, report.html.")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin`, OBJ files, directories of them
+    /// What to touch: `builtin` or built-in objects' names, OBJ files, directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// Directory for the results
