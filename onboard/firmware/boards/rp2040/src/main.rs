@@ -13,7 +13,7 @@
 
 use core::cell::RefCell;
 use critical_section::Mutex;
-use embedded_hal::digital::OutputPin;
+use embedded_hal::digital::{OutputPin, StatefulOutputPin};
 use embedded_io::Write;
 use hal::gpio::bank0::{Gpio2, Gpio3, Gpio4};
 use hal::gpio::{FunctionSioInput, Interrupt, Pin, PullUp};
@@ -74,7 +74,7 @@ static INTERRUPTED: Mutex<RefCell<Option<Interrupted>>> = Mutex::new(RefCell::ne
 fn main() -> ! {
     match run() {
         Some(never) => match never {},
-        // The chip is not as expected, or there is no model: stand still.
+        // The chip is not as expected: stand still.
         None => loop {
             cortex_m::asm::wfi();
         },
@@ -104,7 +104,12 @@ fn run() -> Option<core::convert::Infallible> {
     let mut uart = uart.enable(config, clocks.peripheral_clock.freq()).ok()?;
     let mut led = pins.gpio25.into_push_pull_output();
 
-    let model = Model::new(MODEL).ok()?;
+    let Ok(model) = Model::new(MODEL) else {
+        loop {
+            led.toggle().ok()?;
+            cortex_m::asm::delay(CRYSTAL_HZ);
+        }
+    };
     let scale = Scale::new(MODEL_PROBE, PROBE)?;
     let mut station = Station::<OBJECTS>::new(&model);
     let mut end = DeviceEnd::new(Progress::NONE);
