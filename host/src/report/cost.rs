@@ -83,13 +83,16 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
         let mut family = train::Settings { rounds, depth, bins, ..context.ours() };
         if rounds < 30 {
             // Few trees have to learn faster.
-            family.eta = 0.3;
+            family.eta = 0.6;
         }
         let ensemble = train::train(&first.train, &family)?;
         let name = format!("{rounds} trees, depth {depth}, {bins} bins");
-        let layouts =
-            if settings.quick { vec![None] } else { vec![Some(compile::Layout::Compact), Some(compile::Layout::Grid)] };
-        add(&name, &ensemble, &[Leaf::I8, Leaf::I16], &layouts)?;
+        let layouts: &[_] = if settings.quick {
+            &[None]
+        } else {
+            &[Some(compile::Layout::Compact), Some(compile::Layout::Complete), Some(compile::Layout::Grid)]
+        };
+        add(&name, &ensemble, &[Leaf::I8, Leaf::I16], layouts)?;
     }
     Ok(members)
 }
