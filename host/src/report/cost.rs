@@ -218,16 +218,17 @@ fn figure(
         chart.marks.push(Mark::Dots { points: vec![at], colour, shape });
         // A label only where there is room for it.
         let near =
-            |other: &(f64, f64)| (other.0 / at.0).ln().abs() < 0.9 && (other.1 - at.1).abs() < (high - low) * 0.07;
+            |other: &(f64, f64)| (other.0 / at.0).ln().abs() < 1.15 && (other.1 - at.1).abs() < (high - low) * 0.07;
         if !labelled.iter().any(near) {
             let text = if member.paper {
                 format!("paper, {}", member.leaf)
             } else {
                 let trees = member.name.split(',').next().unwrap_or_default();
-                format!("{trees}, {}{}", member.leaf, if member.layout == "grid" { ", grid" } else { "" })
+                // Leaves of one or two bytes hardly tell: both have the label.
+                format!("{trees}, {}", member.layout)
             };
             let side =
-                if at.0.ln() > (all().fold(0.0, f64::max)).ln() - 1.8 { Side::UpperLeft } else { Side::LowerRight };
+                if at.0.ln() > (all().fold(0.0, f64::max)).ln() - 1.5 { Side::UpperLeft } else { Side::LowerRight };
             chart.marks.push(Mark::Text { at, text, colour, side });
             labelled.push(at);
         }
