@@ -37,6 +37,7 @@ impl Sum<'_> {
                 let length = leaf.len();
                 add_f32_leaves(margins, &Reached { leaves: leaf, reached: &[0], length });
             }
+            // Refused when the model was opened.
             _ => {}
         }
     }

@@ -60,15 +60,11 @@ impl Axes {
     }
 }
 
-/// The fewest bytes that hold every threshold, of those that chips load at once, and such that the next axis's thresholds
-/// are aligned like these.
+/// Bytes a threshold: two where every threshold fits them and the next axis's are then aligned like these, else four.
+/// Other widths are read, too, but byte by byte.
 pub(super) fn width(cuts: &[i32]) -> u8 {
-    let holds = |width: &u8| {
-        let limit = 1_i64 << (8 * width - 1);
-        (cuts.len() * usize::from(*width)).is_multiple_of(4)
-            && cuts.iter().all(|&cut| (-limit..limit).contains(&i64::from(cut)))
-    };
-    [1, 2].into_iter().find(holds).unwrap_or(4)
+    let narrow = cuts.len().is_multiple_of(2) && cuts.iter().all(|&cut| i16::try_from(cut).is_ok());
+    if narrow { 2 } else { 4 }
 }
 
 /// The thresholds' bytes.

@@ -9,8 +9,8 @@
 //! The 1000 one-output trees are the run's own (`paper.json`); the multi-output ensembles are trained on its touches
 //! with its settings, but for the number of trees and their depth.
 //!
-//! `OUT` then holds models, what the exporter's model of the evaluator says that they cost, touches (three times of four bytes), the same trees for other evaluators, and for
-//! `identity.palpate` what this machine makes of ten thousand touches.
+//! `OUT` then holds models, what the exporter's model of the evaluator says that they cost, touches (three times of four
+//! bytes), the same trees for other evaluators, and for `identity.palpate` what this machine makes of ten thousand touches.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::dataset::Dataset;

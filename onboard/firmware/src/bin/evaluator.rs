@@ -1,6 +1,6 @@
 //! What the evaluator costs on this chip, layout by layout: instructions and stack a touch, margins alone, as the
-//! exporter states them (on a Cortex-M4F it must be right to 15 %), and with evidence and stopping; and beside the first model the same trees in irithyll-core and as a plain array of eight-byte
-//! nodes with f32 compares.
+//! exporter states them (on a Cortex-M4F it must be right to 15 %), and with evidence and stopping; and beside the first
+//! model the same trees in irithyll-core and as a plain array of eight-byte nodes with f32 compares.
 #![no_std]
 #![no_main]
 
