@@ -5,13 +5,13 @@
 //! else runs on the machine does not count), except where it says otherwise.
 
 use glam::DVec3;
-use palpate::approach::{Approach, Probe};
 use palpate::capture::{self, Settings};
-use palpate::cast;
 use palpate::mesh::Mesh;
-use palpate::scene::Scene;
-use palpate::sweep::narrow::double::{self, Motion, Triangle};
-use palpate::sweep::{Exact, Plain, Precision, Single, budget};
+use palpate::probe::approach::{Approach, Probe};
+use palpate::probe::cast;
+use palpate::probe::scene::Scene;
+use palpate::probe::sweep::narrow::double::{self, Motion, Triangle};
+use palpate::probe::sweep::{Exact, Plain, Precision, Single, budget};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -94,9 +94,9 @@ macro_rules! parry {
         use $parry::query::{ShapeCastOptions, cast_shapes};
         use $parry::shape::{Ball, TriMesh};
         let [low, high] = Scene::as_is($mesh).unwrap().bounds();
-        let (centre, scale) = ((low + high) / 2.0, 10.0 / (high - low).max_element());
+        let (center, scale) = ((low + high) / 2.0, 10.0 / (high - low).max_element());
         let vector = |v: DVec3| Vector::new(v.x as $real, v.y as $real, v.z as $real);
-        let vertex = |&v: &[f32; 3]| vector((glam::Vec3::from(v).as_dvec3() - centre) * scale);
+        let vertex = |&v: &[f32; 3]| vector((glam::Vec3::from(v).as_dvec3() - center) * scale);
         let shape = TriMesh::new($mesh.vertices.iter().map(vertex).collect(), $mesh.triangles.clone()).unwrap();
         let ball = Ball::new(RADIUS as $real);
         let casts: Vec<_> = $casts.iter().map(|cast| (vector(cast.origin), vector(cast.direction))).collect();
@@ -194,7 +194,7 @@ fn speed_against_error() {
         meshes.extend(["paperclip", "winebottle", "scissors"].map(|name| (directory.clone(), name)));
     }
     for (directory, name) in meshes {
-        let mesh = palpate::obj::read(&directory.join(format!("{name}.obj"))).unwrap();
+        let mesh = palpate::mesh::obj::read(&directory.join(format!("{name}.obj"))).unwrap();
         let lines = cast::read(&directory.join(format!("{name}.casts.csv"))).unwrap();
         let scene = Scene::as_is(&mesh).unwrap();
         row::<Single>(name, "f32 after f32 reject", &scene, &lines);
@@ -247,9 +247,9 @@ fn real_objects() {
     println!("Ten real objects, 21,000 full touches of each, all threads\n");
     let Some(directory) = shared("objects") else { return };
     let sources = [directory.to_string_lossy().into_owned()];
-    let objects = palpate::source::objects(&sources).unwrap();
+    let objects = palpate::mesh::source::objects(&sources).unwrap();
     let output = tempfile::tempdir().unwrap();
-    let summary = capture::capture(&objects, &Settings::default(), output.path()).unwrap();
+    let summary = capture::capture(&objects, &Settings::default(), output.path(), &()).unwrap();
     println!("{:12} {:>11} {:>7} {:>14}", "object", "approaches", "share", "approaches/s");
     for object in &summary.objects {
         let share = 100.0 * object.touches as f64 / object.approaches as f64;

@@ -1,20 +1,45 @@
-//! Progress on stderr, when it is a terminal.
+//! How far long work has come, told to whoever wants to know; and a way to stop it.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use crate::error::{Error, Result};
 
-/// A bar for work of `total` steps, drawn on stderr when it is a terminal, else silent. Cleared when finished or
-/// dropped.
-pub fn bar(what: impl Into<String>, total: u64) -> ProgressBar {
-    let bar = ProgressBar::new(total);
-    if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {human_pos}/{human_len} {eta}") {
-        bar.set_style(style);
+/// Is told by long calls how far they have come, and may cancel them.
+///
+/// Nothing in the library draws: a program implements this with a progress bar, a log, a callback. `&()` is told
+/// everything and does nothing. Calls come from the thread that made the long call and from its workers.
+pub trait Progress: Sync {
+    /// Work named `stage` begins, of `total` steps if their number is known. It ends when the next stage begins or the
+    /// call returns.
+    fn begin(&self, stage: &str, total: Option<u64>) {
+        _ = (stage, total);
     }
-    bar.with_message(what.into()).with_finish(indicatif::ProgressFinish::AndClear)
+
+    /// The current stage has come `steps` further.
+    fn advance(&self, steps: u64) {
+        _ = steps;
+    }
+
+    /// Whether the call should stop as soon as it can, with [`Error::Cancelled`]. Asked often; should be cheap.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
-/// A spinner for work of unknown length, drawn on stderr when it is a terminal, else silent.
-pub fn spinner(what: impl Into<String>) -> ProgressBar {
-    let spinner = ProgressBar::new_spinner();
-    spinner.enable_steady_tick(std::time::Duration::from_millis(100));
-    spinner.with_message(what.into()).with_finish(indicatif::ProgressFinish::AndClear)
+/// Nobody is told, nothing is cancelled.
+impl Progress for () {}
+
+/// The current stage has come `steps` further; stops the call if it was cancelled.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub(crate) fn advance(progress: &dyn Progress, steps: u64) -> Result<()> {
+    progress.advance(steps);
+    check(progress)
+}
+
+/// Stops the call if it was cancelled.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub(crate) fn check(progress: &dyn Progress) -> Result<()> {
+    if progress.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
 }

@@ -1,15 +1,18 @@
-//! The whole way: capture, train, compile, recognise, report.
+//! The whole way: capture, train, compile, recognize, report.
 
 use crate::capture;
 use crate::compile::{self, Compiled};
-use crate::dataset::Dataset;
+use crate::ensemble::train;
 use crate::error::{Error, Result};
+use crate::evaluate::parity::{self, Parity};
 use crate::evaluate::{self, Candidate, Curve, Evaluation, Margins};
-use crate::folds::{self, Split};
 use crate::mesh::Object;
-use crate::parity::{self, Parity};
+use crate::output;
+use crate::page::render;
+use crate::progress::Progress;
 use crate::report::{self, Cell, Data, Picture, RunMethod, RunResults};
-use crate::{output, progress, render, train};
+use crate::touches::Dataset;
+use crate::touches::folds::{self, Split};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use serde::Serialize;
 use std::fmt::Write;
@@ -34,7 +37,7 @@ pub struct Settings {
     pub test_share: f64,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
-    /// The error rate that recognisers stop at.
+    /// The error rate that recognizers stop at.
     pub error_rate: f64,
     /// The command line that remakes the result, as the report shows it.
     pub command: String,
@@ -69,8 +72,8 @@ pub struct Summary {
     pub paper: Method,
     /// The compact one.
     pub ours: Method,
-    /// One sequence of test touches an object, as the compiled compact model recognises it.
-    pub recognised: Vec<Recognition>,
+    /// One sequence of test touches an object, as the compiled compact model recognizes it.
+    pub recognized: Vec<Recognition>,
     /// All of it.
     pub seconds: f64,
 }
@@ -97,7 +100,7 @@ pub struct Method {
     pub layout: String,
     /// What leaves are stored as.
     pub leaf: String,
-    /// Accuracies, and the recogniser that stops by itself.
+    /// Accuracies, and the recognizer that stops by itself.
     #[serde(flatten)]
     pub evaluation: Evaluation,
     /// The least fixed number of touches from which on the error is at most the error rate; none within reach is null.
@@ -111,8 +114,8 @@ pub struct Method {
 pub struct Recognition {
     /// The object that was touched.
     pub touched: String,
-    /// The object that was recognised; null if the recogniser stayed undecided.
-    pub recognised: Option<String>,
+    /// The object that was recognized; null if the recognizer stayed undecided.
+    pub recognized: Option<String>,
     /// Touches used.
     pub touches: u32,
     /// Posterior of the object with the most evidence.
@@ -124,13 +127,13 @@ pub struct Recognition {
 ///
 /// # Errors
 /// What capture, training, compiling, evaluating or writing return.
-pub fn run(objects: &[Object], settings: &Settings, out: &Path) -> Result<Summary> {
+pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn Progress) -> Result<Summary> {
     let began = Instant::now();
     let data = out.join("data");
-    let captured = capture::capture(objects, &settings.capture, &data)?;
+    let captured = capture::capture(objects, &settings.capture, &data, progress)?;
     let seed = settings.capture.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
-    let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out);
+    let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);
     let paper = method("paper", "paper", train::Settings { seed, ..train::Settings::paper() })?;
     let ours = method("ours", "ensemble", train::Settings { seed, ..train::Settings::compact() })?;
     let model = open(&ours.compiled)?;
@@ -140,7 +143,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path) -> Result<Summar
         seed,
         capture: captured,
         touches: Touches { train: split.train.len(), test: split.test.len() },
-        recognised: split.test.objects.iter().map(|o| recognise(&model, &o.name, &o.touches)).collect::<Result<_>>()?,
+        recognized: split.test.objects.iter().map(|o| recognize(&model, &o.name, &o.touches)).collect::<Result<_>>()?,
         paper: paper.method,
         ours: ours.method,
         seconds: began.elapsed().as_secs_f64(),
@@ -172,11 +175,12 @@ impl Trial {
         split: &Split,
         settings: &Settings,
         out: &Path,
+        progress: &dyn Progress,
     ) -> Result<Self> {
         let began = Instant::now();
-        let ensemble = train::train(&split.train, &preset)?;
+        let ensemble = train::train(&split.train, &preset, progress)?;
         let train_seconds = began.elapsed().as_secs_f64();
-        let spinner = progress::spinner(format!("compiling and testing {name}"));
+        progress.begin(&format!("compiling and testing {name}"), None);
         let compile = compile::Settings {
             error_rate: settings.error_rate,
             spacing: settings.capture.probe.spacing as f32,
@@ -201,8 +205,7 @@ impl Trial {
             },
         )?;
         let curve = margins.curve(MOST.min(fewest), settings.groups, seed)?;
-        let parity = parity::parity(&ensemble, &model, &split.test, PARITY_SEQUENCES, seed)?;
-        spinner.finish_and_clear();
+        let parity = parity::parity(&ensemble, &model, &split.test, PARITY_SEQUENCES, seed, progress)?;
         let method = Method {
             trees: ensemble.trees.len(),
             train_seconds,
@@ -226,15 +229,15 @@ fn open(compiled: &Compiled) -> Result<Model<'_>> {
         .map_err(|error| Error::data(format!("the compiled model cannot be read: {error}"), "Report this as a bug."))
 }
 
-/// Pushes one object's test touches until the recogniser has its verdict.
-fn recognise(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]) -> Result<Recognition> {
+/// Pushes one object's test touches until the recognizer has its verdict.
+fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]) -> Result<Recognition> {
     let mut recognizer = Recognizer::<256>::new(model, Stopping::from_model(model))
         .map_err(|_| Error::data(format!("a model of {} objects", model.object_count()), "Use at most 256 objects."))?;
     let verdict = touches.iter().map(|touch| recognizer.push(touch)).find(|verdict| *verdict != Verdict::Undecided);
     let best = recognizer.best();
-    let recognised = matches!(verdict, Some(Verdict::Recognised { .. })).then(|| model.object_name(best).into());
+    let recognized = matches!(verdict, Some(Verdict::Recognized { .. })).then(|| model.object_name(best).into());
     let posterior = recognizer.posterior(best).to_f64();
-    Ok(Recognition { touched: touched.into(), recognised, touches: recognizer.touches(), posterior })
+    Ok(Recognition { touched: touched.into(), recognized, touches: recognizer.touches(), posterior })
 }
 
 fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<Picture> {
@@ -342,12 +345,12 @@ pub fn text(summary: &Summary, out: &Path) -> String {
         summary.touches.train,
         summary.touches.test
     );
-    let width = summary.recognised.iter().map(|r| r.touched.chars().count()).max().unwrap_or(0);
-    for recognition in &summary.recognised {
-        let Recognition { touched, recognised, touches, posterior } = recognition;
-        _ = match recognised {
+    let width = summary.recognized.iter().map(|r| r.touched.chars().count()).max().unwrap_or(0);
+    for recognition in &summary.recognized {
+        let Recognition { touched, recognized, touches, posterior } = recognition;
+        _ = match recognized {
             Some(name) if name == touched => {
-                writeln!(text, "  {touched:width$}  recognised after {touches:>3} touches, posterior {posterior:.4}")
+                writeln!(text, "  {touched:width$}  recognized after {touches:>3} touches, posterior {posterior:.4}")
             }
             Some(name) => {
                 writeln!(text, "  {touched:width$}  taken for {name} after {touches} touches, posterior {posterior:.4}")

@@ -1,10 +1,10 @@
 //! What holds for contact times whatever the object: properties, tried on random approaches.
 
 use glam::{DQuat, DVec3};
-use palpate::approach::{Approach, FINGERS, Probe};
 use palpate::mesh::Mesh;
-use palpate::scene::Scene;
-use palpate::sweep::Surface;
+use palpate::probe::approach::{Approach, FINGERS, Probe};
+use palpate::probe::scene::Scene;
+use palpate::probe::sweep::Surface;
 use proptest::prelude::*;
 use rand::SeedableRng;
 use std::sync::LazyLock;

@@ -1,7 +1,7 @@
 //! Our contact times against those computed in quad precision.
 
-use palpate::cast::{self, Agreement};
-use palpate::scene::Scene;
+use palpate::probe::cast::{self, Agreement};
+use palpate::probe::scene::Scene;
 use std::path::{Path, PathBuf};
 
 /// The radius of the reference casts, the nearest f32.
@@ -13,7 +13,7 @@ fn tolerance(set: &str) -> f64 {
 }
 
 fn agreement(directory: &Path, name: &str) -> Vec<Agreement> {
-    let scene = Scene::as_is(&palpate::obj::read(&directory.join(format!("{name}.obj"))).unwrap()).unwrap();
+    let scene = Scene::as_is(&palpate::mesh::obj::read(&directory.join(format!("{name}.obj"))).unwrap()).unwrap();
     let casts = cast::read(&directory.join(format!("{name}.casts.csv"))).unwrap();
     cast::agreement(&casts, &cast::times(&scene, &casts, RADIUS.into()))
 }

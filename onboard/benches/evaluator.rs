@@ -12,9 +12,9 @@
 
 use hessboost::prelude::{BoostedModel, Iterations, ModelFormat};
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::dataset::Dataset;
+use palpate::ensemble::train;
 use palpate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
-use palpate::train;
+use palpate::touches::Dataset;
 use palpate_onboard::Model;
 use palpate_shared::Touch;
 use std::fmt::Write as _;
@@ -39,7 +39,7 @@ fn main() {
         [("1000 one-output trees, depth 6, times", paper), ("100 multi-output trees, depth 6, curvature", compact)]
     {
         let ensemble = match &data {
-            Some(data) => train::train(data, &settings).expect("a trained ensemble"),
+            Some(data) => train::train(data, &settings, &()).expect("a trained ensemble"),
             None => random(&settings),
         };
         compare(name, &ensemble, &touches);

@@ -95,7 +95,7 @@ fn last_slot<const DEPTH: usize, const SLOTS: usize>(
     ranks: &Ranks,
 ) -> usize {
     let mut slot = usize::from(at(columns, 0)) & 1;
-    // Written out, so that the steps are not left as a loop where size is optimised for.
+    // Written out, so that the steps are not left as a loop where size is optimized for.
     slot = if DEPTH > 0 { step(columns, thresholds, ranks, slot) } else { slot };
     slot = if DEPTH > 1 { step(columns, thresholds, ranks, slot) } else { slot };
     slot = if DEPTH > 2 { step(columns, thresholds, ranks, slot) } else { slot };

@@ -1,4 +1,4 @@
-//! Recognises objects by touch on a microcontroller.
+//! Recognizes objects by touch on a microcontroller.
 //!
 //! ```text
 //! Touch ──► features ──► ranks ──► trees ──► margins ──► evidence ──► Verdict

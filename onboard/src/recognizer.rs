@@ -11,8 +11,8 @@ use palpate_shared::Touch;
 pub enum Verdict {
     /// No object is sure enough yet.
     Undecided,
-    /// An object was recognised. Further touches change nothing until [`Recognizer::reset`].
-    Recognised {
+    /// An object was recognized. Further touches change nothing until [`Recognizer::reset`].
+    Recognized {
         /// The object's index in the model.
         object: u8,
         /// How many touches it took.
@@ -23,24 +23,24 @@ pub enum Verdict {
     Unknown,
 }
 
-/// A model with more objects than a recogniser has room for.
+/// A model with more objects than a recognizer has room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CapacityError {
     /// The model's objects.
     pub objects: usize,
-    /// The recogniser's room.
+    /// The recognizer's room.
     pub capacity: usize,
 }
 
 impl fmt::Display for CapacityError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the model has {} objects, and the recogniser has room for {}", self.objects, self.capacity)
+        write!(f, "the model has {} objects, and the recognizer has room for {}", self.objects, self.capacity)
     }
 }
 
 impl core::error::Error for CapacityError {}
 
-/// Recognises an object by touch; has room for up to `N` objects.
+/// Recognizes an object by touch; has room for up to `N` objects.
 ///
 /// State: 8 bytes an object, and 40.
 #[derive(Clone, Debug)]
@@ -54,7 +54,7 @@ pub struct Recognizer<'m, const N: usize> {
 }
 
 impl<'m, const N: usize> Recognizer<'m, N> {
-    /// A recogniser that has touched nothing yet.
+    /// A recognizer that has touched nothing yet.
     ///
     /// # Errors
     /// [`CapacityError`] when the model has more than `N` objects.
@@ -72,7 +72,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     ///
     /// Cost: the margins, then about 15 instructions an object and one exponential, rarely more. Cannot fail: evidence
     /// that reaches the limits of 64 bits (after 2^33 touches at the earliest) stays there, which brings objects closer
-    /// together and never makes one recognised.
+    /// together and never makes one recognized.
     pub fn push(&mut self, touch: &Touch) -> Verdict {
         let mut margins = [0; N];
         self.model.margins(touch, &mut margins);
@@ -152,7 +152,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         let best = evidence::best(self.evidence());
         if evidence::is_decided(self.evidence(), best, self.stopping.odds, self.unit()) {
             let object = u8::try_from(best.0).unwrap_or(u8::MAX);
-            self.verdict = Verdict::Recognised { object, touches: self.touches };
+            self.verdict = Verdict::Recognized { object, touches: self.touches };
         } else if self.touches >= self.stopping.max_touches {
             self.verdict = Verdict::Unknown;
         }

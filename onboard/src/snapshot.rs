@@ -1,6 +1,6 @@
-//! A recogniser's state as bytes, so that a power cut loses no touch.
+//! A recognizer's state as bytes, so that a power cut loses no touch.
 //!
-//! The bytes are postcard's: the model's checksum, the number of touches, the verdict (0 undecided, 1 recognised,
+//! The bytes are postcard's: the model's checksum, the number of touches, the verdict (0 undecided, 1 recognized,
 //! 2 unknown) and its object, then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
 
 use crate::recognizer::{Recognizer, Verdict};
@@ -47,7 +47,7 @@ impl<const N: usize> Recognizer<'_, N> {
     pub fn snapshot<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], SnapshotError> {
         let (verdict, object) = match self.verdict() {
             Verdict::Undecided => (0, 0),
-            Verdict::Recognised { object, .. } => (1, object),
+            Verdict::Recognized { object, .. } => (1, object),
             Verdict::Unknown => (2, 0),
         };
         let state: State = (self.model().checksum(), self.touches(), verdict, object);
@@ -80,7 +80,7 @@ impl<const N: usize> Recognizer<'_, N> {
         }
         let verdict = match verdict {
             0 => Verdict::Undecided,
-            1 if usize::from(object) < self.model().object_count() => Verdict::Recognised { object, touches },
+            1 if usize::from(object) < self.model().object_count() => Verdict::Recognized { object, touches },
             2 => Verdict::Unknown,
             _ => return Err(SnapshotError::Damaged),
         };

@@ -1,13 +1,13 @@
 //! What Palpate's host and chip both speak.
 //!
-//! A probe with three fingers moves towards an object; each finger reports when it makes contact. The path of one such
+//! A probe with three fingers moves toward an object; each finger reports when it makes contact. The path of one such
 //! [`Touch`] through this crate:
 //!
 //! ```text
 //! contact times ──► Touch ──► Descriptor ──► Features (whole numbers)
 //! ```
 //!
-//! The trainer on the host and the recogniser on the chip compute a feature with the same lines of code, here, so that
+//! The trainer on the host and the recognizer on the chip compute a feature with the same lines of code, here, so that
 //! neither rounds where the other did not: times are whole microseconds, direction cosines are Q15 integers.
 //!
 //! ```

@@ -65,7 +65,7 @@ fn a_touch_that_only_one_object_can_explain_decides_at_once() {
         let model = Model::new(&bytes).unwrap();
         let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(1e-12, 10)).unwrap();
         assert_eq!(recognizer.push(&touch(0)), Verdict::Undecided);
-        assert_eq!(recognizer.push(&touch(1000)), Verdict::Recognised { object: 1, touches: 2 });
+        assert_eq!(recognizer.push(&touch(1000)), Verdict::Recognized { object: 1, touches: 2 });
         assert_eq!(recognizer.posterior(1).complement(), 0.0);
         assert_eq!(recognizer.posterior(0).to_f64(), 0.0);
     }
@@ -82,7 +82,7 @@ fn the_posterior_passes_one_minus_a_billionth_exactly_when_the_evidence_says_so(
             assert_eq!(recognizer.push(&touch(0)), Verdict::Undecided, "after {number} of {needed}");
             assert!(recognizer.posterior(0).complement() > error_rate);
         }
-        assert_eq!(recognizer.push(&touch(0)), Verdict::Recognised { object: 0, touches: needed });
+        assert_eq!(recognizer.push(&touch(0)), Verdict::Recognized { object: 0, touches: needed });
         let complement = recognizer.posterior(0).complement();
         assert!(complement <= error_rate && complement > error_rate / 2.0, "{complement:e}");
     }
@@ -144,7 +144,7 @@ fn thousands_of_touches_pulling_back_and_forth_leave_nothing_behind() {
     assert_eq!(recognizer.evidence(), [0, 0, 0]);
     recognizer.push(&touch(1000));
     recognizer.push(&touch(1000));
-    assert_eq!(recognizer.push(&touch(1000)), Verdict::Recognised { object: 1, touches: 10_003 });
+    assert_eq!(recognizer.push(&touch(1000)), Verdict::Recognized { object: 1, touches: 10_003 });
 }
 
 /// A snapshot with this evidence.

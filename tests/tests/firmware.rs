@@ -3,9 +3,9 @@
 //! Needs `qemu-system-arm` and the targets thumbv7em-none-eabihf and thumbv6m-none-eabi, so it is asked for:
 //! `cargo test -p palpate-tests --test firmware -- --ignored`. It builds the images itself.
 
+use palpate::chip::{Connection, Emulator, Faults, Steps, Summary, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate::dataset::{Dataset, ObjectTouches};
-use palpate::link::{Connection, Emulator, Faults, Steps, Summary, Update, stream};
+use palpate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 use palpate_onboard::station::Station;
 use palpate_shared::link::{Decision, Decoder, Device, Event, HostSettings, Message, TouchMessage, VerdictMessage};

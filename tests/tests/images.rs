@@ -1,4 +1,4 @@
-//! Firmware images made of the recogniser alone: they link although a panic could not, hold no float code, and take the
+//! Firmware images made of the recognizer alone: they link although a panic could not, hold no float code, and take the
 //! flash that is stated.
 //!
 //! They are built for thumbv6m-none-eabi, so these tests only run where they are asked for:

@@ -2,10 +2,10 @@
 
 use palpate::capture::{self, capture};
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::dataset::{Dataset, ObjectTouches};
+use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node};
-use palpate::parity::{Parity, parity};
-use palpate::train::{self, train};
+use palpate::evaluate::parity::{Parity, parity};
+use palpate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use palpate_tests::random;
@@ -22,7 +22,7 @@ fn size(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> usize {
 fn captured(pose: bool) -> Dataset {
     let directory = tempfile::tempdir().unwrap();
     let settings = capture::Settings { touches: 1_500, pose, ..capture::Settings::default() };
-    capture(&palpate::objects::builtin(), &settings, directory.path()).unwrap();
+    capture(&palpate::mesh::builtin::all(), &settings, directory.path(), &()).unwrap();
     Dataset::read(directory.path()).unwrap()
 }
 
@@ -38,8 +38,8 @@ fn million(dataset: &Dataset) -> Dataset {
 fn hold(ensemble: &Ensemble, dataset: &Dataset) -> (Parity, Parity) {
     let compiled = compile(ensemble, &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap();
     let model = Model::new(&compiled.bytes).unwrap();
-    let touches = parity(ensemble, &model, &million(dataset), 0, 1).unwrap();
-    let sequences = parity(ensemble, &model, dataset, SEQUENCES, 1).unwrap();
+    let touches = parity(ensemble, &model, &million(dataset), 0, 1, &()).unwrap();
+    let sequences = parity(ensemble, &model, dataset, SEQUENCES, 1, &()).unwrap();
     assert_eq!((touches.touches, sequences.sequences), (TOUCHES, SEQUENCES));
     println!("{touches:?}\n{sequences:?}");
     (touches, sequences)
@@ -48,7 +48,7 @@ fn hold(ensemble: &Ensemble, dataset: &Dataset) -> (Parity, Parity) {
 #[test]
 fn the_published_methods_margins_stay_within_a_bound_that_is_near_and_its_verdicts_are_equal() {
     let dataset = captured(false);
-    let ensemble = train(&dataset, &train::Settings::paper()).unwrap();
+    let ensemble = train(&dataset, &train::Settings::paper(), &()).unwrap();
     let (touches, sequences) = hold(&ensemble, &dataset);
     assert!(touches.max_margin_error > 0.0 && touches.max_margin_error <= touches.stated_bound);
     assert!(touches.stated_bound <= 4.0 * touches.max_margin_error);
@@ -60,7 +60,7 @@ fn the_published_methods_margins_stay_within_a_bound_that_is_near_and_its_verdic
 fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
     for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
         let dataset = captured(true);
-        let ensemble = train(&dataset, &train::Settings { descriptor, ..train::Settings::compact() }).unwrap();
+        let ensemble = train(&dataset, &train::Settings { descriptor, ..train::Settings::compact() }, &()).unwrap();
         let (touches, sequences) = hold(&ensemble, &dataset);
         assert_eq!((touches.stated_bound, touches.max_margin_error, touches.best_differs), (0.0, 0.0, 0));
         assert_eq!((sequences.verdict_differs, sequences.touches_differ), (0, 0));
@@ -71,7 +71,7 @@ fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
 fn leaves_that_were_not_rounded_in_training_stay_within_a_bound_that_is_near() {
     let dataset = captured(true);
     let settings = train::Settings { descriptor: Descriptor::Oriented, leaf_bits: None, ..train::Settings::compact() };
-    let (touches, sequences) = hold(&train(&dataset, &settings).unwrap(), &dataset);
+    let (touches, sequences) = hold(&train(&dataset, &settings, &()).unwrap(), &dataset);
     assert!(touches.max_margin_error > 0.0 && touches.max_margin_error <= touches.stated_bound);
     assert!(touches.stated_bound <= 4.0 * touches.max_margin_error);
     assert_eq!(sequences.verdict_differs, 0);
@@ -80,11 +80,11 @@ fn leaves_that_were_not_rounded_in_training_stay_within_a_bound_that_is_near() {
 #[test]
 fn a_thousand_one_output_trees_take_six_bytes_a_split_and_forty_multi_output_trees_of_depth_five_17_kb() {
     let dataset = captured(false);
-    let one = train(&dataset, &train::Settings::paper()).unwrap();
+    let one = train(&dataset, &train::Settings::paper(), &()).unwrap();
     let nodes = one.trees.iter().flat_map(|tree| &tree.nodes);
     let splits = nodes.filter(|node| matches!(node, Node::Split { .. })).count();
     assert!(one.trees.len() == 1000 && size(&one, Leaf::I16, Layout::Compact) <= 6 * splits, "{splits} splits");
-    let each = train(&dataset, &train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() }).unwrap();
+    let each = train(&dataset, &train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() }, &()).unwrap();
     let bytes = size(&each, Leaf::I8, Layout::Complete);
     assert!(each.trees.len() == 40 && bytes <= 17_000, "{bytes} bytes");
 }

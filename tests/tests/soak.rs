@@ -2,9 +2,9 @@
 //!
 //! 100,000 touches; `PALPATE_SOAK=1000000 cargo test -p palpate-tests --test soak -- --nocapture` for a million.
 
+use palpate::chip::{Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate::dataset::{Dataset, ObjectTouches};
-use palpate::link::{Connection, Emulator, Port, Steps, Update, stream};
+use palpate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 use palpate_onboard::station::{Memory, serve};
 use palpate_shared::Descriptor;

@@ -1,4 +1,4 @@
-//! A chip's whole program at the end of a link: what it says is what a recogniser of its own would say, through loading,
+//! A chip's whole program at the end of a link: what it says is what a recognizer of its own would say, through loading,
 //! power cuts and torn records.
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
@@ -210,14 +210,14 @@ fn load(bytes: &'static [u8], payload: Payload) -> Vec<Step> {
     steps
 }
 
-/// What a recogniser says to these touches.
+/// What a recognizer says to these touches.
 fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
     let model = Model::new(bytes).unwrap();
     let mut recognizer = Recognizer::<OBJECTS>::new(&model, Stopping::from_model(&model)).unwrap();
     let verdict = |touch| {
         let decision = match recognizer.push(touch) {
             Verdict::Undecided => Decision::Undecided,
-            Verdict::Recognised { object, .. } => Decision::Recognised(object),
+            Verdict::Recognized { object, .. } => Decision::Recognized(object),
             Verdict::Unknown => Decision::Unknown,
         };
         let best = recognizer.best();
@@ -229,7 +229,7 @@ fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
 }
 
 #[test]
-fn verdicts_posteriors_and_evidence_are_those_of_a_recogniser() {
+fn verdicts_posteriors_and_evidence_are_those_of_a_recognizer() {
     let touches = touches(300);
     let bytes = model(1);
     let mut desk = Desk::new(touches.iter().map(push), 0);
@@ -319,7 +319,7 @@ fn a_snapshot_taken_over_the_link_goes_on_in_another_chip_and_not_under_another_
 fn through_power_cuts_and_torn_records_no_touch_is_lost_or_doubled() {
     let loaded: &[u8] = model(1).leak();
     let touches = touches(2_000);
-    // A fresh start for the recogniser now and then, so that it does not rest on its first verdict.
+    // A fresh start for the recognizer now and then, so that it does not rest on its first verdict.
     let mut script = load(loaded, Payload::Model);
     let mut verdicts = Vec::new();
     for touches in touches.chunks(17) {

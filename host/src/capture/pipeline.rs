@@ -6,9 +6,9 @@
 
 use super::store::Store;
 use super::{ObjectSummary, Sampler, Settings};
-use crate::dataset::write_touch;
 use crate::error::Result;
-use crate::progress;
+use crate::progress::{self, Progress};
+use crate::touches::write_touch;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::ops::Range;
 use std::time::Instant;
@@ -26,12 +26,17 @@ struct Chunk {
 }
 
 /// Captures all that the store does not have yet.
-pub(super) fn run(samplers: &[Sampler<'_>], settings: &Settings, store: &mut Store) -> Result<Vec<ObjectSummary>> {
+pub(super) fn run(
+    samplers: &[Sampler<'_>],
+    settings: &Settings,
+    store: &mut Store,
+    progress: &dyn Progress,
+) -> Result<Vec<ObjectSummary>> {
     let samples = settings.samples();
     let total = samples.end - samples.start;
     let rest = |object: usize| samples.start + store.entry(object).touches..samples.end;
     let jobs: Vec<(usize, Range<u64>)> = (0..samplers.len()).map(|object| (object, rest(object))).collect();
-    let bar = progress::bar("Touching", total * samplers.len() as u64);
+    progress.begin("touching", Some(total * samplers.len() as u64));
     let threads = settings.threads().max(1);
     std::thread::scope(|scope| {
         let mut channels = Vec::with_capacity(threads);
@@ -46,14 +51,13 @@ pub(super) fn run(samplers: &[Sampler<'_>], settings: &Settings, store: &mut Sto
         for (object, samples) in &jobs {
             let start = Instant::now();
             let before = store.entry(*object).clone();
-            bar.set_message(before.name.clone());
-            bar.inc(before.touches);
+            progress.advance(before.touches);
             for part in split(samples) {
                 let turn = turns.next().unwrap_or(0);
                 let chunk = receive(&channels[turn])?;
                 let touches = part.end - part.start;
                 store.append(*object, chunk.text.as_bytes(), touches, chunk.approaches)?;
-                bar.inc(touches);
+                progress::advance(progress, touches)?;
             }
             store.complete(*object)?;
             let entry = store.entry(*object).clone();

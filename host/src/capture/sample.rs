@@ -1,9 +1,9 @@
 //! Sample i of an object: a pure function of (seed, object's name, i).
 
 use super::Settings;
-use crate::approach::Approach;
 use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::probe::approach::Approach;
+use crate::probe::scene::Scene;
 use palpate_shared::Touch;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;

@@ -6,10 +6,10 @@
 //! leaves behind that is cut off when the capture is resumed.
 
 use super::Settings;
-use crate::dataset::Format;
-use crate::dataset::manifest::{Entry, Manifest};
 use crate::error::{Error, Result};
 use crate::output;
+use crate::touches::Format;
+use crate::touches::manifest::{Entry, Manifest};
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -126,7 +126,7 @@ impl Store {
             let mut file = options.open(&path).map_err(io)?;
             if file.metadata().map_err(io)?.len() < bytes {
                 let what =
-                    format!("shorter than the {bytes} bytes that {} accounts for", crate::dataset::manifest::FILE);
+                    format!("shorter than the {bytes} bytes that {} accounts for", crate::touches::manifest::FILE);
                 return Err(Error::file(&path, what, "Capture without --resume."));
             }
             file.set_len(bytes).map_err(io)?;
@@ -158,7 +158,7 @@ fn convert(part: &Path, done: &Path, object: &str) -> Result<()> {
     let unfinished = done.with_extension("parquet.part");
     let io = |error| stopped(&unfinished, error);
     let file = File::create(&unfinished).map_err(io)?;
-    crate::dataset::parquet::write(&unfinished, &file, object, crate::dataset::text::lines(part)?)?;
+    crate::touches::parquet::write(&unfinished, &file, object, crate::touches::text::lines(part)?)?;
     file.sync_all().map_err(io)?;
     std::fs::rename(&unfinished, done).map_err(io)?;
     std::fs::remove_file(part).map_err(|error| Error::io(part, "remove the converted touches", error))

@@ -1,7 +1,10 @@
-use palpate::approach::Probe;
+use super::progress::Bar;
+use palpate::Result;
 use palpate::capture::{self, Settings, Shard, Summary};
-use palpate::dataset::Format;
-use palpate::{Result, output, source};
+use palpate::mesh::source;
+use palpate::output;
+use palpate::probe::approach::Probe;
+use palpate::touches::Format;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -36,7 +39,7 @@ pub(crate) struct Arguments {
     /// The fingers' radius, in units
     #[arg(long, value_name = "UNITS", default_value_t = Probe::default().radius)]
     radius: f64,
-    /// The distance between neighbouring fingers, in units
+    /// The distance between neighboring fingers, in units
     #[arg(long, value_name = "UNITS", default_value_t = Probe::default().spacing)]
     spacing: f64,
     /// How fast the probe moves, in units a second
@@ -92,13 +95,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         threads: arguments.threads,
     };
     settings.check()?;
-    let summary = capture::capture(&source::objects(&arguments.sources)?, &settings, &arguments.output)?;
+    let summary = capture::capture(&source::objects(&arguments.sources)?, &settings, &arguments.output, &Bar::new())?;
     if arguments.json { output::print_json(&summary) } else { output::print(&table(&summary)) }
 }
 
 fn table(summary: &Summary) -> String {
     let width = summary.objects.iter().map(|object| object.name.len()).max().unwrap_or(0).max(6);
-    let mut text = format!("{:width$}  {:>10}  {:>12}  {:>7}  {:>14}\n", "object", "touches", "approaches", "share", "approaches/s");
+    let mut text = format!(
+        "{:width$}  {:>10}  {:>12}  {:>7}  {:>14}\n",
+        "object", "touches", "approaches", "share", "approaches/s"
+    );
     let mut row = |name: &str, touches: u64, approaches: u64, now: u64, seconds: f64| {
         let share = 100.0 * touches as f64 / approaches.max(1) as f64;
         let rate = now as f64 / seconds;

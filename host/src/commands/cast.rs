@@ -1,6 +1,9 @@
-use palpate::cast::{self, Agreement};
-use palpate::scene::Scene;
-use palpate::{Error, Result, obj, output};
+use palpate::Error;
+use palpate::Result;
+use palpate::mesh::obj;
+use palpate::output;
+use palpate::probe::cast::{self, Agreement};
+use palpate::probe::scene::Scene;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -8,7 +11,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 CASTS is a text file with a cast a line: `set,ox,oy,oz,dx,dy,dz` or `set,ox,oy,oz,dx,dy,dz,t`, where t is the time that
 another engine found, or `miss`. The same lines come back with our time appended. Times are in lengths of the direction,
-which is not renormalised; all numbers are taken as the nearest f32.
+which is not renormalized; all numbers are taken as the nearest f32.
 
 Examples:
   palpate cast cup.obj casts.csv                        lines on standard output
@@ -24,10 +27,10 @@ pub(crate) struct Arguments {
     /// Where to write the lines [default: standard output]
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
-    /// The longest side that the mesh's bounding box is scaled to, centred at the origin
+    /// The longest side that the mesh's bounding box is scaled to, centered at the origin
     #[arg(long, value_name = "UNITS", default_value_t = 10.0)]
     length: f64,
-    /// Leave the mesh as it is, neither scaled nor centred
+    /// Leave the mesh as it is, neither scaled nor centered
     #[arg(long, conflicts_with = "length")]
     as_is: bool,
     /// The sphere's radius, in units

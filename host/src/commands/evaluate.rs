@@ -1,7 +1,11 @@
-use palpate::dataset::Dataset;
+use super::progress::Bar;
+use palpate::Result;
+use palpate::evaluate::model_file::ModelFile;
 use palpate::evaluate::{self, Evaluation, Margins, Settings};
-use palpate::model_file::ModelFile;
-use palpate::{Result, noise, output};
+use palpate::output;
+use palpate::progress::Progress;
+use palpate::touches::Dataset;
+use palpate::touches::noise;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -54,7 +58,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             object.touches = noise::noisy(&object.name, &object.touches, deviation, arguments.seed);
         }
     }
-    let spinner = palpate::progress::spinner("evaluating");
+    let progress = Bar::new();
+    progress.begin("evaluating", None);
     let evaluation = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?;
         let defaults = Settings::default();
@@ -68,7 +73,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         };
         evaluate::evaluate(&margins, &settings)
     })?;
-    spinner.finish_and_clear();
+    drop(progress);
     if arguments.json { output::print_json(&evaluation) } else { output::print(&table(&evaluation)) }
 }
 

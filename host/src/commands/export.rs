@@ -1,6 +1,7 @@
+use palpate::Result;
 use palpate::compile::{self, Layout, Leaf, Settings};
 use palpate::ensemble::Ensemble;
-use palpate::{Result, output};
+use palpate::output;
 use std::path::PathBuf;
 
 /// Compile an ensemble to the bytes that the chip reads.
@@ -27,7 +28,7 @@ pub(crate) struct Arguments {
     /// How trees are laid out; auto weighs size and speed
     #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid")]
     layout: LayoutChoice,
-    /// The error rate at which recognisers stop unless told otherwise
+    /// The error rate at which recognizers stop unless told otherwise
     #[arg(long, default_value_t = 0.01, value_name = "RATE")]
     error_rate: f64,
     /// The touches after which they give up

@@ -1,5 +1,6 @@
+use palpate::Result;
 use palpate::compile::CompiledFile;
-use palpate::{Result, output};
+use palpate::output;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
 use std::collections::BTreeMap;
@@ -120,8 +121,14 @@ fn text(inspected: &Inspected<'_>) -> String {
     line("objects", format!("{}: {}", inspected.objects.len(), inspected.objects.join(", ")));
     line("trees", format!("{}, {} splits, {} leaves", inspected.trees, inspected.splits, inspected.leaves));
     line("layout", format!("{}, {} leaves", inspected.layout, inspected.leaf));
-    line("margins", format!("units of {:.3e} nats, within {:.2e} nats of the ensemble's", inspected.unit, inspected.margin_error));
-    line("stopping", format!("error rate {}, at most {} touches", inspected.stopping.error_rate, inspected.stopping.max_touches));
+    line(
+        "margins",
+        format!("units of {:.3e} nats, within {:.2e} nats of the ensemble's", inspected.unit, inspected.margin_error),
+    );
+    line(
+        "stopping",
+        format!("error rate {}, at most {} touches", inspected.stopping.error_rate, inspected.stopping.max_touches),
+    );
     line("probe", format!("spacing {}, speed {} a second", inspected.probe.spacing, inspected.probe.speed));
     line("bytes", inspected.bytes.to_string());
     for (part, bytes) in &inspected.bytes_by_part {

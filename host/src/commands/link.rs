@@ -1,9 +1,10 @@
-use palpate::dataset::Dataset;
-use palpate::link::{
-    ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, stream,
-};
+use super::progress::Bar;
+use palpate::Error;
+use palpate::Result;
+use palpate::chip::{ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, stream};
 use palpate::output::{print, print_json};
-use palpate::{Error, Result, progress};
+use palpate::progress::Progress;
+use palpate::touches::Dataset;
 use palpate_onboard::Model;
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;
@@ -51,8 +52,9 @@ impl Reach {
         }
         let mut connection = Connection::open(transport, settings)?;
         if let Some(bytes) = &model {
-            let bar = progress::bar("loading", bytes.len() as u64);
-            connection.load(bytes, |done| bar.set_position(done as u64))?;
+            let progress = Bar::new();
+            progress.begin("loading", Some(bytes.len() as u64));
+            connection.load(bytes, |done| progress.current().set_position(done as u64))?;
         }
         Ok((connection, model))
     }
@@ -91,8 +93,8 @@ pub(crate) fn chip_model(connection: &mut Connection) -> Result<ChipModel> {
 Examples:
   palpate link /dev/ttyACM0                                  what is on the chip?
   palpate link /dev/ttyACM0 --load model.palpate             put a model into it
-  palpate link /dev/ttyACM0 touches/                         recognise a data set's touches
-  echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -         recognise touches as they are typed
+  palpate link /dev/ttyACM0 touches/                         recognize a data set's touches
+  echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -         recognize touches as they are typed
   palpate link emulator --load model.palpate --parity touches/ --touches 10000
   palpate link emulator --load model.palpate --parity touches/ --bad-line 0.001,0.001,0.01,5
 
@@ -102,9 +104,9 @@ object. Every touch is counted exactly once, however bad the line.")]
 pub(crate) struct Arguments {
     /// A serial port, tcp://host:port, or emulator
     port: Port,
-    /// Touches to recognise: a data set's directory, a file of lines, or - for standard input
+    /// Touches to recognize: a data set's directory, a file of lines, or - for standard input
     source: Option<PathBuf>,
-    /// Recognise a data set's touches, and hold every verdict, posterior and evidence against the host's recogniser
+    /// Recognize a data set's touches, and hold every verdict, posterior and evidence against the host's recognizer
     #[arg(long, value_name = "DIR", conflicts_with = "source")]
     parity: Option<PathBuf>,
     /// The model to compare with, if it is on the chip already
@@ -142,19 +144,17 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         }
         None => None,
     };
-    let bar = match steps.count() {
-        Some(count) => progress::bar("touching", count),
-        None => progress::spinner("touching"),
-    };
+    let progress = Bar::new();
+    progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
     let summary = stream(&mut connection, steps, &chip, model.as_ref(), |_, update| {
         if matches!(update, Update::Touch { .. }) {
-            bar.inc(1);
+            progress.advance(1);
         }
-        bar.suspend(|| printer.update(&update, interactive))?;
+        progress.current().suspend(|| printer.update(&update, interactive))?;
         Ok(ControlFlow::Continue(()))
     })?;
-    bar.finish_and_clear();
+    drop(progress);
     printer.summary(&summary)?;
     match summary.first_difference {
         Some(first) if arguments.parity.is_some() => {
@@ -222,7 +222,7 @@ impl<'c> Printer<'c> {
                 let posterior = verdict.detail.map_or(0, |detail| detail.posterior());
                 let posterior = posterior as f64 / (1_u64 << 56) as f64;
                 let said = match verdict.decision {
-                    Decision::Recognised(object) => format!("recognised {}", self.name(object)),
+                    Decision::Recognized(object) => format!("recognized {}", self.name(object)),
                     Decision::Unknown => "unknown".into(),
                     _ => format!("most likely {}", self.name(verdict.best)),
                 };
@@ -248,7 +248,7 @@ impl<'c> Printer<'c> {
         let Summary { touches, compared, differences, right, wrong, undecided, .. } = summary;
         let mut text = format!("{touches} touches in {:.1} s, {:.0} a second\n", summary.seconds, summary.rate());
         if right + wrong + undecided > 0 {
-            text += &format!("objects: {right} recognised rightly, {wrong} wrongly, {undecided} not\n");
+            text += &format!("objects: {right} recognized rightly, {wrong} wrongly, {undecided} not\n");
         }
         if *compared > 0 {
             text += &format!("held against the host: {compared} touches, {differences} differences\n");

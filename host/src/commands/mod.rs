@@ -1,13 +1,28 @@
 //! One file a command: its arguments, its help, and the call into the library.
 
+mod capture;
+mod cast;
+mod evaluate;
+mod export;
+mod inspect;
+mod link;
+mod objects;
+mod parity;
+mod progress;
+mod recognize;
+mod report;
+mod run;
+mod train;
+mod tune;
+mod view;
+mod watch;
+
 use clap::{Parser, Subcommand};
 use palpate::Result;
 
-/// Declares the commands' modules, the enum that clap parses and the dispatch, from one list.
+/// Declares the enum that clap parses and the dispatch, from one list.
 macro_rules! commands {
     ($($(#[$meta:meta])* $name:ident => $module:ident,)*) => {
-        $(mod $module;)*
-
         #[derive(Subcommand)]
         enum Command {
             $($(#[$meta])* $name($module::Arguments),)*
@@ -24,7 +39,7 @@ macro_rules! commands {
 }
 
 commands! {
-    /// Do all of it: capture, train, export, recognise, report (the default)
+    /// Do all of it: capture, train, export, recognize, report (the default)
     Run => run,
     /// Write the ten built-in objects as OBJ files
     Objects => objects,
@@ -40,7 +55,7 @@ commands! {
     Export => export,
     /// Say what is in a compiled model
     Inspect => inspect,
-    /// Recognise objects from a stream of touches
+    /// Recognize objects from a stream of touches
     Recognize => recognize,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
@@ -50,13 +65,13 @@ commands! {
     Parity => parity,
     /// Remake the whole evaluation: every figure, the limit, speed against error
     Report => report,
-    /// Recognise on a chip at the end of a line
+    /// Recognize on a chip at the end of a line
     Link => link,
-    /// Look on while a chip recognises
+    /// Look on while a chip recognizes
     Watch => watch,
 }
 
-/// Recognise objects by touch: virtual touches, boosted trees, a model of a few kilobytes for a microcontroller.
+/// Recognize objects by touch: virtual touches, boosted trees, a model of a few kilobytes for a microcontroller.
 #[derive(Parser)]
 #[command(
     name = "palpate",
@@ -65,7 +80,7 @@ commands! {
     arg_required_else_help = false,
     after_help = "\
 Examples:
-  palpate                            touch, learn, pack and recognise ten built-in objects
+  palpate                            touch, learn, pack and recognize ten built-in objects
   palpate run meshes/ -o out         the same for your own OBJ files
   palpate help capture               what a command does, with examples"
 )]

@@ -1,7 +1,12 @@
 //! `palpate objects`.
 
 use clap::builder::PossibleValuesParser;
-use palpate::{Result, mesh::Object, obj, objects, output, render};
+use palpate::Result;
+use palpate::mesh::Object;
+use palpate::mesh::builtin;
+use palpate::mesh::obj;
+use palpate::output;
+use palpate::page::render;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -13,13 +18,13 @@ Examples:
   palpate objects -o meshes --picture all.png  and a picture of them
   palpate objects -o meshes --varied 7         ten of the same kinds in other proportions; seed 7
 
-The meshes are closed, in centimetres, with z up. The same command writes the same bytes.")]
+The meshes are closed, in centimeters, with z up. The same command writes the same bytes.")]
 pub(crate) struct Arguments {
     /// The directory to write NAME.obj into; made if it is missing
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Only this object; may be given several times
-    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(objects::names()))]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(builtin::names()))]
     only: Vec<String>,
     /// Vary the proportions by up to a fifth or so, with this seed
     #[arg(long, value_name = "SEED")]
@@ -43,8 +48,8 @@ struct Written {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let chosen = |name: &&str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
-    let names: Vec<&str> = objects::names().into_iter().filter(chosen).collect();
-    let made = objects::make(&names, arguments.varied)?;
+    let names: Vec<&str> = builtin::names().into_iter().filter(chosen).collect();
+    let made = builtin::make(&names, arguments.varied)?;
     let written = made.iter().map(|object| write(object, &arguments)).collect::<Result<Vec<_>>>()?;
     if let Some(picture) = &arguments.picture {
         output::write_bytes(picture, &render::sheet(&made, 1200))?;

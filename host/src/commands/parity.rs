@@ -1,7 +1,10 @@
-use palpate::dataset::Dataset;
-use palpate::ensemble::Ensemble;
+use super::progress::Bar;
+use palpate::Result;
 use palpate::compile::CompiledFile;
-use palpate::{Result, output, parity};
+use palpate::ensemble::Ensemble;
+use palpate::evaluate::parity;
+use palpate::output;
+use palpate::touches::Dataset;
 use std::path::PathBuf;
 
 /// Hold a compiled model against its ensemble.
@@ -36,7 +39,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let file = CompiledFile::read(&arguments.model)?;
     let dataset = Dataset::read(&arguments.directory)?;
     let model = file.model()?;
-    let parity = parity::parity(&ensemble, &model, &dataset, arguments.sequences, arguments.seed)
+    let parity = parity::parity(&ensemble, &model, &dataset, arguments.sequences, arguments.seed, &Bar::new())
         .map_err(|error| error.in_file(&arguments.model))?;
     if arguments.json {
         return output::print_json(&parity);

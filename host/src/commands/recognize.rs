@@ -1,12 +1,14 @@
-use palpate::dataset::parse_touch;
+use palpate::Error;
+use palpate::Result;
 use palpate::compile::CompiledFile;
-use palpate::{Error, Result, output};
+use palpate::output;
+use palpate::touches::parse_touch;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Recognise objects from a stream of touches.
+/// Recognize objects from a stream of touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
 One touch a line in (three contact times in seconds, and the pose if the model needs it), one verdict a line out as it
@@ -107,7 +109,7 @@ fn print(recognizer: &Recognizer<'_, 256>, model: &Model<'_>, verdict: Verdict, 
         touch: recognizer.touches(),
         verdict: match verdict {
             Verdict::Undecided => "undecided",
-            Verdict::Recognised { .. } => "recognized",
+            Verdict::Recognized { .. } => "recognized",
             Verdict::Unknown => "unknown",
         },
         object: model.object_name(best),

@@ -1,6 +1,7 @@
+use super::progress::Bar;
+use palpate::Result;
 use palpate::output::{print, print_json};
 use palpate::report::{self, Settings};
-use palpate::Result;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -34,7 +35,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let Arguments { sources, output, seed, quick, resume, json } = arguments;
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
-    let written = report::full(&settings, &output, resume)?;
+    let written = report::full(&settings, &output, resume, &Bar::new())?;
     if json {
         return print_json(&written.summary);
     }

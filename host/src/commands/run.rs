@@ -1,4 +1,9 @@
-use palpate::{Result, capture, output, run, source};
+use super::progress::Bar;
+use palpate::Result;
+use palpate::capture;
+use palpate::mesh::source;
+use palpate::output;
+use palpate::run;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -36,6 +41,6 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         command: format!("palpate run {} -o {} --touches {touches} --seed {seed}", sources.join(" "), out.display()),
         ..run::Settings::default()
     };
-    let summary = run::run(&source::objects(&sources)?, &settings, &out)?;
+    let summary = run::run(&source::objects(&sources)?, &settings, &out, &Bar::new())?;
     if json { output::print_json(&summary) } else { output::print(&run::text(&summary, &out)) }
 }

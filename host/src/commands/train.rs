@@ -1,6 +1,8 @@
-use palpate::dataset::Dataset;
-use palpate::train::{self, Engine, Settings};
-use palpate::{Result, output};
+use super::progress::Bar;
+use palpate::Result;
+use palpate::ensemble::train::{self, Engine, Settings};
+use palpate::output;
+use palpate::touches::Dataset;
 use palpate_shared::Descriptor;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -103,7 +105,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let settings = arguments.settings();
     let dataset = Dataset::read(&arguments.directory)?;
     let start = Instant::now();
-    let ensemble = train::train(&dataset, &settings)?;
+    let ensemble = train::train(&dataset, &settings, &Bar::new())?;
     let seconds = start.elapsed().as_secs_f64();
     ensemble.save(&arguments.output)?;
     let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();

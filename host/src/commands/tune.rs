@@ -1,6 +1,8 @@
-use palpate::dataset::Dataset;
+use super::progress::Bar;
+use palpate::Result;
+use palpate::output;
+use palpate::touches::Dataset;
 use palpate::tune::{self, Row, Settings, Tuned};
-use palpate::{Result, output};
 use palpate_shared::Descriptor;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -59,6 +61,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             groups: arguments.groups,
             seed: arguments.seed,
         },
+        &Bar::new(),
     )?;
     if let Some(path) = &arguments.ensemble {
         tuned.ensemble.save(path)?;

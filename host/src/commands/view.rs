@@ -1,6 +1,11 @@
-use palpate::approach::Probe;
+use palpate::Error;
+use palpate::Result;
 use palpate::mesh::Object;
-use palpate::{Error, Result, objects, output, source, view};
+use palpate::mesh::builtin;
+use palpate::mesh::source;
+use palpate::output;
+use palpate::probe::approach::Probe;
+use palpate::report::view;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -35,7 +40,7 @@ pub(crate) struct Arguments {
     /// The fingers' radius, in units
     #[arg(long, value_name = "UNITS", default_value_t = Probe::default().radius)]
     radius: f64,
-    /// The distance between neighbouring fingers, in units
+    /// The distance between neighboring fingers, in units
     #[arg(long, value_name = "UNITS", default_value_t = Probe::default().spacing)]
     spacing: f64,
 }
@@ -50,12 +55,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 
 /// A built-in object, or else what the file holds.
 fn find(name: &str) -> Result<Object> {
-    if objects::names().contains(&name) {
-        return objects::one(name);
+    if builtin::names().contains(&name) {
+        return builtin::one(name);
     }
     if !Path::new(name).exists() {
         let what = format!("{name} is neither a file nor a built-in object");
-        return Err(Error::argument(what, format!("Give an OBJ file, or one of {}.", objects::names().join(", "))));
+        return Err(Error::argument(what, format!("Give an OBJ file, or one of {}.", builtin::names().join(", "))));
     }
     let mut found = source::objects(&[name.to_owned()])?;
     match (found.pop(), found.is_empty()) {

@@ -1,8 +1,9 @@
 use super::link::{Reach, chip_model};
-use palpate::link::{ChipModel, Connection, Entry, Owned, Port, Update, stream};
+use palpate::Error;
+use palpate::Result;
+use palpate::chip::watch::{Follow, Screen, View, line};
+use palpate::chip::{ChipModel, Connection, Entry, Owned, Port, Update, stream};
 use palpate::output::print;
-use palpate::watch::{Follow, Screen, View, line};
-use palpate::{Error, Result};
 use palpate_onboard::Model;
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -20,7 +21,7 @@ q, Esc or Ctrl-C quit. When the output is not a terminal, plain lines are printe
 pub(crate) struct Arguments {
     /// A serial port, tcp://host:port, emulator, or a journal that palpate link writes
     source: String,
-    /// Touches to recognise: a data set's directory, a file of lines, or - for standard input
+    /// Touches to recognize: a data set's directory, a file of lines, or - for standard input
     data: Option<PathBuf>,
     #[command(flatten)]
     reach: Reach,
@@ -32,18 +33,15 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     if path.is_file() {
         return follow(path);
     }
-    let port: Port = arguments.source.parse().map_err(|what: String| {
-        Error::argument(format!("{}: {what}", arguments.source), "See palpate help watch.")
-    })?;
+    let port: Port = arguments
+        .source
+        .parse()
+        .map_err(|what: String| Error::argument(format!("{}: {what}", arguments.source), "See palpate help watch."))?;
     let steps = arguments.data.as_deref().map(|source| arguments.reach.steps(source)).transpose()?;
     let (mut connection, loaded) = arguments.reach.open(&port)?;
     let chip = chip_model(&mut connection)?;
     let mut show = Show::open(port.to_string())?;
-    show.take(Entry::Model {
-        objects: chip.names.clone(),
-        length: chip.info.length,
-        checksum: chip.info.checksum,
-    })?;
+    show.take(Entry::Model { objects: chip.names.clone(), length: chip.info.length, checksum: chip.info.checksum })?;
     let start = Instant::now();
     let mut each = |connection: &mut Connection, update: Update| {
         let asks = matches!(&update, Update::Touch { posteriors: None, .. } | Update::Event(..));

@@ -4,7 +4,7 @@ use super::axes::{Axes, cuts_bytes, visit, width};
 use super::cells::Cells;
 use super::cost;
 use super::forest::{Branch, Branches, Forest};
-use super::quantise::Scale;
+use super::quantize::Scale;
 use crate::ensemble::Output;
 use crate::error::{Error, Result};
 use palpate_shared::format::{Axis, Columns, Group, HEADER_LENGTH, Layout, LeafType, MAX_COMPLETE_DEPTH};

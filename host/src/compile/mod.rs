@@ -11,7 +11,7 @@ mod cost;
 mod file;
 mod forest;
 mod layout;
-mod quantise;
+mod quantize;
 mod write;
 
 pub use file::CompiledFile;
@@ -32,7 +32,7 @@ pub struct Settings {
     /// How trees are laid out; `None` takes the layout with the least bytes² × instructions: a
     /// table that is many times faster may be a few times larger.
     pub layout: Option<Layout>,
-    /// The error rate that recognisers stop at unless told otherwise: above 0, below 0.5.
+    /// The error rate that recognizers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
     /// The touches after which they give up.
     pub max_touches: u32,

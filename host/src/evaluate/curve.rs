@@ -9,7 +9,7 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     groups: usize,
-    /// For each tested object, and each number of touches less one: groups recognised.
+    /// For each tested object, and each number of touches less one: groups recognized.
     correct: Vec<Vec<usize>>,
 }
 

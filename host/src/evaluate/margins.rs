@@ -1,9 +1,9 @@
 //! A model's margins for every test touch, computed once.
 
-use crate::dataset::Dataset;
 use crate::ensemble::{Ensemble, feature_row};
 use crate::error::{Error, Result};
 use crate::random;
+use crate::touches::Dataset;
 use palpate_onboard::Model;
 use palpate_shared::{Descriptor, Touch};
 use rayon::prelude::*;

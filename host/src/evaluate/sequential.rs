@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// How sequences are drawn and stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SequentialSettings {
-    /// The recogniser stops when the posterior passes one less this.
+    /// The recognizer stops when the posterior passes one less this.
     pub error_rate: f64,
     /// Touches after which it gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble. An object
     /// with fewer test touches gives up when they are used up.
@@ -23,7 +23,7 @@ pub struct SequentialSettings {
     pub seed: u64,
 }
 
-/// What a recogniser does that stops by itself. Each object counts alike.
+/// What a recognizer does that stops by itself. Each object counts alike.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
     /// What it was asked to stay below.
@@ -52,12 +52,12 @@ pub struct Sequential {
 pub struct Outcome {
     /// Touches used.
     pub touches: usize,
-    /// The object recognised (its index in the model), or none where the recogniser gave up.
-    pub recognised: Option<usize>,
+    /// The object recognized (its index in the model), or none where the recognizer gave up.
+    pub recognized: Option<usize>,
 }
 
 impl Margins<'_> {
-    /// Pushes random sequences of each object's touches into a recogniser until it stops.
+    /// Pushes random sequences of each object's touches into a recognizer until it stops.
     ///
     /// # Errors
     /// [`Error::Argument`] if there are no sequences, or the error rate is not between 1e-15 and 0.5.
@@ -71,7 +71,7 @@ impl Margins<'_> {
             Candidate::Compiled(model) => Stopping::from_model(model).max_touches(),
         };
         let stopping = Stopping::new(error_rate, max_touches.unwrap_or(own)).ok_or_else(|| {
-            let what = format!("a recogniser cannot stop at an error rate of {error_rate}");
+            let what = format!("a recognizer cannot stop at an error rate of {error_rate}");
             Error::argument(what, "Use an --error-rate between 1e-15 and 0.5, and at least one touch.")
         })?;
         let outcomes: Vec<Vec<Outcome>> =
@@ -82,8 +82,8 @@ impl Margins<'_> {
             }))
         };
         let right = |position: usize| self.tested[position].object;
-        let error = share(&|position, outcome| outcome.recognised.is_some_and(|object| object != right(position)));
-        let undecided = share(&|_, outcome| outcome.recognised.is_none());
+        let error = share(&|position, outcome| outcome.recognized.is_some_and(|object| object != right(position)));
+        let undecided = share(&|_, outcome| outcome.recognized.is_none());
         let touches = outcomes.iter().map(|outcomes| Estimate::mean(outcomes.iter().map(|o| o.touches as f64)));
         let mean = Estimate::mean_of(touches.clone());
         let per_object = self.tested_names().iter().cloned().zip(touches.map(|estimate| estimate.value)).collect();
@@ -130,7 +130,7 @@ impl Margins<'_> {
     }
 }
 
-/// The onboard recogniser's verdict on margins that its model computed beforehand.
+/// The onboard recognizer's verdict on margins that its model computed beforehand.
 fn onboard<'r, const N: usize>(
     model: &Model<'_>,
     stopping: Stopping,
@@ -138,10 +138,10 @@ fn onboard<'r, const N: usize>(
 ) -> Outcome {
     let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
         // Room was made for at least as many objects as the model has.
-        return Outcome { touches: 0, recognised: None };
+        return Outcome { touches: 0, recognized: None };
     };
     until_sure(rows.map(|margins| match recognizer.push_margins(margins) {
-        Verdict::Recognised { object, .. } => Some(usize::from(object)),
+        Verdict::Recognized { object, .. } => Some(usize::from(object)),
         Verdict::Undecided | Verdict::Unknown => None,
     }))
 }
@@ -152,8 +152,8 @@ fn until_sure(verdicts: impl Iterator<Item = Option<usize>>) -> Outcome {
     for verdict in verdicts {
         touches += 1;
         if verdict.is_some() {
-            return Outcome { touches, recognised: verdict };
+            return Outcome { touches, recognized: verdict };
         }
     }
-    Outcome { touches, recognised: None }
+    Outcome { touches, recognized: None }
 }

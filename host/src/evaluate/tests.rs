@@ -1,15 +1,15 @@
 use super::*;
 use crate::compile::{self, Leaf, compile};
-use crate::dataset::Dataset;
 use crate::ensemble::Ensemble;
-use crate::synthetic;
-use crate::train;
+use crate::ensemble::train;
+use crate::touches::Dataset;
+use crate::touches::synthetic;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 
 fn ensemble() -> Ensemble {
     let settings = train::Settings { rounds: 20, depth: 4, eta: 0.3, ..train::Settings::compact() };
-    train::train(&synthetic::dataset(&[2_000, 2_000, 2_000], 1), &settings).unwrap()
+    train::train(&synthetic::dataset(&[2_000, 2_000, 2_000], 1), &settings, &()).unwrap()
 }
 
 fn compiled(ensemble: &Ensemble) -> Vec<u8> {
@@ -96,7 +96,7 @@ fn the_sequential_errors_stay_below_the_error_rate() {
 }
 
 #[test]
-fn a_compiled_model_stops_as_the_recogniser_that_sees_the_touches() {
+fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
     let bytes = compiled(&ensemble());
     let model = Model::new(&bytes).unwrap();
     let touches = test_touches();
@@ -113,12 +113,12 @@ fn a_compiled_model_stops_as_the_recogniser_that_sees_the_touches() {
                     break;
                 }
             }
-            let recognised = match verdict {
-                Verdict::Recognised { object, .. } => Some(usize::from(object)),
+            let recognized = match verdict {
+                Verdict::Recognized { object, .. } => Some(usize::from(object)),
                 _ => None,
             };
             let touches = usize::try_from(recognizer.touches()).unwrap();
-            assert_eq!(*outcome, Outcome { touches, recognised });
+            assert_eq!(*outcome, Outcome { touches, recognized });
         }
     }
 }
@@ -136,7 +136,7 @@ fn full_and_compiled_model_are_measured_on_the_same_groups() {
 }
 
 #[test]
-fn a_recogniser_that_runs_out_of_touches_is_undecided() {
+fn a_recognizer_that_runs_out_of_touches_is_undecided() {
     both(|margins| {
         let settings = SequentialSettings { error_rate: 1e-12, max_touches: Some(2), sequences: 20, seed: 1 };
         let sequential = margins.sequential(&settings).unwrap();

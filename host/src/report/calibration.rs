@@ -1,14 +1,14 @@
 //! Calibration: whether a posterior of nine tenths is right nine times in ten.
 
-use super::colour;
 use super::context::{Context, compiled, compiled_f32, opened};
-use super::kinds::{ReliabilityBin, reliability};
 use super::limit::Large;
-use super::page::{Figure, Section};
 use super::statistics::wilson;
-use super::table::{Cell, Data, Table};
 use crate::error::Result;
 use crate::evaluate::{Candidate, Confidence, Margins};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::kinds::{ReliabilityBin, reliability};
+use crate::page::table::{Cell, Data, Table};
 use serde::{Deserialize, Serialize};
 
 /// Numbers of touches looked at.
@@ -80,12 +80,12 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
     let mut panels = Vec::new();
     let mut data = Data::new(["method", "touches", "posterior", "right", "low", "high", "share of groups"]);
     for (method, name) in METHODS.iter().enumerate() {
-        let colour = if method == 0 { colour::PAPER } else { colour::OURS };
+        let color = if method == 0 { color::PAPER } else { color::OURS };
         for (index, at) in AT.iter().enumerate() {
             let bins = &calibration.bins[method][index];
             let touches = if *at == 1 { "touch" } else { "touches" };
             let short = if method == 0 { "paper" } else { "ours" };
-            panels.push(reliability(&format!("{short}, {at} {touches}"), bins, colour)?);
+            panels.push(reliability(&format!("{short}, {at} {touches}"), bins, color)?);
             for bin in bins {
                 let shares =
                     [bin.posterior, bin.right, bin.low, bin.high, bin.share].map(|value| Cell::Percent(value, 2));
@@ -98,7 +98,7 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
         title: "Reliability diagrams".into(),
         caption:
             "On the dashed line a posterior is what it says; above it the model is too modest, below it too sure. Bars \
-                  are 95 % intervals (Wilson); grey columns show how many of the groups are in each bin."
+                  are 95 % intervals (Wilson); gray columns show how many of the groups are in each bin."
                 .into(),
         command: context.settings.command(),
         panels,

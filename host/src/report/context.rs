@@ -3,13 +3,16 @@
 use super::cache::Cache;
 use super::settings::Settings;
 use crate::capture::{self, Sampler};
-use crate::dataset::{Dataset, ObjectTouches};
+use crate::compile;
 use crate::ensemble::Ensemble;
+use crate::ensemble::train;
 use crate::error::{Error, Result};
-use crate::folds::{self, Split};
 use crate::mesh::Object;
-use crate::scene::Scene;
-use crate::{compile, objects, progress, train};
+use crate::mesh::builtin;
+use crate::probe::scene::Scene;
+use crate::progress::{self, Progress};
+use crate::touches::folds::{self, Split};
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
 use rayon::prelude::*;
@@ -21,6 +24,7 @@ pub(super) struct Context<'a> {
     pub(super) settings: &'a Settings,
     pub(super) objects: &'a [Object],
     pub(super) cache: &'a Cache,
+    pub(super) progress: &'a dyn Progress,
     scenes: Vec<Scene>,
     captured: OnceCell<Captured>,
     first: OnceCell<Split>,
@@ -47,11 +51,16 @@ pub(super) struct Models {
 pub(super) const NOISE: f64 = 5_000.0;
 
 impl<'a> Context<'a> {
-    pub(super) fn new(settings: &'a Settings, objects: &'a [Object], cache: &'a Cache) -> Result<Self> {
+    pub(super) fn new(
+        settings: &'a Settings,
+        objects: &'a [Object],
+        cache: &'a Cache,
+        progress: &'a dyn Progress,
+    ) -> Result<Self> {
         let length = capture::Settings::default().length;
         let scenes = objects.par_iter().map(|object| Scene::new(&object.mesh, length)).collect::<Result<_>>()?;
         let (captured, first, models, kinds) = Default::default();
-        Ok(Self { settings, objects, cache, scenes, captured, first, models, kinds })
+        Ok(Self { settings, objects, cache, progress, scenes, captured, first, models, kinds })
     }
 
     /// The touches that folds are made of.
@@ -66,10 +75,10 @@ impl<'a> Context<'a> {
 
     /// `count` full touches of each object, and the approaches that they took.
     pub(super) fn touch(&self, count: usize, seed: u64) -> Result<Vec<(ObjectTouches, u64)>> {
-        let bar = progress::bar("touching", (count * self.objects.len()) as u64);
+        self.progress.begin("touching", Some((count * self.objects.len()) as u64));
         let one = |(object, scene): (&Object, &Scene)| {
             let touched = touch(scene, &object.name, count, seed);
-            bar.inc(count as u64);
+            progress::advance(self.progress, count as u64)?;
             touched
         };
         self.objects.iter().zip(&self.scenes).map(one).collect()
@@ -93,7 +102,7 @@ impl<'a> Context<'a> {
                 if let Ok(kept) = Ensemble::load(&path) {
                     return Ok(kept);
                 }
-                let ensemble = train::train(&self.first()?.train, settings)?;
+                let ensemble = train::train(&self.first()?.train, settings, &())?;
                 ensemble.save(&path)?;
                 Ok(ensemble)
             };
@@ -106,26 +115,26 @@ impl<'a> Context<'a> {
     }
 
     /// Instances of the ten built-in kinds, each sorted by name: the canonical ones first, then others with varied
-    /// proportions, as many as growth and generalisation need.
+    /// proportions, as many as growth and generalization need.
     pub(super) fn kinds(&self) -> Result<&[Vec<Object>]> {
         let settings = self.settings;
-        let grown = settings.growth_objects.iter().copied().max().unwrap_or(0).div_ceil(objects::names().len());
+        let grown = settings.growth_objects.iter().copied().max().unwrap_or(0).div_ceil(builtin::names().len());
         let trained = settings.instances.iter().copied().max().unwrap_or(0);
         let count = grown.max(trained + settings.test_instances);
         get_or_try(&self.kinds, || {
-            let mut names = objects::names();
+            let mut names = builtin::names();
             names.sort_unstable();
             let is_builtin = self.settings.sources == ["builtin"];
             let jobs: Vec<(usize, usize)> =
                 (0..count).flat_map(|k| (0..names.len()).map(move |kind| (k, kind))).collect();
-            let bar = progress::bar("making objects", jobs.len() as u64);
+            self.progress.begin("making objects", Some(jobs.len() as u64));
             let made = jobs.into_par_iter().map(|(instance, kind)| {
                 let object = match instance {
                     0 if is_builtin => self.objects[kind].clone(),
-                    0 => objects::one(names[kind])?,
-                    _ => objects::varied(names[kind], 2_000 + instance as u64)?,
+                    0 => builtin::one(names[kind])?,
+                    _ => builtin::varied(names[kind], 2_000 + instance as u64)?,
                 };
-                bar.inc(1);
+                progress::advance(self.progress, 1)?;
                 Ok(object)
             });
             let made: Vec<Object> = made.collect::<Result<_>>()?;

@@ -1,18 +1,18 @@
 //! Speed against error: a family of compiled models, what each costs, and how good it is.
 
-use super::chart::{Chart, Mark, Shape, Side, Stroke};
-use super::colour;
 use super::context::{Context, opened};
 use super::limit::Large;
-use super::page::{Figure, Section};
-use super::scale::{Scale, short_number};
-use super::table::{Cell, Data, Table};
 use super::work::Work;
 use crate::compile::{self, Leaf};
 use crate::ensemble::Ensemble;
+use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
-use crate::train;
+use crate::page::chart::{Chart, Mark, Shape, Side, Stroke};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::scale::{Scale, short_number};
+use crate::page::table::{Cell, Data, Table};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
 use rayon::prelude::*;
@@ -85,7 +85,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
             // Few trees have to learn faster.
             family.eta = 0.6;
         }
-        let ensemble = train::train(&first.train, &family)?;
+        let ensemble = train::train(&first.train, &family, &())?;
         let name = format!("{rounds} trees, depth {depth}, {bins} bins");
         let layouts: &[_] = if settings.quick {
             &[None]
@@ -210,12 +210,12 @@ fn figure(
         }
     }
     steps.push((all().fold(0.0, f64::max), best));
-    chart.marks.push(Mark::Line { points: steps.clone(), colour: colour::GREY, stroke: Stroke::Dashed });
+    chart.marks.push(Mark::Line { points: steps.clone(), color: color::GRAY, stroke: Stroke::Dashed });
     let mut labelled: Vec<(f64, f64)> = Vec::new();
     for member in &by_cost {
         let at = (cost(member), member.at_10);
-        let (colour, shape) = if member.paper { (colour::PAPER, Shape::Ring) } else { (colour::OURS, Shape::Disc) };
-        chart.marks.push(Mark::Dots { points: vec![at], colour, shape });
+        let (color, shape) = if member.paper { (color::PAPER, Shape::Ring) } else { (color::OURS, Shape::Disc) };
+        chart.marks.push(Mark::Dots { points: vec![at], color, shape });
         // A label only where there is room for it.
         let near =
             |other: &(f64, f64)| (other.0 / at.0).ln().abs() < 1.15 && (other.1 - at.1).abs() < (high - low) * 0.07;
@@ -229,7 +229,7 @@ fn figure(
             };
             let side =
                 if at.0.ln() > (all().fold(0.0, f64::max)).ln() - 1.5 { Side::UpperLeft } else { Side::LowerRight };
-            chart.marks.push(Mark::Text { at, text, colour, side });
+            chart.marks.push(Mark::Text { at, text, color, side });
             labelled.push(at);
         }
         data.push([

@@ -1,17 +1,17 @@
 //! Cross-validation: accuracy against the number of touches, and who is taken for whom (the paper's figures 8 and 9).
 
-use super::chart::{Chart, Mark, Stroke};
-use super::colour;
 use super::context::{Context, compiled, compiled_f32, opened};
-use super::kinds::confusion;
-use super::page::{Figure, Section};
-use super::scale::Scale;
 use super::short::method_style;
 use super::statistics::mean_deviation;
-use super::table::{Cell, Data, Table};
+use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
-use crate::train;
+use crate::page::chart::{Chart, Mark, Stroke};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::kinds::confusion;
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data, Table};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -54,7 +54,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     let split = context.fold(fold)?;
     let timed = |settings: &train::Settings| -> Result<_> {
         let began = Instant::now();
-        Ok((train::train(&split.train, settings)?, began.elapsed().as_secs_f64()))
+        Ok((train::train(&split.train, settings, &())?, began.elapsed().as_secs_f64()))
     };
     let (paper, paper_seconds) =
         if fold == 0 { (context.models()?.paper.clone(), 0.0) } else { timed(&context.paper())? };
@@ -91,11 +91,11 @@ pub(super) fn accuracies(folds: &[Fold], method: usize, touches: usize) -> Vec<f
 /// The confusion matrix of all folds together, as shares of each row.
 pub(super) fn shares(folds: &[Fold], method: usize) -> Vec<Vec<f64>> {
     let matrices: Vec<&Vec<Vec<usize>>> = folds.iter().map(|fold| &fold.methods[method].confusion).collect();
-    normalised(&matrices)
+    normalized(&matrices)
 }
 
 /// The sum of matrices of counts, as shares of each row.
-pub(super) fn normalised(matrices: &[&Vec<Vec<usize>>]) -> Vec<Vec<f64>> {
+pub(super) fn normalized(matrices: &[&Vec<Vec<usize>>]) -> Vec<Vec<f64>> {
     let Some(first) = matrices.first() else { return Vec::new() };
     let row = |row: usize| {
         let sum = |column: usize| matrices.iter().map(|matrix| matrix[row][column]).sum::<usize>() as f64;
@@ -143,7 +143,7 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
         Chart::new("touches", Scale::logarithmic(10.0, 120.0), "accuracy", Scale::percent(0.4, 1.0)).sized(620, 400);
     let mut data = Data::new(["method", "touches", "accuracy", "accuracy, many groups"]);
     for (index, name) in METHODS.iter().enumerate() {
-        let (colour, shape) = method_style(index);
+        let (color, shape) = method_style(index);
         let mut points = Vec::new();
         let mut spread = Vec::new();
         for &n in &levels {
@@ -158,12 +158,12 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
                 Cell::PercentSpread(many, many_deviation, 1),
             ]);
         }
-        chart.marks.push(Mark::Spread { points: spread, colour });
-        chart.series(name, colour, shape, &points);
+        chart.marks.push(Mark::Spread { points: spread, color });
+        chart.series(name, color, shape, &points);
     }
     Ok(Figure {
         id: "accuracy".into(),
-        title: "Groups recognised, mean over folds (the paper's figure 8a)".into(),
+        title: "Groups recognized, mean over folds (the paper's figure 8a)".into(),
         caption: format!(
             "Bars are one standard deviation over folds, of {} groups an object each. The CSV also has the same over {} \
              groups an object.",
@@ -184,7 +184,7 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
             .sized(270, 200)
             .titled(name.as_str());
         for (index, method) in METHODS.iter().enumerate() {
-            let (colour, _) = method_style(index);
+            let (color, _) = method_style(index);
             let mut points = Vec::new();
             for &n in &levels {
                 let of = |fold: &Fold| fold.methods[index].few_of_object[position].get(n - 1).copied();
@@ -198,7 +198,7 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
                 ]);
             }
             let stroke = if index == 0 { Stroke::Dashed } else { Stroke::Solid };
-            chart.line(method, colour, stroke, &points);
+            chart.line(method, color, stroke, &points);
         }
         panels.push(chart.svg()?);
     }
@@ -214,20 +214,20 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let names = context.names();
-    let mut data = Data::new(["method", "touched", "recognised as", "share"]);
+    let mut data = Data::new(["method", "touched", "recognized as", "share"]);
     let mut panels = Vec::new();
     for (index, method) in METHODS.iter().enumerate() {
         let shares = shares(folds, index);
-        let colour = if index == 0 { colour::PAPER } else { colour::OURS };
+        let color = if index == 0 { color::PAPER } else { color::OURS };
         let title = if index == 0 { "the paper's method" } else { "ours" };
-        panels.push(confusion(title, &names, &shares, colour)?);
+        panels.push(confusion(title, &names, &shares, color)?);
         push_matrix(&mut data, method, &names, &shares);
     }
     Ok(Figure {
         id: "confusion".into(),
         title: "Who is taken for whom after ten touches (figure 9)".into(),
         caption: format!(
-            "Per cent of the groups of an object (row) that were recognised as another (column), all folds together, {} \
+            "Per cent of the groups of an object (row) that were recognized as another (column), all folds together, {} \
              groups an object and fold. Shares under half a per cent are blank.",
             context.settings.many_groups
         ),
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn recall_is_along_rows_and_precision_along_columns() {
-        let shares = normalised(&[&vec![vec![8, 2], vec![1, 9]], &vec![vec![8, 2], vec![3, 7]]]);
+        let shares = normalized(&[&vec![vec![8, 2], vec![1, 9]], &vec![vec![8, 2], vec![3, 7]]]);
         assert_eq!(shares, [[0.8, 0.2], [0.2, 0.8]]);
         let both = recall_precision(&[vec![0.8, 0.2], vec![0.0, 1.0]]);
         assert_eq!(both[0], (0.8, 1.0));

@@ -7,9 +7,9 @@
 //!
 //! The result is written as an [`Ensemble`] of a single tree, a leaf a cell, so that it is evaluated like any other model.
 
-use crate::dataset::Dataset;
 use crate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
 use crate::error::{Error, Result};
+use crate::touches::Dataset;
 use palpate_shared::Descriptor;
 use rayon::prelude::*;
 
@@ -197,7 +197,7 @@ fn grow(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::ObjectTouches;
+    use crate::touches::ObjectTouches;
     use palpate_shared::Touch;
 
     /// Two objects whose curvature lies around 0 and around 40 ms, with slopes alike.

@@ -2,15 +2,19 @@
 
 use super::cache::Cache;
 use super::context::Context;
-use super::page::{Page, Section};
 use super::settings::Settings;
 use super::{
-    calibration, cost, cross_validation, generalisation, growth, limit, noise, objects, published, sequential,
+    calibration, cost, cross_validation, generalization, growth, limit, noise, objects, published, sequential,
     simulator,
 };
+use crate::capture;
+use crate::compile;
+use crate::ensemble::train;
 use crate::error::{Error, Result};
+use crate::mesh::source;
 use crate::output::write_json;
-use crate::{capture, compile, progress, source, train};
+use crate::page::document::{Page, Section};
+use crate::progress::Progress;
 use serde::Serialize;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
@@ -34,7 +38,7 @@ pub struct Written {
 ///
 /// # Errors
 /// What reading the sources, measuring and writing return; [`Error::Data`] for fewer than two objects.
-pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Written> {
+pub fn full(settings: &Settings, directory: &Path, resume: bool, progress: &dyn Progress) -> Result<Written> {
     let objects = source::objects(&settings.sources)?;
     if objects.len() < 2 {
         return Err(Error::data("there is only one object, and nothing to tell it from", "Give at least two objects."));
@@ -48,12 +52,12 @@ pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Writt
         compile::Settings::default()
     );
     let cache = Cache::open(directory, &(settings, presets), &objects, resume)?;
-    let context = Context::new(settings, &objects, &cache)?;
+    let context = Context::new(settings, &objects, &cache, progress)?;
     let mut stages: Vec<(String, f64)> = Vec::new();
-    let spinner = progress::spinner("report");
+    progress.begin("report", None);
     let mut note = |name: &str, seconds: f64| {
         stages.push((name.to_string(), seconds));
-        spinner.set_message(format!("report: {name} took {seconds:.1} s"));
+        progress.begin(&format!("report: {name} took {seconds:.1} s"), None);
     };
 
     let folds = cache.stage("cross-validation", || cross_validation::measure(&context))?;
@@ -81,8 +85,8 @@ pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Writt
     note("simulator", engines.seconds);
     let growth = cache.stage("growth", || growth::measure(&context))?;
     note("growth", growth.seconds);
-    let instances = cache.stage("generalisation", || generalisation::measure(&context))?;
-    note("generalisation", instances.seconds);
+    let instances = cache.stage("generalization", || generalization::measure(&context))?;
+    note("generalization", instances.seconds);
 
     let summary = published::summary(&context, &folds.result, &noisy.result, &limit.result, &sequences.result);
     let mut first = Section::new("summary", "The paper's numbers beside ours");
@@ -99,12 +103,11 @@ pub fn full(settings: &Settings, directory: &Path, resume: bool) -> Result<Writt
         calibration::section(&context, &calibration.result)?,
         costs,
         growth::section(&context, &growth.result)?,
-        generalisation::section(&context, &instances.result)?,
+        generalization::section(&context, &instances.result)?,
     ];
-    drop(spinner);
     let sentence = published::sentence(&summary);
     let page = Page {
-        title: "Recognising objects by touch".into(),
+        title: "Recognizing objects by touch".into(),
         summary: sentence.clone(),
         sections,
         facts: facts(settings, &stages, began.elapsed().as_secs_f64()),
@@ -150,7 +153,7 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
-    use crate::obj;
+    use crate::mesh::obj;
     use crate::output::write_whole;
     use std::collections::BTreeSet;
 
@@ -190,7 +193,7 @@ mod tests {
         let sources = meshes(&place.path().join("meshes"));
         let directory = place.path().join("report");
         let settings = tiny(sources);
-        let written = full(&settings, &directory, false).unwrap();
+        let written = full(&settings, &directory, false, &()).unwrap();
         let html = std::fs::read_to_string(directory.join("index.html")).unwrap();
         let files: BTreeSet<String> =
             written.files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect();
@@ -212,7 +215,7 @@ mod tests {
             "simulator-figure",
             "growth-objects-figure",
             "growth-triangles",
-            "generalisation",
+            "generalization",
         ] {
             assert!(html.contains(&format!("<figure id=\"{figure}\">")), "{figure}");
             for extension in ["svg", "csv"] {
@@ -224,14 +227,14 @@ mod tests {
         assert_eq!(html.matches("<img ").count(), 3);
 
         // Stages are taken as they are, their times too; a cut-off stage is measured again, and nothing else.
-        let again = full(&settings, &directory, true).unwrap();
+        let again = full(&settings, &directory, true, &()).unwrap();
         assert_eq!((&again.stages, &again.summary), (&written.stages, &written.summary));
         let kept = |name: &str| {
             let stages = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
             stages.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with(name)).unwrap()
         };
         std::fs::remove_file(kept("growth-")).unwrap();
-        let cut = full(&settings, &directory, true).unwrap();
+        let cut = full(&settings, &directory, true, &()).unwrap();
         let differ = written.stages.iter().zip(&cut.stages).filter(|(a, b)| a != b).map(|(a, _)| a.0.as_str());
         assert_eq!(differ.collect::<Vec<_>>(), ["growth"]);
     }
@@ -242,7 +245,7 @@ mod tests {
         let sources = meshes(place.path());
         let one = vec![format!("{}/ball.obj", sources[0])];
         let directory = place.path().join("report");
-        let error = full(&tiny(one), &directory, false).unwrap_err();
+        let error = full(&tiny(one), &directory, false, &()).unwrap_err();
         assert!(error.to_string().contains("only one object"), "{error}");
         assert!(!directory.exists());
     }

@@ -1,19 +1,20 @@
 //! Growth: what more objects, and finer meshes, cost.
 
-use super::chart::{Chart, Mark, Shape, Side};
-use super::colour;
 use super::context::{Context, compiled, opened, touch};
-use super::page::{Figure, Section};
-use super::scale::Scale;
-use super::table::{Cell, Data, Table};
 use super::work::Work;
-use crate::dataset::Dataset;
+use crate::capture;
+use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
-use crate::folds;
 use crate::mesh::{Mesh, Object};
-use crate::scene::Scene;
-use crate::{capture, train};
+use crate::page::chart::{Chart, Mark, Shape, Side};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data, Table};
+use crate::probe::scene::Scene;
+use crate::touches::Dataset;
+use crate::touches::folds;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -88,7 +89,7 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     data.objects.sort_by(|a, b| a.name.cmp(&b.name));
     let split = folds::split(&data, 0.2, settings.seed)?;
     let began = Instant::now();
-    let ensemble = train::train(&split.train, &context.ours())?;
+    let ensemble = train::train(&split.train, &context.ours(), &())?;
     let train = began.elapsed().as_secs_f64();
     let compiled = compiled(&ensemble)?;
     let model = opened(&compiled.bytes)?;
@@ -144,9 +145,9 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
         let all = || lines.iter().flat_map(|line| line.3.iter().copied());
         let y = Scale::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.4);
         let mut chart = Chart::new("objects", x(), unit, y).sized(370, 270).titled(title);
-        for (name, colour, shape, values) in lines {
+        for (name, color, shape, values) in lines {
             let points: Vec<(f64, f64)> = counts.iter().copied().zip(values.iter().copied()).collect();
-            chart.series(name, *colour, *shape, &points);
+            chart.series(name, *color, *shape, &points);
         }
         chart.svg()
     };
@@ -157,15 +158,15 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
             "Time",
             "seconds",
             &[
-                ("capture", colour::GREEN, Shape::Triangle, of(|o| o.capture)),
-                ("training", colour::OURS, Shape::Disc, of(|o| o.train)),
+                ("capture", color::GREEN, Shape::Triangle, of(|o| o.capture)),
+                ("training", color::OURS, Shape::Disc, of(|o| o.train)),
             ],
         )?,
-        panel("Size", "bytes", &[("model", colour::OURS, Shape::Disc, of(|o| o.bytes as f64))])?,
+        panel("Size", "bytes", &[("model", color::OURS, Shape::Disc, of(|o| o.bytes as f64))])?,
         panel(
             &format!("Work ({how})"),
             "instructions a touch, M4F",
-            &[("model", colour::OURS, Shape::Disc, of(|o| o.work.m4f as f64))],
+            &[("model", color::OURS, Shape::Disc, of(|o| o.work.m4f as f64))],
         )?,
     ];
     Ok(Figure {
@@ -231,15 +232,15 @@ fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {
             Cell::Number(triangles.approaches, 0),
         ]);
     }
-    let panel = |title: &str, unit: &str, colour, points: Vec<(f64, f64)>| {
+    let panel = |title: &str, unit: &str, color, points: Vec<(f64, f64)>| {
         let y = || points.iter().map(|point| point.1);
         let scale = Scale::logarithmic(y().fold(f64::INFINITY, f64::min) * 0.5, y().fold(0.0, f64::max) * 2.0);
         let mut chart = Chart::new("triangles", x(), unit, scale).sized(420, 270).titled(title);
         for &at in &points {
-            let text = super::scale::short_number(at.1);
-            chart.marks.push(Mark::Text { at, text, colour: colour::INK, side: Side::Above });
+            let text = crate::page::scale::short_number(at.1);
+            chart.marks.push(Mark::Text { at, text, color: color::INK, side: Side::Above });
         }
-        chart.series("", colour, Shape::Disc, &points);
+        chart.series("", color, Shape::Disc, &points);
         chart.labels.clear();
         chart.svg()
     };
@@ -252,8 +253,8 @@ fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {
                 .into(),
         command: context.settings.command(),
         panels: vec![
-            panel("Speed", "approaches a second", colour::OURS, fast)?,
-            panel("Building", "seconds", colour::GREEN, build)?,
+            panel("Speed", "approaches a second", color::OURS, fast)?,
+            panel("Building", "seconds", color::GREEN, build)?,
         ],
         data,
     })

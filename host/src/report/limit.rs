@@ -1,18 +1,18 @@
 //! The limit: the best that any classifier could do with the curvature descriptor, and how far each model is from it.
 
-use super::chart::{Chart, Shape, Stroke};
-use super::colour;
 use super::context::{Context, compiled, compiled_f32, opened};
 use super::density::density_model;
-use super::page::{Figure, Section};
-use super::scale::Scale;
 use super::statistics::z95;
-use super::table::{Cell, Data, Table};
-use crate::dataset::{Dataset, ObjectTouches};
 use crate::ensemble::Ensemble;
+use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
-use crate::train;
+use crate::page::chart::{Chart, Shape, Stroke};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data, Table};
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Descriptor;
 use serde::{Deserialize, Serialize};
 
@@ -105,8 +105,8 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let halved = half(&large.train);
     let (density, width) = density_model(Descriptor::Curvature, &large.train, &large.held)?;
     let (density_half, _) = density_model(Descriptor::Curvature, &halved, &large.held)?;
-    let ensemble = train::train(&large.train, &large_ensemble)?;
-    let ensemble_half = train::train(&halved, &large_ensemble)?;
+    let ensemble = train::train(&large.train, &large_ensemble, &())?;
+    let ensemble_half = train::train(&halved, &large_ensemble, &())?;
     let models = context.models()?;
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
     let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
@@ -171,7 +171,7 @@ pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
         context.settings.limit_rounds,
         limit.width,
         limit.candidates[limit.best].name,
-        super::scale::number(limit.doubling() * 100.0, 2)
+        crate::page::scale::number(limit.doubling() * 100.0, 2)
     ));
     section.text(
         "The limit holds for the paper's descriptor too: the row of fingers is rolled at random, so a touch and its mirror \
@@ -194,11 +194,11 @@ fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
     let points = |index: usize| -> Vec<(f64, f64)> {
         (1..).map(f64::from).zip(limit.candidates[index].curve.iter().copied()).collect()
     };
-    chart.line("limit", colour::INK, Stroke::Dashed, &points(limit.best));
+    chart.line("limit", color::INK, Stroke::Dashed, &points(limit.best));
     let marked = [1, 2, 3, 5, 7, 10, 14, 20, 30, 42, 60];
     let few = |index| -> Vec<(f64, f64)> { marked.iter().map(|&n| points(index)[n - 1]).collect() };
-    chart.series("ours", colour::OURS, Shape::Disc, &few(OURS));
-    chart.series("paper", colour::PAPER, Shape::Ring, &few(PAPER));
+    chart.series("ours", color::OURS, Shape::Disc, &few(OURS));
+    chart.series("paper", color::PAPER, Shape::Ring, &few(PAPER));
     Ok(Figure {
         id: "limit-curves".into(),
         title: "Accuracy against touches, and the best possible".into(),
@@ -220,7 +220,7 @@ fn table(context: &Context, limit: &Limit) -> Table {
         let (gap, low, high) = limit.gap_at_10(index);
         let name = if index == limit.best { format!("{} (the limit)", candidate.name) } else { candidate.name.clone() };
         let accuracies = AT.iter().map(|&n| Cell::Percent(candidate.curve[n - 1], 1));
-        let [low, high] = [low, high].map(|value| super::scale::number(value * 100.0, 1));
+        let [low, high] = [low, high].map(|value| crate::page::scale::number(value * 100.0, 1));
         let interval = if index == limit.best { Cell::Missing } else { format!("{low} to {high}").into() };
         data.push(std::iter::once(name.into()).chain(accuracies).chain([Cell::Number(gap * 100.0, 1), interval]));
     }
@@ -231,7 +231,7 @@ fn table(context: &Context, limit: &Limit) -> Table {
             "Accuracies on the same {} groups an object; gaps are paired over groups. One standard error of an accuracy \
              is at most {} points.",
             limit.groups,
-            super::scale::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
+            crate::page::scale::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
         ),
         command: context.settings.command(),
         data,

@@ -5,35 +5,30 @@
 
 mod cache;
 mod calibration;
-pub mod chart;
-pub mod colour;
 mod context;
 mod cost;
 mod cross_validation;
 mod density;
 mod full;
-mod generalisation;
+mod generalization;
 mod growth;
-pub mod kinds;
 mod limit;
 mod noise;
 mod objects;
-pub mod page;
 mod published;
-pub mod scale;
 mod sequential;
 mod settings;
 pub mod short;
 mod simulator;
 pub mod statistics;
-pub mod table;
+pub mod view;
 mod work;
 
+pub use crate::page::document::{Block, Figure, Page, Section};
+pub use crate::page::table::{Cell, Data, Table};
 pub use full::{Written, full};
-pub use page::{Block, Figure, Page, Section};
 pub use settings::Settings;
 pub use short::{Picture, RunMethod, RunResults, short};
-pub use table::{Cell, Data, Table};
 
 use crate::error::Result;
 use crate::output::write_bytes;

@@ -1,25 +1,26 @@
 //! Noise on contact times: signal-to-noise ratio, accuracy and confusion (the paper's figures 10 to 13).
 
-use super::chart::{Chart, Mark, Shape, Stroke};
-use super::colour;
 use super::context::{Context, Models, NOISE, compiled, compiled_f32, opened};
-use super::cross_validation::{normalised, push_matrix};
-use super::kinds::confusion;
-use super::page::{Figure, Section};
-use super::scale::Scale;
+use super::cross_validation::{normalized, push_matrix};
 use super::statistics::{mean_deviation, savitzky_golay};
-use super::table::{Cell, Data};
-use crate::dataset::{Dataset, ObjectTouches};
+use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
-use crate::folds::Split;
-use crate::{noise, train};
+use crate::page::chart::{Chart, Mark, Shape, Stroke};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::kinds::confusion;
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data};
+use crate::touches::folds::Split;
+use crate::touches::noise;
+use crate::touches::{Dataset, ObjectTouches};
 use plotters::style::RGBColor;
 use serde::{Deserialize, Serialize};
 
 /// The methods, in the order of [`Fold::methods`].
 pub(super) const METHODS: [&str; 3] = ["paper", "ours", "ours, trained for noise"];
-const COLOURS: [RGBColor; 3] = [colour::PAPER, colour::OURS, colour::GREEN];
+const COLORS: [RGBColor; 3] = [color::PAPER, color::OURS, color::GREEN];
 const SHAPES: [Shape; 3] = [Shape::Ring, Shape::Disc, Shape::Triangle];
 
 /// What one fold showed, one entry a method and noise level.
@@ -43,7 +44,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     if fold == 0 {
         return tested(context, fold, &split, context.models()?);
     }
-    let train = |settings: &train::Settings| train::train(&split.train, settings);
+    let train = |settings: &train::Settings| train::train(&split.train, settings, &());
     let models = Models {
         paper: train(&context.paper())?,
         ours: train(&context.ours())?,
@@ -96,7 +97,7 @@ pub(super) fn accuracy_at(context: &Context, folds: &[Fold], method: usize, devi
     let right = |fold: &Fold| {
         // The matrix at 5 ms is always there, the level need not be.
         if (deviation - NOISE / 1e3).abs() < 1e-9 {
-            let shares = normalised(&[&fold.confusion[method]]);
+            let shares = normalized(&[&fold.confusion[method]]);
             return (0..shares.len()).map(|k| shares[k][k]).sum::<f64>() / shares.len().max(1) as f64;
         }
         let levels = context.settings.deviations();
@@ -161,7 +162,7 @@ fn signal(context: &Context) -> Result<Figure> {
     .sized(620, 400);
     for (index, (name, points)) in lines.iter().enumerate() {
         let stroke = if index % 2 == 0 { Stroke::Solid } else { Stroke::Dashed };
-        chart.line(name, colour::series(index), stroke, points);
+        chart.line(name, color::series(index), stroke, points);
     }
     Ok(Figure {
         id: "signal-to-noise".into(),
@@ -214,8 +215,8 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
             let row = [Cell::Number(point.0, 2), Cell::Percent(point.1, 1), Cell::Percent(smooth.1, 1)];
             data.push(std::iter::once((*name).into()).chain(row));
         }
-        chart.marks.push(Mark::Dots { points: raw, colour: COLOURS[method], shape: SHAPES[method] });
-        chart.line(name, COLOURS[method], Stroke::Solid, &smooth);
+        chart.marks.push(Mark::Dots { points: raw, color: COLORS[method], shape: SHAPES[method] });
+        chart.line(name, COLORS[method], Stroke::Solid, &smooth);
     }
     Ok(Figure {
         id: "noise".into(),
@@ -246,9 +247,9 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
                     Cell::Percent(smooth.1, 1),
                 ]);
             }
-            chart.line("", COLOURS[method], Stroke::Thin, &raw);
+            chart.line("", COLORS[method], Stroke::Thin, &raw);
             let stroke = if method == 0 { Stroke::Dashed } else { Stroke::Solid };
-            chart.line(label, COLOURS[method], stroke, &smooth);
+            chart.line(label, COLORS[method], stroke, &smooth);
         }
         panels.push(chart.svg()?);
     }
@@ -264,18 +265,18 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let names = context.names();
-    let mut data = Data::new(["method", "touched", "recognised as", "share"]);
+    let mut data = Data::new(["method", "touched", "recognized as", "share"]);
     let mut panels = Vec::new();
     for (method, name) in METHODS.iter().enumerate() {
         let matrices: Vec<&Vec<Vec<usize>>> = folds.iter().map(|fold| &fold.confusion[method]).collect();
-        let shares = normalised(&matrices);
-        panels.push(confusion(name, &names, &shares, COLOURS[method])?);
+        let shares = normalized(&matrices);
+        panels.push(confusion(name, &names, &shares, COLORS[method])?);
         push_matrix(&mut data, name, &names, &shares);
     }
     Ok(Figure {
         id: "noise-confusion".into(),
         title: "Who is taken for whom after ten touches with noise of 5 ms (figure 13)".into(),
-        caption: "Per cent of an object's groups (row) that were recognised as another (column).".into(),
+        caption: "Per cent of an object's groups (row) that were recognized as another (column).".into(),
         command: context.settings.command(),
         panels,
         data,

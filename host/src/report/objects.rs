@@ -1,15 +1,15 @@
 //! The objects and their curvature (the paper's figures 5 and 6).
 
-use super::chart::{Chart, Mark, Stroke};
-use super::colour;
 use super::context::Context;
-use super::page::{Block, Figure, Section};
-use super::scale::Scale;
 use super::short::{Picture, shown};
 use super::statistics::{density, quantile};
-use super::table::{Cell, Data, Table};
 use crate::error::Result;
-use crate::render;
+use crate::page::chart::{Chart, Mark, Stroke};
+use crate::page::color;
+use crate::page::document::{Block, Figure, Section};
+use crate::page::render;
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data, Table};
 use palpate_shared::Touch;
 
 /// The figure of the objects, that of their curvature, and a table of what capturing took.
@@ -72,8 +72,8 @@ fn densities(context: &Context) -> Result<Figure> {
         let mut chart = Chart::new("curvature κ (ms)", Scale::linear(-reach, reach, 4), "", y)
             .sized(270, 180)
             .titled(object.name.as_str());
-        chart.marks.push(Mark::Area { points: curve.clone(), base: 0.0, colour: colour::OURS, opacity: 0.25 });
-        chart.marks.push(Mark::Line { points: curve, colour: colour::OURS, stroke: Stroke::Solid });
+        chart.marks.push(Mark::Area { points: curve.clone(), base: 0.0, color: color::OURS, opacity: 0.25 });
+        chart.marks.push(Mark::Line { points: curve, color: color::OURS, stroke: Stroke::Solid });
         chart.marks.push(Mark::Vertical(0.0));
         panels.push(chart.svg()?);
     }
@@ -82,7 +82,7 @@ fn densities(context: &Context) -> Result<Figure> {
         title: "How each object bends under the probe: densities of the curvature descriptor (figures 5 and 6)".into(),
         caption: "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's \
                   bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface; to its right the \
-                  surface is bent towards the probe, to its left away from it."
+                  surface is bent toward the probe, to its left away from it."
             .into(),
         command: context.settings.command(),
         panels,

@@ -6,7 +6,7 @@ use super::limit::{self, Limit};
 use super::noise;
 use super::sequential::Sequences;
 use super::statistics::{mean_deviation, paired_difference};
-use super::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Data, Table};
 use serde::Serialize;
 
 /// The numbers that `summary.json` holds: accuracies as shares of one.
@@ -137,7 +137,7 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
     let fixed = |method: &Method| method.fixed.map_or(Cell::Missing, Cell::count);
     data.push(["fixed number of touches with no more errors".into(), Cell::Missing, fixed(paper), fixed(ours)]);
     let (mean, low, high) = summary.difference_at_10;
-    let points = |value: f64| super::scale::number(value * 100.0, 1);
+    let points = |value: f64| crate::page::scale::number(value * 100.0, 1);
     let interval = match (low, high) {
         (Some(low), Some(high)) => format!(" (95 % interval {} to {}, paired over folds)", points(low), points(high)),
         _ => String::new(),
@@ -160,7 +160,7 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
 
 /// What the summary says in two sentences.
 pub(super) fn sentence(summary: &Summary) -> String {
-    let percent = |value: f64| super::scale::number(value * 100.0, 1);
+    let percent = |value: f64| crate::page::scale::number(value * 100.0, 1);
     format!(
         "After ten touches the paper's method knows the object {}\u{a0}% of the time, ours {}\u{a0}%, and the best that any classifier could \
          do with what three contact times say is about {}\u{a0}%. Stopping when sure, ours takes {} touches on average \
@@ -168,7 +168,7 @@ pub(super) fn sentence(summary: &Summary) -> String {
         percent(summary.paper.at_10.0),
         percent(summary.ours.at_10.0),
         percent(summary.limit_at_10),
-        super::scale::number(summary.ours.touches_until_sure.0, 1),
-        super::scale::number(summary.ours.touches_until_sure.1 * 100.0, 2),
+        crate::page::scale::number(summary.ours.touches_until_sure.0, 1),
+        crate::page::scale::number(summary.ours.touches_until_sure.1 * 100.0, 2),
     )
 }

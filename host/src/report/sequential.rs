@@ -1,18 +1,18 @@
 //! Sequential recognition: how many touches it takes to be sure, against how often that was wrong.
 
-use super::chart::{Chart, Mark, Stroke};
 use super::context::{Context, compiled, compiled_f32, opened};
 use super::limit::Large;
-use super::page::{Figure, Section};
-use super::scale::{Scale, number};
 use super::short::method_style;
 use super::statistics::quantile;
-use super::table::{Cell, Data, Table};
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::page::chart::{Chart, Mark, Stroke};
+use crate::page::document::{Figure, Section};
+use crate::page::scale::{Scale, number};
+use crate::page::table::{Cell, Data, Table};
 use serde::{Deserialize, Serialize};
 
-/// Thresholds: the recogniser stops when the posterior passes one less these.
+/// Thresholds: the recognizer stops when the posterior passes one less these.
 const RATES: [f64; 13] = [0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003, 0.002, 0.001];
 /// Touches after which a sequence gives up: so many that hardly any does.
 const MOST: usize = 1_000;
@@ -100,7 +100,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
 pub(super) fn section(context: &Context, sequences: &Sequences) -> Result<Section> {
     let mut section = Section::new("sequential", "Stopping when sure");
     section.text(format!(
-        "The recogniser stops as soon as the posterior of an object passes one less the threshold. {} sequences of each \
+        "The recognizer stops as soon as the posterior of an object passes one less the threshold. {} sequences of each \
          object's touches, from the large capture that no model was trained on; a sequence of {MOST} touches without a \
          verdict counts as an error. Beside it: the fixed number of touches that is wrong no more often.",
         sequences.count
@@ -118,14 +118,15 @@ fn trade(context: &Context, sequences: &Sequences) -> Result<Figure> {
     let near = points().map(|s| s.touches).fold(far, f64::min);
     let ticks = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005, 0.0002, 0.0001];
     let ticks = ticks.into_iter().filter(|tick| *tick >= low * 0.9);
-    let errors = Scale::logarithmic(low * 0.9, 0.5)
-        .with_ticks(ticks.map(|tick| (tick, format!("{} %", super::scale::short_number(tick * 100.0)))).collect());
+    let errors = Scale::logarithmic(low * 0.9, 0.5).with_ticks(
+        ticks.map(|tick| (tick, format!("{} %", crate::page::scale::short_number(tick * 100.0)))).collect(),
+    );
     let mut chart =
         Chart::new("mean touches", Scale::logarithmic(near * 0.9, far * 1.1), "errors", errors).sized(660, 420);
     let mut data =
         Data::new(["method", "threshold", "mean touches", "errors", "fixed number with no more errors", "ratio"]);
     for (index, name) in METHODS.iter().enumerate() {
-        let (colour, shape) = method_style(index);
+        let (color, shape) = method_style(index);
         let stopped = &sequences.methods[index];
         let sure: Vec<(f64, f64)> = stopped.iter().filter(|s| s.error > 0.0).map(|s| (s.touches, s.error)).collect();
         let fixed = stopped.iter().filter(|s| s.error > 0.0).filter_map(|s| Some((s.fixed? as f64, s.error)));
@@ -137,15 +138,15 @@ fn trade(context: &Context, sequences: &Sequences) -> Result<Figure> {
             );
             (s.touches, low, high)
         });
-        chart.marks.push(Mark::Spread { points: bars.collect(), colour });
-        chart.marks.push(Mark::Line { points: sure.clone(), colour, stroke: Stroke::Solid });
-        chart.marks.push(Mark::Dots { points: sure.clone(), colour, shape });
-        chart.marks.push(Mark::Line { points: fixed.clone(), colour, stroke: Stroke::Dashed });
+        chart.marks.push(Mark::Spread { points: bars.collect(), color });
+        chart.marks.push(Mark::Line { points: sure.clone(), color, stroke: Stroke::Solid });
+        chart.marks.push(Mark::Dots { points: sure.clone(), color, shape });
+        chart.marks.push(Mark::Line { points: fixed.clone(), color, stroke: Stroke::Dashed });
         // The lines fall steeply, so each is named in its upper part.
-        let label = |at: Option<&(f64, f64)>, text: String, side| at.map(|&at| Mark::Text { at, text, colour, side });
-        let side = super::chart::Side::Left;
+        let label = |at: Option<&(f64, f64)>, text: String, side| at.map(|&at| Mark::Text { at, text, color, side });
+        let side = crate::page::chart::Side::Left;
         chart.marks.extend(label(sure.get(5), format!("{name}, when sure"), side));
-        let side = super::chart::Side::Right;
+        let side = crate::page::chart::Side::Right;
         chart.marks.extend(label(fixed.get(if index == 0 { 1 } else { 7 }), format!("{name}, fixed number"), side));
         for s in stopped {
             data.push([
@@ -222,7 +223,7 @@ fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
             .sized(280, 190)
             .titled(name.as_str());
         for (index, method) in METHODS.iter().enumerate() {
-            let (colour, _) = method_style(index);
+            let (color, _) = method_style(index);
             let used = &sequences.used[index][position];
             let mean = floats(used).iter().sum::<f64>() / used.len().max(1) as f64;
             let mut outline = vec![(0.0, 0.0)];
@@ -231,11 +232,11 @@ fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
                 outline.extend([(from, share), (to, share)]);
                 data.push([(*method).into(), name.as_str().into(), Cell::count(bin * width), Cell::Percent(share, 2)]);
             }
-            chart.marks.push(Mark::Area { points: outline.clone(), base: 0.0, colour, opacity: 0.15 });
-            chart.marks.push(Mark::Line { points: outline, colour, stroke: Stroke::Thin });
+            chart.marks.push(Mark::Area { points: outline.clone(), base: 0.0, color, opacity: 0.15 });
+            chart.marks.push(Mark::Line { points: outline, color, stroke: Stroke::Thin });
             let at = ((30 * width) as f64 * 0.55, top * (0.9 - 0.14 * index as f64));
             let text = format!("{method}: {}", number(mean, 1));
-            chart.marks.push(Mark::Text { at, text, colour, side: super::chart::Side::Right });
+            chart.marks.push(Mark::Text { at, text, color, side: crate::page::chart::Side::Right });
         }
         panels.push(chart.svg()?);
     }

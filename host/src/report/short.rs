@@ -1,11 +1,11 @@
 //! What `palpate run` writes: the short form of the report.
 
-use super::chart::{Chart, Mark, Shape, Stroke};
-use super::colour;
-use super::page::{Block, Figure, Page, Section};
-use super::scale::Scale;
-use super::table::{Cell, Data, Table};
 use crate::error::Result;
+use crate::page::chart::{Chart, Mark, Shape, Stroke};
+use crate::page::color;
+use crate::page::document::{Block, Figure, Page, Section};
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data, Table};
 use base64::Engine;
 
 /// What a run has to show.
@@ -70,7 +70,7 @@ pub fn short(results: &RunResults) -> Result<Page> {
     section.figure(objects(results)?);
     sections.push(section);
     Ok(Page {
-        title: "Recognising objects by touch".into(),
+        title: "Recognizing objects by touch".into(),
         summary: "A probe with three fingers touched each object; trees learned what a touch says about the object; a \
                   compiled model of a few kilobytes added the evidence up, touch by touch."
             .into(),
@@ -86,15 +86,15 @@ pub(super) fn shown(picture: &Picture) -> (String, String, String) {
     (url, picture.name.clone(), picture.line.clone())
 }
 
-/// The `index`-th method's colour and point shape: the paper's first, ours second.
+/// The `index`-th method's color and point shape: the paper's first, ours second.
 pub(super) fn method_style(index: usize) -> (plotters::style::RGBColor, Shape) {
     const SHAPES: [Shape; 4] = [Shape::Ring, Shape::Disc, Shape::Triangle, Shape::Square];
-    let colour = match index {
-        0 => colour::PAPER,
-        1 => colour::OURS,
-        _ => colour::series(index),
+    let color = match index {
+        0 => color::PAPER,
+        1 => color::OURS,
+        _ => color::series(index),
     };
-    (colour, SHAPES[index % SHAPES.len()])
+    (color, SHAPES[index % SHAPES.len()])
 }
 
 /// An axis of touches that holds all curves.
@@ -107,11 +107,11 @@ fn curves(results: &RunResults) -> Result<Figure> {
     let mut chart = Chart::new("touches", touches_scale(results), "accuracy", Scale::share()).sized(600, 380);
     let mut data = Data::new(["method", "touches", "accuracy", "standard error"]);
     for (index, method) in results.methods.iter().enumerate() {
-        let (colour, shape) = method_style(index);
+        let (color, shape) = method_style(index);
         let bars = method.curve.iter().map(|&(n, a, e)| (n as f64, (a - 1.96 * e).max(0.0), (a + 1.96 * e).min(1.0)));
-        chart.marks.push(Mark::Spread { points: bars.collect(), colour });
+        chart.marks.push(Mark::Spread { points: bars.collect(), color });
         let points: Vec<(f64, f64)> = method.curve.iter().map(|&(n, a, _)| (n as f64, a)).collect();
-        chart.series(&method.name, colour, shape, &points);
+        chart.series(&method.name, color, shape, &points);
         for &(n, accuracy, error) in &method.curve {
             data.push([
                 method.name.as_str().into(),
@@ -123,7 +123,7 @@ fn curves(results: &RunResults) -> Result<Figure> {
     }
     Ok(Figure {
         id: "accuracy-curves".into(),
-        title: "Share of groups recognised after a fixed number of touches".into(),
+        title: "Share of groups recognized after a fixed number of touches".into(),
         caption: "Each group holds touches of one object, drawn at random from touches that training never saw; all \
                   objects count alike. Bars are 95 % confidence intervals."
             .into(),
@@ -145,11 +145,11 @@ fn objects(results: &RunResults) -> Result<Figure> {
     for name in names {
         let mut chart = Chart::new("touches", touches_scale(results), "", Scale::share()).sized(270, 200).titled(name);
         for (index, method) in results.methods.iter().enumerate() {
-            let (colour, _) = method_style(index);
+            let (color, _) = method_style(index);
             let curve = method.per_object.iter().find(|(object, _)| object == name).map(|found| &found.1);
             let points: Vec<(f64, f64)> = curve.into_iter().flatten().map(|&(n, a)| (n as f64, a)).collect();
             let stroke = if index == 0 { Stroke::Dashed } else { Stroke::Solid };
-            chart.line(&method.name, colour, stroke, &points);
+            chart.line(&method.name, color, stroke, &points);
             for &(n, accuracy) in curve.into_iter().flatten() {
                 data.push([name.into(), method.name.as_str().into(), Cell::count(n), Cell::Percent(accuracy, 1)]);
             }

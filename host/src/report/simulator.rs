@@ -1,18 +1,18 @@
 //! The simulator's speed against its error: the choices there are for deciding a contact.
 
-use super::chart::{Chart, Mark, Shape, Side};
-use super::colour;
 use super::context::Context;
-use super::page::{Figure, Section};
-use super::scale::Scale;
-use super::table::{Cell, Data, Table};
-use crate::approach::{Approach, Probe};
 use crate::error::Result;
+use crate::page::chart::{Chart, Mark, Shape, Side};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data, Table};
+use crate::probe::approach::{Approach, Probe};
+use crate::probe::scene::Scene;
+use crate::probe::sweep::narrow::Motion;
+use crate::probe::sweep::narrow::double::{self, Triangle};
+use crate::probe::sweep::{Exact, Plain, Precision, Single};
 use crate::random;
-use crate::scene::Scene;
-use crate::sweep::narrow::Motion;
-use crate::sweep::narrow::double::{self, Triangle};
-use crate::sweep::{Exact, Plain, Precision, Single};
 use glam::DVec3;
 use rand::RngExt;
 use rayon::prelude::*;
@@ -157,11 +157,11 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
         Data::new(["decided in", "casts a second", "casts compared", "missed", "false contacts", "largest error (s)"]);
     for (index, engine) in engines.iter().enumerate() {
         let at = (engine.rate, shown(engine.largest_error));
-        let colour = if index == 1 { colour::OURS } else { colour::GREY };
-        chart.marks.push(Mark::Dots { points: vec![at], colour, shape: Shape::Disc });
+        let color = if index == 1 { color::OURS } else { color::GRAY };
+        chart.marks.push(Mark::Dots { points: vec![at], color, shape: Shape::Disc });
         // Points of equal error stand side by side, so every other label goes above.
         let side = if index % 2 == 0 { Side::UpperLeft } else { Side::LowerRight };
-        chart.marks.push(Mark::Text { at, text: engine.name.clone(), colour, side });
+        chart.marks.push(Mark::Text { at, text: engine.name.clone(), color, side });
         data.push([
             engine.name.as_str().into(),
             Cell::Number(engine.rate, 0),

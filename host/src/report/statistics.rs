@@ -25,9 +25,9 @@ pub fn wilson(successes: f64, trials: f64) -> (f64, f64) {
     }
     let z = z95();
     let share = successes / trials;
-    let centre = (share + z * z / (2.0 * trials)) / (1.0 + z * z / trials);
+    let center = (share + z * z / (2.0 * trials)) / (1.0 + z * z / trials);
     let half = z / (1.0 + z * z / trials) * (share * (1.0 - share) / trials + z * z / (4.0 * trials * trials)).sqrt();
-    ((centre - half).max(0.0), (centre + half).min(1.0))
+    ((center - half).max(0.0), (center + half).min(1.0))
 }
 
 /// The mean of the paired differences `b − a` and its two-sided 95 % interval by Student's t over pairs: folds that both

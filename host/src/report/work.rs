@@ -1,7 +1,7 @@
 //! How many instructions a touch takes on the chips.
 
+use crate::chip::emulated::Chip;
 use crate::compile::Compiled;
-use crate::emulated::Chip;
 use crate::error::Result;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};

@@ -36,7 +36,7 @@ fn stderr(output: Output, code: i32) -> String {
 fn globe(directory: &Path, name: &str, rings: u32) -> PathBuf {
     let path = directory.join(format!("{name}.obj"));
     let mut text = Vec::new();
-    palpate::obj::write(&palpate::mesh::Mesh::globe(rings), &mut text).unwrap();
+    palpate::mesh::obj::write(&palpate::mesh::Mesh::globe(rings), &mut text).unwrap();
     std::fs::write(&path, text).unwrap();
     path
 }

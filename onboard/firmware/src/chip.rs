@@ -28,7 +28,7 @@ macro_rules! address {
     };
 }
 
-/// Bytes of (vector table and code, constants, initialised statics, zeroed statics).
+/// Bytes of (vector table and code, constants, initialized statics, zeroed statics).
 pub fn section_sizes() -> [usize; 4] {
     [
         address!(__etext) - address!(__vector_table),

@@ -11,7 +11,7 @@ const MOST: u64 = 16;
 /// is half as large as the model's, measure in half as large units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Geometry {
-    /// Between neighbouring fingers.
+    /// Between neighboring fingers.
     pub spacing: u32,
     /// Along the motion, a second.
     pub speed: u32,

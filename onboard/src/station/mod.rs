@@ -1,4 +1,4 @@
-//! A recogniser at the end of a link: everything that a chip's program needs but the chip itself.
+//! A recognizer at the end of a link: everything that a chip's program needs but the chip itself.
 //!
 //! ```text
 //! transport ──► DeviceEnd ──► Station ──► Recognizer
@@ -6,7 +6,7 @@
 //!                               └──► Memory: two places for models, two for records
 //! ```
 //!
-//! [`serve`] is the whole program of a chip that recognises touches from a host. A chip with fingers of its own pushes
+//! [`serve`] is the whole program of a chip that recognizes touches from a host. A chip with fingers of its own pushes
 //! their touches into a [`Station`] and tells the host of them.
 //!
 //! # Power cuts

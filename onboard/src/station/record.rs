@@ -38,7 +38,7 @@ pub(super) struct Record<'a> {
     pub(super) source: Source,
     pub(super) staged: Option<Staged>,
     pub(super) progress: Progress,
-    /// The recogniser's snapshot.
+    /// The recognizer's snapshot.
     pub(super) evidence: &'a [u8],
 }
 

@@ -1,4 +1,4 @@
-//! The whole program of a chip that recognises touches from a host.
+//! The whole program of a chip that recognizes touches from a host.
 
 use super::Memory;
 use super::record::{Records, Source};

@@ -11,7 +11,7 @@ use palpate_shared::link::{
 /// object alone would take.
 type SnapshotBuffer<const N: usize> = [[u8; SNAPSHOT_LENGTH + 10]; N];
 
-/// A recogniser with room for `N` objects, as a [`Device`] at the end of a link.
+/// A recognizer with room for `N` objects, as a [`Device`] at the end of a link.
 #[derive(Debug)]
 pub struct Station<'m, 'r, const N: usize> {
     model: Option<&'m Model<'m>>,
@@ -69,7 +69,7 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
         let recognizer = self.recognizer.as_mut()?;
         let decision = match recognizer.push(touch) {
             Verdict::Undecided => Decision::Undecided,
-            Verdict::Recognised { object, .. } => Decision::Recognised(object),
+            Verdict::Recognized { object, .. } => Decision::Recognized(object),
             Verdict::Unknown => Decision::Unknown,
         };
         let best = recognizer.best();

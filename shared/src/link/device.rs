@@ -7,7 +7,7 @@ use crate::Touch;
 use embedded_io::{Read, Write};
 use serde::{Deserialize, Serialize};
 
-/// What the link drives: a recogniser, and a place for models.
+/// What the link drives: a recognizer, and a place for models.
 pub trait Device {
     /// Takes a touch into account; [`Outcome::Verdict`], with a detail if asked for.
     fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome;

@@ -265,7 +265,7 @@ pub struct VerdictMessage {
     pub best: u8,
     /// Touches since the last reset.
     pub touches: u32,
-    /// What to hold against another recogniser, where it was asked for.
+    /// What to hold against another recognizer, where it was asked for.
     pub detail: Option<Detail>,
 }
 
@@ -276,12 +276,12 @@ pub enum Decision {
     /// Nothing yet.
     Undecided,
     /// The object with this index.
-    Recognised(u8),
+    Recognized(u8),
     /// Most likely no object of the model.
     Unknown,
 }
 
-/// Enough to see whether two recognisers agree in every bit.
+/// Enough to see whether two recognizers agree in every bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Detail {
     /// The posterior of the best object: u64 in Q56, little endian.

@@ -1,4 +1,4 @@
-//! The link between a host and a chip that recognises.
+//! The link between a host and a chip that recognizes.
 //!
 //! # Frames
 //!

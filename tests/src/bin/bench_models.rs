@@ -12,12 +12,13 @@
 //! `OUT` then holds models, what the exporter's model of the evaluator says that they cost, touches (three times of four
 //! bytes), the same trees for other evaluators, and for `identity.palpate` what this machine makes of ten thousand touches.
 
+use palpate::Error;
+use palpate::Result;
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::dataset::Dataset;
+use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node, Output};
-use palpate::folds::{self, Split};
-use palpate::train::{self, train};
-use palpate::{Error, Result};
+use palpate::touches::Dataset;
+use palpate::touches::folds::{self, Split};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::identity;
@@ -92,7 +93,7 @@ fn split(run: &Path) -> Result<Split> {
 /// Trained where there is data; otherwise random, of the same shape and without missing splits.
 fn ensemble(data: Option<&Dataset>, settings: train::Settings, descriptor: Descriptor) -> Result<Ensemble> {
     if let Some(data) = data {
-        return train(data, &settings);
+        return train(data, &settings, &());
     }
     let each = settings.multi_output;
     let trees = if each { settings.rounds } else { 10 * settings.rounds };

@@ -1,11 +1,11 @@
 use super::*;
-use crate::synthetic;
-use crate::train::{Settings, train};
+use crate::ensemble::train::{Settings, train};
+use crate::touches::synthetic;
 use serde_json::{Value, json};
 
 fn ensemble(multi_output: bool) -> Ensemble {
     let settings = Settings { multi_output, rounds: 4, depth: 3, ..Settings::compact() };
-    train(&synthetic::dataset(&[300, 200, 400], 1), &settings).unwrap()
+    train(&synthetic::dataset(&[300, 200, 400], 1), &settings, &()).unwrap()
 }
 
 fn document(multi_output: bool) -> Value {

@@ -41,7 +41,7 @@ fn main() -> ! {
     effector(&mut meter, &touch);
     link(&mut meter, &touch);
     match Model::new(MODEL) {
-        Ok(model) => recogniser(&mut meter, &model, &touch),
+        Ok(model) => recognizer(&mut meter, &model, &touch),
         Err(_) => println!("no model is built in: PALPATE_MODEL=/path/to/model.palpate cargo run --release"),
     }
     let sections = Sections::of_this_image();
@@ -99,19 +99,19 @@ fn link(meter: &mut Meter, touch: &Touch) {
     });
 }
 
-fn recogniser(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
+fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
     // Never sure, so that every touch costs the same.
     let never = Stopping::new(1e-15, u32::MAX).and_then(|never| Recognizer::<OBJECTS>::new(model, never).ok());
     let Some(mut recognizer) = never else { fail() };
     println!("the model: {} bytes, {} objects", MODEL.len(), model.object_count());
     let mut margins = [0; OBJECTS];
-    cost!(meter, "recogniser: margins", || model.margins(black_box(touch), &mut margins));
-    cost!(meter, "recogniser: a touch with its verdict", || {
+    cost!(meter, "recognizer: margins", || model.margins(black_box(touch), &mut margins));
+    cost!(meter, "recognizer: a touch with its verdict", || {
         // There and back, so that the evidence stays small.
         recognizer.push(black_box(touch))
     });
-    cost!(meter, "recogniser: a posterior", || recognizer.posterior(black_box(3)));
-    cost!(meter, "recogniser: a snapshot", || recognizer.snapshot(&mut [0; 256]).map(<[u8]>::len));
+    cost!(meter, "recognizer: a posterior", || recognizer.posterior(black_box(3)));
+    cost!(meter, "recognizer: a snapshot", || recognizer.snapshot(&mut [0; 256]).map(<[u8]>::len));
 
     let mut station = Station::<OBJECTS>::new(model);
     let evidence = [1_i64; 10];

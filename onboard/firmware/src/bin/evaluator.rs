@@ -76,7 +76,7 @@ fn main() -> ! {
         );
     }
     peers(&mut meter, &touches);
-    println!("state: {} bytes of recogniser, {} of model", size_of::<Recognizer<10>>(), size_of::<Model>());
+    println!("state: {} bytes of recognizer, {} of model", size_of::<Recognizer<10>>(), size_of::<Model>());
     if cfg!(target_abi = "eabihf") && off > 0 {
         println!("the exporter's model of the evaluator is off by more than {} % for {} models", STATED_WITHIN, off);
         fail()

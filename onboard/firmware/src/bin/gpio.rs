@@ -1,4 +1,4 @@
-//! Recognises from three switches on three pins, and tells a host of every touch and fault over the UART
+//! Recognizes from three switches on three pins, and tells a host of every touch and fault over the UART
 //! (`palpate watch`). A verdict ends an object; the next touch begins another.
 //!
 //! The model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`.

@@ -44,7 +44,7 @@ fn outcome(model: &Model<'_>, recognizer: &mut Recognizer<'_, 10>, touch: &Touch
     model.margins(touch, &mut margins);
     let verdict = match recognizer.push(touch) {
         Verdict::Undecided => 0,
-        Verdict::Recognised { object, touches } => 1 << 30 | u32::from(object) << 16 | touches,
+        Verdict::Recognized { object, touches } => 1 << 30 | u32::from(object) << 16 | touches,
         Verdict::Unknown => 2 << 30,
     };
     let posterior = recognizer.posterior(recognizer.best()).q56();

@@ -1,4 +1,4 @@
-//! The recogniser alone, with posteriors: links only if nothing in it can panic; its size is what recognition takes.
+//! The recognizer alone, with posteriors: links only if nothing in it can panic; its size is what recognition takes.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Recognises touches that a host sends over the UART: `palpate link` at the other end.
+//! Recognizes touches that a host sends over the UART: `palpate link` at the other end.
 //!
 //! A model comes from the host (`palpate link PORT --load model.palpate`) and lies in RAM that keeps its content through
 //! resets, as do the records that let it go on after one.

@@ -1,4 +1,4 @@
-//! The recogniser alone, verdicts only: links only if nothing in it can panic; its size is what recognition takes.
+//! The recognizer alone, verdicts only: links only if nothing in it can panic; its size is what recognition takes.
 #![no_std]
 #![no_main]
 

@@ -142,9 +142,9 @@ fn run() -> Option<core::convert::Infallible> {
             Ok(Some(touch)) => {
                 let touch = scale.apply(&touch);
                 station.push(&touch, true).map(|verdict| {
-                    let recognised = matches!(verdict.decision, Decision::Recognised(_));
+                    let recognized = matches!(verdict.decision, Decision::Recognized(_));
                     // The LED's pin cannot fail.
-                    let _ = led.set_state(recognised.into());
+                    let _ = led.set_state(recognized.into());
                     if verdict.decision != Decision::Undecided {
                         station.reset();
                     }

@@ -1,0 +1,137 @@
+//! What is streamed to a chip: touches, and where one object ends and the next begins.
+
+use crate::error::{Error, Result};
+use crate::touches::{Dataset, parse_touch};
+use palpate_shared::Touch;
+use std::io::BufRead;
+use std::path::{Path, PathBuf};
+
+/// Something to tell the chip.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Step {
+    /// Another object comes: forget the touches so far. With its name, where it is known.
+    Object(Option<String>),
+    /// A touch.
+    Touch(Touch),
+}
+
+/// Where touches come from.
+pub enum Steps {
+    /// A data set: sequences of touches of one object after another, in turns.
+    Sequences {
+        /// The touches.
+        dataset: Dataset,
+        /// Touches of an object before the next one comes.
+        length: usize,
+        /// Touches still to come.
+        left: u64,
+        /// Which sequence, and which touch of it.
+        at: (usize, usize),
+    },
+    /// Lines of text as they come; an empty line ends an object.
+    Lines {
+        /// The lines.
+        reader: Box<dyn BufRead + Send>,
+        /// For errors.
+        path: PathBuf,
+        /// The last line read.
+        line: u64,
+    },
+}
+
+impl Steps {
+    /// `count` touches of a data set: `length` of the first object, `length` of the second, …, and again from where each
+    /// was left. An object's touches begin again when they are used up.
+    pub fn sequences(dataset: Dataset, length: usize, count: u64) -> Self {
+        Self::Sequences { dataset, length: length.max(1), left: count, at: (0, 0) }
+    }
+
+    /// Lines as in a data set's files, until they end.
+    pub fn lines(reader: Box<dyn BufRead + Send>, path: &Path) -> Self {
+        Self::Lines { reader, path: path.into(), line: 0 }
+    }
+
+    /// How many touches there will be, where that is known.
+    pub fn count(&self) -> Option<u64> {
+        match self {
+            Self::Sequences { left, .. } => Some(*left),
+            Self::Lines { .. } => None,
+        }
+    }
+
+    /// The next step; `None` at the end.
+    ///
+    /// # Errors
+    /// When a line is not a touch.
+    pub fn next_step(&mut self) -> Result<Option<Step>> {
+        match self {
+            Self::Sequences { dataset, length, left, at: (sequence, touch) } => {
+                if *left == 0 {
+                    return Ok(None);
+                }
+                let objects = dataset.objects.len();
+                let Some(object) = dataset.objects.get(*sequence % objects.max(1)) else { return Ok(None) };
+                if *touch == 0 {
+                    *touch = 1;
+                    return Ok(Some(Step::Object(Some(object.name.clone()))));
+                }
+                let index = (*sequence / objects) * *length + *touch - 1;
+                let next = object.touches.get(index % object.touches.len().max(1)).copied();
+                *left -= 1;
+                (*sequence, *touch) = if touch == length { (*sequence + 1, 0) } else { (*sequence, *touch + 1) };
+                Ok(next.map(Step::Touch))
+            }
+            Self::Lines { reader, path, line } => {
+                let mut text = String::new();
+                *line += 1;
+                let read = reader.read_line(&mut text);
+                if read.map_err(|source| Error::io(&path, "read the touches", source))? == 0 {
+                    return Ok(None);
+                }
+                let text = text.trim();
+                if text.is_empty() {
+                    return Ok(Some(Step::Object(None)));
+                }
+                let fix = "Write three times in seconds, - for a missing contact.";
+                let touch = parse_touch(text).map_err(|what| Error::line(&path, *line, what, fix))?;
+                Ok(Some(Step::Touch(touch)))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::touches::ObjectTouches;
+
+    #[test]
+    fn sequences_take_turns_and_go_on_where_each_object_was_left() {
+        let object = |name: &str, first: u32| ObjectTouches {
+            name: name.into(),
+            touches: (first..first + 3).map(|t| Touch::from_micros([0, t, t])).collect(),
+        };
+        let dataset = Dataset { objects: vec![object("a", 10), object("b", 20)] };
+        let mut steps = Steps::sequences(dataset, 2, 7);
+        let mut seen = Vec::new();
+        while let Some(step) = steps.next_step().unwrap() {
+            seen.push(match step {
+                Step::Object(name) => name.unwrap(),
+                Step::Touch(touch) => touch.times()[1].micros().unwrap().to_string(),
+            });
+        }
+        assert_eq!(seen, ["a", "10", "11", "b", "20", "21", "a", "12", "10", "b", "22"]);
+    }
+
+    #[test]
+    fn lines_are_touches_and_an_empty_line_ends_an_object() {
+        let text: &[u8] = b"0.03 0 0.05\n\n0 - 0.1\nnonsense\n";
+        let mut steps = Steps::lines(Box::new(text), Path::new("touches.txt"));
+        assert_eq!(steps.next_step().unwrap(), Some(Step::Touch(Touch::from_micros([30_000, 0, 50_000]))));
+        assert_eq!(steps.next_step().unwrap(), Some(Step::Object(None)));
+        assert!(matches!(steps.next_step().unwrap(), Some(Step::Touch(touch)) if !touch.is_full()));
+        let error = steps.next_step().unwrap_err().to_string();
+        assert!(error.starts_with("touches.txt:4:"), "{error}");
+        assert_eq!(steps.next_step().unwrap(), None);
+    }
+}

@@ -1,0 +1,247 @@
+//! Touches to the chip, verdicts from it, and the host's own recognizer beside it.
+
+use super::connection::Owned;
+use super::{ChipModel, Connection, Step, Steps};
+use crate::error::{Error, Result};
+use palpate_onboard::Model;
+use palpate_onboard::station::Station;
+use palpate_shared::Touch;
+use palpate_shared::link::{Command, Decision, Device, Event, Outcome, TouchMessage, VerdictMessage};
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+/// Something new from the chip.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Update {
+    /// The touches of another object begin.
+    Object(Option<String>),
+    /// A touch, and what is known after it.
+    Touch {
+        /// The touch.
+        touch: Touch,
+        /// What the chip knows after it.
+        verdict: VerdictMessage,
+        /// Whether this touch decided.
+        decided: bool,
+        /// The posterior of each object, where the host's recognizer runs along.
+        posteriors: Option<Vec<f64>>,
+    },
+    /// Something happened on the chip by itself; so many events before it were lost.
+    Event(Event, u32),
+    /// Nothing has happened for a while.
+    Idle,
+}
+
+/// How a stream went.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Touches that the chip counted.
+    pub touches: u64,
+    /// Of these, held against the host's recognizer.
+    pub compared: u64,
+    /// Of these, with another verdict, posterior or evidence.
+    pub differences: u64,
+    /// The first of them.
+    pub first_difference: Option<String>,
+    /// Objects recognized, where their names were known: rightly, wrongly, not at all.
+    pub right: u64,
+    /// Wrongly.
+    pub wrong: u64,
+    /// Not at all.
+    pub undecided: u64,
+    /// From the first touch to the last verdict.
+    pub seconds: f64,
+    /// Frames that this end sent.
+    pub sent: u64,
+    /// Frames that this end sent again.
+    pub resent: u64,
+    /// Garbled frames that this end received.
+    pub garbled: u64,
+    /// Garbled frames that the chip received.
+    pub chip_garbled: u64,
+    /// Commands that reached the chip more than once, and were counted once.
+    pub chip_repeated: u64,
+    /// Commands that reached the chip after one that was lost.
+    pub chip_early: u64,
+    /// The chip's own events that were lost.
+    pub missed_events: u64,
+}
+
+impl Summary {
+    /// Touches a second.
+    pub fn rate(&self) -> f64 {
+        self.touches as f64 / self.seconds.max(1e-9)
+    }
+}
+
+/// What was sent and has no outcome yet.
+enum Sent {
+    Object(Option<String>),
+    Touch { touch: Touch, expected: Option<VerdictMessage>, posteriors: Option<Vec<f64>> },
+}
+
+/// Streams `steps` to the chip until they end or `each` breaks off, and hands every update to `each` in order. With a
+/// `mirror`, the host's own recognizer takes the same touches, and every verdict, posterior and evidence is compared.
+///
+/// # Errors
+/// When a step cannot be read, the chip refuses a touch, or is gone; and when the mirror's model is not the chip's.
+pub fn stream(
+    connection: &mut Connection,
+    mut steps: Steps,
+    chip: &ChipModel,
+    mirror: Option<&Model<'_>>,
+    mut each: impl FnMut(&mut Connection, Update) -> Result<ControlFlow<()>>,
+) -> Result<Summary> {
+    if let Some(model) = mirror
+        && model.checksum() != chip.info.checksum
+    {
+        let what = "the chip's model is not the one to compare with";
+        return Err(Error::file(connection.transport().name(), what, "Load it with --load."));
+    }
+    let mut mirror = mirror.map(Station::<256>::new);
+    // Who types lines wants the verdict before the next line.
+    let one_by_one = matches!(steps, Steps::Lines { .. });
+    let mut run = Run { summary: Summary::default(), under_way: VecDeque::new(), truth: None, decided: false };
+    let mut pending = None;
+    let mut more = true;
+    let start = Instant::now();
+    while more || pending.is_some() || !run.under_way.is_empty() {
+        while connection.has_room() && (pending.is_some() || more) && (!one_by_one || run.under_way.is_empty()) {
+            let step = match pending.take() {
+                Some(step) => Some(step),
+                None => steps.next_step()?,
+            };
+            let Some(step) = step else {
+                more = false;
+                break;
+            };
+            if !connection.submit(command(&step))? {
+                pending = Some(step);
+                break;
+            }
+            run.under_way.push_back(sent(step, mirror.as_mut(), chip));
+        }
+        let update = match connection.hear(Duration::from_millis(50))? {
+            None => Update::Idle,
+            Some(Owned::Event(event, missed)) => Update::Event(event, missed),
+            Some(Owned::Outcome(outcome)) => run.take(outcome, chip, connection.transport().name())?,
+        };
+        if each(connection, update)?.is_break() {
+            break;
+        }
+    }
+    run.summary.seconds = start.elapsed().as_secs_f64();
+    run.end_object(chip);
+    let (host, chip) = (connection.statistics(), connection.chip_statistics()?);
+    let summary = run.summary;
+    Ok(Summary {
+        sent: host.sent,
+        resent: host.resent,
+        garbled: host.garbled,
+        missed_events: host.missed_events,
+        chip_garbled: chip.garbled.into(),
+        chip_repeated: chip.repeated.into(),
+        chip_early: chip.early.into(),
+        ..summary
+    })
+}
+
+fn command(step: &Step) -> Command<'static> {
+    match step {
+        Step::Object(_) => Command::Reset,
+        Step::Touch(touch) => Command::Touch { touch: TouchMessage::from(touch), detail: true },
+    }
+}
+
+fn sent(step: Step, mirror: Option<&mut Station<'_, '_, 256>>, chip: &ChipModel) -> Sent {
+    match step {
+        Step::Object(name) => {
+            if let Some(mirror) = mirror {
+                mirror.reset();
+            }
+            Sent::Object(name)
+        }
+        Step::Touch(touch) => {
+            let Some(mirror) = mirror else { return Sent::Touch { touch, expected: None, posteriors: None } };
+            let expected = mirror.push(&touch, true);
+            let objects = 0..=chip.info.last_object;
+            let posteriors = objects.map(|object| mirror.posterior(object).map_or(0.0, probability)).collect();
+            Sent::Touch { touch, expected, posteriors: Some(posteriors) }
+        }
+    }
+}
+
+/// A probability from Q56.
+pub(super) fn probability(q56: u64) -> f64 {
+    q56 as f64 / (1_u64 << 56) as f64
+}
+
+/// What is known while a stream runs.
+struct Run {
+    summary: Summary,
+    under_way: VecDeque<Sent>,
+    truth: Option<String>,
+    decided: bool,
+}
+
+impl Run {
+    fn take(&mut self, outcome: Outcome, chip: &ChipModel, name: &str) -> Result<Update> {
+        if let Outcome::Refused(refusal) = outcome {
+            let what = format!("the chip refuses a touch: {refusal}");
+            return Err(Error::file(name, what, "Load a model with --load."));
+        }
+        match (self.under_way.pop_front(), outcome) {
+            (Some(Sent::Object(name)), Outcome::Done) => {
+                self.end_object(chip);
+                self.truth.clone_from(&name);
+                Ok(Update::Object(name))
+            }
+            (Some(Sent::Touch { touch, expected, posteriors }), Outcome::Verdict(verdict)) => {
+                self.summary.touches += 1;
+                self.compare(&touch, expected, verdict);
+                let decided = verdict.decision != Decision::Undecided && !self.decided;
+                if decided {
+                    self.decided = true;
+                    self.count(verdict.decision, chip);
+                }
+                Ok(Update::Touch { touch, verdict, decided, posteriors })
+            }
+            _ => {
+                let fix = "The chip's program speaks another version of the link: flash it again.";
+                Err(Error::file(name, "an outcome came that belongs to no command", fix))
+            }
+        }
+    }
+
+    fn compare(&mut self, touch: &Touch, expected: Option<VerdictMessage>, verdict: VerdictMessage) {
+        let Some(expected) = expected else { return };
+        self.summary.compared += 1;
+        if expected != verdict {
+            self.summary.differences += 1;
+            let number = self.summary.touches;
+            let difference = || format!("touch {number}, {touch:?}: the host says {expected:?}, the chip {verdict:?}");
+            self.summary.first_difference.get_or_insert_with(difference);
+        }
+    }
+
+    fn count(&mut self, decision: Decision, chip: &ChipModel) {
+        let Some(truth) = &self.truth else { return };
+        let said = match decision {
+            Decision::Recognized(object) => chip.names.get(usize::from(object)),
+            _ => None,
+        };
+        match said {
+            Some(said) if said == truth => self.summary.right += 1,
+            Some(_) => self.summary.wrong += 1,
+            None => self.summary.undecided += 1,
+        }
+    }
+
+    fn end_object(&mut self, chip: &ChipModel) {
+        if !std::mem::take(&mut self.decided) && self.truth.is_some() {
+            self.count(Decision::Unknown, chip);
+        }
+    }
+}

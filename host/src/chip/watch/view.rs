@@ -1,0 +1,88 @@
+//! What a live view shows, whatever shows it.
+
+use crate::chip::Entry;
+use std::collections::VecDeque;
+
+/// Touches that are kept to be shown.
+const KEPT: usize = 200;
+
+/// What a live view shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct View {
+    /// Where it comes from.
+    pub source: String,
+    /// The objects' names.
+    pub objects: Vec<String>,
+    /// The posterior of each object; empty while unknown.
+    pub posteriors: Vec<f64>,
+    /// The object that is being touched, where its name is known.
+    pub truth: Option<String>,
+    /// The last touches as lines, the newest first.
+    pub touches: VecDeque<String>,
+    /// The last verdict: `undecided`, `unknown`, or an object's name.
+    pub verdict: String,
+    /// Touches in all.
+    pub count: u64,
+    /// Touches a second, over the last second or so.
+    pub rate: f64,
+    /// Frames sent again.
+    pub resent: u64,
+    /// Garbled frames.
+    pub garbled: u64,
+    /// The chip's own events that were lost.
+    pub missed: u64,
+    /// Whether nothing more will come.
+    pub ended: bool,
+    /// Times of recent touches, for the rate.
+    recent: VecDeque<f64>,
+}
+
+impl View {
+    /// A view that has seen nothing yet.
+    pub fn new(source: impl Into<String>) -> Self {
+        Self { source: source.into(), verdict: "undecided".into(), ..Self::default() }
+    }
+
+    /// Takes an entry in.
+    pub fn take(&mut self, entry: &Entry) {
+        match entry {
+            Entry::Model { objects, .. } => {
+                self.objects.clone_from(objects);
+                self.posteriors.clear();
+            }
+            Entry::Object { name } => {
+                self.truth.clone_from(name);
+                self.verdict = "undecided".into();
+                self.posteriors.clear();
+            }
+            Entry::Touch { verdict, posteriors, at, .. } => {
+                self.count += 1;
+                self.verdict.clone_from(verdict);
+                if let Some(posteriors) = posteriors {
+                    self.posteriors.clone_from(posteriors);
+                }
+                self.tick(*at);
+                self.keep(super::line(entry));
+            }
+            Entry::Fault { .. } => self.keep(super::line(entry)),
+            Entry::Link { resent, garbled, missed } => {
+                (self.resent, self.garbled, self.missed) = (*resent, *garbled, *missed);
+            }
+        }
+    }
+
+    fn keep(&mut self, line: String) {
+        self.touches.push_front(line);
+        self.touches.truncate(KEPT);
+    }
+
+    /// Counts a touch at `at` seconds into the rate.
+    fn tick(&mut self, at: f64) {
+        self.recent.push_back(at);
+        while self.recent.len() > 2 && self.recent.front().is_some_and(|&first| at - first > 1.0) {
+            self.recent.pop_front();
+        }
+        let span = at - self.recent.front().copied().unwrap_or(at);
+        self.rate = if span > 0.0 { (self.recent.len() - 1) as f64 / span } else { 0.0 };
+    }
+}

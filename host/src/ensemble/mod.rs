@@ -1,0 +1,115 @@
+//! The full model: boosted trees in f32 as the trainer left them.
+
+pub mod train;
+mod xgboost_json;
+
+use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
+
+/// Boosted trees over a descriptor's features, with one margin for each object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ensemble {
+    /// Which features a touch is turned into.
+    pub descriptor: Descriptor,
+    /// The objects' names; a margin's position is its object's position here.
+    pub objects: Vec<String>,
+    /// What every margin starts from, one for each object.
+    pub base_margins: Vec<f32>,
+    /// The trees, in the order in which their leaves are added.
+    pub trees: Vec<Tree>,
+}
+
+/// One tree; its root is node 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tree {
+    /// Splits and leaves.
+    pub nodes: Vec<Node>,
+    /// Which margins the tree adds to.
+    pub output: Output,
+}
+
+/// Which margins a tree adds to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Output {
+    /// One value a leaf, for the object with this index.
+    One(usize),
+    /// One value for each object a leaf.
+    Each,
+}
+
+/// A node of a tree.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Node {
+    /// Left if `feature < threshold` in f32; a missing value (NaN) follows `missing_left`.
+    Split {
+        /// Index of the feature in the descriptor.
+        feature: usize,
+        /// The threshold.
+        threshold: f32,
+        /// Where a missing value goes.
+        missing_left: bool,
+        /// Index of the left child.
+        left: usize,
+        /// Index of the right child.
+        right: usize,
+    },
+    /// What the tree adds: one value, or one for each object, as the tree's [`Output`] says.
+    Leaf(Vec<f32>),
+}
+
+impl Node {
+    /// A leaf's values.
+    pub fn leaf(&self) -> Option<&[f32]> {
+        match self {
+            Self::Leaf(values) => Some(values),
+            Self::Split { .. } => None,
+        }
+    }
+}
+
+impl Tree {
+    /// The leaf that `features` (NaN where missing) reach.
+    ///
+    /// # Panics
+    /// If a child's or a feature's index is out of range, which reading an ensemble rules out.
+    pub fn leaf(&self, features: &[f32]) -> &[f32] {
+        let mut index = 0;
+        loop {
+            match &self.nodes[index] {
+                Node::Leaf(values) => return values,
+                Node::Split { feature, threshold, missing_left, left, right } => {
+                    let value = features[*feature];
+                    let goes_left = if value.is_nan() { *missing_left } else { value < *threshold };
+                    index = if goes_left { *left } else { *right };
+                }
+            }
+        }
+    }
+}
+
+impl Ensemble {
+    /// The margins of one row of features, in f32, leaves added in tree order to the base margins: the trainer's own
+    /// prediction, bit for bit.
+    pub fn margins_of_features(&self, features: &[f32]) -> Vec<f32> {
+        let mut margins = self.base_margins.clone();
+        for tree in &self.trees {
+            let leaf = tree.leaf(features);
+            match tree.output {
+                Output::One(object) => margins[object] += leaf[0],
+                Output::Each => margins.iter_mut().zip(leaf).for_each(|(margin, value)| *margin += value),
+            }
+        }
+        margins
+    }
+
+    /// The margins of a touch.
+    pub fn margins(&self, touch: &Touch) -> Vec<f32> {
+        self.margins_of_features(&feature_row(self.descriptor, touch))
+    }
+}
+
+/// The features of a touch as a trainer sees them: f32, NaN where missing. Exact, since features are whole numbers
+/// below 2²⁴.
+pub fn feature_row(descriptor: Descriptor, touch: &Touch) -> Vec<f32> {
+    let to_f32 = |&feature: &i32| if feature == MISSING_FEATURE { f32::NAN } else { feature as f32 };
+    descriptor.features(touch).as_slice().iter().map(to_f32).collect()
+}

@@ -1,0 +1,343 @@
+//! From touches to an ensemble.
+//!
+//! The trainer is gradient boosting with softmax loss over histograms, XGBoost's algorithm and parameters. Two presets:
+//! the published method, and a compact one, whose trees hold one leaf value for each object, so that one walk through a
+//! tree serves all objects.
+//!
+//! Every object counts alike, however many touches it has: touches are weighted by the inverse of their object's share.
+//! Otherwise each margin would hold the log of that share, and summing margins over touches would count that prior once
+//! a touch instead of once.
+
+use crate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+use crate::touches::Dataset;
+use crate::touches::noise;
+use hessboost::config::MultiStrategy;
+use hessboost::data::DMatrix;
+use hessboost::model::BoostedModel;
+use hessboost::objective::Multiclass;
+use hessboost::prelude::{HessboostError, Objective, Trainer, TrainingParams, TreeMethod};
+use palpate_shared::{Descriptor, Touch};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::ControlFlow;
+
+#[cfg(feature = "xgboost")]
+mod xgboost;
+
+/// What every margin starts from; the same for all objects, so it changes no verdict. XGBoost's default.
+pub const BASE_MARGIN: f32 = 0.5;
+
+/// Who grows the trees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Engine {
+    /// hessboost, in Rust.
+    #[default]
+    Hessboost,
+    /// XGBoost 1.6.2, if the cargo feature `xgboost` built it in. It has no multi-output trees.
+    Xgboost,
+}
+
+/// How an ensemble is trained. Parameters have XGBoost's names and meanings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Which features a touch is turned into.
+    pub descriptor: Descriptor,
+    /// Whether a leaf holds one value for each object (one tree a round) or one value (one tree an object a round).
+    pub multi_output: bool,
+    /// Boosting rounds.
+    pub rounds: usize,
+    /// `max_depth`: the most splits between root and leaf.
+    pub depth: usize,
+    /// `eta`: the share of each tree that is added.
+    pub eta: f64,
+    /// `min_child_weight`: the least sum of second derivatives in a leaf.
+    pub min_child_weight: f64,
+    /// `max_bin`: the most bins of a feature's histogram: at most `bins − 1` different thresholds a feature, and one more
+    /// where contacts are missing.
+    pub bins: usize,
+    /// Bins of each feature, at quantiles, if they are to differ: values are rounded down to the lower edge of their bin
+    /// before training, so that no feature has more thresholds than that. For models that are compiled to a table.
+    pub feature_bins: Option<Vec<usize>>,
+    /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
+    /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
+    pub leaf_bits: Option<u32>,
+    /// Standard deviation in microseconds of the Gaussian noise that is added to contact times before training.
+    pub noise: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Threads, or all of the machine's; the ensemble is the same for any number.
+    pub threads: Option<usize>,
+    /// Who grows the trees.
+    pub engine: Engine,
+}
+
+impl Settings {
+    /// The published method: 100 rounds of one tree an object, depth 6, eta 0.3, on contact times.
+    pub fn paper() -> Self {
+        Self {
+            descriptor: Descriptor::Times,
+            multi_output: false,
+            rounds: 100,
+            depth: 6,
+            eta: 0.3,
+            min_child_weight: 1.0,
+            bins: 256,
+            feature_bins: None,
+            leaf_bits: None,
+            noise: 0.0,
+            seed: 1,
+            threads: None,
+            engine: Engine::Hessboost,
+        }
+    }
+
+    /// Thirty multi-output trees on curvature: more accurate than the published method, and small enough for a chip with
+    /// 16-bit leaves (37 KB for ten objects). Twice as many trees at half the eta are no better, and twice the size.
+    pub fn compact() -> Self {
+        Self {
+            descriptor: Descriptor::Curvature,
+            multi_output: true,
+            rounds: 30,
+            min_child_weight: 30.0,
+            leaf_bits: Some(16),
+            ..Self::paper()
+        }
+    }
+}
+
+/// Trains an ensemble on all touches of `dataset`. The same touches and settings give the same ensemble on any number
+/// of threads. Progress is counted in rounds.
+///
+/// # Errors
+/// [`Error::Argument`] if a setting is out of its range; [`Error::Data`] if there are fewer than two objects, an object
+/// has no touches, or the descriptor needs a pose that no touch has.
+pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
+    check(dataset, settings.descriptor)?;
+    let parameters = parameters(settings, dataset.objects.len())?;
+    let rows = Rows::new(dataset, settings);
+    let mut ensemble = match settings.engine {
+        Engine::Hessboost => with_hessboost(rows, settings, &parameters, dataset.names(), progress)?,
+        Engine::Xgboost => with_xgboost(&rows, settings, dataset.names(), progress)?,
+    };
+    if let Some(bits) = settings.leaf_bits {
+        round_leaves(&mut ensemble, bits);
+    }
+    Ok(ensemble)
+}
+
+/// Rounds every leaf to a whole multiple of a power of two (the unit, at most 2⁻¹ and at least 2⁻¹⁵ nats), the smallest
+/// with which the largest leaf still fits `bits` bits, its sign included.
+///
+/// A 16-bit unit is about 10⁻⁴ nats, far below what a finite number of touches can teach a leaf. In exchange, f32 sums
+/// of leaves are exact in any order while they stay below 2²⁴ units, a compiled model with leaves of that width holds
+/// the very same numbers, and full and compiled model cannot differ.
+pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
+    let leaves = || ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(Node::leaf).flatten();
+    let largest = leaves().fold(0.0_f32, |most, value| most.max(value.abs()));
+    let most = 2.0_f32.powi(i32::try_from(bits).unwrap_or(32) - 1) - 1.0;
+    let fits = |digits: &i32| (largest * 2.0_f32.powi(*digits)).round() <= most;
+    let unit = 2.0_f32.powi(-(1..=15).rev().find(fits).unwrap_or(1));
+    for node in ensemble.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+        if let Node::Leaf(values) = node {
+            // Multiplying and dividing by a power of two is exact.
+            values.iter_mut().for_each(|value| *value = (*value / unit).round() * unit);
+        }
+    }
+}
+
+fn with_hessboost(
+    rows: Rows,
+    settings: &Settings,
+    parameters: &TrainingParams,
+    objects: Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Ensemble> {
+    let data = rows.matrix().map_err(|error| refused(&error))?;
+    progress.begin("training", u64::try_from(settings.rounds).ok());
+    let result = Trainer::new(parameters, &data, settings.rounds)
+        .on_round(|_| {
+            progress.advance(1);
+            if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .train()
+        .map_err(|error| refused(&error))?;
+    crate::progress::check(progress)?;
+    Ok(ensemble(&result.model, settings.descriptor, objects))
+}
+
+#[cfg(feature = "xgboost")]
+fn with_xgboost(rows: &Rows, settings: &Settings, objects: Vec<String>, progress: &dyn Progress) -> Result<Ensemble> {
+    if settings.multi_output {
+        let what = "XGBoost 1.6.2 cannot train leaves that hold a value for each object";
+        return Err(Error::argument(what, "Use --preset paper or --leaves one, or --trainer hessboost."));
+    }
+    xgboost::train(rows, settings, objects, progress)
+}
+
+#[cfg(not(feature = "xgboost"))]
+fn with_xgboost(_: &Rows, _: &Settings, _: Vec<String>, _: &dyn Progress) -> Result<Ensemble> {
+    Err(Error::argument(
+        "this program was built without XGBoost",
+        "Use --trainer hessboost, or build with: cargo build --release --features xgboost (cmake, g++ and libclang needed).",
+    ))
+}
+
+/// Whether there is something to learn from.
+fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
+    let objects = &dataset.objects;
+    if objects.len() < 2 {
+        return Err(Error::data("there is only one object to train on", "Capture at least two."));
+    }
+    if let Some(empty) = objects.iter().find(|object| object.touches.is_empty()) {
+        return Err(Error::data(format!("{} has no touches to train on", empty.name), "Capture it anew."));
+    }
+    let posed = || objects.iter().flat_map(|object| &object.touches).any(|touch| touch.pose().is_some());
+    if descriptor.needs_pose() && !posed() {
+        let what = format!("the descriptor {} needs the probe's pose, which no touch has", descriptor.name());
+        return Err(Error::data(what, "Capture with --pose, or use --descriptor curvature."));
+    }
+    Ok(())
+}
+
+/// The trainer's parameters for `objects` classes.
+fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
+    let range =
+        |name: &str, range: &str| Err(Error::argument(format!("{name} is out of range"), format!("Use {range}.")));
+    if settings.rounds == 0 || settings.rounds > 10_000 {
+        return range("--rounds", "1 to 10000");
+    }
+    if settings.depth == 0 || settings.depth > 16 {
+        return range("--depth", "1 to 16");
+    }
+    if !(settings.eta > 0.0 && settings.eta <= 1.0) {
+        return range("--eta", "a number above 0, at most 1");
+    }
+    if !(settings.min_child_weight >= 0.0 && settings.min_child_weight.is_finite()) {
+        return range("--min-child-weight", "a number of at least 0");
+    }
+    if !(2..=65_536).contains(&settings.bins) {
+        return range("--bins", "2 to 65536");
+    }
+    if let Some(bins) = &settings.feature_bins
+        && (bins.len() != settings.descriptor.feature_count() || bins.iter().any(|bins| !(2..=65_536).contains(bins)))
+    {
+        return range("--bins", "one number from 2 to 65536 for all features, or one for each");
+    }
+    if settings.leaf_bits.is_some_and(|bits| !(4..=24).contains(&bits)) {
+        return range("--leaf-bits", "4 to 24, or 0 to leave the leaves as they are");
+    }
+    if !(settings.noise >= 0.0 && settings.noise.is_finite()) {
+        return range("--noise", "a duration of at least 0");
+    }
+    let strategy = if settings.multi_output { MultiStrategy::MultiOutputTree } else { MultiStrategy::OneOutputPerTree };
+    let builder = Multiclass::new(objects).map(|classes| {
+        TrainingParams::builder()
+            .objective(Objective::Softprob(classes))
+            .tree_method(TreeMethod::Hist)
+            .multi_strategy(strategy)
+            .max_depth(settings.depth)
+            .eta(settings.eta)
+            .min_child_weight(settings.min_child_weight)
+            .max_bin(settings.bins)
+            .base_score(f64::from(BASE_MARGIN))
+            .seed(settings.seed)
+    });
+    let built = builder.and_then(|builder| match settings.threads {
+        Some(threads) => builder.nthread(threads).build(),
+        None => builder.global_pool().build(),
+    });
+    built.map_err(|error| Error::argument(format!("the trainer refused a setting: {error}"), "Choose another value."))
+}
+
+fn refused(error: &HessboostError) -> Error {
+    Error::data(format!("the trainer refused the touches: {error}"), "Report this as a bug, with the data.")
+}
+
+/// The training data as a trainer wants it: one row of features a touch, its object's position as label.
+pub(crate) struct Rows {
+    pub(crate) features: Vec<f32>,
+    pub(crate) labels: Vec<f32>,
+    /// One weight a touch, or none where all objects have equally many touches.
+    pub(crate) weights: Option<Vec<f32>>,
+    pub(crate) columns: usize,
+}
+
+impl Rows {
+    pub(crate) fn new(dataset: &Dataset, settings: &Settings) -> Self {
+        let objects = &dataset.objects;
+        let descriptor = settings.descriptor;
+        let features = objects.iter().flat_map(|object| {
+            let touches: Cow<'_, [Touch]> = if settings.noise > 0.0 {
+                noise::noisy(&object.name, &object.touches, settings.noise, settings.seed).into()
+            } else {
+                (&object.touches[..]).into()
+            };
+            let rows: Vec<Vec<f32>> = touches.par_iter().map(|touch| feature_row(descriptor, touch)).collect();
+            rows.into_iter().flatten()
+        });
+        let mut features: Vec<f32> = features.collect();
+        for (column, &bins) in settings.feature_bins.iter().flatten().enumerate() {
+            round_down(&mut features, column, descriptor.feature_count(), bins);
+        }
+        let per_touch = |value: fn(usize, usize, usize) -> f32| {
+            let (classes, total) = (objects.len(), dataset.len());
+            let share = |(label, count)| std::iter::repeat_n(value(label, count * classes, total), count);
+            objects.iter().map(|object| object.touches.len()).enumerate().flat_map(share).collect::<Vec<f32>>()
+        };
+        let equal = objects.windows(2).all(|pair| pair[0].touches.len() == pair[1].touches.len());
+        Self {
+            features,
+            labels: per_touch(|label, _, _| label as f32),
+            weights: (!equal).then(|| per_touch(|_, expected, total| (total as f64 / expected as f64) as f32)),
+            columns: descriptor.feature_count(),
+        }
+    }
+
+    fn matrix(self) -> hessboost::error::Result<DMatrix> {
+        let rows = self.labels.len();
+        let matrix = DMatrix::from_dense_vec(self.features, rows, self.columns)?.with_labels(&self.labels)?;
+        match self.weights {
+            Some(weights) => matrix.with_weights(&weights),
+            None => Ok(matrix),
+        }
+    }
+}
+
+/// Rounds a column's values down to the edges of `bins` bins that hold equally many of them. Missing values stay.
+fn round_down(features: &mut [f32], column: usize, columns: usize, bins: usize) {
+    let mut values: Vec<f32> =
+        features.iter().skip(column).step_by(columns).copied().filter(|value| !value.is_nan()).collect();
+    values.sort_unstable_by(f32::total_cmp);
+    let mut edges: Vec<f32> = (0..bins).filter_map(|bin| values.get(bin * values.len() / bins)).copied().collect();
+    edges.dedup();
+    for value in features.iter_mut().skip(column).step_by(columns).filter(|value| !value.is_nan()) {
+        // The first edge is the smallest value, so there is always one at or below.
+        *value = edges[edges.partition_point(|edge| *edge <= *value).max(1) - 1];
+    }
+}
+
+/// The trainer's model as an ensemble; its trees add up in the same order.
+fn ensemble(model: &BoostedModel, descriptor: Descriptor, objects: Vec<String>) -> Ensemble {
+    let trees = model.trees().iter().zip(model.tree_outputs()).map(|(tree, outputs)| Tree {
+        output: if tree.is_vector_leaf() { Output::Each } else { Output::One(outputs.start) },
+        nodes: (tree.nodes().iter().enumerate())
+            .map(|(index, node)| match (usize::try_from(node.left), usize::try_from(node.right)) {
+                (Ok(left), Ok(right)) => Node::Split {
+                    // Lossless: a descriptor has at most eight features.
+                    feature: node.split_feature as usize,
+                    threshold: node.split_cond,
+                    missing_left: node.default_left,
+                    left,
+                    right,
+                },
+                _ => Node::Leaf(tree.leaf_vector(index).to_vec()),
+            })
+            .collect(),
+    });
+    Ensemble { descriptor, objects, base_margins: model.base_scores().to_vec(), trees: trees.collect() }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+//! How often, and after how many touches, a model is right.
+//!
+//! Margins are computed once for every test touch ([`Margins`]); everything else is sums of them over groups of touches,
+//! each group drawn at random without replacement from one object's touches:
+//!
+//! - [`Curve`]: how often the object with the most evidence is the right one, after any fixed number of touches;
+//! - [`Sequential`]: touches pushed one after the other until the recognizer is sure.
+//!
+//! A compiled model is evaluated by the onboard crate, the lines of code that run on the chip; an ensemble in f32 margins
+//! and f64 evidence, with the same stopping rule. The same seed draws the same groups for every model.
+//!
+//! Standard errors are those of the drawing of groups from the test touches at hand.
+
+mod curve;
+mod estimate;
+mod margins;
+pub mod model_file;
+pub mod parity;
+mod sequential;
+#[cfg(test)]
+mod tests;
+
+pub use curve::{Confidence, Curve};
+pub use estimate::Estimate;
+pub use margins::{Candidate, Margins};
+pub use sequential::{Outcome, Sequential, SequentialSettings};
+
+use crate::error::{Error, Result};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Touches after which a recognizer gives up, unless its model says otherwise.
+pub const MAX_TOUCHES: u32 = 200;
+
+/// What is evaluated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Numbers of touches after which accuracy is wanted.
+    pub at: Vec<usize>,
+    /// Groups, and sequences, drawn for each object.
+    pub groups: usize,
+    /// The recognizer stops when the posterior passes one less this.
+    pub error_rate: f64,
+    /// Touches after which the recognizer gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble.
+    pub max_touches: Option<u32>,
+    /// Seed of the drawing.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { at: vec![5, 10, 20, 30, 60], groups: 1000, error_rate: 0.01, max_touches: None, seed: 1 }
+    }
+}
+
+/// What an evaluation found; as JSON, `palpate evaluate --json`. Shares are between 0 and 1; maps go from numbers of
+/// touches or objects' names to values.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// The model's descriptor.
+    pub descriptor: Option<&'static str>,
+    /// Test touches, of all objects together.
+    pub touches: usize,
+    /// Groups drawn for each object.
+    pub groups: usize,
+    /// Accuracy after a number of touches, each object counting alike.
+    pub accuracy: BTreeMap<usize, f64>,
+    /// Standard error of [`Evaluation::accuracy`].
+    pub accuracy_standard_error: BTreeMap<usize, f64>,
+    /// The same for each object.
+    pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
+    /// What the recognizer does that stops by itself.
+    pub sequential: Sequential,
+}
+
+/// Evaluates a model on test touches.
+///
+/// # Errors
+/// [`Error::Argument`] if a number of touches is 0 or more than an object has, if there are no groups, or the error rate
+/// is not between 1e-15 and 0.5.
+pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation> {
+    let most = settings.at.iter().copied().max().unwrap_or(1);
+    let curve = margins.curve(most, settings.groups, settings.seed)?;
+    if settings.at.contains(&0) {
+        return Err(Error::argument("accuracy after 0 touches was asked for", "Use numbers of at least 1 with --at."));
+    }
+    let sequential = margins.sequential(&SequentialSettings {
+        error_rate: settings.error_rate,
+        max_touches: settings.max_touches,
+        sequences: settings.groups,
+        seed: settings.seed,
+    })?;
+    let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));
+    let per_object = |(position, name): (usize, &String)| {
+        let accuracy = |&touches: &usize| (touches, curve.object_accuracy(position, touches).value);
+        (name.clone(), settings.at.iter().map(accuracy).collect())
+    };
+    Ok(Evaluation {
+        descriptor: margins.descriptor().map(palpate_shared::Descriptor::name),
+        touches: margins.touch_count(),
+        groups: settings.groups,
+        accuracy: settings.at.iter().map(accuracy).map(|(at, estimate)| (at, estimate.value)).collect(),
+        accuracy_standard_error: settings.at.iter().map(accuracy).map(|(at, e)| (at, e.standard_error)).collect(),
+        per_object: margins.tested_names().iter().enumerate().map(per_object).collect(),
+        sequential,
+    })
+}

@@ -1,0 +1,147 @@
+use super::*;
+use crate::mesh::Mesh;
+use glam::Vec3;
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
+/// The canonical objects, made once for all tests.
+static CANONICAL: LazyLock<Vec<Object>> = LazyLock::new(all);
+
+/// The signed volume, in cubic centimeters: positive if the triangles are anticlockwise seen from outside.
+fn volume(mesh: &Mesh) -> f64 {
+    let at = |i: u32| Vec3::from(mesh.vertices[i as usize]).as_dvec3();
+    mesh.triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c))) / 6.0).sum()
+}
+
+/// How often every directed edge occurs.
+fn edges(mesh: &Mesh) -> HashMap<(u32, u32), usize> {
+    let mut count = HashMap::new();
+    for &[a, b, c] in &mesh.triangles {
+        for edge in [(a, b), (b, c), (c, a)] {
+            *count.entry(edge).or_insert(0) += 1;
+        }
+    }
+    count
+}
+
+/// How many pieces the surface falls into.
+fn pieces(mesh: &Mesh) -> usize {
+    fn root(parents: &mut [u32], mut i: u32) -> u32 {
+        while parents[i as usize] != i {
+            parents[i as usize] = parents[parents[i as usize] as usize];
+            i = parents[i as usize];
+        }
+        i
+    }
+    let mut parents: Vec<u32> = (0..).take(mesh.vertices.len()).collect();
+    for &[a, b, c] in &mesh.triangles {
+        for other in [b, c] {
+            let (a, other) = (root(&mut parents, a), root(&mut parents, other));
+            parents[a as usize] = other;
+        }
+    }
+    mesh.triangles.iter().map(|&[a, ..]| root(&mut parents, a)).collect::<std::collections::HashSet<_>>().len()
+}
+
+fn assert_closed(name: &str, mesh: &Mesh) {
+    let edges = edges(mesh);
+    for (&(a, b), &count) in &edges {
+        assert_ne!(a, b, "{name}: a triangle uses a vertex twice");
+        assert_eq!(count, 1, "{name}: an edge is used {count} times in one direction");
+        assert_eq!(edges.get(&(b, a)), Some(&1), "{name}: an edge has no opposite");
+    }
+    assert!(mesh.vertices.iter().flatten().all(|x| x.is_finite()), "{name}: a vertex is not finite");
+}
+
+#[test]
+fn there_are_ten_in_the_agreed_order() {
+    let names: Vec<_> = CANONICAL.iter().map(|object| object.name.as_str()).collect();
+    let agreed =
+        ["bowl", "camera", "paperclip", "fork", "hammer", "mouse", "scissors", "spoon", "wristwatch", "winebottle"];
+    assert_eq!(names, agreed);
+}
+
+#[test]
+fn every_edge_is_shared_by_two_triangles_that_agree_which_side_is_out() {
+    for object in &*CANONICAL {
+        assert_closed(&object.name, &object.mesh);
+        assert!(volume(&object.mesh) > 0.0, "{} is inside out", object.name);
+    }
+}
+
+#[test]
+fn every_object_is_of_one_piece() {
+    for object in &*CANONICAL {
+        assert_eq!(pieces(&object.mesh), 1, "{}", object.name);
+    }
+}
+
+#[test]
+fn every_mesh_has_5000_to_60000_triangles() {
+    let counts: Vec<_> = CANONICAL.iter().map(|object| (&object.name, object.mesh.triangles.len())).collect();
+    assert!(counts.iter().all(|(_, count)| (5_000..=60_000).contains(count)), "{counts:?}");
+}
+
+#[test]
+fn the_same_bytes_on_any_number_of_threads() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+    for (a, b) in CANONICAL.iter().zip(&pool.install(all)) {
+        assert_eq!(a.mesh, b.mesh, "{}", a.name);
+    }
+}
+
+#[test]
+fn varied_objects_are_closed_and_right_side_out_and_never_the_same() {
+    for object in &*CANONICAL {
+        let mut volumes = vec![volume(&object.mesh)];
+        for seed in [1, 3] {
+            let varied = varied(&object.name, seed).unwrap();
+            let name = format!("{} with seed {seed}", object.name);
+            assert_closed(&name, &varied.mesh);
+            assert_eq!(pieces(&varied.mesh), 1, "{name}");
+            assert!((5_000..=70_000).contains(&varied.mesh.triangles.len()), "{name}: {}", varied.mesh.triangles.len());
+            let size = volume(&varied.mesh);
+            assert!(size > 0.3 * volumes[0] && size < 3.0 * volumes[0], "{name}: {size} against {}", volumes[0]);
+            assert!(volumes.iter().all(|other| (size / other - 1.0).abs() > 1e-4), "{name} is like another");
+            volumes.push(size);
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_object() {
+    assert_eq!(varied("fork", 7).unwrap().mesh, varied("fork", 7).unwrap().mesh);
+}
+
+#[test]
+fn no_triangle_faces_inwards_where_surfaces_are_smooth() {
+    // The angle between a triangle and the mean of its three neighbors: folds show as more than a right angle.
+    for object in &*CANONICAL {
+        let mesh = &object.mesh;
+        let normal = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| Vec3::from(mesh.vertices[i as usize]));
+            (b - a).cross(c - a).normalize_or_zero()
+        };
+        let mut owner = HashMap::new();
+        for (i, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+            owner.extend([((a, b), i), ((b, c), i), ((c, a), i)]);
+        }
+        let area = |&[a, b, c]: &[u32; 3]| {
+            let [a, b, c] = [a, b, c].map(|i| Vec3::from(mesh.vertices[i as usize]));
+            (b - a).cross(c - a).length()
+        };
+        let folded = mesh.triangles.iter().filter(|&&[a, b, c]| {
+            let around: Vec3 = [(b, a), (c, b), (a, c)].iter().map(|edge| normal(&mesh.triangles[owner[edge]])).sum();
+            normal(&[a, b, c]).dot(around) < 0.0
+        });
+        let share = folded.map(area).sum::<f32>() / mesh.triangles.iter().map(area).sum::<f32>();
+        assert!(share < 1e-3, "{}: {share} of the surface is folded", object.name);
+    }
+}
+
+#[test]
+fn an_unknown_name_is_an_argument_error_that_lists_the_known_ones() {
+    let error = one("teapot").unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().contains("teapot") && error.to_string().contains("winebottle"), "{error}");
+}

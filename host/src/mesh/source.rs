@@ -1,0 +1,201 @@
+//! Where objects come from: built in, an OBJ file, a directory of them.
+
+use crate::error::{Error, Result};
+use crate::mesh::Object;
+use crate::mesh::builtin;
+use crate::mesh::obj;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The objects of all `sources`, sorted by name. A source is `builtin` (the ten built-in objects), the name of one of
+/// them, an OBJ file, or a directory, which is searched for OBJ files with its folders.
+///
+/// An object is named after its file; in ShapeNet's layout (`<category>/<id>/models/model_normalized.obj`) after the
+/// category, or after category and id where the sources hold several of a category.
+///
+/// # Errors
+/// When a source does not exist, holds no OBJ file, or a file is no usable mesh, and when two objects have one name.
+pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
+    let mut objects = Vec::new();
+    for file in files(sources)? {
+        objects.push(match file {
+            Source::BuiltIn(object) => object,
+            Source::File { name, path } => Object { mesh: obj::read(&path)?, name },
+        });
+    }
+    Ok(objects)
+}
+
+/// An object that is not yet read.
+#[derive(Debug)]
+pub enum Source {
+    /// One that the program makes.
+    BuiltIn(Object),
+    /// One that a file holds.
+    File {
+        /// The object's name.
+        name: String,
+        /// Its OBJ file.
+        path: PathBuf,
+    },
+}
+
+impl Source {
+    /// The object's name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::BuiltIn(object) => &object.name,
+            Self::File { name, .. } => name,
+        }
+    }
+}
+
+/// What [`objects`](fn@objects) gives, files not yet read: sorted by name.
+///
+/// # Errors
+/// As [`objects`](fn@objects), apart from what is wrong inside a file.
+pub fn files(sources: &[String]) -> Result<Vec<Source>> {
+    let mut paths = Vec::new();
+    let mut found = BTreeMap::new();
+    for source in sources {
+        if source == "builtin" {
+            for object in builtin::all() {
+                insert(&mut found, object.name.clone(), Source::BuiltIn(object))?;
+            }
+        } else if builtin::names().contains(&source.as_str()) && !Path::new(source).exists() {
+            insert(&mut found, source.clone(), Source::BuiltIn(builtin::one(source)?))?;
+        } else {
+            let path = Path::new(source);
+            let metadata = std::fs::metadata(path).map_err(|error| Error::io(path, "read the mesh", error))?;
+            if metadata.is_dir() {
+                let before = paths.len();
+                search(path, FOLDERS, &mut paths)?;
+                if paths.len() == before {
+                    return Err(Error::file(path, "no OBJ file here", "Give a directory that holds .obj files."));
+                }
+            } else {
+                paths.push(path.to_owned());
+            }
+        }
+    }
+    let mut in_category = BTreeMap::new();
+    for (category, _) in paths.iter().filter_map(|path| shapenet(path)) {
+        *in_category.entry(category).or_insert(0) += 1;
+    }
+    for path in &paths {
+        let name = match shapenet(path) {
+            Some((category, id)) if in_category[&category] > 1 => format!("{category}-{id}"),
+            Some((category, _)) => category,
+            None => text(path.file_stem()),
+        };
+        insert(&mut found, name.clone(), Source::File { name, path: path.clone() })?;
+    }
+    Ok(found.into_values().collect())
+}
+
+fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) -> Result<()> {
+    let place = |source: &Source| match source {
+        Source::BuiltIn(_) => "builtin".to_owned(),
+        Source::File { path, .. } => path.display().to_string(),
+    };
+    if let Some(other) = found.get(&name) {
+        let what = format!("two objects are called {name}: {} and {}", place(other), place(&source));
+        return Err(Error::data(what, "Rename one of the files, or leave one out."));
+    }
+    found.insert(name, source);
+    Ok(())
+}
+
+/// How many folders deep a directory is searched.
+const FOLDERS: usize = 8;
+
+fn search(directory: &Path, folders: usize, paths: &mut Vec<PathBuf>) -> Result<()> {
+    let io = |error| Error::io(directory, "read the directory", error);
+    let mut entries = std::fs::read_dir(directory).map_err(io)?.collect::<std::io::Result<Vec<_>>>().map_err(io)?;
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    for path in entries.into_iter().map(|entry| entry.path()) {
+        if path.is_dir() && folders > 0 {
+            search(&path, folders - 1, paths)?;
+        } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
+            paths.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Category and id of a file in ShapeNet's layout.
+fn shapenet(path: &Path) -> Option<(String, String)> {
+    let models = path.parent()?;
+    let id = models.parent()?;
+    let category = text(id.parent()?.file_name());
+    let is_shapenet = path.file_stem()? == "model_normalized" && models.file_name()? == "models";
+    let id = text(Some(id.file_name()?));
+    is_shapenet.then(|| if category.is_empty() { (id.clone(), id) } else { (category, id) })
+}
+
+fn text(name: Option<&std::ffi::OsStr>) -> String {
+    name.unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    fn place(directory: &Path, files: &[&str]) -> String {
+        for file in files {
+            let path = directory.join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, TRIANGLE).unwrap();
+        }
+        directory.to_str().unwrap().to_owned()
+    }
+
+    fn names(sources: &[String]) -> Vec<String> {
+        objects(sources).unwrap().into_iter().map(|object| object.name).collect()
+    }
+
+    #[test]
+    fn files_and_directories_together_are_sorted_by_name() {
+        let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let one = place(one.path(), &["spoon.OBJ", "deep/er/fork.obj", "notes.txt"]);
+        let two = place(two.path(), &["a cup.obj"]) + "/a cup.obj";
+        assert_eq!(names(&[one, two]), ["a cup", "fork", "spoon"]);
+    }
+
+    #[test]
+    fn a_built_in_object_is_found_by_its_name_unless_a_file_has_it() {
+        assert_eq!(names(&["mouse".into(), "bowl".into()]), ["bowl", "mouse"]);
+        let error = objects(&["builtin".into(), "mouse".into()]).unwrap_err().to_string();
+        assert!(error.contains("two objects are called mouse"), "{error}");
+    }
+
+    #[test]
+    fn shapenet_objects_are_named_after_category_and_id() {
+        let directory = tempfile::tempdir().unwrap();
+        let files = ["mug/1a/models/model_normalized.obj", "bowl/2b/models/model_normalized.obj"];
+        let source = place(directory.path(), &files);
+        assert_eq!(names(&[format!("{source}/mug/1a/models/model_normalized.obj")]), ["mug"]);
+        assert_eq!(names(&[source]), ["bowl", "mug"]);
+        let source = place(directory.path(), &["mug/3c/models/model_normalized.obj"]);
+        assert_eq!(names(&[source]), ["bowl", "mug-1a", "mug-3c"]);
+    }
+
+    #[test]
+    fn two_objects_of_one_name_are_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let source = place(directory.path(), &["a/cup.obj", "b/cup.obj"]);
+        let error = objects(&[source]).unwrap_err().to_string();
+        assert!(error.contains("two objects are called cup") && error.contains("b/cup.obj"), "{error}");
+    }
+
+    #[test]
+    fn missing_and_empty_sources_are_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let source = directory.path().to_str().unwrap().to_owned();
+        assert!(objects(std::slice::from_ref(&source)).unwrap_err().to_string().contains("no OBJ file here"));
+        let error = objects(&[source + "/bultin"]).unwrap_err();
+        assert!(error.to_string().contains("bultin: cannot read the mesh"), "{error}");
+    }
+}

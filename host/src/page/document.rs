@@ -1,0 +1,294 @@
+//! The page: one HTML file with its style, script, drawings and pictures inside, so that it opens anywhere and asks the
+//! network for nothing.
+
+use super::chart::Svg;
+use super::table::{Data, Table};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// A figure: one or more drawings side by side, with the numbers behind them.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// Its anchor, and its files' stem.
+    pub id: String,
+    /// What it shows.
+    pub title: String,
+    /// What to see in it, and how it was made.
+    pub caption: String,
+    /// The command that remakes it.
+    pub command: String,
+    /// Its drawings, at least one.
+    pub panels: Vec<Svg>,
+    /// The numbers drawn.
+    pub data: Data,
+}
+
+impl Figure {
+    /// All panels in one drawing on white, `columns` side by side as fit 1,160 pixels.
+    pub fn whole_svg(&self) -> Svg {
+        let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
+        let (width, height) = (cell(|panel| panel.width), cell(|panel| panel.height));
+        let columns = (1160 / width.max(1)).clamp(1, self.panels.len().max(1) as u32);
+        let rows = (self.panels.len() as u32).div_ceil(columns);
+        let (whole_width, whole_height) = (width * columns, height * rows);
+        let mut text = format!(
+            "<svg width=\"{whole_width}\" height=\"{whole_height}\" viewBox=\"0 0 {whole_width} {whole_height}\" \
+             xmlns=\"http://www.w3.org/2000/svg\">\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n"
+        );
+        for (index, panel) in (0..).zip(&self.panels) {
+            let (x, y) = (width * (index % columns), height * (index / columns));
+            text += &panel.text.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1);
+        }
+        Svg { text: text + "</svg>\n", width: whole_width, height: whole_height }
+    }
+}
+
+/// What a section is made of.
+#[derive(Clone, Debug)]
+pub enum Block {
+    /// A paragraph.
+    Text(String),
+    /// A figure.
+    Figure(Figure),
+    /// A table.
+    Table(Table),
+    /// Small pictures with a name and a line below each: `(PNG as a data URL, name, line)`.
+    Pictures(Vec<(String, String, String)>),
+}
+
+/// A heading with what belongs below it.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// Its anchor.
+    pub id: String,
+    /// Its heading.
+    pub title: String,
+    /// What it holds.
+    pub blocks: Vec<Block>,
+}
+
+impl Section {
+    /// An empty section.
+    pub fn new(id: &str, title: &str) -> Self {
+        Self { id: id.to_string(), title: title.to_string(), blocks: Vec::new() }
+    }
+
+    /// Adds a paragraph.
+    pub fn text(&mut self, text: impl Into<String>) -> &mut Self {
+        self.blocks.push(Block::Text(text.into()));
+        self
+    }
+
+    /// Adds a figure.
+    pub fn figure(&mut self, figure: Figure) -> &mut Self {
+        self.blocks.push(Block::Figure(figure));
+        self
+    }
+
+    /// Adds a table.
+    pub fn table(&mut self, table: Table) -> &mut Self {
+        self.blocks.push(Block::Table(table));
+        self
+    }
+}
+
+/// A whole page.
+#[derive(Clone, Debug)]
+pub struct Page {
+    /// Its title.
+    pub title: String,
+    /// One or two sentences below the title.
+    pub summary: String,
+    /// The sections, in order.
+    pub sections: Vec<Section>,
+    /// What stands at the foot: settings and version, as name and value.
+    pub facts: Vec<(String, String)>,
+    /// Whether figures' and tables' files lie beside the page and are linked to.
+    pub files: bool,
+}
+
+impl Page {
+    /// All figures, in order.
+    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
+        self.blocks().filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
+    }
+
+    /// All tables, in order.
+    pub fn tables(&self) -> impl Iterator<Item = &Table> {
+        self.blocks().filter_map(|block| if let Block::Table(table) = block { Some(table) } else { None })
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = &Block> {
+        self.sections.iter().flat_map(|section| &section.blocks)
+    }
+
+    /// The page as HTML.
+    pub fn html(&self) -> String {
+        html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    meta name="color-scheme" content="light dark";
+                    // The browser itself refuses whatever this page might ask the network for.
+                    meta http-equiv="Content-Security-Policy"
+                        content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+                    // No icon, so that a browser does not ask for one.
+                    link rel="icon" href="data:,";
+                    title { (self.title) }
+                    style { (PreEscaped(include_str!("page.css"))) }
+                }
+                body {
+                    header {
+                        h1 { (self.title) }
+                        p.lead { (self.summary) }
+                        @if self.sections.len() > 2 {
+                            nav { @for section in &self.sections { a href={ "#" (section.id) } { (section.title) } " " } }
+                        }
+                    }
+                    main {
+                        @for section in &self.sections {
+                            section id=(section.id) {
+                                h2 { (section.title) }
+                                @for block in &section.blocks { (self.block(block)) }
+                            }
+                        }
+                    }
+                    footer {
+                        dl { @for (name, value) in &self.facts { div { dt { (name) } dd { (value) } } } }
+                    }
+                    script { (PreEscaped(include_str!("page.js"))) }
+                }
+            }
+        }
+        .into_string()
+    }
+
+    fn block(&self, block: &Block) -> Markup {
+        match block {
+            Block::Text(text) => html! { p { (text) } },
+            Block::Figure(figure) => html! {
+                figure id=(figure.id) {
+                    h3 { (figure.title) }
+                    div.panels {
+                        @for panel in &figure.panels {
+                            div.panel.wide[panel.width > 400] style={ "--width:" (panel.width) "px" } role="img" aria-label=(figure.title) {
+                                (PreEscaped(&panel.text))
+                            }
+                        }
+                    }
+                    figcaption { (figure.caption) (self.origin(&figure.id, &figure.command, true)) }
+                }
+            },
+            Block::Table(table) => html! {
+                figure.table id=(table.id) {
+                    h3 { (table.title) }
+                    (rows(&table.data))
+                    figcaption { (table.caption) (self.origin(&table.id, &table.command, false)) }
+                }
+            },
+            Block::Pictures(pictures) => html! {
+                div.pictures {
+                    @for (url, name, line) in pictures {
+                        div { img src=(url) alt=(name); strong { (name) } span { (line) } }
+                    }
+                }
+            },
+        }
+    }
+
+    /// How to remake a figure or table, and where its numbers are.
+    fn origin(&self, id: &str, command: &str, drawn: bool) -> Markup {
+        html! {
+            div.origin {
+                @if !command.is_empty() { code { (command) } }
+                @if self.files {
+                    " " a href={ (id) ".csv" } { (id) ".csv" }
+                    @if drawn { " " a href={ (id) ".svg" } { (id) ".svg" } }
+                }
+            }
+        }
+    }
+}
+
+fn rows(data: &Data) -> Markup {
+    // A column reads as numbers if none of its cells is words.
+    let numeric: Vec<bool> = (0..data.columns.len())
+        .map(|column| !data.rows.iter().any(|row| matches!(row[column], super::table::Cell::Text(_))))
+        .collect();
+    html! {
+        div.scroll {
+            table {
+                thead {
+                    tr { @for (name, numeric) in data.columns.iter().zip(&numeric) {
+                        th scope="col" class=[numeric.then_some("number")] { button type="button" { (name) } }
+                    } }
+                }
+                tbody {
+                    @for row in &data.rows {
+                        tr { @for (cell, numeric) in row.iter().zip(&numeric) {
+                            td class=[numeric.then_some("number")] data-value=[cell.value()] { (cell.shown()) }
+                        } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::page::table::Cell;
+
+    #[test]
+    fn a_page_escapes_what_it_is_given_and_holds_everything_itself() {
+        let mut section = Section::new("one", "One & only");
+        let mut data = Data::new(["name", "value"]);
+        data.push(["<b>".into(), Cell::Number(2.0, 0)]);
+        section.table(Table {
+            id: "t".into(),
+            title: "T".into(),
+            caption: "C".into(),
+            command: "palpate report a b".into(),
+            data,
+        });
+        let page = Page {
+            title: "A <page>".into(),
+            summary: String::new(),
+            sections: vec![section],
+            facts: vec![("seed".into(), "1".into())],
+            files: true,
+        };
+        let html = page.html();
+        for part in [
+            "A &lt;page&gt;",
+            "&lt;b&gt;",
+            "One &amp; only",
+            "data-value=\"2\"",
+            "href=\"t.csv\"",
+            "palpate report a b",
+        ] {
+            assert!(html.contains(part), "{part}");
+        }
+        for part in ["http:", "https:", "url(", "@import", "<link rel=\"stylesheet\"", "src=\"/"] {
+            assert!(!html.contains(part), "{part}");
+        }
+    }
+
+    #[test]
+    fn panels_are_tiled_into_one_drawing() {
+        let panel = Svg { text: "<svg width=\"500\" height=\"100\"></svg>\n".into(), width: 500, height: 100 };
+        let figure = Figure {
+            id: "f".into(),
+            title: String::new(),
+            caption: String::new(),
+            command: String::new(),
+            panels: vec![panel; 3],
+            data: Data::default(),
+        };
+        let whole = figure.whole_svg();
+        assert_eq!((whole.width, whole.height), (1000, 200));
+        assert!(whole.text.contains("<svg x=\"500\" y=\"0\"") && whole.text.contains("<svg x=\"0\" y=\"100\""));
+    }
+}

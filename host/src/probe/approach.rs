@@ -1,0 +1,160 @@
+//! One attempt of the probe to touch a scene.
+//!
+//! The probe is three spheres in a row that move together in a straight line. Where it starts, where it aims and how
+//! its row is turned are drawn at random; when each finger first touches is what it measures.
+
+use crate::error::{Error, Result};
+use crate::probe::scene::Scene;
+use crate::touches::to_q15;
+use glam::DVec3;
+use palpate_shared::{ContactTime, Pose, Touch};
+use rand::{Rng, RngExt};
+
+/// How many fingers the probe has.
+pub const FINGERS: usize = 3;
+
+/// How far outside the sphere about the object's bounding box an approach starts, in units.
+pub const CLEARANCE: f64 = 5.0;
+
+/// The probe's measures.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// The fingers' radius, in units.
+    pub radius: f64,
+    /// The distance between neighboring fingers' centers, in units.
+    pub spacing: f64,
+    /// How fast the probe moves, in units a second.
+    pub speed: f64,
+    /// How far the row of fingers may be tilted from the perpendicular to the motion, in degrees, to either side.
+    pub tilt: f64,
+}
+
+/// The published probe: radius 0.15, spacing 1.5, 10 units a second, ±10°.
+impl Default for Probe {
+    fn default() -> Self {
+        Self { radius: 0.15, spacing: 1.5, speed: 10.0, tilt: 10.0 }
+    }
+}
+
+impl Probe {
+    /// Refuses measures that make no probe, or one too slow for times in microseconds, against an object whose box's
+    /// longest side is `length`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the measure.
+    pub fn check(&self, length: f64) -> Result<()> {
+        let positive = [("length", length), ("radius", self.radius), ("speed", self.speed)];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::argument(format!("the {name} is {value}"), "Give a number greater than 0."));
+            }
+        }
+        if !(self.spacing.is_finite() && self.spacing >= 0.0) {
+            return Err(Error::argument(format!("the spacing is {}", self.spacing), "Give 0 or more."));
+        }
+        if !(0.0..90.0).contains(&self.tilt) {
+            return Err(Error::argument(format!("the tilt is {}°", self.tilt), "Give 0 or more, and less than 90."));
+        }
+        // Twice the diagonal of a cube, the clearance, and the row, generously.
+        let longest_way = 4.0 * length + 2.0 * (CLEARANCE + self.spacing + self.radius);
+        if longest_way / self.speed * 1e6 >= f64::from(u32::MAX) {
+            let what = format!("the speed {} is too low to keep contact times below 4294 s", self.speed);
+            return Err(Error::argument(what, "Give a higher speed."));
+        }
+        Ok(())
+    }
+}
+
+/// Where the probe starts, which way it goes and how its row lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach {
+    /// Where the middle finger starts.
+    pub start: DVec3,
+    /// Unit vector of the motion.
+    pub direction: DVec3,
+    /// Unit vector along the row, from the first finger to the third.
+    pub alignment: DVec3,
+}
+
+impl Approach {
+    /// Draws an approach to an object with this bounding box. Start: uniform in direction, at half the box's diagonal
+    /// plus [`CLEARANCE`] from its center. Aim: uniform in the box; the middle finger moves from start to aim. Row:
+    /// perpendicular to the motion, rolled uniformly about it, then tilted in the plane of row and motion by a uniform
+    /// angle within ± `tilt` degrees.
+    pub fn draw(rng: &mut impl Rng, [low, high]: [DVec3; 2], tilt: f64) -> Self {
+        let (center, side) = ((low + high) / 2.0, high - low);
+        let start = center + on_sphere(rng) * (side.length() / 2.0 + CLEARANCE);
+        let aim = low + side * DVec3::new(unit(rng), unit(rng), unit(rng));
+        let direction = (aim - start).normalize();
+        let across = direction.any_orthonormal_vector();
+        let [roll_cos, roll_sin] = on_circle(rng);
+        let row = across * roll_cos + direction.cross(across) * roll_sin;
+        let (tilt_sin, tilt_cos) = libm::sincos((tilt * (2.0 * unit(rng) - 1.0)).to_radians());
+        Self { start, direction, alignment: row * tilt_cos + direction * tilt_sin }
+    }
+
+    /// Where the fingers start, first to third.
+    pub fn fingers(&self, spacing: f64) -> [DVec3; FINGERS] {
+        [-1.0, 0.0, 1.0].map(|place| self.start + self.alignment * (place * spacing))
+    }
+
+    /// How far the probe has moved when each finger first touches, in units; none for a finger that never does.
+    pub fn distances(&self, scene: &Scene, probe: &Probe) -> [Option<f64>; FINGERS] {
+        self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius))
+    }
+
+    /// The same if all three fingers touch, else none: as soon as one finger misses, the others are left alone.
+    pub fn full_distances(&self, scene: &Scene, probe: &Probe) -> Option<[f64; FINGERS]> {
+        let [first, middle, last] = self.fingers(probe.spacing);
+        let may_touch = |finger| scene.may_touch(finger, self.direction, probe.radius);
+        // The middle finger is aimed at the box, so it is the one that is likely to get there.
+        if !may_touch(first) || !may_touch(last) {
+            return None;
+        }
+        let contact = |finger| scene.first_contact(finger, self.direction, probe.radius);
+        let first = contact(first)?;
+        let last = contact(last)?;
+        let middle = contact(middle)?;
+        Some([first, middle, last])
+    }
+
+    /// The touch that these distances make: times in whole microseconds after the first contact, and the pose.
+    pub fn touch(&self, distances: [Option<f64>; FINGERS], probe: &Probe) -> Touch {
+        let earliest = distances.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let micros =
+            |distance: f64| ContactTime::from_micros(((distance - earliest) / probe.speed * 1e6).round() as u32);
+        let times = distances.map(|distance| distance.map_or(ContactTime::MISSING, micros));
+        Touch::new(times).with_pose(Pose {
+            direction: self.direction.to_array().map(to_q15),
+            alignment: self.alignment.to_array().map(to_q15),
+        })
+    }
+}
+
+/// Uniform in [0, 1), of 53 bits.
+fn unit(rng: &mut impl Rng) -> f64 {
+    rng.random()
+}
+
+/// A uniform direction, by rejection: no trigonometry whose last bit could differ between machines.
+fn on_sphere(rng: &mut impl Rng) -> DVec3 {
+    loop {
+        let point = DVec3::new(unit(rng), unit(rng), unit(rng)) * 2.0 - 1.0;
+        let square = point.length_squared();
+        if (1e-4..=1.0).contains(&square) {
+            return point / square.sqrt();
+        }
+    }
+}
+
+/// The cosine and sine of a uniform angle, by rejection.
+fn on_circle(rng: &mut impl Rng) -> [f64; 2] {
+    loop {
+        let [x, y] = [unit(rng), unit(rng)].map(|u| 2.0 * u - 1.0);
+        let square = x * x + y * y;
+        if (1e-4..=1.0).contains(&square) {
+            return [x / square.sqrt(), y / square.sqrt()];
+        }
+    }
+}

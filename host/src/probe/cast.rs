@@ -1,0 +1,196 @@
+//! Casts from a file, for holding this simulator against another engine.
+//!
+//! A line is `set,ox,oy,oz,dx,dy,dz` or `set,ox,oy,oz,dx,dy,dz,t`: the name of a set of casts, where the sphere's
+//! center starts, its direction (not renormalized: times are in its length), and the time of contact that somebody else
+//! found (`miss` for none). Numbers are taken as the nearest `f32`, as meshes and engines have them. Lines that begin
+//! with `#` and blank lines are kept as they are.
+
+use crate::error::{Error, Result};
+use crate::probe::scene::Scene;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// A line of a file of casts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Line {
+    /// A comment or a blank line.
+    Other(String),
+    /// A cast.
+    Cast(Cast),
+}
+
+/// A sphere to be moved against a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cast {
+    /// The line as it stands in the file.
+    pub text: String,
+    /// The set it belongs to.
+    pub set: String,
+    /// Where the sphere's center starts.
+    pub origin: DVec3,
+    /// Its direction.
+    pub direction: DVec3,
+    /// The time that the file gives, if it does: none within for a miss.
+    pub known: Option<Option<f64>>,
+}
+
+/// Reads a file of casts.
+///
+/// # Errors
+/// When the file cannot be read or a line is wrong.
+pub fn read(path: &Path) -> Result<Vec<Line>> {
+    let io = |error| Error::io(path, "read the casts", error);
+    let reader = BufReader::new(File::open(path).map_err(io)?);
+    let line = |(index, text): (usize, std::io::Result<String>)| {
+        let text = text.map_err(io)?;
+        if text.trim().is_empty() || text.starts_with('#') {
+            return Ok(Line::Other(text));
+        }
+        let wrong = |what| Error::line(path, index as u64 + 1, what, "Give set,ox,oy,oz,dx,dy,dz and, if known, t.");
+        parse(text).map(Line::Cast).map_err(wrong)
+    };
+    reader.lines().enumerate().map(line).collect()
+}
+
+fn parse(text: String) -> Result<Cast, String> {
+    let fields: Vec<&str> = text.trim().split(',').map(str::trim).collect();
+    if fields.len() != 7 && fields.len() != 8 {
+        return Err(format!("{} fields where a cast has 7, or 8 with a time", fields.len()));
+    }
+    let vector = |first: usize| -> Result<DVec3, String> {
+        let mut vector = Vec3::ZERO;
+        for axis in 0..3 {
+            let field = fields[first + axis];
+            let value = field.parse::<f32>().ok().filter(|value| value.is_finite());
+            vector[axis] = value.ok_or_else(|| format!("{field:?} is not a finite number"))?;
+        }
+        Ok(vector.as_dvec3())
+    };
+    let known = match fields.get(7) {
+        None => None,
+        Some(&"miss") => Some(None),
+        Some(field) => {
+            let time = field.parse().ok().filter(|time: &f64| time.is_finite() && *time >= 0.0);
+            Some(Some(time.ok_or_else(|| format!("{field:?} is neither a time nor `miss`"))?))
+        }
+    };
+    let (set, origin, direction) = (fields[0].to_owned(), vector(1)?, vector(4)?);
+    Ok(Cast { set, origin, direction, known, text })
+}
+
+/// The times of contact of the casts among the lines, in their order.
+pub fn times(scene: &Scene, lines: &[Line], radius: f64) -> Vec<Option<f64>> {
+    let time = |line: &Line| match line {
+        Line::Other(_) => None,
+        Line::Cast(cast) => Some(scene.first_contact(cast.origin, cast.direction, radius)),
+    };
+    lines.par_iter().filter_map(time).collect()
+}
+
+/// The lines with the casts' times appended: the shortest decimals that are read back as the same f64, or `miss`.
+pub fn annotate(lines: &[Line], times: &[Option<f64>]) -> String {
+    let mut text = String::new();
+    let mut times = times.iter();
+    for line in lines {
+        // Writing to a string cannot fail.
+        let _ = match line {
+            Line::Other(other) => writeln!(text, "{other}"),
+            Line::Cast(cast) => match times.next().copied().flatten() {
+                Some(time) => writeln!(text, "{},{time}", cast.text.trim_end()),
+                None => writeln!(text, "{},miss", cast.text.trim_end()),
+            },
+        };
+    }
+    text
+}
+
+/// How times agree with those that a file gives, set by set.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Agreement {
+    /// The set's name.
+    pub set: String,
+    /// How many of its casts have a known time.
+    pub casts: usize,
+    /// Known contacts that were not found.
+    pub missed: usize,
+    /// Contacts that were found where there is none.
+    pub false_contacts: usize,
+    /// The largest difference between a known and a found time.
+    pub largest_error: f64,
+}
+
+/// Holds times against the known ones; sets in the order in which they first appear.
+pub fn agreement(lines: &[Line], times: &[Option<f64>]) -> Vec<Agreement> {
+    let mut sets: Vec<Agreement> = Vec::new();
+    let casts = lines.iter().filter_map(|line| match line {
+        Line::Cast(cast) => Some(cast),
+        Line::Other(_) => None,
+    });
+    for (cast, found) in casts.zip(times) {
+        let Some(known) = cast.known else { continue };
+        let place = sets.iter().position(|set| set.set == cast.set).unwrap_or_else(|| {
+            sets.push(Agreement { set: cast.set.clone(), ..Agreement::default() });
+            sets.len() - 1
+        });
+        let set = &mut sets[place];
+        set.casts += 1;
+        match (known, found) {
+            (Some(known), Some(found)) => set.largest_error = set.largest_error.max((known - found).abs()),
+            (Some(_), None) => set.missed += 1,
+            (None, Some(_)) => set.false_contacts += 1,
+            (None, None) => {}
+        }
+    }
+    sets
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+
+    fn lines(text: &str) -> Result<Vec<Line>> {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("casts.csv");
+        std::fs::write(&path, text).unwrap();
+        read(&path)
+    }
+
+    #[test]
+    fn lines_come_back_with_their_time_appended() {
+        let vertices = vec![[0.0, -5.0, -5.0], [0.0, 5.0, -5.0], [0.0, 0.0, 5.0]];
+        let scene = Scene::as_is(&Mesh { vertices, triangles: vec![[0, 1, 2]] }).unwrap();
+        let lines =
+            lines("# casts\n\na,-4,0,0,2,0,0,1.75\na,-4,0,0,-2,0,0\r\nb,1,0,0,-1,0,0,miss\nb,0,9,0,0,0,0,0\n").unwrap();
+        let times = times(&scene, &lines, 0.5);
+        let text = annotate(&lines, &times);
+        let expected = "# casts\n\na,-4,0,0,2,0,0,1.75,1.75\na,-4,0,0,-2,0,0,miss\nb,1,0,0,-1,0,0,miss,0.5\nb,0,9,0,0,0,0,0,miss\n";
+        assert_eq!(text, expected);
+        let agreement = agreement(&lines, &times);
+        let set = |set: &str, casts, missed, false_contacts| Agreement {
+            set: set.into(),
+            casts,
+            missed,
+            false_contacts,
+            largest_error: 0.0,
+        };
+        assert_eq!(agreement, [set("a", 1, 0, 0), set("b", 2, 1, 1)]);
+    }
+
+    #[test]
+    fn wrong_lines_are_named() {
+        for (text, what) in [
+            ("a,0,0,0,1,0\n", "casts.csv:1: 6 fields"),
+            ("# x\na,0,0,0,1,0,x\n", "casts.csv:2: \"x\" is not a finite number"),
+            ("a,0,0,0,1,0,1e39\n", "\"1e39\" is not a finite number"),
+            ("a,0,0,0,1,0,0,-1\n", "\"-1\" is neither a time nor `miss`"),
+        ] {
+            let error = lines(text).unwrap_err().to_string();
+            assert!(error.contains(what), "{error}");
+        }
+    }
+}

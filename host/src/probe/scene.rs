@@ -1,0 +1,115 @@
+//! An object scaled and centered, ready to be touched.
+
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::probe::sweep::{Surface, narrow::Triangle};
+use glam::{DVec3, Vec3};
+
+/// A surface in the units of the probe.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    surface: Surface,
+    bounds: [DVec3; 2],
+}
+
+impl Scene {
+    /// The mesh, scaled so that its bounding box's longest side has `length` units and centered on the box's center.
+    ///
+    /// # Errors
+    /// When the mesh has no triangles, an index is out of range, a coordinate is not finite, or all corners are the
+    /// same point.
+    pub fn new(mesh: &Mesh, length: f64) -> Result<Self> {
+        let mut triangles = corners(mesh)?;
+        let [low, high] = bounds(&triangles);
+        let longest = (high - low).max_element();
+        if longest <= 0.0 {
+            return Err(Error::data("the mesh has no extent: all its corners are the same point", FIX));
+        }
+        let (center, scale) = ((low + high) / 2.0, length / longest);
+        triangles.iter_mut().flatten().for_each(|corner| *corner = (*corner - center) * scale);
+        Ok(Self::of(triangles))
+    }
+
+    /// The mesh in its own units and place.
+    ///
+    /// # Errors
+    /// When the mesh has no triangles, an index is out of range, or a coordinate is not finite.
+    pub fn as_is(mesh: &Mesh) -> Result<Self> {
+        Ok(Self::of(corners(mesh)?))
+    }
+
+    fn of(triangles: Vec<Triangle>) -> Self {
+        let bounds = bounds(&triangles);
+        Self { surface: Surface::new(triangles), bounds }
+    }
+
+    /// The surface itself.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// The triangles' corners, in no particular order.
+    pub fn triangles(&self) -> impl ExactSizeIterator<Item = Triangle> + '_ {
+        self.surface.triangles()
+    }
+
+    /// The bounding box: its lowest and highest corner.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.bounds
+    }
+
+    /// The first t ≥ 0 at which a sphere of this radius, centered at origin + t · direction, touches the object; 0 when
+    /// it starts in contact, none when it never touches. With a unit vector as direction, t is a distance.
+    pub fn first_contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
+        self.surface.first_contact(origin, direction, radius)
+    }
+
+    /// Whether such a sphere's path meets the bounding box: if not, it never touches.
+    pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
+        self.surface.may_touch(origin, direction, radius)
+    }
+}
+
+const FIX: &str = "Give a mesh with faces and an extent.";
+
+fn corners(mesh: &Mesh) -> Result<Vec<Triangle>> {
+    let corner = |index: u32| {
+        let position =
+            mesh.vertices.get(index as usize).copied().map(Vec3::from).filter(|position| position.is_finite());
+        position
+            .map(Vec3::as_dvec3)
+            .ok_or_else(|| Error::data(format!("vertex {index} of the mesh is missing or not finite"), FIX))
+    };
+    if mesh.triangles.is_empty() {
+        return Err(Error::data("the mesh has no triangles", FIX));
+    }
+    mesh.triangles.iter().map(|&[a, b, c]| Ok([corner(a)?, corner(b)?, corner(c)?])).collect()
+}
+
+fn bounds(triangles: &[Triangle]) -> [DVec3; 2] {
+    let grow = |[low, high]: [DVec3; 2], &corner: &DVec3| [low.min(corner), high.max(corner)];
+    triangles.iter().flatten().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], grow)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_side_gets_the_length_and_the_box_is_centered() {
+        let vertices = vec![[1.0, 10.0, 0.0], [3.0, 10.0, 0.5], [2.0, 6.0, 0.25], [900.0; 3]];
+        let scene = Scene::new(&Mesh { vertices, triangles: vec![[0, 1, 2]] }, 10.0).unwrap();
+        assert_eq!(scene.bounds(), [DVec3::new(-2.5, -5.0, -0.625), DVec3::new(2.5, 5.0, 0.625)]);
+        assert_eq!(scene.triangles().next().unwrap()[0], DVec3::new(-2.5, 5.0, -0.625));
+    }
+
+    #[test]
+    fn meshes_that_cannot_be_touched_are_refused() {
+        let vertices = vec![[1.0; 3], [f32::NAN; 3], [2.0; 3]];
+        for (triangle, what) in [([0, 0, 0], "no extent"), ([0, 1, 2], "not finite"), ([0, 2, 3], "vertex 3")] {
+            let error = Scene::new(&Mesh { vertices: vertices.clone(), triangles: vec![triangle] }, 10.0).unwrap_err();
+            assert!(error.to_string().contains(what), "{error}");
+        }
+        assert!(Scene::as_is(&Mesh::default()).unwrap_err().to_string().contains("no triangles"));
+    }
+}

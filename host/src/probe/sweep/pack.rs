@@ -1,0 +1,153 @@
+//! Eight triangles at once in f32: which of them can a moving sphere not touch?
+//!
+//! Seen along the motion, the sphere's path is a disc and a triangle is a triangle: they are apart if a line separates
+//! them (the sides of the triangle's bounding rectangle and its edges are tried). Along the motion, a triangle behind
+//! the start is out of reach, and one at a distance from the path is touched late. Slack makes up for the rounding, so
+//! a triangle that is thrown out is surely not touched; of those that stay, most are.
+
+use super::budget::BOX;
+use super::narrow::{Motion, Triangle};
+use glam::{DVec3, Vec3, Vec4};
+
+/// How many triangles a pack holds.
+pub(super) const LANES: usize = 2 * WIDTH;
+
+/// How many lanes a register of the baseline instruction sets has; `glam` keeps a [`Vec4`] in one.
+pub(super) const WIDTH: usize = 4;
+
+/// Up to eight triangles, in two halves of four: corner by corner, axis by axis. Free lanes repeat the first triangle.
+#[derive(Clone, Debug)]
+pub(super) struct Pack {
+    halves: [[[Vec4; 3]; 3]; 2],
+    /// Index of the first triangle; the others follow it.
+    pub(super) first: u32,
+    /// How many lanes are in use.
+    pub(super) count: u32,
+}
+
+impl Pack {
+    pub(super) fn new(triangles: &[Triangle], first: u32) -> Self {
+        let mut halves = [[[Vec4::ZERO; 3]; 3]; 2];
+        for lane in 0..LANES {
+            let triangle = triangles.get(lane).unwrap_or(&triangles[0]);
+            for (corner, place) in halves[lane / WIDTH].iter_mut().zip(triangle) {
+                for (axis, value) in corner.iter_mut().zip(place.to_array()) {
+                    axis[lane % WIDTH] = value as f32;
+                }
+            }
+        }
+        Self { halves, first, count: triangles.len() as u32 }
+    }
+
+    /// For each triangle, that the sphere may touch it at once.
+    #[inline]
+    pub(super) fn unknown(&self) -> [f32; LANES] {
+        std::array::from_fn(|lane| if lane < self.count as usize { 0.0 } else { f32::INFINITY })
+    }
+
+    /// For each triangle, a distance before which the sphere does not touch it; infinite if it does not before `limit`.
+    #[inline]
+    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> [f32; LANES] {
+        let mut earliest = [f32::INFINITY; LANES];
+        let used = self.count as usize;
+        for (half, places) in self.halves.iter().zip(earliest.chunks_exact_mut(WIDTH)).take(used.div_ceil(WIDTH)) {
+            places.copy_from_slice(&half_earliest(half, ray, limit).to_array());
+        }
+        earliest[used..].fill(f32::INFINITY);
+        earliest
+    }
+}
+
+#[inline]
+fn half_earliest(corners: &[[Vec4; 3]; 3], ray: &Ray, limit: f32) -> Vec4 {
+    let us = corners.each_ref().map(|corner| ray.along(corner, 0));
+    let vs = corners.each_ref().map(|corner| ray.along(corner, 1));
+    let ws = corners.each_ref().map(|corner| ray.along(corner, 2));
+    let (zero, infinite) = (Vec4::ZERO, Vec4::INFINITY);
+    let margin_squared = Vec4::splat(ray.margin * ray.margin);
+    // The triangle's bounding rectangle, at its distance from the path, is met where the sphere is round.
+    let beside = least(us).max(-greatest(us)).max(zero);
+    let above = least(vs).max(-greatest(vs)).max(zero);
+    let reach = margin_squared - (beside * beside + above * above);
+    let mut out = reach.cmplt(zero) | greatest(ws).cmplt(Vec4::splat(-ray.margin));
+    for (from, to, opposite) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+        let (eu, ev) = (us[to] - us[from], vs[to] - vs[from]);
+        // Where the path and the opposite corner stand across this edge, times its length.
+        let path = ev * us[from] - eu * vs[from];
+        let corner = eu * (vs[opposite] - vs[from]) - ev * (us[opposite] - us[from]);
+        let beyond = (path - corner.max(zero)).max(corner.min(zero) - path);
+        out |= beyond.cmpgt(zero) & (beyond * beyond).cmpgt(margin_squared * (eu * eu + ev * ev));
+    }
+    if limit < f32::INFINITY {
+        // With the sphere at the limit, in the direction of the triangle's middle: if that points forward and all of the
+        // triangle lies beyond the radius, the sphere has not reached it there, nor before.
+        let ends = ws.map(|w| w - limit);
+        let (mu, mv, mw) = (us[0] + us[1] + us[2], vs[0] + vs[1] + vs[2], ends[0] + ends[1] + ends[2]);
+        let nearest = least([0, 1, 2].map(|corner| us[corner] * mu + vs[corner] * mv + ends[corner] * mw));
+        let square = mu * mu + mv * mv + mw * mw;
+        out |= mw.cmpge(zero) & nearest.cmpgt(zero) & (nearest * nearest).cmpgt(margin_squared * square);
+    }
+    Vec4::select(out, infinite, (least(ws) - reach.max(zero).sqrt()).max(zero))
+}
+
+/// A motion as the f32 tests need it.
+pub(super) struct Ray {
+    pub(super) origin: Vec3,
+    /// One over the direction, zeros replaced by something tiny.
+    pub(super) inverse: Vec3,
+    /// Two directions across the motion, and the motion's own.
+    axes: [Vec3; 3],
+    /// The origin along each of them.
+    offsets: [f32; 3],
+    /// The radius and what rounding in f32 can move anything by.
+    pub(super) margin: f32,
+}
+
+impl Ray {
+    /// Coordinates are at most 1 in the frame of the casts, a sphere that has been moved up to the box starts within
+    /// √3 + radius of it or stands inside.
+    pub(super) fn new(motion: &Motion) -> Self {
+        let direction = if motion.direction == DVec3::ZERO { DVec3::X } else { motion.direction };
+        let (u, v) = direction.any_orthonormal_pair();
+        let margin = motion.radius + BOX * (1.0 + motion.radius + motion.origin.abs().max_element());
+        let component = |c: f64| if c.abs() < 1e-12 { 1e12_f64.copysign(c) } else { 1.0 / c };
+        let across = |axis: DVec3| axis.dot(motion.origin) as f32;
+        Self {
+            origin: motion.origin.as_vec3(),
+            inverse: DVec3::from(direction.to_array().map(component)).as_vec3(),
+            axes: [u.as_vec3(), v.as_vec3(), direction.as_vec3()],
+            offsets: [across(u), across(v), across(direction)],
+            margin: margin as f32,
+        }
+    }
+
+    /// Of boxes, given by their center and half their sides: where the center is along one of the axes, and how far
+    /// the box reaches from there.
+    #[inline]
+    pub(super) fn extent(&self, center: &[Vec4; 3], [x, y, z]: &[Vec4; 3], axis: usize) -> [Vec4; 2] {
+        let size = self.axes[axis].abs();
+        [self.along(center, axis), *x * size.x + *y * size.y + *z * size.z]
+    }
+
+    /// Unit vector of the motion.
+    #[inline]
+    pub(super) fn direction(&self) -> Vec3 {
+        self.axes[2]
+    }
+
+    #[inline]
+    fn along(&self, [x, y, z]: &[Vec4; 3], axis: usize) -> Vec4 {
+        let direction = self.axes[axis];
+        *x * direction.x + *y * direction.y + *z * direction.z - self.offsets[axis]
+    }
+}
+
+#[inline]
+fn least([a, b, c]: [Vec4; 3]) -> Vec4 {
+    a.min(b).min(c)
+}
+
+#[inline]
+fn greatest([a, b, c]: [Vec4; 3]) -> Vec4 {
+    a.max(b).max(c)
+}

@@ -1,0 +1,154 @@
+//! Generalization: recognizing a fork that was never touched by what other forks felt like.
+
+use super::context::{Context, compiled, opened, touch};
+use super::statistics::mean_deviation;
+use crate::capture;
+use crate::ensemble::train;
+use crate::error::Result;
+use crate::evaluate::{Candidate, Margins};
+use crate::mesh::Object;
+use crate::page::chart::{Chart, Mark, Shape, Side};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::scale::Scale;
+use crate::page::table::{Cell, Data};
+use crate::probe::scene::Scene;
+use crate::touches::{Dataset, ObjectTouches};
+use serde::{Deserialize, Serialize};
+
+/// Numbers of touches looked at.
+const AT: [usize; 2] = [10, 30];
+
+/// What training on so many instances of each kind is worth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Instances {
+    /// How many instances of each kind were trained on.
+    pub(super) count: usize,
+    /// For each of [`AT`], for each test instance: accuracy over all kinds.
+    pub(super) unseen: Vec<Vec<f64>>,
+    /// For each of [`AT`]: accuracy on other touches of the instances trained on.
+    pub(super) seen: Vec<f64>,
+}
+
+/// Trains on more and more instances; tests on instances that no training touched.
+pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
+    let settings = context.settings;
+    let most = settings.instances.iter().copied().max().unwrap_or(1);
+    let kinds = context.kinds()?;
+    let (train, test) = (&kinds[..most], &kinds[kinds.len() - settings.test_instances..]);
+    let tested = test.iter().map(|objects| touched(objects, settings.instance_touches / 4, settings.seed));
+    let tested: Vec<Dataset> = tested.collect::<Result<_>>()?;
+    // Instance k's touches, as many as training on it alone takes, and some more to test on.
+    let count = settings.instance_touches;
+    let felt = train.iter().map(|objects| touched(objects, count + count / 4, settings.seed));
+    let felt: Vec<Dataset> = felt.collect::<Result<_>>()?;
+
+    let of = |&instances: &usize| -> Result<Instances> {
+        // The same number of touches of a kind, however many instances share it.
+        let part = |data: &Dataset, kind: usize, from: usize, to: usize| data.objects[kind].touches[from..to].to_vec();
+        let gathered = |from: &dyn Fn(usize) -> (usize, usize)| Dataset {
+            objects: (0..felt[0].objects.len())
+                .map(|kind| ObjectTouches {
+                    name: felt[0].objects[kind].name.clone(),
+                    touches: (0..instances).flat_map(|k| part(&felt[k], kind, from(k).0, from(k).1)).collect(),
+                })
+                .collect(),
+        };
+        let training = gathered(&|_| (0, count / instances));
+        let ensemble = train::train(&training, &context.ours(), &())?;
+        let bytes = compiled(&ensemble)?.bytes;
+        let model = opened(&bytes)?;
+        let accuracies = |data: &Dataset| -> Result<Vec<f64>> {
+            let curve =
+                Margins::new(Candidate::Compiled(&model), data)?.curve(30, settings.many_groups, settings.seed)?;
+            Ok(AT.iter().map(|&at| curve.accuracy(at).value).collect())
+        };
+        let unseen: Vec<Vec<f64>> = tested.iter().map(&accuracies).collect::<Result<_>>()?;
+        // Groups of a seen kind stay within one instance too.
+        let seen = (0..instances).map(|k| {
+            let data = Dataset {
+                objects: felt[k]
+                    .objects
+                    .iter()
+                    .map(|object| ObjectTouches {
+                        name: object.name.clone(),
+                        touches: object.touches[count..].to_vec(),
+                    })
+                    .collect(),
+            };
+            accuracies(&data)
+        });
+        let seen: Vec<Vec<f64>> = seen.collect::<Result<_>>()?;
+        let column = |rows: &[Vec<f64>], index: usize| rows.iter().map(|row| row[index]).collect::<Vec<f64>>();
+        Ok(Instances {
+            count: instances,
+            unseen: (0..AT.len()).map(|index| column(&unseen, index)).collect(),
+            seen: (0..AT.len()).map(|index| mean_deviation(&column(&seen, index)).0).collect(),
+        })
+    };
+    settings.instances.iter().map(of).collect()
+}
+
+fn touched(objects: &[Object], count: usize, seed: u64) -> Result<Dataset> {
+    let length = capture::Settings::default().length;
+    let one = |object: &Object| Ok(touch(&Scene::new(&object.mesh, length)?, &object.name, count, seed)?.0);
+    let mut objects: Vec<ObjectTouches> = objects.iter().map(one).collect::<Result<_>>()?;
+    objects.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(Dataset { objects })
+}
+
+/// The figure.
+pub(super) fn section(context: &Context, results: &[Instances]) -> Result<Section> {
+    let settings = context.settings;
+    let mut section = Section::new("generalization", "Objects never touched");
+    section.text(format!(
+        "Our method was trained on some instances of each built-in kind, their proportions varied by up to a fifth, and \
+         tested on {} others of each that it never touched. The touches of a kind are as many ({}) however many \
+         instances share them.",
+        settings.test_instances, settings.instance_touches
+    ));
+    let most = results.iter().map(|result| result.count as f64).fold(2.0, f64::max);
+    let ticks = results.iter().map(|result| (result.count as f64, result.count.to_string())).collect();
+    let scale = Scale::logarithmic(1.0, most).with_ticks(ticks);
+    let mut chart = Chart::new("instances of each kind in training", scale, "accuracy", Scale::share()).sized(620, 400);
+    let mut data = Data::new(["instances", "touches", "accuracy, never touched", "accuracy, trained on"]);
+    for (index, at) in AT.iter().enumerate() {
+        let (color, shape) = [(color::OURS, Shape::Disc), (color::GREEN, Shape::Triangle)][index];
+        let (mut unseen, mut spread, mut seen) = (Vec::new(), Vec::new(), Vec::new());
+        for result in results {
+            let (mean, deviation) = mean_deviation(&result.unseen[index]);
+            let x = result.count as f64;
+            unseen.push((x, mean));
+            spread.push((x, mean - deviation, mean + deviation));
+            seen.push((x, result.seen[index]));
+            data.push([
+                Cell::count(result.count),
+                Cell::count(*at),
+                Cell::PercentSpread(mean, deviation, 1),
+                Cell::Percent(result.seen[index], 1),
+            ]);
+        }
+        chart.marks.push(Mark::Spread { points: spread, color });
+        chart.series(&format!("new, {at} touches"), color, shape, &unseen);
+        chart.line(&format!("known, {at} touches"), color, crate::page::chart::Stroke::Dashed, &seen);
+    }
+    if let Some(first) = results.first().and_then(|result| result.unseen.first()) {
+        let spread = mean_deviation(first).1;
+        if first.len() > 1 && spread > 0.0 {
+            let text = "bars: standard deviation over instances".to_string();
+            chart.marks.push(Mark::Text { at: (1.0, 0.04), text, color: color::GRAY, side: Side::Right });
+        }
+    }
+    section.figure(Figure {
+        id: "generalization".into(),
+        title: "Accuracy against the number of training instances".into(),
+        caption:
+            "Solid: instances never touched. Dashed: other touches of the instances trained on. Each group of touches \
+                  is of one instance."
+                .into(),
+        command: settings.command(),
+        panels: vec![chart.svg()?],
+        data,
+    });
+    Ok(section)
+}
