@@ -1,5 +1,5 @@
-//! Any bytes offered as a model give an error or a model that can be walked. The checksum and the length are put right
-//! first, or hardly an input would get past them.
+//! Any bytes offered as a model give an error or a model that can be walked. The checksum and the length are corrected
+//! first, since hardly any input would pass them.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -40,5 +40,5 @@ fn walk(model: &Model<'_>) {
         recognizer.push_features(row);
     }
     let snapshot = recognizer.snapshot(&mut buffer).expect("the buffer is long enough").to_vec();
-    recognizer.restore(&snapshot).expect("a snapshot of its own");
+    recognizer.restore(&snapshot).expect("its own snapshot");
 }

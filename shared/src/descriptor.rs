@@ -28,7 +28,7 @@ pub enum Descriptor {
     Oriented,
 }
 
-/// The features of one touch: at most [`MAX_FEATURES`] whole numbers, [`MISSING_FEATURE`] where there is none.
+/// The features of one touch: at most [`MAX_FEATURES`] whole numbers, [`MISSING_FEATURE`] where one is missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Features {
     values: [i32; MAX_FEATURES],

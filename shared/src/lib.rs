@@ -25,10 +25,12 @@
 #[cfg(test)]
 extern crate std;
 
+mod checksum;
 mod descriptor;
 pub mod format;
 pub mod link;
 mod touch;
 
+pub use checksum::checksum;
 pub use descriptor::{Descriptor, FEATURE_LIMIT, Features, MAX_FEATURES, MISSING_FEATURE};
 pub use touch::{ContactTime, Pose, Q15_ONE, Touch};

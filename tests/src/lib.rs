@@ -1,4 +1,5 @@
 //! What the tests between the floors share.
 
+#[path = "../../onboard/firmware/src/identity.rs"]
 pub mod identity;
 pub mod random;

@@ -58,7 +58,7 @@ codes! {
 }
 
 impl LeafType {
-    /// Bytes a value.
+    /// Bytes per value.
     pub const fn size(self) -> usize {
         // 1, 2, 4: a shift, and not a table.
         1 << self.code()

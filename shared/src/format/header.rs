@@ -9,8 +9,8 @@ pub const VERSION: u16 = 1;
 
 /// The header's bytes, wherever they stand; every field is read from its place when asked for.
 ///
-/// Cost: one load a field. Cannot fail: every bit pattern has a meaning, and whether it is a sensible one is for the
-/// model's validation to say.
+/// Cost: one load per field. Cannot fail: every bit pattern has a value; whether it makes sense is checked
+/// when a model is opened.
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a>(&'a [u8; HEADER_LENGTH]);
 
@@ -81,7 +81,7 @@ fields! {
     max_touches, with_max_touches: u32 = 56;
     /// The distance between fingers that the model was trained for, in lengths of the scene (object = 10).
     spacing, with_spacing: f32 = 60;
-    /// The probe's speed that the model was trained for, in lengths of the scene a second.
+    /// The probe's speed that the model was trained for, in lengths of the scene per second.
     speed, with_speed: f32 = 64;
     /// Bytes of the text section.
     text_length, with_text_length: u32 = 68;
@@ -99,7 +99,7 @@ impl<'a> Header<'a> {
     /// A header of zeros.
     pub const EMPTY: Header<'static> = Header(&[0; HEADER_LENGTH]);
 
-    /// The header at the start of a model and the bytes after it, or `None` when there are too few bytes.
+    /// The header at the start of a model and the bytes after it, or `None` if there are too few bytes.
     pub fn split(bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         bytes.split_first_chunk().map(|(header, rest)| (Self(header), rest))
     }

@@ -1,9 +1,8 @@
 //! A touch to margins: the evaluator.
 
-use crate::built_in;
-use crate::leaves::Sum;
-use crate::model::Model;
-use crate::{complete, fixed, grid, preorder, ranks};
+use super::{Model, fixed};
+use crate::layouts::leaves::{BLOCK, Sum};
+use crate::layouts::{built_in, complete, grid, preorder, ranks};
 use palpate_shared::format::{Group, Layout};
 use palpate_shared::{Features, Touch};
 
@@ -20,7 +19,7 @@ impl Model<'_> {
 
     /// The margins of a row of features (see [`Model::margins`]): whole numbers or
     /// [`f32_key`](palpate_shared::format::f32_key)s as [`Model::key`] says,
-    /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where there is none; a short row is filled up with those.
+    /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where one is missing, as it is for all features beyond the end of a short row.
     pub fn margins_of(&self, features: &[i32], margins: &mut [i32]) -> bool {
         let Some(margins) = self.sum(features, margins) else { return false };
         if self.is_float() {
@@ -49,21 +48,21 @@ impl Model<'_> {
     /// Adds up all trees: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
-        if built_in::layout(Layout::Grid) && self.layout == Layout::Grid {
-            grid::look_up(self, features, margins);
+        if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
+            grid::look_up(&self.sections, features, margins);
             return Some(margins);
         }
         // Without a shift (the first is the largest), and always in f32, margins start from their base.
-        let shifted = self.groups.get(1).is_some_and(|&shift| shift > 0);
+        let shifted = self.sections.groups.get(1).is_some_and(|&shift| shift > 0);
         if shifted {
             margins.fill(0);
         } else {
             self.start(margins);
         }
-        let mut sum = Sum { margins, leaf: self.leaf, object: None };
+        let mut sum = Sum { margins, leaf: self.sections.leaf, object: None };
         let bias = self.add_trees(features, &mut sum);
         if shifted {
-            for (margin, &base) in margins.iter_mut().zip(self.base.as_chunks().0) {
+            for (margin, &base) in margins.iter_mut().zip(self.sections.base.as_chunks().0) {
                 *margin = margin.wrapping_add(i32::from_le_bytes(base)).wrapping_sub(bias);
             }
         } else if bias != 0 {
@@ -74,9 +73,9 @@ impl Model<'_> {
 
     /// Sets margins to their base.
     fn start(&self, margins: &mut [i32]) {
-        match bytemuck::try_cast_slice(self.base) {
+        match bytemuck::try_cast_slice(self.sections.base) {
             Ok(bases) => grid::put(margins, bases, |[base]: [i32; 1]| i32::from_le(base)),
-            Err(_) => grid::put(margins, self.base, i32::from_le_bytes),
+            Err(_) => grid::put(margins, self.sections.base, i32::from_le_bytes),
         }
     }
 
@@ -84,9 +83,9 @@ impl Model<'_> {
     /// first, so that all that was added before is shifted on the way.
     fn add_trees(&self, features: &[i32], sum: &mut Sum<'_>) -> i32 {
         let mut ranks = [0; 256];
-        ranks::rank(self, features, &mut ranks);
-        let mut reached = [0; complete::BLOCK];
-        let (mut nodes, mut leaves) = (self.nodes, self.leaves);
+        ranks::rank(&self.sections, features, &mut ranks);
+        let mut reached = [0; BLOCK];
+        let (mut nodes, mut leaves) = (self.sections.nodes, self.sections.leaves);
         let (mut shift, mut bias) = (0, 0_i32);
         let shift_all = |margins: &mut [i32], bias: &mut i32, shift: u8| {
             if shift > 0 {
@@ -94,17 +93,17 @@ impl Model<'_> {
                 margins.iter_mut().for_each(|margin| *margin = margin.wrapping_shl(shift.into()));
             }
         };
-        for &bytes in self.groups.as_chunks().0 {
+        for &bytes in self.sections.groups.as_chunks().0 {
             let Some(group) = Group::from_bytes(bytes) else { continue };
             shift_all(sum.margins, &mut bias, u8::saturating_sub(shift, group.shift));
             shift = group.shift;
             sum.object = group.object;
-            match self.layout {
+            match self.sections.layout {
                 Layout::Complete if built_in::layout(Layout::Complete) => {
                     complete::add(&group, &ranks, &mut reached, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Wide if built_in::layout(Layout::Wide) => {
-                    preorder::add_wide(self, &group, features, &mut nodes, &mut leaves, sum);
+                    preorder::add_wide(self.sections.cuts, &group, features, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Compact if built_in::layout(Layout::Compact) => {
                     preorder::add_compact(&group, &ranks, &mut nodes, &mut leaves, sum);

@@ -1,4 +1,4 @@
-//! What this build reads: layouts and types of leaves are features of the crate, so that none is linked in vain.
+//! What this build reads: layouts and types of leaves are features of the crate, so that only what is used is linked.
 
 use palpate_shared::format::{Layout, LeafType};
 

@@ -3,7 +3,7 @@
 //! The bytes are postcard's: the model's checksum, the number of touches, the verdict (0 undecided, 1 recognized,
 //! 2 unknown) and its object, then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
 
-use crate::recognizer::{Recognizer, Verdict};
+use super::recognizer::{Recognizer, Verdict};
 use core::fmt;
 use palpate_shared::format::checksum;
 
@@ -40,7 +40,7 @@ type State = (u32, u32, u8, u8);
 impl<const N: usize> Recognizer<'_, N> {
     /// Writes the state to the start of `buffer`, and gives the bytes that it took.
     ///
-    /// Cost: about 60 instructions a byte. Cannot panic.
+    /// Cost: about 60 instructions per byte. Cannot panic.
     ///
     /// # Errors
     /// [`SnapshotError::Short`].
@@ -64,7 +64,7 @@ impl<const N: usize> Recognizer<'_, N> {
 
     /// Takes over the state of a snapshot; what was touched before is forgotten. On an error nothing changes.
     ///
-    /// Cost: about 60 instructions a byte. Cannot panic.
+    /// Cost: about 60 instructions per byte. Cannot panic.
     ///
     /// # Errors
     /// [`SnapshotError::Damaged`] or [`SnapshotError::OtherModel`].

@@ -1,8 +1,8 @@
 //! Touch by touch to a verdict.
 
-use crate::evidence::{self, Posterior, Unit};
+use super::evidence::{self, Posterior, Unit};
+use super::stopping::Stopping;
 use crate::model::Model;
-use crate::stopping::Stopping;
 use core::fmt;
 use palpate_shared::Touch;
 
@@ -42,7 +42,7 @@ impl core::error::Error for CapacityError {}
 
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
-/// State: 8 bytes an object, and 40.
+/// State: 8 bytes per object, and 40.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: &'m Model<'m>,
@@ -70,7 +70,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// Takes in a touch.
     ///
-    /// Cost: the margins, then about 15 instructions an object and one exponential, rarely more. Cannot fail: evidence
+    /// Cost: the margins, then about 15 instructions per object and one exponential, rarely more. Cannot fail: evidence
     /// that reaches the limits of 64 bits (after 2^33 touches at the earliest) stays there, which brings objects closer
     /// together and never makes one recognized.
     pub fn push(&mut self, touch: &Touch) -> Verdict {

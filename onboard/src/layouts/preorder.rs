@@ -1,23 +1,35 @@
 //! Trees with their splits in preorder: no byte for what is not there.
 //!
 //! A tree is the number of its splits, then the splits, each with the number of splits in its left subtree; its leaves
-//! stand in order, so going right passes as many leaves as splits, and one.
+//! are in order, so going right skips as many leaves as splits, plus one.
 
-use crate::leaves::Sum;
-use crate::model::Model;
-use crate::ranks::{Ranks, at_or_missing};
+use super::leaves::Sum;
+use super::ranks::{Ranks, at_or_missing};
+use crate::bytes::{at, take};
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::Group;
 
-/// Adds up a group of compact trees, and moves `nodes` and `leaves` behind it. A split has three bytes: column,
+/// Checks that a group's splits, of `node` bytes each, and leaves are there, and moves `nodes` and `leaves` past them.
+pub(crate) fn check(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], leaf: usize, node: usize) -> Option<()> {
+    for _ in 0..group.trees {
+        let (&splits, rest) = nodes.split_first_chunk()?;
+        *nodes = rest;
+        let splits = usize::from(u16::from_le_bytes(splits));
+        take(nodes, splits * node)?;
+        take(leaves, (splits + 1) * leaf)?;
+    }
+    Some(())
+}
+
+/// Adds up a group of compact trees, and moves `nodes` and `leaves` past it. A split has three bytes: column,
 /// threshold, splits in the left subtree.
 ///
-/// Cost: about twelve instructions a step, 30 a tree; then the leaves.
+/// Cost: about twelve instructions per step, 30 per tree; then the leaves.
 #[inline(never)]
 pub(crate) fn add_compact(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leaves: &mut &[u8], sum: &mut Sum<'_>) {
     for _ in 0..group.trees {
         let Some((leaf, splits)) = tree(nodes, |[column, threshold, left]: [u8; 3]| {
-            let right = crate::bytes::at(ranks, usize::from(column)) > threshold;
+            let right = at(ranks, usize::from(column)) > threshold;
             (right, usize::from(left))
         }) else {
             return;
@@ -26,20 +38,20 @@ pub(crate) fn add_compact(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leave
     }
 }
 
-/// Adds up a group of wide trees, and moves `nodes` and `leaves` behind it. A split has six bytes: feature, where a
+/// Adds up a group of wide trees, and moves `nodes` and `leaves` past it. A split has six bytes: feature, where a
 /// missing value goes (1 = left), the threshold's number, splits in the left subtree.
 ///
-/// Cost: about 25 instructions a step, 30 a tree; then the leaves.
+/// Cost: about 25 instructions per step, 30 per tree; then the leaves.
 #[inline(never)]
 pub(crate) fn add_wide(
-    model: &Model<'_>,
+    cuts: &[u8],
     group: &Group,
     features: &[i32],
     nodes: &mut &[u8],
     leaves: &mut &[u8],
     sum: &mut Sum<'_>,
 ) {
-    let (cuts, _) = model.cuts.as_chunks();
+    let (cuts, _) = cuts.as_chunks();
     for _ in 0..group.trees {
         let Some((leaf, splits)) = tree(nodes, |[feature, missing_left, a, b, c, d]: [u8; 6]| {
             let value = at_or_missing(features, feature);

@@ -2,26 +2,36 @@
 //!
 //! A tree of depth D has 2^D slots: slot 1 is the root, the children of slot i are 2i and 2i + 1, and the column
 //! of slot 0 is the number of the root, 1: read and not known, it keeps the compiler from splitting slots into constant
-//! and variable parts, which costs an addition for every load. A split goes right where the column's rank is above its
+//! and variable parts, which costs an addition forevery load. A split goes right where the column's rank is above its
 //! threshold. What comes out after D steps, less 2^D, is the leaf. A group has the columns of all slots of all its
-//! trees, a byte each, then the thresholds likewise: as two pointers that move together, they need no arithmetic between
+//! trees, one byte each, then the thresholds in the same way: as two pointers that move together, they need no arithmetic between
 //! the loads.
 
-use crate::bytes::at;
-use crate::leaves::Sum;
-use crate::ranks::Ranks;
+use super::leaves::{BLOCK, Sum};
+use super::ranks::Ranks;
+use crate::bytes::{at, take};
 use core::hint::black_box;
 use palpate_shared::format::Group;
-
-/// Trees walked before their leaves are added: a few, so that code for walking is not repeated for every type of leaf.
-pub(crate) const BLOCK: usize = 64;
 
 /// Numbers of leaves, counted through all trees of a block.
 pub(crate) type Reached = [u16; BLOCK];
 
-/// Adds up a group of complete trees, and moves `nodes` and `leaves` behind it.
+/// Checks that a group's splits and leaves are there, and moves `nodes` and `leaves` past them.
+pub(crate) fn check(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], leaf: usize) -> Option<()> {
+    let trees = usize::try_from(group.trees).ok()?;
+    // Two bytes per slot; compared like this nothing can overflow.
+    if trees > nodes.len() >> 1 >> (group.depth & 15) {
+        return None;
+    }
+    let slots = trees << (group.depth & 15);
+    take(nodes, 2 * slots)?;
+    take(leaves, slots.checked_mul(leaf)?)?;
+    Some(())
+}
+
+/// Adds up a group of complete trees, and moves `nodes` and `leaves` past it.
 ///
-/// Cost: six instructions a step on a Cortex-M4, seven on a Cortex-M0+, and 12 to 22 a tree; then the leaves.
+/// Cost: six instructions per step on a Cortex-M4, seven on a Cortex-M0+, and 12 to 22 per tree; then the leaves.
 pub(crate) fn add(
     group: &Group,
     ranks: &Ranks,
@@ -79,7 +89,7 @@ fn walk_fixed<const DEPTH: usize, const SLOTS: usize>(
     // As two bytes, or the compiler would find columns by it.
     let mut first = low(SLOTS).wrapping_neg();
     for (leaf, (columns, thresholds)) in reached.iter_mut().zip(trees) {
-        // Otherwise the compiler addresses both by one running offset, which costs an addition a step.
+        // Otherwise the compiler addresses both by one running offset, which costs an addition per step.
         let thresholds = black_box(thresholds);
         *leaf = first.wrapping_add(low(last_slot::<DEPTH, SLOTS>(columns, thresholds, ranks)));
         first = first.wrapping_add(low(SLOTS));

@@ -1,8 +1,8 @@
 //! What the touches so far say about each object.
 
-use crate::exp::exp2_negative;
+use super::exponential::exp2_negative;
 
-/// A posterior probability, in Q56: fine enough to tell 1 − 1e-16 from 1.
+/// A posterior probability, in Q56: fine enough to distinguish 1 − 1e-16 from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Posterior(u64);
 
@@ -47,7 +47,7 @@ impl Unit {
 
 /// The object with the most evidence; the first of several.
 ///
-/// Cost: six instructions an object.
+/// Cost: six instructions per object.
 pub(crate) fn best(evidence: &[i64]) -> (usize, i64) {
     let mut best = (0, i64::MIN);
     for (object, &evidence) in evidence.iter().enumerate() {

@@ -1,9 +1,11 @@
 //! Adding up leaves.
 
-use crate::built_in;
-use crate::complete;
+use super::built_in;
 use core::sync::atomic::{Ordering, compiler_fence};
 use palpate_shared::format::LeafType;
+
+/// Trees walked before their leaves are added: a few, so that code for walking is not repeated forevery type of leaf.
+pub(crate) const BLOCK: usize = 64;
 
 /// Margins under construction, in units (integer leaves) or as the bits of f32 values.
 pub(crate) struct Sum<'a> {
@@ -15,7 +17,7 @@ pub(crate) struct Sum<'a> {
     pub(crate) object: Option<u8>,
 }
 
-/// A byte is this much more than the value that it stands for.
+/// How much more a stored byte is than its value.
 pub(crate) const BIAS: i32 = 128;
 
 impl Sum<'_> {
@@ -26,7 +28,7 @@ impl Sum<'_> {
 
     /// Adds one leaf; bytes with their bias.
     ///
-    /// Cost: eight instructions a value, and 15.
+    /// Cost: eight instructions per value, and 15.
     pub(crate) fn add(&mut self, leaf: &[u8]) {
         let leaf_type = self.leaf;
         let margins = self.of_group();
@@ -44,7 +46,7 @@ impl Sum<'_> {
 
     /// Adds the leaves with these numbers, of `length` bytes each; bytes with their bias.
     ///
-    /// Cost: two to four instructions a value on a Cortex-M4, five on a Cortex-M0+, and twelve a leaf.
+    /// Cost: two to four instructions per value on a Cortex-M4, five on a Cortex-M0+, and twelve per leaf.
     pub(crate) fn add_reached(&mut self, leaves: &[u8], reached: &[u16], length: usize) {
         let leaf_type = self.leaf;
         let margins = self.of_group();
@@ -177,7 +179,7 @@ fn add_i8_in_memory(margins: &mut [i32], reached: &Reached<'_>) {
 /// Adds bytes in lanes of 16 bits, which hold a block of trees.
 #[inline(always)]
 fn add_ten_i8(margins: &mut [i32; 10], reached: &Reached<'_>, from: usize) {
-    const { assert!(complete::BLOCK <= 256) };
+    const { assert!(BLOCK <= 256) };
     const LANES: u32 = 0x00ff_00ff;
     let (mut a, mut b, mut c, mut d, mut e) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
     reached.each(from, |values: &[u8; 10]| {

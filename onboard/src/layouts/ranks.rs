@@ -1,16 +1,41 @@
-//! Features to ranks: where each value stands among the thresholds, looked up once a touch.
+//! Features to ranks: where each value stands among the thresholds, looked up once per touch.
 
-use crate::model::Model;
+use super::Sections;
+use crate::bytes::{ModelError, take};
 use palpate_shared::MISSING_FEATURE;
+use palpate_shared::format::{Axis, Layout};
 
 /// The rank of every column; beyond the model's columns, 0.
 pub(crate) type Ranks = [u8; 256];
 
+/// Checks that every axis is of a feature that exists, that columns can be numbered in a byte, and that thresholds fill their section.
+pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), ModelError> {
+    let start = model.offset(model.axes);
+    let mut columns = 0;
+    let mut cuts = model.cuts;
+    for (index, &bytes) in model.axes.as_chunks().0.iter().enumerate() {
+        let wrong = ModelError::Field { offset: start + Axis::LENGTH * index };
+        let axis = Axis::from_bytes(bytes).ok_or(wrong)?;
+        columns += axis.columns.count();
+        if axis.feature > last_feature || columns > 256 {
+            return Err(wrong);
+        }
+        take(&mut cuts, axis.cuts_length()).ok_or(ModelError::Section { offset: model.offset(model.cuts) })?;
+    }
+    // Wide splits number thresholds of four bytes throughout; the others have axes.
+    let ends = if model.layout == Layout::Wide {
+        model.axes.is_empty() && cuts.len().is_multiple_of(4)
+    } else {
+        cuts.is_empty()
+    };
+    if ends { Ok(()) } else { Err(ModelError::Section { offset: model.offset(cuts) }) }
+}
+
 /// Ranks of a row of features in all of the model's columns.
 ///
-/// Cost: 9 instructions a step of a binary search in each axis's thresholds on a Cortex-M4, 11 on a Cortex-M0+, and 50 an
-/// axis; about 30 a step where thresholds are not aligned.
-pub(crate) fn rank(model: &Model<'_>, features: &[i32], ranks: &mut Ranks) {
+/// Cost: 9 instructions per step of a binary search in each axis's thresholds on a Cortex-M4, 11 on a Cortex-M0+, and 50 an
+/// axis; about 30 per step where thresholds are not aligned.
+pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
     let mut column = 0_u8;
     let mut put = |rank: u8| {
         if let Some(place) = ranks.get_mut(usize::from(column)) {
@@ -58,7 +83,7 @@ impl<'m> Cuts<'m> {
 
 /// How many of an axis's thresholds, of `width` bytes each, are at or below `value`.
 ///
-/// Those of two or four bytes are loaded at once where they are aligned, as the exporter sees to if the model is.
+/// Those of two or four bytes are loaded at once where they are aligned, which the exporter ensures if the model is aligned.
 #[inline(never)]
 pub(crate) fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
     if width == 2
@@ -81,7 +106,7 @@ fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32) -> u8 {
     while step > cuts.len() {
         step >>= 1;
     }
-    // The last threshold that was passed; before there is one, a threshold before the first.
+    // The last threshold that was passed; before that, a threshold before the first.
     let mut passed = usize::MAX;
     while step > 0 {
         let next = passed.wrapping_add(step);
@@ -139,7 +164,7 @@ mod tests {
                 let bytes: std::vec::Vec<u8> =
                     cuts.iter().flat_map(|cut| cut.to_le_bytes().into_iter().take(usize::from(width))).collect();
                 assert_eq!(usize::from(rank(&bytes, width, value)), expected);
-                // Beside where it is aligned.
+                // Not aligned.
                 let shifted = [&[0; 1], &*bytes].concat();
                 assert_eq!(usize::from(rank(&shifted[1..], width, value)), expected);
             }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Why bytes are not a model; [`ModelError::offset`] says where.
+/// Why bytes are not a model; [`ModelError::offset`] is the place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -24,21 +24,21 @@ pub enum ModelError {
         /// The checksum of the bytes.
         computed: u32,
     },
-    /// A field of the header has a value that means nothing.
+    /// A field of the header has an invalid value.
     Field {
-        /// Where it stands.
+        /// Its offset in the model.
         offset: usize,
     },
-    /// A section does not have the length that the header implies.
+    /// A section does not have the length stated in the header.
     Section {
-        /// Where it starts.
+        /// Its offset in the model.
         offset: usize,
     },
     /// Margins could grow beyond [`MARGIN_LIMIT`](palpate_shared::format::MARGIN_LIMIT).
     MarginRange,
     /// This crate was built without the feature that reads such a model.
     NotBuiltIn {
-        /// Where the model states what is missing: 6 for its layout, 7 for its type of leaf.
+        /// The offset of what is missing: 6 for the layout, 7 for the type of leaf.
         offset: usize,
     },
 }
@@ -72,8 +72,8 @@ impl fmt::Display for ModelError {
             Self::Checksum { stated, computed } => {
                 write!(f, "the checksum is {computed:08x} where the model states {stated:08x}: its bytes were changed")
             }
-            Self::Field { .. } => f.write_str("a field of the model has a value that means nothing"),
-            Self::Section { .. } => f.write_str("a section of the model does not have the length that it should have"),
+            Self::Field { .. } => f.write_str("a field of the model has an invalid value"),
+            Self::Section { .. } => f.write_str("a section of the model does not have the length stated in the header"),
             Self::MarginRange => f.write_str("the model's margins could overflow"),
             Self::NotBuiltIn { offset } => {
                 let what = if *offset == 6 { "layout" } else { "type of leaf" };

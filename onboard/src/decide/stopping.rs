@@ -2,7 +2,7 @@
 
 use crate::model::Model;
 
-/// When a recognizer stops: once the posterior of the best object passes 1 − error rate, or after so many touches.
+/// When a recognizer stops: once the posterior of the best object passes 1 − error rate, or after a number of touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopping {
     /// Error rate / (1 − error rate) in Q56: what the other objects' weights may come to, the best object's being 1.

@@ -1,18 +1,25 @@
 //! An ensemble over two features as a table of margins over their thresholds.
 
-use crate::built_in;
-use crate::leaves::BIAS;
-use crate::model::Model;
-use crate::ranks::{Cuts, at_or_missing, rank_in};
+use super::leaves::BIAS;
+use super::ranks::{Cuts, at_or_missing, rank_in};
+use super::{Sections, built_in};
 use palpate_shared::MISSING_FEATURE;
-use palpate_shared::format::LeafType;
+use palpate_shared::format::{Axis, LeafType};
+
+/// The number of cells of a grid: for each of its two axes, one between any two thresholds, one at either end, and one
+/// for a missing value.
+pub(crate) fn cells(model: &Sections<'_>) -> Option<usize> {
+    let (&[first, second], []) = model.axes.as_chunks() else { return None };
+    let side = |bytes| Axis::from_bytes(bytes).map(|axis| usize::from(axis.count) + 2);
+    Some(side(first)? * side(second)?)
+}
 
 /// The margins of the cell that the features fall into, in units or as the bits of f32 values.
 ///
-/// Cost: two binary searches of about 12 instructions a step on a Cortex-M4, 25 on a Cortex-M0+; then four or five
-/// instructions an object.
+/// Cost: two binary searches of about 12 instructions per step on a Cortex-M4, 25 on a Cortex-M0+; then four or five
+/// instructions per object.
 #[inline(never)]
-pub(crate) fn look_up(model: &Model<'_>, features: &[i32], margins: &mut [i32]) {
+pub(crate) fn look_up(model: &Sections<'_>, features: &[i32], margins: &mut [i32]) {
     let mut axes = Cuts(model.cuts);
     let mut cell = 0;
     for &[feature, _, width, count] in model.axes.as_chunks().0 {
