@@ -92,7 +92,8 @@ impl Facts {
     /// neither.
     pub fn complaint(&self) -> Option<String> {
         if self.open_edges > 0 {
-            let edges = if self.open_edges == 1 { "1 edge belongs" } else { &format!("{} edges belong", self.open_edges) };
+            let edges =
+                if self.open_edges == 1 { "1 edge belongs" } else { &format!("{} edges belong", self.open_edges) };
             Some(format!("The mesh is open: {edges} to one triangle only, so fingers may reach through the gaps."))
         } else if self.contrary_edges > 0 {
             let places = if self.contrary_edges == 1 { "1 edge" } else { &format!("{} edges", self.contrary_edges) };

@@ -197,8 +197,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
                     let index = index.ok_or_else(|| MeshProblem::NotAnIndex { text: shown(word) })?;
                     let absolute = if index < 0 { index.saturating_add_unsigned(self.vertices) + 1 } else { index };
                     let absolute = u64::try_from(absolute).ok().filter(|&absolute| absolute > 0);
-                    let absolute =
-                        absolute.ok_or(MeshProblem::IndexBeforeFirst { index, vertices: self.vertices })?;
+                    let absolute = absolute.ok_or(MeshProblem::IndexBeforeFirst { index, vertices: self.vertices })?;
                     if absolute > self.largest.0 {
                         self.largest = (absolute, self.line);
                     }

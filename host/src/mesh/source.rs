@@ -227,7 +227,9 @@ mod tests {
 
     #[test]
     fn a_misspelled_built_in_object_is_refused_with_the_names_of_all() {
-        for error in [objects(&["builtin".into(), "mug".into()]), objects(&["mug".into()]), object("mug").map(|one| vec![one])] {
+        for error in
+            [objects(&["builtin".into(), "mug".into()]), objects(&["mug".into()]), object("mug").map(|one| vec![one])]
+        {
             let error = error.unwrap_err().to_string();
             assert!(error.starts_with("mug: ") && !error.contains("os error"), "{error}");
             assert!(builtin::names().iter().all(|name| error.contains(name)), "{error}");

@@ -28,9 +28,7 @@ const DEPTH: u8 = 9;
 /// where the cells happen to lie, so a mesh that is not closed is made again with cells a hundredth larger.
 pub(super) fn mesh(form: &Form) -> Option<Mesh> {
     const ATTEMPTS: u8 = 12;
-    (0..ATTEMPTS)
-        .map(|attempt| contour(form, form.cells * (1.0 - 0.0117 * f32::from(attempt))))
-        .find(is_closed)
+    (0..ATTEMPTS).map(|attempt| contour(form, form.cells * (1.0 - 0.0117 * f32::from(attempt)))).find(is_closed)
 }
 
 /// Whether there are edges, and each is used once in each direction.
