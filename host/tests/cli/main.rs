@@ -3,6 +3,9 @@
 mod capture;
 mod cast;
 mod compiled;
+mod mesh;
+mod objects;
+mod view;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
