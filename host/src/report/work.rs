@@ -1,8 +1,8 @@
 //! How many instructions a touch takes on the chips.
 
-use crate::chip::emulated::Chip;
+use crate::chip::instructions::Core;
 use crate::compile::Compiled;
-use crate::error::Result;
+use crate::error::{ChipProblem, Result};
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 
@@ -26,9 +26,9 @@ impl Work {
     /// # Errors
     /// When the emulated chip does not run the model.
     pub(super) fn of(compiled: &Compiled, touches: &[Touch]) -> Result<Self> {
-        if Chip::M4F.is_there() && Chip::M0Plus.is_there() {
-            let margins = |chip: Chip| chip.measure(&compiled.bytes, touches).map(|cost| cost.margins);
-            return Ok(Self { m4f: margins(Chip::M4F)?, m0_plus: margins(Chip::M0Plus)?, measured: true });
+        if obstacle().is_none() {
+            let margins = |core: Core| core.measure(&compiled.bytes, touches).map(|cost| cost.margins);
+            return Ok(Self { m4f: margins(Core::M4F)?, m0_plus: margins(Core::M0Plus)?, measured: true });
         }
         let m4f = compiled.instructions;
         Ok(Self { m4f, m0_plus: (m4f as f64 * M0_RATIO).round() as u64, measured: false })
@@ -40,12 +40,20 @@ impl Work {
     }
 
     /// The same, for a text.
-    pub(super) fn explanation(self) -> &'static str {
+    pub(super) fn explanation(self) -> String {
         if self.measured {
-            "Instructions, from contact times to margins, are measured: emulated chips run the compiled models."
-        } else {
-            "Instructions are the export's own estimate (modelled, not measured: the emulator or the firmware's images \
-             are not there; onboard/firmware says how to build them)."
+            return "Instructions, from contact times to margins, are measured: emulated chips run the compiled models."
+                .into();
         }
+        let reason = obstacle().map_or_else(String::new, |problem| format!(": {problem}"));
+        format!(
+            "Instructions are the export's own estimate (modelled, not measured{reason}; onboard/firmware says how to \
+             measure them)."
+        )
     }
+}
+
+/// Why instructions cannot be measured here, if they cannot.
+fn obstacle() -> Option<ChipProblem> {
+    [Core::M4F, Core::M0Plus].into_iter().find_map(Core::obstacle)
 }
