@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-/// A processor core that can be emulated.
+/// A chip that can be emulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Core {
+pub enum Chip {
     /// Code for a Cortex-M4F.
     M4F,
     /// Code for a Cortex-M0+, on a Cortex-M3, which runs it unchanged.
@@ -37,7 +37,7 @@ pub const TOUCHES: usize = 64;
 /// Longer than any model takes.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-impl Core {
+impl Chip {
     /// Where `cargo build --release` in `onboard/firmware` puts the image, seen from the project's folder.
     pub fn image(self) -> PathBuf {
         let target = match self {
@@ -55,6 +55,11 @@ impl Core {
         }
         let path = self.image();
         (!path.is_file()).then_some(ChipProblem::NoImage { path })
+    }
+
+    /// Whether instructions can be measured here.
+    pub fn is_there(self) -> bool {
+        self.obstacle().is_none()
     }
 
     /// Runs the model on the first [`TOUCHES`] of these touches. Takes some tenths of a second.

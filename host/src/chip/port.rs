@@ -52,7 +52,9 @@ impl Port {
         match self {
             Self::Serial(name) => serial::open(name, baud),
             Self::Tcp(address) => {
-                let io = |source| Error::io(self.to_string(), "connect to the chip", source);
+                let io = |source: std::io::Error| {
+                    Error::at(Place::file(self.to_string()), ChipProblem::CannotConnect { reason: source.to_string() })
+                };
                 let stream = TcpStream::connect(address).map_err(io)?;
                 stream.set_nodelay(true).map_err(io)?;
                 let reader = stream.try_clone().map_err(io)?;
@@ -132,7 +134,8 @@ mod serial {
 
 #[cfg(not(feature = "serial"))]
 mod serial {
-    use super::*;
+    use super::super::Transport;
+    use crate::error::{ChipProblem, Error, Place, Result};
 
     pub(super) fn open(name: &str, _: u32) -> Result<Transport> {
         Err(Error::at(Place::file(name), ChipProblem::NoSerialPorts))

@@ -102,7 +102,7 @@ enum Sent {
     Touch { touch: Touch, expected: Option<VerdictMessage>, posteriors: Option<Vec<f64>> },
 }
 
-/// Streams `steps` to the chip until they end or `each` breaks off, and passes every update to `each`, in order. With a
+/// Streams `steps` to the chip until they end or `each` breaks, and passes every update to `each`, in order. With a
 /// `mirror`, the host recognizes the same touches with this model and compares every verdict, posterior and evidence.
 ///
 /// # Errors
@@ -196,8 +196,8 @@ fn sent(step: Step, mirror: Option<&mut Station<'_, '_, 256>>, chip: &ChipModel)
     }
 }
 
-/// A probability from Q56.
-pub(super) fn probability(q56: u64) -> f64 {
+/// A probability from Q56, as chips send posteriors.
+pub fn probability(q56: u64) -> f64 {
     q56 as f64 / (1_u64 << 56) as f64
 }
 

@@ -1,4 +1,3 @@
-use clap::CommandFactory;
 use clap_complete::Shell;
 use palpate::Result;
 use palpate::output::print;
@@ -16,6 +15,6 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut super::Cli::command(), "palpate", &mut script);
+    clap_complete::generate(arguments.shell, &mut super::cli(), "palpate", &mut script);
     print(&String::from_utf8_lossy(&script))
 }

@@ -1,6 +1,8 @@
 use super::progress::Bar;
 use clap::ArgGroup;
-use palpate::chip::{ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, stream};
+use palpate::chip::{
+    ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
+};
 use palpate::compile::CompiledFile;
 use palpate::error::ChipProblem;
 use palpate::output::{print, print_json};
@@ -198,8 +200,7 @@ impl<'c> Printer<'c> {
         match update {
             Update::Object(name) => self.object.clone_from(name),
             Update::Touch { verdict, decided, .. } if !self.json && (*decided || every_touch) => {
-                let posterior = verdict.detail.map_or(0, |detail| detail.posterior());
-                let posterior = posterior as f64 / (1_u64 << 56) as f64;
+                let posterior = probability(verdict.detail.map_or(0, |detail| detail.posterior()));
                 let said = match verdict.decision {
                     Decision::Recognized(object) => format!("recognized {}", self.name(object)),
                     Decision::Unknown => "unknown".into(),

@@ -96,9 +96,32 @@ pub(crate) struct Cli {
     command: Command,
 }
 
+/// The program's commands and arguments.
+fn cli() -> clap::Command {
+    Cli::command().mut_subcommands(|command| match command.get_after_help().map(|text| unwrapped(&text.to_string())) {
+        Some(text) => command.after_help(text),
+        None => command,
+    })
+}
+
+/// Joins the lines of each paragraph, so that they can be wrapped to the terminal's width. Indented lines stay as they are.
+fn unwrapped(text: &str) -> String {
+    let mut unwrapped = String::new();
+    let mut joins = false;
+    for line in text.lines() {
+        let is_prose = !line.is_empty() && !line.starts_with(' ');
+        if !unwrapped.is_empty() {
+            unwrapped.push(if joins && is_prose { ' ' } else { '\n' });
+        }
+        unwrapped.push_str(line);
+        joins = is_prose;
+    }
+    unwrapped
+}
+
 /// Runs the command that the arguments name, prints its error if it has one, and returns the exit code.
 pub(crate) fn run() -> ExitCode {
-    let matches = Cli::command().get_matches();
+    let matches = cli().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     match cli.command.run() {
         Ok(()) => ExitCode::SUCCESS,
@@ -117,7 +140,7 @@ fn message(error: &Error, command: &str) -> String {
         return error.to_string();
     };
     let option = name.replace('_', "-");
-    let cli = Cli::command();
+    let cli = cli();
     let mut arguments = cli.find_subcommand(command).into_iter().flat_map(|command| command.get_arguments());
     if arguments.any(|argument| argument.get_long() == Some(&option)) {
         return format!("{place}--{option} is {value}. {}", problem.fix());
@@ -131,7 +154,13 @@ mod tests {
 
     #[test]
     fn every_commands_arguments_are_consistent() {
-        Cli::command().debug_assert();
+        cli().debug_assert();
+    }
+
+    #[test]
+    fn paragraphs_of_help_are_joined_and_lists_are_not() {
+        let text = "One\ntwo.\n\nExamples:\n  palpate run\n  palpate view\n\nThree\nfour.";
+        assert_eq!(unwrapped(text), "One two.\n\nExamples:\n  palpate run\n  palpate view\n\nThree four.");
     }
 
     #[test]

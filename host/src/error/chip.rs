@@ -30,6 +30,12 @@ pub enum ChipProblem {
         /// The serial ports that there are.
         ports: Vec<String>,
     },
+    /// Nobody answers at a TCP address.
+    #[error("cannot connect to the chip: {reason}")]
+    CannotConnect {
+        /// What the operating system said.
+        reason: String,
+    },
     /// The line to a chip broke while it was used.
     #[error("the connection to the chip was lost: {reason}")]
     Lost {
@@ -146,6 +152,7 @@ impl ChipProblem {
                 };
                 return format!("{ports}. Check the cable, and that no other program has the port open.");
             }
+            Self::CannotConnect { .. } => "Check the address, and that a program serves the chip there.",
             Self::Lost { .. } => {
                 "Check the cable and the chip's power, or the program at the other end of a TCP connection; then start \
                  again."

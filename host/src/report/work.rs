@@ -1,6 +1,6 @@
 //! How many instructions a touch takes on the chips.
 
-use crate::chip::instructions::Core;
+use crate::chip::instructions::Chip;
 use crate::compile::Compiled;
 use crate::error::{ChipProblem, Result};
 use palpate_shared::Touch;
@@ -26,9 +26,9 @@ impl Work {
     /// # Errors
     /// When the emulated chip does not run the model.
     pub(super) fn of(compiled: &Compiled, touches: &[Touch]) -> Result<Self> {
-        if obstacle().is_none() {
-            let margins = |core: Core| core.measure(&compiled.bytes, touches).map(|cost| cost.margins);
-            return Ok(Self { m4f: margins(Core::M4F)?, m0_plus: margins(Core::M0Plus)?, measured: true });
+        if Chip::M4F.is_there() && Chip::M0Plus.is_there() {
+            let margins = |chip: Chip| chip.measure(&compiled.bytes, touches).map(|cost| cost.margins);
+            return Ok(Self { m4f: margins(Chip::M4F)?, m0_plus: margins(Chip::M0Plus)?, measured: true });
         }
         let m4f = compiled.instructions;
         Ok(Self { m4f, m0_plus: (m4f as f64 * M0_RATIO).round() as u64, measured: false })
@@ -55,5 +55,5 @@ impl Work {
 
 /// Why instructions cannot be measured here, if they cannot.
 fn obstacle() -> Option<ChipProblem> {
-    [Core::M4F, Core::M0Plus].into_iter().find_map(Core::obstacle)
+    [Chip::M4F, Chip::M0Plus].into_iter().find_map(Chip::obstacle)
 }

@@ -3,7 +3,7 @@ mod screen;
 use super::link::ChipOptions;
 use palpate::Result;
 use palpate::chip::watch::{Follow, Status};
-use palpate::chip::{ChipModel, Connection, Entry, Port, Received, Update, stream};
+use palpate::chip::{ChipModel, Connection, Entry, Port, Received, Update, probability, stream};
 use palpate::output::print;
 use screen::Screen;
 use std::io::IsTerminal;
@@ -142,7 +142,7 @@ impl Display {
         let garbled = here.garbled + u64::from(there.garbled);
         if posteriors {
             let q56 = connection.posteriors(chip.names.len())?;
-            self.status.posteriors = q56.into_iter().map(|p| p as f64 / (1_u64 << 56) as f64).collect();
+            self.status.posteriors = q56.into_iter().map(probability).collect();
         }
         self.take(Entry::Link { resent: here.resent, garbled, missed: here.missed_events })
     }
