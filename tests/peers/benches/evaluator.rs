@@ -1,14 +1,15 @@
-//! Nanoseconds a touch on this machine: the compiled model against `hessboost`'s own predictor, `gbdt` and
-//! `irithyll-core`, on the same ensemble and the same rows.
+//! Nanoseconds per touch on this machine: the compiled model, `hessboost`'s own predictor, `gbdt` and `irithyll-core`,
+//! on the same ensemble and the same rows.
 //!
 //! ```text
-//! cargo bench -p palpate-onboard
-//! PALPATE_BENCH_DATA=data cargo bench -p palpate-onboard     on touches that `palpate capture` made
+//! cargo bench --manifest-path tests/peers/Cargo.toml --bench evaluator
+//! cargo bench --manifest-path tests/peers/Cargo.toml --bench evaluator -- --quick     a few seconds, no times to rely on
+//! PALPATE_BENCH_DATA=data cargo bench ...                                    on touches that `palpate capture` made
 //! ```
 //!
 //! Without captured touches, both ensembles are random, of the shape that training gives. All margins are compared
-//! before anything is timed. `gbdt` and `irithyll-core` have no trees with a value for each object, so there the
-//! multi-output trees are taken apart into one tree for each object.
+//! before anything is timed. `gbdt` and `irithyll-core` have no trees with one value per object, so for them each
+//! multi-output tree is split into one tree per object.
 
 use hessboost::prelude::{BoostedModel, Iterations, ModelFormat};
 use palpate::compile::{Layout, Leaf, Settings, compile};
@@ -19,18 +20,17 @@ use palpate_onboard::Model;
 use palpate_shared::Touch;
 use std::fmt::Write as _;
 use std::hint::black_box;
+use std::sync::LazyLock;
 use std::time::Instant;
 
 /// Rows that are timed.
 const ROWS: usize = 2000;
-/// The best of so many runs counts: the others were disturbed.
-const RUNS: usize = 7;
+
+/// Runs of which the fastest counts: the others were disturbed.
+static RUNS: LazyLock<usize> =
+    LazyLock::new(|| if std::env::args().any(|argument| argument == "--quick") { 1 } else { 7 });
 
 fn main() {
-    // `cargo test --benches` only asks whether it runs.
-    if std::env::args().any(|argument| argument == "--test") {
-        return;
-    }
     let data = std::env::var_os("PALPATE_BENCH_DATA").map(|data| Dataset::read(data.as_ref()).expect("touches"));
     let touches = touches(data.as_ref());
     let paper = train::Settings::paper();
@@ -119,7 +119,7 @@ fn report(name: &str, time: f64, ours: f64) {
     println!("  {name:26} {time:9.0} ns {:9.2} × palpate complete i16", time / ours);
 }
 
-/// Nanoseconds an item.
+/// Nanoseconds per item.
 fn nanoseconds<T, R>(items: &[T], mut f: impl FnMut(&T) -> R) -> f64 {
     best(|| {
         for item in items {
@@ -134,7 +134,7 @@ fn best(mut f: impl FnMut()) -> f64 {
         f();
         start.elapsed().as_secs_f64() * 1e9
     };
-    (0..RUNS).map(run).fold(f64::INFINITY, f64::min)
+    (0..*RUNS).map(run).fold(f64::INFINITY, f64::min)
 }
 
 fn touches(data: Option<&Dataset>) -> Vec<Touch> {

@@ -1,8 +1,13 @@
-//! `cargo bench -p palpate --bench sweep`: the swept spheres against parry3d, on the same casts in the same run; speed
-//! against error; how the cost grows with the mesh; and the ten real objects, where `PALPATE_SHARED` leads to them.
+//! First contacts of a swept sphere: Palpate and parry3d, on the same casts in the same run; speed against error; how the
+//! cost grows with the mesh; and the ten real objects, where `PALPATE_SHARED` leads to them.
 //!
-//! Rates are the best of three rounds of one thread (one for parry3d), in processor time where the system tells it (so that what
-//! else runs on the machine does not count), except where it says otherwise.
+//! ```text
+//! cargo bench --manifest-path tests/peers/Cargo.toml --bench sweep
+//! cargo bench --manifest-path tests/peers/Cargo.toml --bench sweep -- --quick     a few seconds, no rates to rely on
+//! ```
+//!
+//! Rates are the best of three rounds of one thread (one for parry3d), in processor time where the system reports it, so
+//! that other processes do not count, except where it says otherwise.
 
 use glam::DVec3;
 use palpate::capture::{self, Settings};
@@ -16,6 +21,7 @@ use palpate::probe::sweep::{Surface, budget};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::time::Instant;
 
 const RADIUS: f64 = 0.15;
@@ -25,10 +31,12 @@ struct Cast {
     direction: DVec3,
 }
 
+/// Whether this run only shows that everything works.
+static QUICK: LazyLock<bool> = LazyLock::new(|| std::env::args().any(|argument| argument == "--quick"));
+
 fn main() {
-    // `cargo test --benches` only asks whether it starts.
-    if std::env::args().any(|argument| argument == "--test") {
-        return;
+    if *QUICK {
+        println!("A quick run: its rates mean nothing.\n");
     }
     peers();
     speed_against_error();
@@ -73,13 +81,13 @@ fn clock() -> f64 {
     }
 }
 
-/// The best rate of `rounds`, each of at least a quarter of a second, and the times found.
+/// The best rate of `rounds`, each of at least a quarter of a second unless the run is quick, and the times found.
 fn measure<T>(casts: &[T], rounds: usize, contact: impl Fn(&T) -> Option<f64>) -> (f64, Vec<Option<f64>>) {
     let mut best = 0.0_f64;
     let mut times = Vec::new();
     for _ in 0..rounds {
         let (start, mut count) = (clock(), 0);
-        while count == 0 || clock() - start < 0.25 {
+        while count == 0 || (!*QUICK && clock() - start < 0.25) {
             times = casts.iter().map(|cast| black_box(contact(black_box(cast)))).collect();
             count += casts.len();
         }
@@ -116,10 +124,11 @@ fn peers() {
         "{:>9}  {:12} {:>12} {:>9} {:>7} {:>7} {:>12}",
         "triangles", "engine", "casts/s", "ratio", "missed", "false", "worst time"
     );
-    for triangles in [1e3, 1e4, 1e5] {
+    let (sizes, count): (&[f64], usize) = if *QUICK { (&[1e3], 600) } else { (&[1e3, 1e4, 1e5], 12_000) };
+    for &triangles in sizes {
         let mesh = mesh_of(triangles);
         let scene = Scene::new(&mesh, 10.0).unwrap();
-        let casts = casts(&scene, 12_000);
+        let casts = casts(&scene, count);
         let (our_rate, ours) = measure(&casts, 3, |cast| scene.first_contact(cast.origin, cast.direction, RADIUS));
         let (single_rate, single) = parry!(parry3d, f32, &mesh, &scene, casts);
         let (double_rate, double) = parry!(parry3d_f64, f64, &mesh, &scene, casts);
@@ -174,7 +183,7 @@ fn compare(truth: &[Option<f64>], times: &[Option<f64>]) -> [f64; 3] {
 
 fn shared(folder: &str) -> Option<PathBuf> {
     let shared = std::env::var_os("PALPATE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"), PathBuf::from);
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
     let directory = shared.join(folder);
     if directory.is_dir() {
         return Some(directory);
@@ -189,7 +198,7 @@ fn speed_against_error() {
         "{:12} {:24} {:>12} {:>7} {:>7} {:>14}",
         "mesh", "narrow phase", "casts/s", "missed", "false", "largest error"
     );
-    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data");
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data");
     let mut meshes = vec![(own, "slivers")];
     if let Some(directory) = shared("reference") {
         meshes.extend(["paperclip", "winebottle", "scissors"].map(|name| (directory.clone(), name)));
@@ -234,7 +243,8 @@ fn growth() {
     println!("How the cost grows: the same shape in 1 k to 1 M triangles\n");
     println!("{:>9} {:>14} {:>14} {:>9}", "triangles", "scene built in", "approaches/s", "against 1 k");
     let mut first = None;
-    for triangles in [1e3, 1e4, 1e5, 1e6] {
+    let (sizes, count): (&[f64], usize) = if *QUICK { (&[1e3], 300) } else { (&[1e3, 1e4, 1e5, 1e6], 30_000) };
+    for &triangles in sizes {
         let mesh = mesh_of(triangles);
         let start = clock();
         let scene = Scene::new(&mesh, 10.0).unwrap();
@@ -242,7 +252,7 @@ fn growth() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
         let probe = Probe::default();
         let approaches: Vec<Approach> =
-            (0..30_000).map(|_| Approach::draw(&mut rng, scene.bounds(), probe.tilt)).collect();
+            (0..count).map(|_| Approach::draw(&mut rng, scene.bounds(), probe.tilt)).collect();
         let (rate, _) =
             measure(&approaches, 3, |approach| approach.full_distances(&scene, &probe).map(|distances| distances[0]));
         let against = *first.get_or_insert(rate) / rate;
@@ -252,12 +262,14 @@ fn growth() {
 }
 
 fn real_objects() {
-    println!("Ten real objects, 21,000 full touches of each, all threads\n");
+    let touches = if *QUICK { 200 } else { 21_000 };
+    let settings = Settings { touches, ..Settings::default() };
+    println!("Ten real objects, {touches} full touches of each, all threads\n");
     let Some(directory) = shared("objects") else { return };
     let sources = [directory.to_string_lossy().into_owned()];
     let objects = palpate::mesh::source::objects(&sources).unwrap();
     let output = tempfile::tempdir().unwrap();
-    let summary = capture::capture(&objects, &Settings::default(), output.path(), &()).unwrap();
+    let summary = capture::capture(&objects, &settings, output.path(), &()).unwrap();
     println!("{:12} {:>11} {:>7} {:>14}", "object", "approaches", "share", "approaches/s");
     for object in &summary.objects {
         let share = 100.0 * object.touches as f64 / object.approaches as f64;

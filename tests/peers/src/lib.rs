@@ -1,0 +1,1 @@
+//! Palpate's benchmarks against other software, in `benches/`.
