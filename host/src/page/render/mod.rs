@@ -1,7 +1,7 @@
 //! Pictures of meshes.
 //!
-//! A small software rasteriser: a depth buffer, one soft light from above the viewer's left shoulder, normals smoothed
-//! over everything but sharp edges, and four samples a pixel each way. Orthographic, so that proportions can be judged.
+//! A small software rasterizer: a depth buffer, one soft light from above the viewer's left shoulder, normals smoothed
+//! over everything but sharp edges, and several samples per pixel. Orthographic, so that proportions can be judged.
 
 mod picture;
 mod raster;
