@@ -1,4 +1,4 @@
-//! The whole way: capture, train, compile, recognize, report.
+//! The main job: capture, train, compile, recognize, report.
 
 use crate::capture;
 use crate::compile::{self, Compiled};
@@ -25,7 +25,7 @@ use std::time::Instant;
 
 /// Numbers of touches after which accuracy is reported.
 const AT: [usize; 6] = [1, 5, 10, 20, 30, 60];
-/// Those of them that stand in the table.
+/// Those of them that the table shows.
 const TABLE_AT: [usize; 2] = [10, 30];
 /// The most touches that accuracy is followed to.
 const MOST: usize = 200;
@@ -34,7 +34,7 @@ const PARITY_SEQUENCES: usize = 10_000;
 /// The width and height of a picture in the page, in pixels.
 const PICTURE: u32 = 160;
 
-/// Files in the output directory beside `data/` and `summary.json`.
+/// Files in the output directory besides `data/` and `summary.json`.
 const FILES: [&str; 5] = ["paper.json", "paper.palpate", "ensemble.json", "model.palpate", "report.html"];
 
 /// How to run.
@@ -417,7 +417,7 @@ pub fn text(summary: &Summary, out: &Path) -> String {
                 writeln!(text, "  {touched:width$}  recognized after {touches:>3} touches, posterior {posterior:.4}")
             }
             Some(name) => {
-                writeln!(text, "  {touched:width$}  taken for {name} after {touches} touches, posterior {posterior:.4}")
+                writeln!(text, "  {touched:width$}  mistaken for {name} after {touches} touches, posterior {posterior:.4}")
             }
             None => writeln!(text, "  {touched:width$}  undecided after {touches} touches"),
         };

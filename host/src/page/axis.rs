@@ -1,4 +1,4 @@
-//! An axis: how its values map to places, and which of them get a tick.
+//! An axis: where its values are drawn, and which of them get a tick.
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
@@ -9,7 +9,7 @@ pub(crate) struct Axis {
     low: f64,
     high: f64,
     logarithmic: bool,
-    /// Values that get a tick, with what stands beside them.
+    /// Values that get a tick, with its label.
     pub(crate) ticks: Vec<(f64, String)>,
     /// Whether lines are drawn across the chart at the ticks.
     pub(crate) grid: bool,
@@ -54,12 +54,12 @@ impl Axis {
         Self { low, high, logarithmic: true, ticks, grid: true }
     }
 
-    /// From 0 to 1, written in per cent.
+    /// From 0 to 1, written as percentages.
     pub(crate) fn share() -> Self {
         Self::percent(0.0, 1.0)
     }
 
-    /// From `low` to `high`, written in per cent.
+    /// From `low` to `high`, written as percentages.
     pub(crate) fn percent(low: f64, high: f64) -> Self {
         let mut scale = Self::linear(low, high, 6);
         let step = scale.ticks.get(1).map_or(1.0, |second| second.0 - scale.ticks[0].0);
@@ -132,7 +132,7 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-/// A range with an extent, whatever was given.
+/// A range with an extent, even if none was given.
 fn ordered(low: f64, high: f64) -> (f64, f64) {
     match (low.is_finite(), high.is_finite()) {
         (true, true) if low < high => (low, high),

@@ -30,7 +30,7 @@ pub(crate) struct Figure {
 }
 
 impl Figure {
-    /// All panels in one drawing on white, `columns` side by side as fit 1,160 pixels.
+    /// All panels in one drawing on white, in rows of at most 1,160 pixels.
     pub(crate) fn whole_svg(&self) -> Svg {
         let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
         let (width, height) = (cell(|panel| panel.width), cell(|panel| panel.height));
@@ -118,9 +118,9 @@ pub(crate) struct Page {
     pub(crate) summary: String,
     /// The sections, in order.
     pub(crate) sections: Vec<Section>,
-    /// What stands at the foot: settings and version, as name and value.
+    /// The footer: settings and version, as name and value.
     pub(crate) facts: Vec<(String, String)>,
-    /// Whether figures' and tables' files lie beside the page and are linked to.
+    /// Whether the files of figures and tables are written next to the page and linked.
     pub(crate) files: bool,
 }
 

@@ -1,5 +1,4 @@
-//! Drawing, and nothing else: pages, tables, charts, pictures of meshes, scenes that can be turned. Knows no touch and
-//! no model.
+//! Drawing, and nothing else: pages, tables, charts, pictures of meshes, 3-D scenes. Knows no touch and no model.
 //!
 //! ```text
 //! color ──► axis ──► chart ──► heat map ──► document (html) ──► a file

@@ -1,8 +1,8 @@
-//! What was measured already, so that an interrupted report goes on where it was.
+//! What was already measured, so that an interrupted report can be resumed.
 //!
 //! Each stage's result is a file in the report's `.stages` directory, named after the stage and the key of everything
 //! that it depends on: the settings, the objects' meshes, the program (its version and its executable's bytes), and the
-//! emulator's images. Another key is another file, so an old result is never taken for a new one.
+//! emulator's images. Another key is another file, so an outdated result is never reused.
 
 use super::results::json;
 use crate::chip::emulated::Chip;
@@ -86,7 +86,7 @@ impl Cache {
     }
 }
 
-/// What results depend on beside settings and objects.
+/// What results depend on besides settings and objects.
 #[derive(Clone, Debug, PartialEq)]
 struct Surroundings {
     /// A checksum of the program's version and bytes.
@@ -96,8 +96,8 @@ struct Surroundings {
 }
 
 impl Surroundings {
-    /// Those of this process. A program that cannot be read is one that was never seen before. For a library that is
-    /// loaded by another program, the version alone stands for the library.
+    /// Those of this process. If the program's file cannot be read, nothing is reused. Where another
+    /// program loads this library, the library is identified by its version alone.
     fn here() -> Self {
         let mut program = CHECKSUM.digest();
         program.update(env!("CARGO_PKG_VERSION").as_bytes());

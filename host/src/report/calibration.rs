@@ -18,7 +18,7 @@ const AT: [usize; 4] = [1, 5, 10, 20];
 const BINS: usize = 10;
 const METHODS: [&str; 2] = ["paper's method", "ours"];
 
-/// What the posteriors were worth.
+/// How well calibrated the posteriors are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Calibration {
     /// Groups per object.

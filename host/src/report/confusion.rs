@@ -1,4 +1,4 @@
-//! Confusion matrices: which object is taken for which.
+//! Confusion matrices: which object is recognized as which.
 
 use crate::error::Result;
 use crate::page::chart::Svg;

@@ -38,7 +38,7 @@ pub(super) struct MethodFold {
     pub(super) few_of_object: Vec<Vec<f64>>,
     /// Accuracy over many groups.
     pub(super) many: Vec<f64>,
-    /// How often each object (rows) was taken for each (columns) after ten touches, over many groups.
+    /// How often each object (rows) was recognized as each (columns) after ten touches, over many groups.
     pub(super) confusion: Vec<Vec<usize>>,
     /// Seconds of training.
     pub(super) seconds: f64,
@@ -206,7 +206,7 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     }
     Ok(Figure {
         id: "confusion".into(),
-        title: "Which object is taken for which after ten touches (figure 9)".into(),
+        title: "Which object is recognized as which after ten touches (figure 9)".into(),
         caption: format!(
             "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
              groups per object and fold. Shares below half a percent are blank.",

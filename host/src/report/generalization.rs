@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// Numbers of touches looked at.
 const AT: [usize; 2] = [10, 30];
 
-/// What training on a number of instances of each kind is worth.
+/// How accurate training on a number of instances of each kind is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Instances {
     /// How many instances of each kind were trained on.

@@ -118,7 +118,7 @@ fn triangles_cost(context: &Context, count: usize) -> Result<Triangles> {
     Ok(Triangles { count: mesh.triangles.len(), build, approaches: approaches as f64 / seconds })
 }
 
-/// What stands in the place of growth and generalization where they were not measured.
+/// Replaces growth and generalization where they were not measured.
 pub(super) fn left_out() -> Section {
     let mut section = Section::new("left-out", "Not measured");
     section.text(
@@ -222,7 +222,7 @@ fn objects_table(context: &Context, growth: &Growth) -> Table {
     Table {
         id: "growth-objects".into(),
         title: "More objects, in numbers".into(),
-        caption: "Accuracy is over all objects: beyond ten, a fork can be taken for another fork.".into(),
+        caption: "Accuracy is over all objects: beyond ten, a fork can be mistaken for another fork.".into(),
         command: context.settings.command.clone(),
         data: objects_data(growth),
     }

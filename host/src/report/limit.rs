@@ -34,7 +34,7 @@ pub(super) struct Limit {
     pub(super) width: f64,
     /// All candidates on the same groups.
     pub(super) candidates: Vec<Measured>,
-    /// Index of the limit among them: the best of those trained on the whole capture, or ours should it be better.
+    /// Index of the limit among them: the best of those trained on the whole capture, or ours if it is better.
     pub(super) best: usize,
 }
 
@@ -165,7 +165,7 @@ pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
          ensemble was trained ({} multi-output trees of depth 7), and the density of each object's touches over the two \
          features of the curvature descriptor was estimated (a grid of 256 × 256 ranks, smoothed by a Gaussian kernel \
          {:.1} cells wide, mirrored at the borders, the width chosen on 5 % held out). The limit is the better of the \
-         two (or our own model, should it be better than both), here: {}, on groups from the remaining 10 %. Doubling the \
+         two (or our own model, if it is better than both), here: {}, on groups from the remaining 10 %. Doubling the \
          capture changed the estimate by {} points at ten touches.",
         limit.captured,
         context.settings.limit_rounds,

@@ -283,7 +283,7 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     }
     Ok(Figure {
         id: "noise-confusion".into(),
-        title: "Which object is taken for which after ten touches with noise of 5 ms (figure 13)".into(),
+        title: "Which object is recognized as which after ten touches with noise of 5 ms (figure 13)".into(),
         caption: "Percentage of an object's groups (row) that were recognized as another (column).".into(),
         command: context.settings.command.clone(),
         panels,

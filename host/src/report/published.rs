@@ -1,4 +1,4 @@
-//! The paper's own numbers beside ours.
+//! The published numbers compared with ours.
 
 use super::confusion::recall_precision;
 use super::context::Context;

@@ -33,7 +33,7 @@ pub(super) struct Sequences {
     pub(super) used: Vec<Vec<Vec<usize>>>,
 }
 
-/// What one threshold comes to.
+/// The results for one threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Stopped {
     /// The threshold.

@@ -35,7 +35,7 @@ pub struct Settings {
     pub limit_touches: usize,
     /// Boosting rounds of the ensemble that estimates the limit.
     pub limit_rounds: usize,
-    /// Whether to measure growth and generalization, which use built-in objects whatever the sources are.
+    /// Whether to measure growth and generalization, which use built-in objects no matter what the sources are.
     pub growth: bool,
     /// Numbers of objects in the growth figures.
     pub growth_objects: Vec<usize>,

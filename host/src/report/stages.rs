@@ -1,4 +1,4 @@
-//! The whole report: every stage measured or taken from what was measured before, then written as one page.
+//! The whole report: measures every stage or takes it from an interrupted report, then writes one page.
 
 use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
@@ -53,7 +53,7 @@ struct Stages<'a> {
 }
 
 impl Stages<'_> {
-    /// The result of the stage, which progress is told of before it begins.
+    /// The result of the stage; progress is told its name before it begins.
     fn stage<T: Serialize + DeserializeOwned>(&mut self, name: &str, measure: impl FnOnce() -> Result<T>) -> Result<T> {
         progress::check(self.progress)?;
         self.progress.begin(name, None);
@@ -114,7 +114,7 @@ pub fn report(settings: &Settings, directory: &Path, existing: Existing, progres
     progress.begin("drawing", None);
 
     let summary = published::summary(&context, &folds, &noisy, &limit, &sequences);
-    let mut first = Section::new("summary", "The paper's numbers beside ours");
+    let mut first = Section::new("summary", "The paper's numbers compared with ours");
     first.table(published::table(&context, &summary));
     let mut costs = cost::section(&context, &members)?;
     simulator::add(&context, &engines, &mut costs)?;

@@ -13,7 +13,7 @@ pub(crate) fn mean_deviation(values: &[f64]) -> (f64, f64) {
     (Statistics::mean(values), deviation)
 }
 
-/// How many standard deviations a two-sided 95 % interval of a normal distribution reaches.
+/// The half-width of a two-sided 95 % interval of a normal distribution, in standard deviations.
 pub(crate) fn z95() -> f64 {
     Normal::standard().inverse_cdf(0.975)
 }

@@ -1,4 +1,4 @@
-//! Charts as SVG: axes with units, marks, and labels beside what they name instead of a legend.
+//! Charts as SVG: axes with units, marks, and labels next to lines instead of a legend.
 
 mod draw;
 mod labels;

@@ -72,7 +72,7 @@ pub(crate) enum Mark {
         text: String,
         /// Its color.
         color: RGBColor,
-        /// Which side of the point it stands on.
+        /// Where it is relative to the point.
         side: Side,
     },
     /// A thin line across the chart at an x.
@@ -103,7 +103,7 @@ pub(crate) enum Shape {
     Square,
 }
 
-/// Which side of a point a text stands on.
+/// Where a text is relative to a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     /// Left of it.
@@ -144,7 +144,7 @@ impl EndLabel {
 /// A chart.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
-    /// Stands above the chart; may be empty.
+    /// Above the chart; may be empty.
     pub(crate) title: String,
     /// Width in pixels.
     pub(crate) width: u32,
@@ -158,7 +158,7 @@ pub(crate) struct Chart {
     pub(crate) y: Axis,
     /// What it shows, with its unit; may be empty.
     pub(crate) y_name: String,
-    /// Whether the horizontal axis's texts stand upright, for names.
+    /// Whether the horizontal axis's labels are vertical, for names.
     pub(crate) upright_names: bool,
     /// What is drawn, in order.
     pub(crate) marks: Vec<Mark>,
