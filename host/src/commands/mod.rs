@@ -13,6 +13,7 @@ mod progress;
 mod recognize;
 mod report;
 mod run;
+mod shell;
 mod train;
 mod tune;
 mod view;

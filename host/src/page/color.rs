@@ -6,30 +6,30 @@
 use plotters::style::RGBColor;
 
 /// Text, axes, and what is no series.
-pub const INK: RGBColor = RGBColor(0, 0, 0);
+pub(crate) const INK: RGBColor = RGBColor(0, 0, 0);
 /// Grid lines and what should stay in the background.
-pub const GRID: RGBColor = RGBColor(221, 221, 221);
+pub(crate) const GRID: RGBColor = RGBColor(221, 221, 221);
 /// Axis text and leader lines.
-pub const GRAY: RGBColor = RGBColor(102, 102, 102);
+pub(crate) const GRAY: RGBColor = RGBColor(102, 102, 102);
 /// The paper's method, everywhere.
-pub const PAPER: RGBColor = VERMILION;
+pub(crate) const PAPER: RGBColor = VERMILION;
 /// Our method, everywhere.
-pub const OURS: RGBColor = BLUE;
+pub(crate) const OURS: RGBColor = BLUE;
 /// Okabe–Ito blue.
-pub const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub(crate) const BLUE: RGBColor = RGBColor(0, 114, 178);
 /// Okabe–Ito vermilion.
-pub const VERMILION: RGBColor = RGBColor(213, 94, 0);
+pub(crate) const VERMILION: RGBColor = RGBColor(213, 94, 0);
 /// Okabe–Ito bluish green.
-pub const GREEN: RGBColor = RGBColor(0, 158, 115);
+pub(crate) const GREEN: RGBColor = RGBColor(0, 158, 115);
 /// Okabe–Ito reddish purple.
-pub const PURPLE: RGBColor = RGBColor(204, 121, 167);
+pub(crate) const PURPLE: RGBColor = RGBColor(204, 121, 167);
 /// Okabe–Ito orange.
-pub const ORANGE: RGBColor = RGBColor(230, 159, 0);
+pub(crate) const ORANGE: RGBColor = RGBColor(230, 159, 0);
 /// Okabe–Ito sky blue.
-pub const SKY: RGBColor = RGBColor(86, 180, 233);
+pub(crate) const SKY: RGBColor = RGBColor(86, 180, 233);
 
 /// The color of the `index`-th of several series without a fixed meaning.
-pub fn series(index: usize) -> RGBColor {
+pub(crate) fn series(index: usize) -> RGBColor {
     const ORDER: [RGBColor; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
     ORDER[index % ORDER.len()]
 }

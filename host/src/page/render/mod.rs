@@ -1,7 +1,7 @@
 //! Pictures of meshes.
 //!
-//! A small software rasteriser: a depth buffer, one soft light from above the viewer's left shoulder, normals smoothed
-//! over everything but sharp edges, and four samples a pixel each way. Orthographic, so that proportions can be judged.
+//! A small software rasterizer: a depth buffer, one soft light from above the viewer's left shoulder, normals smoothed
+//! over everything but sharp edges, and several samples per pixel. Orthographic, so that proportions can be judged.
 
 mod picture;
 mod raster;
@@ -19,7 +19,7 @@ pub fn thumbnail(mesh: &Mesh, size: u32) -> Vec<u8> {
     seen_from(mesh, size, View::three_quarter(mesh))
 }
 
-/// As [`thumbnail`], from a view of one's own.
+/// As [`thumbnail`], from the given view.
 pub fn seen_from(mesh: &Mesh, size: u32, view: View) -> Vec<u8> {
     let mut picture = Picture::new(size, size);
     picture.draw(&raster::render(mesh, size, view), 0, 0);

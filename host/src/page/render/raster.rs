@@ -4,7 +4,7 @@ use super::view::View;
 use crate::mesh::Mesh;
 use glam::{Vec2, Vec3};
 
-/// Samples a pixel, each way.
+/// Samples per pixel, each way.
 const SAMPLES: u32 = 3;
 /// Faces that meet at less than this share a smooth normal: the cosine of 40°.
 const CREASE: f32 = 0.766;

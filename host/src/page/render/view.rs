@@ -23,7 +23,7 @@ impl View {
     }
 
     /// From the front, right and above; the flatter the mesh lies, the more from above. A mesh that is thin in x or y
-    /// is first laid on its side.
+    /// is first turned onto its side.
     pub fn three_quarter(mesh: &Mesh) -> Self {
         let [low, high] = bounds(mesh);
         let side = (high - low).max(Vec3::splat(f32::MIN_POSITIVE));

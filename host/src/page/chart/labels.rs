@@ -1,39 +1,7 @@
-//! Where labels and dashes go.
+//! Where labels go.
 
-/// Cuts a path into dashes of a length with gaps of another, in its own units.
-pub(super) fn dashes(path: &[(i32, i32)], dash: f64, gap: f64) -> Vec<Vec<(i32, i32)>> {
-    let mut out = Vec::new();
-    let (mut current, mut drawing, mut left) = (path.first().map(|&p| vec![p]).unwrap_or_default(), true, dash);
-    for ends in path.windows(2) {
-        let (from, to) = (ends[0], ends[1]);
-        let (dx, dy) = (f64::from(to.0 - from.0), f64::from(to.1 - from.1));
-        let length = dx.hypot(dy);
-        let mut done = 0.0;
-        while length - done > left {
-            done += left;
-            let at = (from.0 + (dx * done / length).round() as i32, from.1 + (dy * done / length).round() as i32);
-            if drawing {
-                current.push(at);
-                out.push(std::mem::take(&mut current));
-            } else {
-                current = vec![at];
-            }
-            drawing = !drawing;
-            left = if drawing { dash } else { gap };
-        }
-        left -= length - done;
-        if drawing {
-            current.push(to);
-        }
-    }
-    if current.len() > 1 {
-        out.push(current);
-    }
-    out
-}
-
-/// Places as near as possible to the `wanted` ones, in the order of `ordered`, at least `distance` apart and within `low..high`
-/// if they fit: neighbors that collide are pooled and spread about their mean.
+/// Places as near as possible to the `wanted` ones, in the order of `ordered`, at least `distance` apart and within
+/// `low..high` if they fit: neighbors that collide are pooled and spread about their mean.
 pub(super) fn apart(wanted: &[f64], ordered: &[f64], distance: f64, low: f64, high: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..wanted.len()).collect();
     order.sort_by(|&a, &b| ordered[a].total_cmp(&ordered[b]));
@@ -77,12 +45,5 @@ mod tests {
         assert_eq!(apart(&[5.0, 30.0], 10.0, 0.0, 100.0), [5.0, 30.0]);
         assert_eq!(apart(&[20.0, 20.0], 10.0, 0.0, 100.0), [15.0, 25.0]);
         assert!(apart(&[], 10.0, 0.0, 1.0).is_empty());
-    }
-
-    #[test]
-    fn dashes_cover_the_path_with_gaps() {
-        let cut = dashes(&[(0, 0), (100, 0)], 30.0, 10.0);
-        assert_eq!(cut, [vec![(0, 0), (30, 0)], vec![(40, 0), (70, 0)], vec![(80, 0), (100, 0)]]);
-        assert_eq!(dashes(&[(0, 0), (10, 0), (10, 10)], 100.0, 5.0), [vec![(0, 0), (10, 0), (10, 10)]]);
     }
 }

@@ -1,38 +1,38 @@
-//! A mesh as the page shows it: its triangles, few enough and small enough.
+//! A mesh as a page holds it: its triangles, few enough and small enough.
 
 use crate::mesh::Mesh;
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
 /// How many triangles a page holds at most.
-pub(super) const MOST_TRIANGLES: usize = 120_000;
+pub(crate) const MOST_TRIANGLES: usize = 120_000;
 
-/// The triangles that are shown.
-pub(super) struct Shown {
+/// A mesh with at most [`MOST_TRIANGLES`] triangles, its corners on a grid of 2¹⁶ steps along the longest side.
+#[derive(Clone, Debug)]
+pub(crate) struct SimplifiedMesh {
     /// Multiples of `step` from `origin`, in units.
-    pub(super) points: Vec<[u16; 3]>,
-    pub(super) triangles: Vec<[u32; 3]>,
-    pub(super) step: f64,
-    pub(super) origin: DVec3,
+    pub(crate) points: Vec<[u16; 3]>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) step: f64,
+    pub(crate) origin: DVec3,
 }
 
-impl Shown {
+impl SimplifiedMesh {
     /// The mesh, scaled so that its longest side is `length` and its box is centered on the origin, with at most
     /// [`MOST_TRIANGLES`] triangles: in a larger mesh, the vertices in each cell of a grid become one, on the finest grid
     /// that is coarse enough.
-    pub(super) fn of(mesh: &Mesh, length: f64) -> Self {
+    pub(crate) fn new(mesh: &Mesh, length: f64) -> Self {
         let [low, high] = mesh.bounds();
         let longest = f64::from((high - low).max_element());
         let origin = -(high - low).as_dvec3() / 2.0 * (length / longest);
         let step = length / f64::from(u16::MAX);
-        let place = |point: Vec3| {
-            let steps = (point - low).as_dvec3() / longest * f64::from(u16::MAX);
+        let place = |point: [f32; 3]| {
+            let steps = (Vec3::from(point) - low).as_dvec3() / longest * f64::from(u16::MAX);
             // Between 0 and 65535 by construction.
             steps.to_array().map(|x| x.round() as u16)
         };
         let Mesh { vertices, triangles } = mesh.welded();
-        let points = vertices.into_iter().map(|vertex| place(vertex.into())).collect();
-        let mut shown = Self { points, triangles, step, origin };
+        let mut shown = Self { points: vertices.into_iter().map(place).collect(), triangles, step, origin };
         if shown.triangles.len() > MOST_TRIANGLES {
             let full = shown;
             let mut cells = 800.0;
@@ -81,15 +81,15 @@ impl Shown {
     }
 
     /// Whether indices need four bytes instead of two.
-    pub(super) fn is_wide(&self) -> bool {
+    pub(crate) fn is_wide(&self) -> bool {
         self.points.len() > usize::from(u16::MAX)
     }
 
-    pub(super) fn position_bytes(&self) -> Vec<u8> {
+    pub(crate) fn position_bytes(&self) -> Vec<u8> {
         self.points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect()
     }
 
-    pub(super) fn index_bytes(&self) -> Vec<u8> {
+    pub(crate) fn index_bytes(&self) -> Vec<u8> {
         let bytes = if self.is_wide() { 4 } else { 2 };
         self.triangles.iter().flatten().flat_map(|i| i.to_le_bytes().into_iter().take(bytes)).collect()
     }

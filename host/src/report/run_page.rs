@@ -1,66 +1,56 @@
-//! What `palpate run` writes: the short form of the report.
+//! The page of a run: the short form of the report.
 
 use crate::error::Result;
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
-use crate::page::document::{Block, Figure, Page, Section};
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data, Table};
-use base64::Engine;
+use crate::page::document::{Block, Figure, Page, Picture, Section};
+use crate::page::table::{Cell, Records, Table};
 
 /// What a run has to show.
 #[derive(Clone, Debug)]
-pub struct RunResults {
+pub(crate) struct RunResults {
     /// The command that remakes it.
-    pub command: String,
-    /// One object each: its name, a picture as PNG, and a line about its capture. May be empty.
-    pub pictures: Vec<Picture>,
+    pub(crate) command: String,
+    /// One picture per object, with a line about its capture. May be empty.
+    pub(crate) pictures: Vec<Picture>,
     /// The methods compared, the paper's first.
-    pub methods: Vec<RunMethod>,
-    /// The table that the run prints: what was measured in the first column, a column a method after it.
-    pub table: Data,
+    pub(crate) methods: Vec<RunMethod>,
+    /// The table that the run prints: what was measured in the first column, then one column per method.
+    pub(crate) table: Records,
+    /// What should be known about the table, in sentences; may be empty.
+    pub(crate) note: String,
     /// Settings, times and version, as name and value.
-    pub facts: Vec<(String, String)>,
-}
-
-/// A picture of an object as it was captured.
-#[derive(Clone, Debug)]
-pub struct Picture {
-    /// The object's name.
-    pub name: String,
-    /// The picture, as the bytes of a PNG file.
-    pub png: Vec<u8>,
-    /// A few words below it: how often it was touched.
-    pub line: String,
+    pub(crate) facts: Vec<(String, String)>,
 }
 
 /// One method's accuracies.
 #[derive(Clone, Debug)]
-pub struct RunMethod {
+pub(crate) struct RunMethod {
     /// Its name, in one to three words.
-    pub name: String,
+    pub(crate) name: String,
     /// `(touches, accuracy, standard error)`, by rising number of touches, each a share of one.
-    pub curve: Vec<(usize, f64, f64)>,
+    pub(crate) curve: Vec<(usize, f64, f64)>,
     /// For each object its `(touches, accuracy)`.
-    pub per_object: Vec<(String, Vec<(usize, f64)>)>,
+    pub(crate) per_object: Vec<(String, Vec<(usize, f64)>)>,
 }
 
 /// The page of a run.
 ///
 /// # Errors
 /// If a chart cannot be drawn.
-pub fn short(results: &RunResults) -> Result<Page> {
+pub(crate) fn run_page(results: &RunResults) -> Result<Page> {
     let mut sections = Vec::new();
     if !results.pictures.is_empty() {
         let mut section = Section::new("objects", "The objects");
-        section.blocks.push(Block::Pictures(results.pictures.iter().map(shown).collect()));
+        section.blocks.push(Block::Pictures(results.pictures.clone()));
         sections.push(section);
     }
     let mut section = Section::new("result", "The result");
     section.table(Table {
         id: "summary".into(),
         title: "The paper's method and ours".into(),
-        caption: "Both were trained on the same touches and tested on others.".into(),
+        caption: format!("Both were trained on the same touches and tested on others. {}", results.note),
         command: results.command.clone(),
         data: results.table.clone(),
     });
@@ -80,12 +70,6 @@ pub fn short(results: &RunResults) -> Result<Page> {
     })
 }
 
-/// A picture as the page takes it.
-pub(super) fn shown(picture: &Picture) -> (String, String, String) {
-    let url = format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(&picture.png));
-    (url, picture.name.clone(), picture.line.clone())
-}
-
 /// The `index`-th method's color and point shape: the paper's first, ours second.
 pub(super) fn method_style(index: usize) -> (plotters::style::RGBColor, Shape) {
     const SHAPES: [Shape; 4] = [Shape::Ring, Shape::Disc, Shape::Triangle, Shape::Square];
@@ -98,14 +82,14 @@ pub(super) fn method_style(index: usize) -> (plotters::style::RGBColor, Shape) {
 }
 
 /// An axis of touches that holds all curves.
-fn touches_scale(results: &RunResults) -> Scale {
+fn touches_scale(results: &RunResults) -> Axis {
     let touches = || results.methods.iter().flat_map(|method| method.curve.iter().map(|point| point.0 as f64));
-    Scale::logarithmic(touches().fold(f64::INFINITY, f64::min).clamp(1.0, 1e9), touches().fold(2.0, f64::max))
+    Axis::logarithmic(touches().fold(f64::INFINITY, f64::min).clamp(1.0, 1e9), touches().fold(2.0, f64::max))
 }
 
 fn curves(results: &RunResults) -> Result<Figure> {
-    let mut chart = Chart::new("touches", touches_scale(results), "accuracy", Scale::share()).sized(600, 380);
-    let mut data = Data::new(["method", "touches", "accuracy", "standard error"]);
+    let mut chart = Chart::new("touches", touches_scale(results), "accuracy", Axis::share()).sized(600, 380);
+    let mut data = Records::new(["method", "touches", "accuracy", "standard error"]);
     for (index, method) in results.methods.iter().enumerate() {
         let (color, shape) = method_style(index);
         let bars = method.curve.iter().map(|&(n, a, e)| (n as f64, (a - 1.96 * e).max(0.0), (a + 1.96 * e).min(1.0)));
@@ -125,7 +109,7 @@ fn curves(results: &RunResults) -> Result<Figure> {
         id: "accuracy-curves".into(),
         title: "Share of groups recognized after a fixed number of touches".into(),
         caption: "Each group holds touches of one object, drawn at random from touches that training never saw; all \
-                  objects count alike. Bars are 95 % confidence intervals."
+                  objects are weighted equally. Bars are 95 % confidence intervals."
             .into(),
         command: results.command.clone(),
         panels: vec![chart.svg()?],
@@ -140,10 +124,10 @@ fn objects(results: &RunResults) -> Result<Figure> {
             names.push(name);
         }
     }
-    let mut data = Data::new(["object", "method", "touches", "accuracy"]);
+    let mut data = Records::new(["object", "method", "touches", "accuracy"]);
     let mut panels = Vec::new();
     for name in names {
-        let mut chart = Chart::new("touches", touches_scale(results), "", Scale::share()).sized(270, 200).titled(name);
+        let mut chart = Chart::new("touches", touches_scale(results), "", Axis::share()).sized(270, 200).titled(name);
         for (index, method) in results.methods.iter().enumerate() {
             let (color, _) = method_style(index);
             let curve = method.per_object.iter().find(|(object, _)| object == name).map(|found| &found.1);
@@ -179,20 +163,21 @@ mod tests {
                 ("bowl".into(), vec![(5, 0.5), (30, 1.0)]),
             ],
         };
-        let mut table = Data::new(["", "paper", "ours"]);
+        let mut table = Records::new(["", "paper", "ours"]);
         table.push(["accuracy at 10".into(), Cell::Percent(0.65, 1), Cell::Percent(0.75, 1)]);
         RunResults {
             command: "palpate run builtin --seed 1".into(),
             pictures: vec![Picture { name: "fork".into(), png: vec![1, 2, 3], line: "5.6 % of approaches".into() }],
             methods: vec![method("paper", 0.5), method("ours", 0.57)],
             table,
+            note: String::new(),
             facts: vec![("seed".into(), "1".into())],
         }
     }
 
     #[test]
     fn the_short_page_shows_objects_table_and_curves_of_both_methods() {
-        let page = short(&results()).unwrap();
+        let page = run_page(&results()).unwrap();
         let html = page.html();
         assert_eq!(page.figures().count(), 2);
         assert_eq!(html.matches("<svg ").count(), 3);
@@ -210,9 +195,9 @@ mod tests {
     #[test]
     fn writing_with_files_puts_csv_and_svg_beside_the_page() {
         let directory = tempfile::tempdir().unwrap();
-        let mut page = short(&results()).unwrap();
+        let mut page = run_page(&results()).unwrap();
         page.files = true;
-        let written = crate::report::write(&page, &directory.path().join("index.html")).unwrap();
+        let written = page.write(&directory.path().join("index.html")).unwrap();
         let mut names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
         names.sort_unstable();
         let expected = ["accuracy-curves.csv", "accuracy-curves.svg", "accuracy-objects.csv", "accuracy-objects.svg"];

@@ -1,23 +1,23 @@
-//! An axis: how its values map to places, and which of them get a tick.
+//! An axis: where its values are drawn, and which of them get a tick.
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
 /// A linear or logarithmic axis with its ticks.
 #[derive(Clone, Debug)]
-pub struct Scale {
+pub(crate) struct Axis {
     low: f64,
     high: f64,
     logarithmic: bool,
-    /// Values that get a tick, with what stands beside them.
-    pub ticks: Vec<(f64, String)>,
+    /// Values that get a tick, with its label.
+    pub(crate) ticks: Vec<(f64, String)>,
     /// Whether lines are drawn across the chart at the ticks.
-    pub grid: bool,
+    pub(crate) grid: bool,
 }
 
-impl Scale {
+impl Axis {
     /// From `low` to `high`, with about `count` ticks at multiples of 1, 2, 2.5 or 5 times a power of ten.
-    pub fn linear(low: f64, high: f64, count: usize) -> Self {
+    pub(crate) fn linear(low: f64, high: f64, count: usize) -> Self {
         let (low, high) = ordered(low, high);
         let step = nice_step((high - low) / count.max(1) as f64);
         let decimals = decimals_of(step);
@@ -29,7 +29,7 @@ impl Scale {
 
     /// From `low` to `high`, both positive, logarithmic, with ticks at 1, 2 and 5 times the powers of ten, or at the
     /// powers alone over more than two and a half decades.
-    pub fn logarithmic(low: f64, high: f64) -> Self {
+    pub(crate) fn logarithmic(low: f64, high: f64) -> Self {
         let low = low.max(f64::MIN_POSITIVE);
         let (low, high) = ordered(low, high.max(low * 1.001));
         let decades = (high / low).log10();
@@ -54,13 +54,13 @@ impl Scale {
         Self { low, high, logarithmic: true, ticks, grid: true }
     }
 
-    /// From 0 to 1, written in per cent.
-    pub fn share() -> Self {
+    /// From 0 to 1, written as percentages.
+    pub(crate) fn share() -> Self {
         Self::percent(0.0, 1.0)
     }
 
-    /// From `low` to `high`, written in per cent.
-    pub fn percent(low: f64, high: f64) -> Self {
+    /// From `low` to `high`, written as percentages.
+    pub(crate) fn percent(low: f64, high: f64) -> Self {
         let mut scale = Self::linear(low, high, 6);
         let step = scale.ticks.get(1).map_or(1.0, |second| second.0 - scale.ticks[0].0);
         let decimals = decimals_of(step * 100.0);
@@ -69,32 +69,32 @@ impl Scale {
     }
 
     /// One place for each name, at 0.5, 1.5, …; without lines across the chart.
-    pub fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
+    pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let ticks: Vec<(f64, String)> =
             names.into_iter().enumerate().map(|(index, name)| (index as f64 + 0.5, name.to_string())).collect();
         Self { low: 0.0, high: ticks.len().max(1) as f64, logarithmic: false, ticks, grid: false }
     }
 
     /// The same upside down, or right to left.
-    pub fn reversed(mut self) -> Self {
+    pub(crate) fn reversed(mut self) -> Self {
         std::mem::swap(&mut self.low, &mut self.high);
         self
     }
 
     /// The same with these ticks instead.
-    pub fn with_ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
+    pub(crate) fn with_ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
         self.ticks = ticks;
         self
     }
 
     /// The same without lines across the chart.
-    pub fn without_grid(mut self) -> Self {
+    pub(crate) fn without_grid(mut self) -> Self {
         self.grid = false;
         self
     }
 
     /// The longest tick's text, in characters.
-    pub fn longest(&self) -> usize {
+    pub(crate) fn longest(&self) -> usize {
         self.ticks.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0)
     }
 
@@ -109,7 +109,7 @@ impl Scale {
     }
 }
 
-impl Ranged for Scale {
+impl Ranged for Axis {
     type FormatOption = NoDefaultFormatting;
     type ValueType = f64;
 
@@ -126,13 +126,13 @@ impl Ranged for Scale {
     }
 }
 
-impl ValueFormatter<f64> for Scale {
+impl ValueFormatter<f64> for Axis {
     fn format_ext(&self, value: &f64) -> String {
         self.ticks.iter().find(|tick| tick.0 == *value).map(|tick| tick.1.clone()).unwrap_or_default()
     }
 }
 
-/// A range with an extent, whatever was given.
+/// A range with an extent, even if none was given.
 fn ordered(low: f64, high: f64) -> (f64, f64) {
     match (low.is_finite(), high.is_finite()) {
         (true, true) if low < high => (low, high),
@@ -162,7 +162,7 @@ fn decimals_of(step: f64) -> usize {
 }
 
 /// `value` with `decimals` decimals and a true minus sign.
-pub fn number(value: f64, decimals: usize) -> String {
+pub(crate) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
         Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_string(),
@@ -172,7 +172,7 @@ pub fn number(value: f64, decimals: usize) -> String {
 }
 
 /// `value` as short as a tick should be: 0.01, 5, 200, 10 k, 2 M, 1e−9.
-pub fn short_number(value: f64) -> String {
+pub(crate) fn short_number(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 {
         "0".to_string()
@@ -202,35 +202,35 @@ fn trimmed(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn texts(scale: &Scale) -> Vec<&str> {
+    fn texts(scale: &Axis) -> Vec<&str> {
         scale.ticks.iter().map(|tick| tick.1.as_str()).collect()
     }
 
     #[test]
     fn linear_ticks_are_round_and_inside() {
-        assert_eq!(texts(&Scale::linear(0.0, 10.0, 5)), ["0", "2", "4", "6", "8", "10"]);
-        assert_eq!(texts(&Scale::linear(-0.5, 0.5, 4)), ["\u{2212}0.50", "\u{2212}0.25", "0.00", "0.25", "0.50"]);
-        assert_eq!(texts(&Scale::percent(0.0, 1.0)), ["0 %", "20 %", "40 %", "60 %", "80 %", "100 %"]);
+        assert_eq!(texts(&Axis::linear(0.0, 10.0, 5)), ["0", "2", "4", "6", "8", "10"]);
+        assert_eq!(texts(&Axis::linear(-0.5, 0.5, 4)), ["\u{2212}0.50", "\u{2212}0.25", "0.00", "0.25", "0.50"]);
+        assert_eq!(texts(&Axis::percent(0.0, 1.0)), ["0 %", "20 %", "40 %", "60 %", "80 %", "100 %"]);
     }
 
     #[test]
     fn logarithmic_ticks_are_1_2_5_or_powers_alone() {
-        assert_eq!(texts(&Scale::logarithmic(10.0, 120.0)), ["10", "20", "50", "100"]);
-        assert_eq!(texts(&Scale::logarithmic(1e3, 1e6)), ["1000", "10 k", "100 k", "1 M"]);
+        assert_eq!(texts(&Axis::logarithmic(10.0, 120.0)), ["10", "20", "50", "100"]);
+        assert_eq!(texts(&Axis::logarithmic(1e3, 1e6)), ["1000", "10 k", "100 k", "1 M"]);
     }
 
     #[test]
     fn a_value_maps_between_the_limits_and_a_logarithm_of_nothing_stays_near_the_chart() {
-        let scale = Scale::logarithmic(1.0, 100.0);
+        let scale = Axis::logarithmic(1.0, 100.0);
         assert_eq!(scale.map(&10.0, (0, 1000)), 500);
         assert_eq!(scale.map(&0.0, (0, 1000)), -20);
-        assert_eq!(Scale::linear(0.0, 4.0, 4).map(&1.0, (100, 0)), 75);
+        assert_eq!(Axis::linear(0.0, 4.0, 4).map(&1.0, (100, 0)), 75);
     }
 
     #[test]
     fn an_axis_without_extent_still_has_one() {
         for (low, high) in [(1.0, 1.0), (0.0, 0.0), (f64::NAN, 1.0), (2.0, f64::INFINITY), (3.0, 2.0)] {
-            let scale = Scale::linear(low, high, 5);
+            let scale = Axis::linear(low, high, 5);
             assert!(!scale.ticks.is_empty(), "{low} {high}");
             assert!(scale.ticks.len() < 20, "{low} {high}");
         }
