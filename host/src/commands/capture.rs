@@ -19,7 +19,7 @@ Examples:
   palpate capture meshes/ -o data --pose          with the probe's direction
   palpate capture meshes/ -o data --approaches    every approach, also misses
   palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts
-  palpate capture meshes/ -o data --resume        continue an interrupted capture")]
+  palpate capture meshes/ -o data --resume        continue an interrupted one")]
 pub(crate) struct Arguments {
     /// What to touch: `builtin` or a built-in object's name, an OBJ file, or a directory that is searched for OBJ files
     #[arg(value_name = "SOURCE", required = true)]
