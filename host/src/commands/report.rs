@@ -8,10 +8,10 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate report                         the built-in objects, in about ten minutes
-  palpate report --quick -o quick        the same figures from fewer touches, in half a minute
-  palpate report meshes/ -o report       your own OBJ files
-  palpate report --resume                continue an interrupted report")]
+  palpate report                    the built-in objects, in about ten minutes
+  palpate report --quick -o quick   fewer touches, in half a minute
+  palpate report meshes/ -o report  your own OBJ files
+  palpate report --resume           continue an interrupted report")]
 pub(crate) struct Arguments {
     /// Where objects come from: `builtin` or a built-in object's name, an OBJ file, or a directory of OBJ files
     #[arg(default_value = "builtin", value_name = "SOURCE")]

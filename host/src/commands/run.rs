@@ -10,9 +10,9 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate run                          ten built-in objects, 21,000 touches each; results in out/
-  palpate run meshes/ -o mine          your own OBJ files
-  palpate run --touches 2000           a quick look
+  palpate run                  ten built-in objects; results in out/
+  palpate run meshes/ -o mine  your own OBJ files
+  palpate run --touches 2000   a quick look
   palpate run --json | jq .ours.accuracy
 
 Written into the output directory: data/ (the touches), paper.json and ensemble.json (the full models), paper.palpate
