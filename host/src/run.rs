@@ -417,7 +417,10 @@ pub fn text(summary: &Summary, out: &Path) -> String {
                 writeln!(text, "  {touched:width$}  recognized after {touches:>3} touches, posterior {posterior:.4}")
             }
             Some(name) => {
-                writeln!(text, "  {touched:width$}  mistaken for {name} after {touches} touches, posterior {posterior:.4}")
+                writeln!(
+                    text,
+                    "  {touched:width$}  mistaken for {name} after {touches} touches, posterior {posterior:.4}"
+                )
             }
             None => writeln!(text, "  {touched:width$}  undecided after {touches} touches"),
         };

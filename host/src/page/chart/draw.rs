@@ -6,7 +6,7 @@ use super::labels::apart;
 use super::parts::{Chart, Mark, Shape, Side, Stroke, Svg};
 use crate::error::{PageProblem, Result};
 use crate::page::axis::Axis;
-use crate::page::color::{GRAY, GRID, INK};
+use crate::page::color::{self, GRAY, GRID, INK};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::element::{Circle, DashedPathElement, PathElement, Polygon, Rectangle, Text, TriangleMarker};
@@ -103,7 +103,7 @@ impl Chart {
             if (wanted - place).abs() > 2.0 {
                 draw_line(root, &[from, to], &label.color, 1)?;
             }
-            draw_text(root, &label.text, (to.0 + 3, to.1), HPos::Left, VPos::Center, &label.color, false)?;
+            draw_text(root, &label.text, (to.0 + 3, to.1), HPos::Left, VPos::Center, &color::text(label.color), false)?;
         }
         Ok(())
     }
@@ -170,7 +170,7 @@ fn draw_mark(root: &Root, area: &Plane, frame: &Frame, mark: &Mark) -> Result<()
                 Side::UpperLeft => ((x - 5, y - 10), HPos::Right, VPos::Center),
                 Side::Center => ((x, y), HPos::Center, VPos::Center),
             };
-            draw_text(root, text, place, h, v, color, false)
+            draw_text(root, text, place, h, v, &color::text(*color), false)
         }
         Mark::Vertical(x) => {
             let x = area.map_coordinate(&(*x, area.get_y_range().start)).0 / FINE;

@@ -5,15 +5,15 @@ use glam::{Mat3, Vec3};
 
 /// A direction to look from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub(super) struct Viewpoint {
     /// Turns the mesh's axes into the viewer's: x to the right, y up, z toward the viewer.
     pub(super) turn: Mat3,
 }
 
-impl View {
+impl Viewpoint {
     /// From `azimuth` degrees (0 looks along −x, 90 along −y) and `elevation` degrees above the plane of x and y, with z
     /// up.
-    pub fn new(azimuth: f32, elevation: f32) -> Self {
+    fn new(azimuth: f32, elevation: f32) -> Self {
         let (sin_a, cos_a) = libm::sincosf(azimuth.to_radians());
         let (sin_e, cos_e) = libm::sincosf(elevation.to_radians());
         let right = Vec3::new(-sin_a, cos_a, 0.0);
@@ -24,7 +24,7 @@ impl View {
 
     /// From the front, right and above; the flatter the mesh lies, the more from above. A mesh that is thin in x or y
     /// is first turned onto its side.
-    pub fn three_quarter(mesh: &Mesh) -> Self {
+    pub(super) fn three_quarter(mesh: &Mesh) -> Self {
         let [low, high] = bounds(mesh);
         let side = (high - low).max(Vec3::splat(f32::MIN_POSITIVE));
         let thin = |a: f32, b: f32, c: f32| a < 0.3 * b.min(c);
@@ -42,7 +42,7 @@ impl View {
 }
 
 /// The least and the greatest corner of the mesh's bounding box; the origin twice if it has no finite vertex.
-pub(super) fn bounds(mesh: &Mesh) -> [Vec3; 2] {
+fn bounds(mesh: &Mesh) -> [Vec3; 2] {
     let finite = mesh.vertices.iter().map(|&v| Vec3::from(v)).filter(|v| v.is_finite());
     finite.map(|v| [v, v]).reduce(|[low, high], [v, _]| [low.min(v), high.max(v)]).unwrap_or([Vec3::ZERO; 2])
 }
