@@ -15,7 +15,9 @@ fuzz_target!(|bytes: &[u8]| {
         return;
     }
     bytes[..4].copy_from_slice(&MAGIC);
-    bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
+    // Either version.
+    let version = 1 + u16::from(bytes[4]) % VERSION;
+    bytes[4..6].copy_from_slice(&version.to_le_bytes());
     bytes[8..12].copy_from_slice(&length.to_le_bytes());
     let body = bytes.len() - CHECKSUM_LENGTH;
     let sum = checksum(&bytes[..body]);
@@ -28,6 +30,7 @@ fn walk(model: &Model<'_>) {
     for object in 0..=model.object_count() {
         let _ = (model.object_name(object), model.prior(object), model.tool_version());
     }
+    let _ = (model.probe(), model.trained_touches(), model.noise(), model.optional_sections().count());
     let stopping = Stopping::from_model(model);
     let _ = stopping.error_rate();
     let Ok(mut recognizer) = Recognizer::<256>::new(model, stopping) else { return };

@@ -3,3 +3,4 @@
 #[path = "../../onboard/firmware/src/identity.rs"]
 pub mod identity;
 pub mod random;
+pub mod sections;

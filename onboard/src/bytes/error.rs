@@ -34,6 +34,13 @@ pub enum ModelError {
         /// Its offset in the model.
         offset: usize,
     },
+    /// The model has an optional section that a reader has to understand, and this crate does not.
+    NotUnderstood {
+        /// The section's tag.
+        tag: u16,
+        /// Its offset in the model.
+        offset: usize,
+    },
     /// Margins could grow beyond [`MARGIN_LIMIT`](palpate_shared::format::MARGIN_LIMIT).
     MarginRange,
     /// This crate was built without the feature that reads such a model.
@@ -51,7 +58,10 @@ impl ModelError {
             Self::NotAModel => 0,
             Self::Version(_) => 4,
             Self::Checksum { .. } | Self::MarginRange => 8,
-            Self::Field { offset } | Self::Section { offset } | Self::NotBuiltIn { offset } => offset,
+            Self::Field { offset }
+            | Self::Section { offset }
+            | Self::NotUnderstood { offset, .. }
+            | Self::NotBuiltIn { offset } => offset,
         }
     }
 }
@@ -66,7 +76,7 @@ impl fmt::Display for ModelError {
             Self::NotAModel => f.write_str("this is not a Palpate model"),
             Self::Version(version) => write!(
                 f,
-                "the model is of format version {version}, and this program reads version {}",
+                "the model is of format version {version}, and this program reads versions 1 to {}",
                 palpate_shared::format::VERSION
             ),
             Self::Checksum { stated, computed } => {
@@ -74,6 +84,9 @@ impl fmt::Display for ModelError {
             }
             Self::Field { .. } => f.write_str("a field of the model has an invalid value"),
             Self::Section { .. } => f.write_str("a section of the model does not have the length stated in the header"),
+            Self::NotUnderstood { tag, .. } => {
+                write!(f, "the model relies on section {tag}, which this program does not know: it needs a newer one")
+            }
             Self::MarginRange => f.write_str("the model's margins could overflow"),
             Self::NotBuiltIn { offset } => {
                 let what = if *offset == 6 { "layout" } else { "type of leaf" };

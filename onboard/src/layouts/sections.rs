@@ -7,6 +7,8 @@ use palpate_shared::format::{Layout, LeafType};
 pub(crate) struct Sections<'a> {
     /// All of the model's bytes.
     pub(crate) bytes: &'a [u8],
+    /// The optional sections.
+    pub(crate) optional: &'a [u8],
     pub(crate) base: &'a [u8],
     pub(crate) axes: &'a [u8],
     pub(crate) cuts: &'a [u8],

@@ -1,5 +1,6 @@
 //! What is checked when a model is opened, so that no later step can fail.
 
+use super::optional;
 use crate::bytes::{ModelError, take};
 use crate::layouts::{Sections, built_in, complete, grid, preorder, ranks};
 use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
@@ -24,6 +25,7 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>) -> Result<(), Mod
     if !built_in || !built_in::leaf(model.leaf) {
         return Err(ModelError::NotBuiltIn { offset: if built_in { 7 } else { 6 } });
     }
+    optional::check(model)?;
     ranks::check(model, header.last_feature())?;
     let section =
         |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };

@@ -18,7 +18,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Sections<'_>, Option<Descriptor>), M
         let expected = u32::try_from(HEADER_LENGTH).unwrap_or_default();
         return Err(ModelError::Length { expected, found });
     };
-    if header.version() != VERSION {
+    if header.version() == 0 || header.version() > VERSION {
         return Err(ModelError::Version(header.version()));
     }
     let expected = header.length();
@@ -39,6 +39,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Sections<'_>, Option<Descriptor>), M
     };
     let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
     section(length(header.text_length()))?;
+    let optional = section(length(header.optional_length()))?;
     let base = section(4 * usize::from(objects))?;
     section(4 * usize::from(objects))?;
     let axes = section(4 * usize::from(header.axes()))?;
@@ -52,7 +53,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Sections<'_>, Option<Descriptor>), M
     if rest.len() != CHECKSUM_LENGTH {
         return Err(ModelError::Section { offset: found - rest.len() });
     }
-    Ok((Sections { bytes, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf }, descriptor))
+    Ok((Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf }, descriptor))
 }
 
 /// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.

@@ -4,11 +4,15 @@ mod check;
 mod fixed;
 mod header;
 mod margins;
+mod optional;
 
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Sections, built_in};
 use palpate_shared::Descriptor;
-use palpate_shared::format::{HEADER_LENGTH, Header, Key, Layout, LeafType};
+use palpate_shared::format::{
+    HEADER_LENGTH, Header, Key, Layout, LeafType, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
+    take_section,
+};
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
 ///
@@ -113,9 +117,35 @@ impl<'a> Model<'a> {
         self.priors().get(object).map_or(0, |prior| i32::from_le_bytes(*prior))
     }
 
+    /// The probe that the model was trained for, if it states one.
+    pub fn probe(&self) -> Option<TrainedProbe> {
+        TrainedProbe::from_bytes(optional::find(self.sections.optional, Tag::Probe))
+    }
+
+    /// The touches that the model was trained on, and so the only ones that count as evidence: full touches, with a pose
+    /// if the descriptor needs one, unless the model states others.
+    ///
+    /// Cost: about 100 instructions.
+    pub fn trained_touches(&self) -> TrainedTouches {
+        TrainedTouches::from_bytes(optional::find(self.sections.optional, Tag::Touches))
+            .unwrap_or_else(|| TrainedTouches::full(self.descriptor.is_some_and(Descriptor::needs_pose)))
+    }
+
+    /// The noise in the training, if the model states it.
+    pub fn noise(&self) -> Option<TrainedNoise> {
+        TrainedNoise::from_bytes(optional::find(self.sections.optional, Tag::Noise))
+    }
+
+    /// The optional sections, in the order of their tags; also those that this crate does not know.
+    pub fn optional_sections(&self) -> impl Iterator<Item = Section<'a>> {
+        let mut rest = self.sections.optional;
+        core::iter::from_fn(move || take_section(&mut rest))
+    }
+
     /// The evidence for each object before any touch.
     pub(crate) fn priors(&self) -> &'a [[u8; 4]] {
-        let start = HEADER_LENGTH + self.text_length() + self.sections.base.len();
+        // They follow the base margins, which are as long.
+        let start = self.sections.offset(self.sections.base) + self.sections.base.len();
         self.sections.bytes.get(start..start + self.sections.base.len()).unwrap_or_default().as_chunks().0
     }
 

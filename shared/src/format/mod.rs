@@ -1,19 +1,24 @@
 //! The bytes of a compiled model; `FORMAT.md` in this crate specifies every one of them.
 //!
 //! ```text
-//! header │ text │ base margins │ priors │ axes │ thresholds │ groups │ splits │ leaves │ CRC-32
+//! header │ text │ optional sections │ base margins │ priors │ axes │ thresholds │ groups │ splits │ leaves │ CRC-32
 //! ```
 
 mod codes;
 mod header;
 mod key;
 mod records;
+mod trained;
 
 pub use crate::checksum::checksum;
-pub use codes::{Key, Layout, LeafType, RAW_FEATURES};
-pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION};
+pub use codes::{Counted, Key, Layout, LeafType, Length, RAW_FEATURES};
+pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
 pub use records::{Axis, Columns, Group};
+pub use trained::{
+    MUST_UNDERSTAND, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe, TrainedTouches,
+    take_section, write_section,
+};
 
 /// Bytes of the checksum at the end.
 pub const CHECKSUM_LENGTH: usize = 4;
