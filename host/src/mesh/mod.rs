@@ -1,6 +1,10 @@
 //! Triangle meshes: from files, or built in.
 
+#[cfg(feature = "objects")]
 pub mod builtin;
+#[cfg(not(feature = "objects"))]
+#[path = "no_builtin.rs"]
+mod builtin;
 pub mod obj;
 pub mod source;
 
