@@ -2,18 +2,6 @@
 
 mod commands;
 
-use clap::Parser;
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    let cli = commands::Cli::parse();
-    match cli.run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            if !matches!(error, palpate::Error::Closed) {
-                eprintln!("palpate: {error}");
-            }
-            ExitCode::from(error.exit_code())
-        }
-    }
+fn main() -> std::process::ExitCode {
+    commands::run()
 }

@@ -72,8 +72,8 @@ fn parity(
         transport = transport.with_faults(faults, 1);
     }
     let mut connection = Connection::open(transport, settings).unwrap();
-    connection.load(model, |_| ()).unwrap();
-    let chip = connection.model().unwrap().unwrap();
+    connection.load(model, &()).unwrap();
+    let chip = connection.model().unwrap();
     let host = Model::new(model).unwrap();
     let steps = Steps::sequences(dataset(1_000), 60, touches);
     stream(&mut connection, steps, &chip, Some(&host), |connection, update| {

@@ -102,8 +102,8 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
 
     let transport = port.open(115_200, &Emulator::default()).unwrap();
     let mut connection = Connection::open(transport, HostSettings { retry: 5_000_000, attempts: 10 }).unwrap();
-    connection.load(&bytes, |_| ()).unwrap();
-    let described = connection.model().unwrap().unwrap();
+    connection.load(&bytes, &()).unwrap();
+    let described = connection.model().unwrap();
     let object =
         |index: usize| ObjectTouches { name: format!("object {index}"), touches: random::touches(997, index as u64) };
     let dataset = Dataset { objects: (0..OBJECTS).map(object).collect() };

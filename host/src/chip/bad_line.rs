@@ -1,5 +1,6 @@
 //! A line that loses, changes and delays bytes on purpose.
 
+use crate::error::{ChipProblem, Error, Result};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use std::collections::VecDeque;
@@ -11,22 +12,22 @@ use std::time::{Duration, Instant};
 pub struct Faults {
     /// Probability that a byte is lost.
     pub lost: f64,
-    /// Probability that a bit of a byte is turned.
+    /// Probability that one bit of a byte is flipped.
     pub changed: f64,
     /// Probability that bytes sent together arrive twice.
     pub doubled: f64,
-    /// Bytes arrive up to so much later, in order.
+    /// Bytes arrive up to this much later, in order.
     pub delay: Duration,
 }
 
 impl FromStr for Faults {
-    type Err = String;
+    type Err = Error;
 
     /// `lost,changed,doubled,delay`: three probabilities and milliseconds.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || String::from("not faults: give three probabilities and milliseconds, as in 0.001,0.001,0.01,5");
+    fn from_str(text: &str) -> Result<Self> {
+        let wrong = || Error::from(ChipProblem::NotFaults { text: text.into() });
         let numbers: Vec<f64> =
-            text.split(',').map(|number| number.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+            text.split(',').map(|number| number.trim().parse().map_err(|_| wrong())).collect::<Result<_>>()?;
         match numbers.as_slice() {
             &[lost, changed, doubled, delay]
                 if [lost, changed, doubled].iter().all(|p| (0.0..=1.0).contains(p)) && (0.0..1e6).contains(&delay) =>
@@ -47,7 +48,7 @@ pub struct BadLine {
 }
 
 impl BadLine {
-    /// A line; the same seed does the same to the same bytes, but for the delay's effects.
+    /// A line. The same seed does the same to the same bytes, except for what the delay changes.
     pub fn new(faults: Faults, seed: u64) -> Self {
         Self { faults, rng: ChaCha8Rng::seed_from_u64(seed), under_way: VecDeque::new() }
     }
@@ -64,8 +65,8 @@ impl BadLine {
                 if rng.random_bool(faults.lost) {
                     continue;
                 }
-                let turned = if rng.random_bool(faults.changed) { 1 << rng.random_range(0..8) } else { 0 };
-                arriving.push(byte ^ turned);
+                let flipped = if rng.random_bool(faults.changed) { 1 << rng.random_range(0..8) } else { 0 };
+                arriving.push(byte ^ flipped);
             }
             let due = now + faults.delay.mul_f64(rng.random());
             let last = under_way.back().map_or(now, |(due, _)| *due);
@@ -103,5 +104,7 @@ mod tests {
         assert!("2,0,0,0".parse::<Faults>().is_err());
         assert!("0,0,0,-1".parse::<Faults>().is_err());
         assert!("0,0,0,0".parse::<Faults>().is_ok());
+        let error = "often".parse::<Faults>().unwrap_err().to_string();
+        assert!(error.starts_with("`often` does not say") && error.ends_with("as in 0.001,0.001,0.01,5."), "{error}");
     }
 }

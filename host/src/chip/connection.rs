@@ -1,7 +1,8 @@
 //! A session with a chip.
 
 use super::Transport;
-use crate::error::{Error, Result};
+use crate::error::{ChipProblem, Error, Place, Result};
+use crate::progress::{self, Progress};
 use palpate_shared::link::{
     Answer, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo, Outcome, Payload, Query,
     Refusal, Statistics, checksum,
@@ -9,12 +10,12 @@ use palpate_shared::link::{
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// What a chip says, kept.
+/// What a chip says by itself or about a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Owned {
-    /// What came of a command, in the commands' order.
+pub enum Received {
+    /// The outcome of a command, in the commands' order.
     Outcome(Outcome),
-    /// Something happened on the chip by itself; so many events before it were lost.
+    /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
 }
 
@@ -42,7 +43,7 @@ pub struct Connection {
     end: HostEnd,
     transport: Transport,
     started: Instant,
-    heard: VecDeque<Owned>,
+    heard: VecDeque<Received>,
     reply: Option<Reply>,
     open: bool,
 }
@@ -75,7 +76,7 @@ impl Connection {
         u64::try_from(self.started.elapsed().as_micros()).unwrap_or(u64::MAX)
     }
 
-    /// The transport, to be reset or named.
+    /// The transport, for its name and for resetting an emulated chip.
     pub fn transport(&mut self) -> &mut Transport {
         &mut self.transport
     }
@@ -98,7 +99,7 @@ impl Connection {
     /// Sends a command if there is room for it, and says whether it did.
     ///
     /// # Errors
-    /// When the chip is gone.
+    /// When the line broke or the chip is silent.
     pub fn submit(&mut self, command: Command<'_>) -> Result<bool> {
         let now = self.now();
         let mut sent = Ok(());
@@ -106,11 +107,12 @@ impl Connection {
         sent.map(|()| number.is_some())
     }
 
-    /// What the chip has said; waits for something, at most for `wait`.
+    /// What the chip has said. Waits for it, but no longer than `wait`.
     ///
     /// # Errors
-    /// When the chip is gone, silent, or has forgotten the session: the error says how many touches that concerns.
-    pub fn hear(&mut self, wait: Duration) -> Result<Option<Owned>> {
+    /// When the line broke, or the chip is silent or has forgotten the session: the error says how many commands are
+    /// concerned.
+    pub fn hear(&mut self, wait: Duration) -> Result<Option<Received>> {
         if self.heard.is_empty() {
             self.exchange(wait)?;
         }
@@ -129,17 +131,13 @@ impl Connection {
         };
         end.receive(&bytes, now, &mut send, |incoming| match incoming {
             Incoming::Opened => *open = true,
-            Incoming::Outcome { outcome, .. } => heard.push_back(Owned::Outcome(outcome)),
-            Incoming::Event { event, missed } => heard.push_back(Owned::Event(event, missed)),
+            Incoming::Outcome { outcome, .. } => heard.push_back(Received::Outcome(outcome)),
+            Incoming::Event { event, missed } => heard.push_back(Received::Event(event, missed)),
             Incoming::Answer(answer) => *reply = Some(keep(answer)),
         });
         let ticked = end.tick(now, &mut send);
         sent?;
-        ticked.map_err(|error| {
-            let text = error.to_string();
-            let (what, fix) = text.split_once(". ").unwrap_or((&text, "Check the cable"));
-            Error::file(self.transport.name(), what, format!("{fix}."))
-        })
+        ticked.map_err(|error| self.wrong(ChipProblem::from(error)))
     }
 
     fn ask(&mut self, query: Query) -> Result<Reply> {
@@ -160,21 +158,25 @@ impl Connection {
     }
 
     fn unexpected<T>(&self, reply: &Reply) -> Result<T> {
-        let what = match reply {
-            Reply::Refused(refusal) => format!("the chip refuses: {refusal}"),
-            _ => "the chip answers something else than it was asked".into(),
-        };
-        Err(Error::file(self.transport.name(), what, "See palpate help link."))
+        Err(self.wrong(match *reply {
+            Reply::Refused(refusal) => ChipProblem::Refused(refusal),
+            _ => ChipProblem::UnexpectedAnswer,
+        }))
     }
 
-    /// The model in use on the chip; `None` if it has none.
+    /// The error for a problem with this chip.
+    pub(super) fn wrong(&self, problem: ChipProblem) -> Error {
+        Error::at(Place::file(self.transport.name()), problem)
+    }
+
+    /// The model in use on the chip.
     ///
     /// # Errors
-    /// When the chip is gone.
-    pub fn model(&mut self) -> Result<Option<ChipModel>> {
+    /// [`ChipProblem::NoModel`] if it has none. When the line broke or the chip is silent.
+    pub fn model(&mut self) -> Result<ChipModel> {
         let info = match self.ask(Query::Model)? {
             Reply::Model(info) => info,
-            Reply::Refused(Refusal::NoModel) => return Ok(None),
+            Reply::Refused(Refusal::NoModel) => return Err(self.wrong(ChipProblem::NoModel)),
             reply => return self.unexpected(&reply),
         };
         let mut names = Vec::new();
@@ -184,13 +186,13 @@ impl Connection {
                 reply => return self.unexpected(&reply),
             }
         }
-        Ok(Some(ChipModel { info, names }))
+        Ok(ChipModel { info, names })
     }
 
     /// What the chip's end has seen.
     ///
     /// # Errors
-    /// When the chip is gone.
+    /// When the line broke or the chip is silent.
     pub fn chip_statistics(&mut self) -> Result<Statistics> {
         match self.ask(Query::Statistics)? {
             Reply::Statistics(statistics) => Ok(statistics),
@@ -201,7 +203,7 @@ impl Connection {
     /// The posteriors of all objects in Q56.
     ///
     /// # Errors
-    /// When the chip is gone.
+    /// When the line broke or the chip is silent.
     pub fn posteriors(&mut self, objects: usize) -> Result<Vec<u64>> {
         let mut posteriors = Vec::new();
         while posteriors.len() < objects {
@@ -214,11 +216,13 @@ impl Connection {
         Ok(posteriors)
     }
 
-    /// Loads a model into the chip, which checks it before it uses it; `progress` is told of the bytes that are there.
+    /// Loads a model into the chip, which checks it before it uses it. `progress` counts bytes.
     ///
     /// # Errors
-    /// When the chip refuses it (it then goes on with the one it had), or is gone.
-    pub fn load(&mut self, bytes: &[u8], mut progress: impl FnMut(usize)) -> Result<()> {
+    /// [`ChipProblem::ModelRefused`] when the chip refuses it: it then goes on with the one it had, as it does when this
+    /// is [cancelled](Error::Cancelled). When the line broke or the chip is silent.
+    pub fn load(&mut self, bytes: &[u8], progress: &dyn Progress) -> Result<()> {
+        progress.begin("loading", Some(bytes.len() as u64));
         let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
         let begin = Command::Begin { payload: Payload::Model, length, checksum: checksum(bytes) };
         let chunks = bytes.chunks(CHUNK).enumerate().map(|(index, bytes)| {
@@ -235,15 +239,16 @@ impl Connection {
                 self.submit(command)?;
             }
             match self.hear(Duration::from_millis(20))? {
-                Some(Owned::Outcome(Outcome::Refused(refusal))) => {
-                    let what = format!("the chip refuses the model: {refusal}");
-                    return Err(Error::file(self.transport.name(), what, "The model it had is still in use."));
+                Some(Received::Outcome(Outcome::Refused(refusal))) => {
+                    return Err(self.wrong(ChipProblem::ModelRefused(refusal)));
                 }
-                Some(Owned::Outcome(_)) => {
-                    progress(bytes.len().min(done * CHUNK));
+                Some(Received::Outcome(_)) => {
+                    // The first outcome is that of the beginning, the last that of the end.
+                    let chunk = done.checked_sub(1).and_then(|chunk| bytes.chunks(CHUNK).nth(chunk));
+                    progress::advance(progress, chunk.map_or(0, |chunk| chunk.len() as u64))?;
                     done += 1;
                 }
-                Some(Owned::Event(..)) | None => {}
+                Some(Received::Event(..)) | None => progress::check(progress)?,
             }
         }
         Ok(())

@@ -1,11 +1,10 @@
-//! An emulated chip.
+//! A link to an emulated chip.
 
 use super::Transport;
-use super::transport::Running;
-use crate::error::{Error, Result};
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use super::qemu::{self, Qemu};
+use crate::error::{ChipProblem, Result};
+use std::path::PathBuf;
+use std::process::Command;
 use std::time::Duration;
 
 /// What to start for the port `emulator`.
@@ -32,75 +31,55 @@ impl Emulator {
     pub fn for_firmware(firmware: PathBuf) -> Self {
         let small = firmware.iter().any(|part| part == "thumbv6m-none-eabi");
         let machine = if small { "mps2-an385" } else { "mps2-an386" };
-        Self { program: "qemu-system-arm".into(), firmware, machine: machine.into() }
+        Self { program: qemu::PROGRAM.into(), firmware, machine: machine.into() }
     }
 
     /// Starts it; its UART is the transport.
     ///
     /// # Errors
-    /// When the firmware has not been built, or the emulator is not installed.
+    /// [`ChipProblem::NoImage`] when the firmware has not been built, [`ChipProblem::NoEmulator`] when the emulator is
+    /// not installed.
     pub fn start(&self) -> Result<Transport> {
         if !self.firmware.is_file() {
-            let fix = "Build it: cd onboard/firmware && cargo build --release; or name one with --firmware.";
-            return Err(Error::file(&self.firmware, "the firmware is not there", fix));
+            return Err(ChipProblem::NoImage { path: self.firmware.clone() }.into());
         }
-        let directory = tempfile::tempdir().map_err(|source| Error::io("the emulator's folder", "make", source))?;
         let mut command = Command::new(&self.program);
         command.args(["-machine", &self.machine, "-display", "none", "-serial", "stdio"]);
-        command.args(["-semihosting-config", "enable=on,target=native"]);
-        let monitor = if cfg!(unix) {
-            format!("unix:{},server=on,wait=off", directory.path().join(MONITOR).display())
-        } else {
-            "none".into()
-        };
-        command.args(["-monitor", "none", "-qmp"]).arg(monitor).arg("-kernel").arg(&self.firmware);
-        let spawned = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
-        let mut child = spawned.map_err(|source| match source.kind() {
-            ErrorKind::NotFound => {
-                let fix = "Install it: apt-get install qemu-system-arm, brew install qemu.";
-                Error::file(&self.program, "the emulator is not installed", fix)
-            }
-            _ => Error::io(&self.program, "start the emulator", source),
-        })?;
-        let (Some(stdin), Some(stdout)) = (child.stdin.take(), child.stdout.take()) else {
-            return Err(Error::data("the emulator has no serial line", "Report this as a bug."));
-        };
-        let running = Running { child, directory: Some(directory) };
+        command.args(["-semihosting-config", "enable=on,target=native"]).arg("-kernel").arg(&self.firmware);
+        let (qemu, stdin, stdout) = Qemu::start(command)?;
         // The emulated UART writes each byte by itself: waking up for each would cost more than all the rest.
         let gather = Duration::from_micros(300);
-        Ok(Transport::new("emulator".into(), stdout, stdin, gather).with_emulator(running))
+        Ok(Transport::new("emulator".into(), stdout, stdin, gather).with_emulator(qemu))
     }
 }
 
-const MONITOR: &str = "monitor";
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
 
-/// Resets the chip, as its reset button does, and returns when that has happened: over QEMU's machine protocol, a line of
-/// JSON for each command, answer and event.
-#[cfg(unix)]
-pub(super) fn reset(directory: &Path) -> Result<()> {
-    use std::io::{BufRead, BufReader, Write};
-    let path = directory.join(MONITOR);
-    let io = |source| Error::io(&path, "reset the emulated chip", source);
-    let mut monitor = std::os::unix::net::UnixStream::connect(&path).map_err(io)?;
-    monitor.set_read_timeout(Some(Duration::from_secs(30))).map_err(io)?;
-    let mut lines = BufReader::new(monitor.try_clone().map_err(io)?).lines();
-    let mut wait_for = |key: &str, value: Option<&str>| -> std::io::Result<()> {
-        for line in &mut lines {
-            let message: serde_json::Value = serde_json::from_str(&line?)?;
-            if message.get(key).is_some_and(|found| value.is_none_or(|value| found == value)) {
-                return Ok(());
+    #[test]
+    fn what_the_emulator_complains_about_is_shown() {
+        // Stands in for QEMU: it does not know these options either, says so on standard error, and ends.
+        let firmware = tempfile::NamedTempFile::new().unwrap();
+        let emulator = Emulator { program: "cat".into(), ..Emulator::for_firmware(firmware.path().into()) };
+        let mut transport = emulator.start().unwrap();
+        let error = loop {
+            if let Err(error) = transport.receive(Duration::from_secs(60)) {
+                break error.to_string();
             }
-        }
-        Err(ErrorKind::UnexpectedEof.into())
-    };
-    wait_for("QMP", None).map_err(io)?;
-    writeln!(monitor, r#"{{"execute":"qmp_capabilities"}}"#).map_err(io)?;
-    wait_for("return", None).map_err(io)?;
-    writeln!(monitor, r#"{{"execute":"system_reset"}}"#).map_err(io)?;
-    wait_for("event", Some("RESET")).map_err(io)
-}
+        };
+        assert!(error.starts_with("emulator: the emulator ended: cat: "), "{error}");
+        assert!(error.contains("option") && error.contains("Check that the firmware image"), "{error}");
+    }
 
-#[cfg(not(unix))]
-pub(super) fn reset(_: &Path) -> Result<()> {
-    Err(Error::data("the emulator cannot be reset from here", "Run this on Linux or macOS."))
+    #[test]
+    fn a_missing_image_and_a_missing_emulator_are_distinguished() {
+        let start = |emulator: Emulator| emulator.start().err().unwrap().to_string();
+        let error = start(Emulator::for_firmware("no/such/uart".into()));
+        assert!(error.starts_with("the firmware image no/such/uart does not exist. Build it: cd onboard"), "{error}");
+        let firmware = tempfile::NamedTempFile::new().unwrap();
+        let emulator = Emulator::for_firmware(firmware.path().into());
+        let error = start(Emulator { program: "no-such-qemu".into(), ..emulator });
+        assert!(error.starts_with("no-such-qemu: the emulator is not installed. Install it"), "{error}");
+    }
 }

@@ -1,14 +1,15 @@
-//! What happened on a link, as lines of JSON: for programs, and for `palpate watch` to look at later or meanwhile.
+//! What happened on a link, as lines of JSON: for programs, and to be watched meanwhile or later.
 
 use super::{ChipModel, Update};
 use crate::error::{Error, Result};
 use palpate_shared::link::{Decision, Event};
 use serde::{Deserialize, Serialize};
-use std::io::Write;
+use std::fmt;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// A line of a journal.
+/// One line of a journal. Its `Display` is the same for people.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "is", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -22,7 +23,7 @@ pub enum Entry {
         /// CRC-32.
         checksum: u32,
     },
-    /// The touches of another object begin.
+    /// Another object begins.
     Object {
         /// Its name, where it is known.
         name: Option<String>,
@@ -65,13 +66,19 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a journal. A file that is there already is emptied: a journal is followed while it is written, so it cannot
-    /// appear whole at its end.
+    /// Begins a journal. A file of this name is replaced, not emptied: whoever still follows it can read the rest of it.
     ///
     /// # Errors
     /// When the file cannot be written.
     pub fn create(path: &Path) -> Result<Self> {
-        let file = std::fs::File::create(path).map_err(|source| Error::io(path, "write the journal", source))?;
+        let io = |source| Error::io(path, "write the journal", source);
+        match std::fs::canonicalize(path) {
+            // Only files are removed: devices and pipes are written to, and links stay.
+            Ok(target) if target.is_file() => std::fs::remove_file(target).map_err(io)?,
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(io(error)),
+            _ => {}
+        }
+        let file = std::fs::File::create(path).map_err(io)?;
         Ok(Self { path: path.into(), file })
     }
 
@@ -117,6 +124,41 @@ impl Entry {
                 Some(Self::Fault { what })
             }
             Update::Event(..) | Update::Idle => None,
+        }
+    }
+}
+
+/// One line for people, without an end of line.
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Model { objects, length, checksum } => {
+                write!(f, "model of {length} bytes, checksum {checksum:08x}: {}", objects.join(", "))
+            }
+            Self::Object { name: Some(name) } => write!(f, "another object: {name}"),
+            Self::Object { name: None } => f.write_str("another object"),
+            Self::Touch { times, verdict, best, touches, posteriors, .. } => {
+                write!(f, "{touches:5}")?;
+                for time in times {
+                    match time {
+                        Some(micros) => write!(f, " {:9.3}", f64::from(*micros) / 1e3)?,
+                        None => write!(f, " {:>9}", "-")?,
+                    }
+                }
+                f.write_str(" ms  ")?;
+                if verdict != "undecided" {
+                    return f.write_str(verdict);
+                }
+                write!(f, "perhaps {best}")?;
+                match posteriors.as_ref().and_then(|p| p.iter().copied().reduce(f64::max)) {
+                    Some(posterior) => write!(f, " {:.1} %", 100.0 * posterior),
+                    None => Ok(()),
+                }
+            }
+            Self::Fault { what } => write!(f, "fault: {what}"),
+            Self::Link { resent, garbled, missed } => {
+                write!(f, "link: {resent} frames sent again, {garbled} garbled, {missed} events missed")
+            }
         }
     }
 }

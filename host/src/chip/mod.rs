@@ -3,27 +3,28 @@
 //! ```text
 //! touches ──► stream ──► Connection ──► Transport ──► (bad line) ──► serial port, TCP or emulator
 //!                │
-//!                └──► mirror: the host's own recognizer, which the chip is held against
+//!                └──► mirror: the host's own recognizer, which the chip is compared with
 //! ```
 //!
-//! What is said, and why nothing is counted twice: [`palpate_shared::link`].
+//! The messages, and why no touch is counted twice: [`palpate_shared::link`].
 
 mod bad_line;
 mod connection;
-pub mod emulated;
 mod emulator;
+pub mod instructions;
 mod journal;
 mod port;
+mod qemu;
 mod steps;
 mod stream;
 mod transport;
 pub mod watch;
 
 pub use bad_line::{BadLine, Faults};
-pub use connection::{ChipModel, Connection, Owned};
+pub use connection::{ChipModel, Connection, Received};
 pub use emulator::Emulator;
 pub use journal::{Entry, Journal};
 pub use port::Port;
 pub use steps::{Step, Steps};
-pub use stream::{Summary, Update, stream};
+pub use stream::{Summary, Update, probability, stream};
 pub use transport::Transport;

@@ -1,9 +1,9 @@
 //! Where a chip can be reached.
 
 use super::{Emulator, Transport};
-use crate::error::{Error, Result};
+use crate::error::{ChipProblem, Error, Place, Result};
 use std::fmt;
-use std::io::{ErrorKind, Read, Write};
+use std::io::Write;
 use std::net::{Shutdown, TcpStream};
 use std::str::FromStr;
 use std::time::Duration;
@@ -20,12 +20,12 @@ pub enum Port {
 }
 
 impl FromStr for Port {
-    type Err = String;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self> {
         match text.split_once("://") {
             Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.into())),
-            Some(_) => Err("not a port: give a serial port, tcp://host:port or emulator".into()),
+            Some(_) => Err(ChipProblem::NotAPort { text: text.into() }.into()),
             None if text == "emulator" => Ok(Self::Emulator),
             None => Ok(Self::Serial(text.into())),
         }
@@ -43,15 +43,18 @@ impl fmt::Display for Port {
 }
 
 impl Port {
-    /// Opens the port; `baud` is the speed of a serial one, `emulator` what to start.
+    /// Opens the port; `baud` is the speed of a serial one in bits per second, `emulator` what to start.
     ///
     /// # Errors
-    /// When the port cannot be opened or the emulator not be started.
+    /// When the port cannot be opened or the emulator cannot be started. [`ChipProblem::NoSerialPorts`] for a serial port
+    /// without the feature `serial`.
     pub fn open(&self, baud: u32, emulator: &Emulator) -> Result<Transport> {
         match self {
-            Self::Serial(name) => open_serial(name, baud),
+            Self::Serial(name) => serial::open(name, baud),
             Self::Tcp(address) => {
-                let io = |source| Error::io(self.to_string(), "connect to the chip", source);
+                let io = |source: std::io::Error| {
+                    Error::at(Place::file(self.to_string()), ChipProblem::CannotConnect { reason: source.to_string() })
+                };
                 let stream = TcpStream::connect(address).map_err(io)?;
                 stream.set_nodelay(true).map_err(io)?;
                 let reader = stream.try_clone().map_err(io)?;
@@ -60,19 +63,6 @@ impl Port {
             Self::Emulator => emulator.start(),
         }
     }
-}
-
-fn open_serial(name: &str, baud: u32) -> Result<Transport> {
-    let wrong = |error: serialport::Error| {
-        let ports = serialport::available_ports().unwrap_or_default();
-        let names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
-        let there = if names.is_empty() { "No serial port is there".into() } else { names.join(", ") };
-        let fix = format!("Serial ports here: {there}. Check the cable, and that no other program has the port.");
-        Error::file(name, format!("cannot open the serial port: {error}"), fix)
-    };
-    let port = serialport::new(name, baud).timeout(Duration::from_millis(100)).open().map_err(wrong)?;
-    let reader = port.try_clone().map_err(wrong)?;
-    Ok(Transport::new(name.into(), Patient(reader), SerialWriter(port), Duration::ZERO))
 }
 
 /// Hangs up when it is dropped: the thread that reads has the stream open too, and waits in it.
@@ -94,13 +84,47 @@ impl Write for TcpWriter {
     }
 }
 
-/// A serial port that is quiet has nothing to read yet; it has not failed.
-struct Patient(Box<dyn serialport::SerialPort>);
+#[cfg(feature = "serial")]
+mod serial {
+    use super::super::Transport;
+    use crate::error::{ChipProblem, Error, Place, Result};
+    use serialport::SerialPort;
+    use std::io::{ErrorKind, Read, Write};
+    use std::time::Duration;
 
-impl Read for Patient {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+    pub(super) fn open(name: &str, baud: u32) -> Result<Transport> {
+        let wrong = |error: serialport::Error| {
+            let ports = serialport::available_ports().unwrap_or_default();
+            let ports = ports.into_iter().map(|port| port.port_name).collect();
+            Error::at(Place::file(name), ChipProblem::CannotOpen { reason: error.to_string(), ports })
+        };
+        let port = serialport::new(name, baud).timeout(Duration::from_millis(100)).open().map_err(wrong)?;
+        let reader = port.try_clone().map_err(wrong)?;
+        Ok(Transport::new(name.into(), Patient(reader), Patient(port), Duration::ZERO))
+    }
+
+    /// A serial port that is quiet, or slower than this program, has not failed: it is asked again.
+    struct Patient(Box<dyn SerialPort>);
+
+    impl Read for Patient {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            retry(|| self.0.read(buffer))
+        }
+    }
+
+    impl Write for Patient {
+        fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
+            retry(|| self.0.write(buffer))
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            self.0.flush()
+        }
+    }
+
+    fn retry(mut action: impl FnMut() -> std::io::Result<usize>) -> std::io::Result<usize> {
         loop {
-            match self.0.read(buffer) {
+            match action() {
                 Err(error) if error.kind() == ErrorKind::TimedOut => {}
                 result => return result,
             }
@@ -108,35 +132,30 @@ impl Read for Patient {
     }
 }
 
-struct SerialWriter(Box<dyn serialport::SerialPort>);
+#[cfg(not(feature = "serial"))]
+mod serial {
+    use super::super::Transport;
+    use crate::error::{ChipProblem, Error, Place, Result};
 
-impl Write for SerialWriter {
-    fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
-        loop {
-            match self.0.write(buffer) {
-                // The line is slower than we are.
-                Err(error) if error.kind() == ErrorKind::TimedOut => {}
-                result => return result,
-            }
-        }
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.0.flush()
+    pub(super) fn open(name: &str, _: u32) -> Result<Transport> {
+        Err(Error::at(Place::file(name), ChipProblem::NoSerialPorts))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read;
 
     #[test]
-    fn ports_are_told_apart_by_how_they_are_written() {
+    fn ports_are_distinguished_by_how_they_are_written() {
         let port = |text: &str| text.parse::<Port>();
-        assert_eq!(port("emulator"), Ok(Port::Emulator));
-        assert_eq!(port("tcp://localhost:4000"), Ok(Port::Tcp("localhost:4000".into())));
-        assert_eq!(port("/dev/ttyACM0"), Ok(Port::Serial("/dev/ttyACM0".into())));
+        assert_eq!(port("emulator").unwrap(), Port::Emulator);
+        assert_eq!(port("tcp://localhost:4000").unwrap(), Port::Tcp("localhost:4000".into()));
+        assert_eq!(port("/dev/ttyACM0").unwrap(), Port::Serial("/dev/ttyACM0".into()));
         assert!(port("http://localhost").is_err() && port("tcp://localhost").is_err());
+        let error = port("http://localhost").unwrap_err().to_string();
+        assert_eq!(error, "`http://localhost` is not a port. Give a serial port, tcp://HOST:PORT or emulator.");
     }
 
     #[test]
@@ -150,9 +169,17 @@ mod tests {
         assert_eq!(chip.read(&mut [0]).unwrap(), 0);
     }
 
+    #[cfg(feature = "serial")]
     #[test]
-    fn a_serial_port_that_is_not_there_is_named() {
+    fn a_serial_port_that_does_not_exist_is_named() {
         let error = Port::Serial("/dev/no-such-port".into()).open(115_200, &Emulator::default()).err().unwrap();
         assert!(error.to_string().starts_with("/dev/no-such-port: cannot open the serial port"), "{error}");
+    }
+
+    #[cfg(not(feature = "serial"))]
+    #[test]
+    fn without_serial_ports_the_missing_feature_is_named() {
+        let error = Port::Serial("/dev/ttyACM0".into()).open(115_200, &Emulator::default()).err().unwrap();
+        assert!(error.to_string().contains("feature `serial`"), "{error}");
     }
 }

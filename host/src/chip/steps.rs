@@ -1,6 +1,6 @@
 //! What is streamed to a chip: touches, and where one object ends and the next begins.
 
-use crate::error::{Error, Result};
+use crate::error::{ChipProblem, Error, Place, Result};
 use crate::touches::{Dataset, parse_touch};
 use palpate_shared::Touch;
 use std::io::BufRead;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Something to tell the chip.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Another object comes: forget the touches so far. With its name, where it is known.
+    /// The next object begins: forget the touches so far. With its name, where it is known.
     Object(Option<String>),
     /// A touch.
     Touch(Touch),
@@ -17,7 +17,7 @@ pub enum Step {
 
 /// Where touches come from.
 pub enum Steps {
-    /// A data set: sequences of touches of one object after another, in turns.
+    /// A data set: a sequence of touches of each object in turn, again and again.
     Sequences {
         /// The touches.
         dataset: Dataset,
@@ -28,7 +28,7 @@ pub enum Steps {
         /// Which sequence, and which touch of it.
         at: (usize, usize),
     },
-    /// Lines of text as they come; an empty line ends an object.
+    /// Lines of text as they come; an empty line begins another object.
     Lines {
         /// The lines.
         reader: Box<dyn BufRead + Send>,
@@ -40,8 +40,8 @@ pub enum Steps {
 }
 
 impl Steps {
-    /// `count` touches of a data set: `length` of the first object, `length` of the second, …, and again from where each
-    /// was left. An object's touches begin again when they are used up.
+    /// `count` touches of a data set: `length` of the first object, `length` of the second, and so on, then `length` more
+    /// of the first. An object's touches begin again when they are used up.
     pub fn sequences(dataset: Dataset, length: usize, count: u64) -> Self {
         Self::Sequences { dataset, length: length.max(1), left: count, at: (0, 0) }
     }
@@ -92,9 +92,8 @@ impl Steps {
                 if text.is_empty() {
                     return Ok(Some(Step::Object(None)));
                 }
-                let fix = "Write three times in seconds, - for a missing contact.";
-                let touch = parse_touch(text).map_err(|what| Error::line(&path, *line, what, fix))?;
-                Ok(Some(Step::Touch(touch)))
+                let wrong = |what: String| Error::at(Place::line(&*path, *line), ChipProblem::NotATouch { what });
+                Ok(Some(Step::Touch(parse_touch(text).map_err(wrong)?)))
             }
         }
     }
@@ -106,7 +105,7 @@ mod tests {
     use crate::touches::ObjectTouches;
 
     #[test]
-    fn sequences_take_turns_and_go_on_where_each_object_was_left() {
+    fn sequences_take_turns_and_continue_where_each_object_stopped() {
         let object = |name: &str, first: u32| ObjectTouches {
             name: name.into(),
             touches: (first..first + 3).map(|t| Touch::from_micros([0, t, t])).collect(),
@@ -124,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_touches_and_an_empty_line_ends_an_object() {
+    fn lines_are_touches_and_an_empty_line_begins_another_object() {
         let text: &[u8] = b"0.03 0 0.05\n\n0 - 0.1\nnonsense\n";
         let mut steps = Steps::lines(Box::new(text), Path::new("touches.txt"));
         assert_eq!(steps.next_step().unwrap(), Some(Step::Touch(Touch::from_micros([30_000, 0, 50_000]))));

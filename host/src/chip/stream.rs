@@ -1,8 +1,7 @@
 //! Touches to the chip, verdicts from it, and the host's own recognizer beside it.
 
-use super::connection::Owned;
-use super::{ChipModel, Connection, Step, Steps};
-use crate::error::{Error, Result};
+use super::{ChipModel, Connection, Received, Step, Steps};
+use crate::error::{ChipProblem, Result};
 use palpate_onboard::Model;
 use palpate_onboard::station::Station;
 use palpate_shared::Touch;
@@ -15,7 +14,7 @@ use std::time::{Duration, Instant};
 /// Something new from the chip.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Update {
-    /// The touches of another object begin.
+    /// Another object begins, with its name where it is known.
     Object(Option<String>),
     /// A touch, and what is known after it.
     Touch {
@@ -25,10 +24,10 @@ pub enum Update {
         verdict: VerdictMessage,
         /// Whether this touch decided.
         decided: bool,
-        /// The posterior of each object, where the host's recognizer runs along.
+        /// The posterior of each object, where the host recognizes too.
         posteriors: Option<Vec<f64>>,
     },
-    /// Something happened on the chip by itself; so many events before it were lost.
+    /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
     /// Nothing has happened for a while.
     Idle,
@@ -39,19 +38,19 @@ pub enum Update {
 pub struct Summary {
     /// Touches that the chip counted.
     pub touches: u64,
-    /// Of these, held against the host's recognizer.
+    /// Of these, compared with the host's recognizer.
     pub compared: u64,
     /// Of these, with another verdict, posterior or evidence.
     pub differences: u64,
     /// The first of them.
     pub first_difference: Option<String>,
-    /// Objects recognized, where their names were known: rightly, wrongly, not at all.
+    /// Objects whose names were known and that were recognized correctly.
     pub right: u64,
-    /// Wrongly.
+    /// Objects whose names were known and that were taken for others.
     pub wrong: u64,
-    /// Not at all.
+    /// Objects whose names were known and that were not recognized.
     pub undecided: u64,
-    /// From the first touch to the last verdict.
+    /// Seconds in which the chip had something to answer. Waiting for touches to be typed is not included.
     pub seconds: f64,
     /// Frames that this end sent.
     pub sent: u64,
@@ -70,9 +69,30 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Touches a second.
+    /// Touches per second.
     pub fn rate(&self) -> f64 {
         self.touches as f64 / self.seconds.max(1e-9)
+    }
+}
+
+/// Adds up the time in which something was under way.
+#[derive(Default)]
+struct Busy {
+    since: Option<Instant>,
+    total: Duration,
+}
+
+impl Busy {
+    /// Something is under way or not, from now on.
+    fn set(&mut self, busy: bool, now: Instant) {
+        match (self.since, busy) {
+            (None, true) => self.since = Some(now),
+            (Some(since), false) => {
+                self.total += now.duration_since(since);
+                self.since = None;
+            }
+            _ => {}
+        }
     }
 }
 
@@ -82,11 +102,11 @@ enum Sent {
     Touch { touch: Touch, expected: Option<VerdictMessage>, posteriors: Option<Vec<f64>> },
 }
 
-/// Streams `steps` to the chip until they end or `each` breaks off, and hands every update to `each` in order. With a
-/// `mirror`, the host's own recognizer takes the same touches, and every verdict, posterior and evidence is compared.
+/// Streams `steps` to the chip until they end or `each` breaks, and passes every update to `each`, in order. With a
+/// `mirror`, the host recognizes the same touches with this model and compares every verdict, posterior and evidence.
 ///
 /// # Errors
-/// When a step cannot be read, the chip refuses a touch, or is gone; and when the mirror's model is not the chip's.
+/// When a step cannot be read, the chip refuses a touch, the line breaks, or the mirror's model is not the chip's.
 pub fn stream(
     connection: &mut Connection,
     mut steps: Steps,
@@ -97,16 +117,16 @@ pub fn stream(
     if let Some(model) = mirror
         && model.checksum() != chip.info.checksum
     {
-        let what = "the chip's model is not the one to compare with";
-        return Err(Error::file(connection.transport().name(), what, "Load it with --load."));
+        let problem = ChipProblem::OtherModel { chip: chip.info.checksum, expected: model.checksum() };
+        return Err(connection.wrong(problem));
     }
     let mut mirror = mirror.map(Station::<256>::new);
-    // Who types lines wants the verdict before the next line.
+    // A person who types lines wants each verdict before typing the next line.
     let one_by_one = matches!(steps, Steps::Lines { .. });
     let mut run = Run { summary: Summary::default(), under_way: VecDeque::new(), truth: None, decided: false };
     let mut pending = None;
     let mut more = true;
-    let start = Instant::now();
+    let mut busy = Busy::default();
     while more || pending.is_some() || !run.under_way.is_empty() {
         while connection.has_room() && (pending.is_some() || more) && (!one_by_one || run.under_way.is_empty()) {
             let step = match pending.take() {
@@ -121,18 +141,21 @@ pub fn stream(
                 pending = Some(step);
                 break;
             }
+            busy.set(true, Instant::now());
             run.under_way.push_back(sent(step, mirror.as_mut(), chip));
         }
         let update = match connection.hear(Duration::from_millis(50))? {
             None => Update::Idle,
-            Some(Owned::Event(event, missed)) => Update::Event(event, missed),
-            Some(Owned::Outcome(outcome)) => run.take(outcome, chip, connection.transport().name())?,
+            Some(Received::Event(event, missed)) => Update::Event(event, missed),
+            Some(Received::Outcome(outcome)) => run.take(outcome, chip).map_err(|problem| connection.wrong(problem))?,
         };
+        busy.set(!run.under_way.is_empty(), Instant::now());
         if each(connection, update)?.is_break() {
             break;
         }
     }
-    run.summary.seconds = start.elapsed().as_secs_f64();
+    busy.set(false, Instant::now());
+    run.summary.seconds = busy.total.as_secs_f64();
     run.end_object(chip);
     let (host, chip) = (connection.statistics(), connection.chip_statistics()?);
     let summary = run.summary;
@@ -173,8 +196,8 @@ fn sent(step: Step, mirror: Option<&mut Station<'_, '_, 256>>, chip: &ChipModel)
     }
 }
 
-/// A probability from Q56.
-pub(super) fn probability(q56: u64) -> f64 {
+/// A probability from Q56, as chips send posteriors.
+pub fn probability(q56: u64) -> f64 {
     q56 as f64 / (1_u64 << 56) as f64
 }
 
@@ -187,10 +210,9 @@ struct Run {
 }
 
 impl Run {
-    fn take(&mut self, outcome: Outcome, chip: &ChipModel, name: &str) -> Result<Update> {
+    fn take(&mut self, outcome: Outcome, chip: &ChipModel) -> Result<Update, ChipProblem> {
         if let Outcome::Refused(refusal) = outcome {
-            let what = format!("the chip refuses a touch: {refusal}");
-            return Err(Error::file(name, what, "Load a model with --load."));
+            return Err(ChipProblem::Refused(refusal));
         }
         match (self.under_way.pop_front(), outcome) {
             (Some(Sent::Object(name)), Outcome::Done) => {
@@ -208,10 +230,7 @@ impl Run {
                 }
                 Ok(Update::Touch { touch, verdict, decided, posteriors })
             }
-            _ => {
-                let fix = "The chip's program speaks another version of the link: flash it again.";
-                Err(Error::file(name, "an outcome came that belongs to no command", fix))
-            }
+            _ => Err(ChipProblem::UnexpectedAnswer),
         }
     }
 
@@ -243,5 +262,23 @@ impl Run {
         if !std::mem::take(&mut self.decided) && self.truth.is_some() {
             self.count(Decision::Unknown, chip);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waiting_for_the_next_touch_does_not_count_as_time_of_the_chip() {
+        let start = Instant::now();
+        let at = |seconds| start + Duration::from_secs(seconds);
+        let mut busy = Busy::default();
+        for (is_busy, seconds) in
+            [(false, 5), (true, 10), (true, 11), (false, 12), (false, 100), (true, 200), (false, 203)]
+        {
+            busy.set(is_busy, at(seconds));
+        }
+        assert_eq!(busy.total, Duration::from_secs(2 + 3));
     }
 }

@@ -1,10 +1,10 @@
 //! Bytes to and from a chip, over a line that can be made bad on purpose.
 
+use super::qemu::Qemu;
 use super::{BadLine, Faults};
-use crate::error::{Error, Result};
+use crate::error::{ChipProblem, Error, Place, Result};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::io::{ErrorKind, Read, Write};
-use std::process::Child;
 use std::time::{Duration, Instant};
 
 /// Bytes to and from a chip.
@@ -13,26 +13,12 @@ pub struct Transport {
     received: Receiver<std::io::Result<Vec<u8>>>,
     writer: Box<dyn Write + Send>,
     bad: Option<(BadLine, BadLine)>,
-    emulator: Option<Running>,
-}
-
-/// A started emulator, ended when it is dropped.
-pub(super) struct Running {
-    pub(super) child: Child,
-    /// Holds the monitor's socket.
-    pub(super) directory: Option<tempfile::TempDir>,
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+    emulator: Option<Qemu>,
 }
 
 impl Transport {
-    /// A transport of a reader, which a thread of its own waits on, and a writer; `name` is for errors. `gather` is how
-    /// long bytes may pile up before they are read, where they come one by one.
+    /// A transport of a reader, on which a thread waits, and a writer; `name` is for errors. Where bytes come one by one,
+    /// `gather` is how long they may pile up before they are read.
     pub fn new(
         name: String,
         mut reader: impl Read + Send + 'static,
@@ -62,7 +48,7 @@ impl Transport {
         Self { name, received, writer: Box::new(writer), bad: None, emulator: None }
     }
 
-    pub(super) fn with_emulator(mut self, emulator: Running) -> Self {
+    pub(super) fn with_emulator(mut self, emulator: Qemu) -> Self {
         self.emulator = Some(emulator);
         self
     }
@@ -83,11 +69,10 @@ impl Transport {
     /// # Errors
     /// When this is no emulator, or it does not listen.
     pub fn reset_chip(&mut self) -> Result<()> {
-        let directory = self.emulator.as_ref().and_then(|emulator| emulator.directory.as_ref());
-        let Some(directory) = directory else {
-            return Err(Error::data(format!("{} has no reset", self.name), "Use the emulator."));
-        };
-        super::emulator::reset(directory.path())
+        match &self.emulator {
+            Some(emulator) => emulator.reset(),
+            None => Err(Error::at(Place::file(&self.name), ChipProblem::NoReset)),
+        }
     }
 
     /// Sends bytes, at once or, on a bad line, when they are due.
@@ -106,7 +91,7 @@ impl Transport {
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         let written = self.writer.write_all(bytes).and_then(|()| self.writer.flush());
-        written.map_err(|source| Error::io(&self.name, "send to the chip", source))
+        written.map_err(|source| self.lost(&source))
     }
 
     fn send_due(&mut self) -> Result<()> {
@@ -125,11 +110,9 @@ impl Transport {
         let wait = if self.bad.is_some() { wait.min(Duration::from_millis(1)) } else { wait };
         let bytes = match self.received.recv_timeout(wait) {
             Ok(Ok(bytes)) => bytes,
-            Ok(Err(source)) => return Err(Error::io(&self.name, "hear from the chip", source)),
+            Ok(Err(source)) => return Err(self.lost(&source)),
             Err(RecvTimeoutError::Timeout) => Vec::new(),
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(Error::io(&self.name, "hear from the chip", ErrorKind::UnexpectedEof.into()));
-            }
+            Err(RecvTimeoutError::Disconnected) => return Err(self.lost(&ErrorKind::UnexpectedEof.into())),
         };
         let Some((_, up)) = &mut self.bad else { return Ok(bytes) };
         up.push(&bytes, Instant::now());
@@ -138,5 +121,78 @@ impl Transport {
             due.extend(bytes);
         }
         Ok(due)
+    }
+
+    /// The error for a line that broke.
+    fn lost(&mut self, source: &std::io::Error) -> Error {
+        let problem = match &mut self.emulator {
+            Some(emulator) => ChipProblem::EmulatorEnded { said: emulator.end() },
+            None if source.kind() == ErrorKind::UnexpectedEof => {
+                ChipProblem::Lost { reason: "the other end closed it".into() }
+            }
+            None => ChipProblem::Lost { reason: source.to_string() },
+        };
+        Error::at(Place::file(&self.name), problem)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A device that is no longer there.
+    struct Unplugged;
+
+    impl Unplugged {
+        fn error() -> std::io::Error {
+            std::io::Error::other("Input/output error (os error 5)")
+        }
+    }
+
+    impl Read for Unplugged {
+        fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+            Err(Self::error())
+        }
+    }
+
+    impl Write for Unplugged {
+        fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+            Err(Self::error())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Err(Self::error())
+        }
+    }
+
+    #[test]
+    fn an_unplugged_cable_says_what_happened_and_what_to_do() {
+        let mut transport = Transport::new("/dev/ttyACM0".into(), Unplugged, Unplugged, Duration::ZERO);
+        let errors = [transport.receive(Duration::from_secs(60)).unwrap_err(), transport.send(b"hello").unwrap_err()];
+        for error in errors {
+            let text = error.to_string();
+            assert!(
+                text.starts_with("/dev/ttyACM0: the connection to the chip was lost: Input/output error"),
+                "{text}"
+            );
+            assert!(text.contains("Check the cable and the chip's power") && !text.contains("disk"), "{text}");
+            assert_eq!(error.exit_code(), 1);
+        }
+    }
+
+    #[test]
+    fn a_connection_that_the_other_end_closed_says_so() {
+        let mut transport =
+            Transport::new("tcp://localhost:1".into(), std::io::empty(), std::io::sink(), Duration::ZERO);
+        let error = transport.receive(Duration::from_secs(60)).unwrap_err().to_string();
+        let start = "tcp://localhost:1: the connection to the chip was lost: the other end closed it. Check";
+        assert!(error.starts_with(start), "{error}");
+    }
+
+    #[test]
+    fn only_the_emulator_can_be_reset() {
+        let mut transport = Transport::new("/dev/ttyACM0".into(), Unplugged, Unplugged, Duration::ZERO);
+        let error = transport.reset_chip().unwrap_err().to_string();
+        assert!(error.starts_with("/dev/ttyACM0: the chip cannot be reset from here"), "{error}");
     }
 }

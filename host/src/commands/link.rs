@@ -1,36 +1,40 @@
 use super::progress::Bar;
-use palpate::Error;
-use palpate::Result;
-use palpate::chip::{ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, stream};
+use clap::ArgGroup;
+use palpate::chip::{
+    ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
+};
+use palpate::compile::CompiledFile;
+use palpate::error::ChipProblem;
 use palpate::output::{print, print_json};
 use palpate::progress::Progress;
 use palpate::touches::Dataset;
-use palpate_onboard::Model;
+use palpate::{Error, Result};
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What `link` and `watch` have in common: where the chip is, and which touches it gets.
+/// Options of `link` and `watch`: how the chip is reached, and which touches it gets.
 #[derive(clap::Args)]
-pub(crate) struct Reach {
+pub(crate) struct ChipOptions {
     /// Load this model into the chip first; it is checked there before it is used
     #[arg(long, value_name = "FILE")]
-    pub(crate) load: Option<PathBuf>,
-    /// Touches of one object before the next one comes
+    load: Option<PathBuf>,
+    /// Touches of one object before the next object begins
     #[arg(long, value_name = "N", default_value_t = 60)]
-    pub(crate) sequence: usize,
-    /// Touches in all, from a data set [default: as many as it holds]
+    sequence: usize,
+    /// Touches in all, from a data set [default: all that it holds]
     #[arg(long, value_name = "N")]
-    pub(crate) touches: Option<u64>,
-    /// Speed of a serial port
+    touches: Option<u64>,
+    /// Speed of a serial port, in bits per second
     #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
     baud: u32,
     /// Image that the emulator runs [default: onboard/firmware/target/thumbv7em-none-eabihf/release/uart]
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// Make the line bad: probability that a byte is lost, changed, that a frame is doubled, and delay in ms
+    /// Make the line bad: the probabilities that a byte is lost, that a byte is changed and that a frame comes twice, and
+    /// the longest delay in milliseconds
     #[arg(long, value_name = "LOST,CHANGED,DOUBLED,MS")]
     bad_line: Option<Faults>,
     /// Seed of the bad line
@@ -38,23 +42,21 @@ pub(crate) struct Reach {
     seed: u64,
 }
 
-impl Reach {
+impl ChipOptions {
     /// Opens a session, and loads the model if there is one to load.
-    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<Vec<u8>>)> {
-        let model = self.load.as_deref().map(read_model).transpose()?;
+    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledFile>)> {
+        let model = self.load.as_deref().map(CompiledFile::read).transpose()?;
         let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
         let mut transport = port.open(self.baud, &emulator)?;
         let mut settings = HostSettings::default();
         if let Some(faults) = self.bad_line {
             transport = transport.with_faults(faults, self.seed);
-            // A bad line fails often: try for longer, and sooner.
+            // A bad line fails often: retry sooner, and more often.
             settings = HostSettings { retry: 50_000, attempts: 200 };
         }
         let mut connection = Connection::open(transport, settings)?;
-        if let Some(bytes) = &model {
-            let progress = Bar::new();
-            progress.begin("loading", Some(bytes.len() as u64));
-            connection.load(bytes, |done| progress.current().set_position(done as u64))?;
+        if let Some(file) = &model {
+            connection.load(file.bytes(), &Bar::new())?;
         }
         Ok((connection, model))
     }
@@ -74,76 +76,55 @@ impl Reach {
     }
 }
 
-/// Reads a compiled model, and says what is wrong with it before the chip has to.
-pub(crate) fn read_model(path: &Path) -> Result<Vec<u8>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read the model", e))?;
-    Model::new(&bytes).map_err(|e| Error::file(path, e.to_string(), "Make one with: palpate export."))?;
-    Ok(bytes)
-}
-
-/// What is on the chip, or an error that says how to change that.
-pub(crate) fn chip_model(connection: &mut Connection) -> Result<ChipModel> {
-    let name = connection.transport().name().to_owned();
-    let model = connection.model()?;
-    model.ok_or_else(|| Error::file(name, "the chip has no model", "Give it one: --load model.palpate."))
-}
-
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(group(ArgGroup::new("expected").args(["model", "load"])), after_help = "\
 Examples:
-  palpate link /dev/ttyACM0                                  what is on the chip?
-  palpate link /dev/ttyACM0 --load model.palpate             put a model into it
-  palpate link /dev/ttyACM0 touches/                         recognize a data set's touches
-  echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -         recognize touches as they are typed
+  palpate link /dev/ttyACM0                           what is on the chip?
+  palpate link /dev/ttyACM0 --load model.palpate      load a model into it
+  palpate link /dev/ttyACM0 touches/                  recognize a data set's touches
+  echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize touches as they come
   palpate link emulator --load model.palpate --parity touches/ --touches 10000
-  palpate link emulator --load model.palpate --parity touches/ --bad-line 0.001,0.001,0.01,5
+  palpate link emulator --load model.palpate --parity touches/ \\
+      --bad-line 0.001,0.001,0.01,5
 
 The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station.
-A touch is a line of three contact times in seconds (- where missing), as in a data set; an empty line begins another
-object. Every touch is counted exactly once, however bad the line.")]
+
+A touch is one line of three contact times in seconds (- for a missing contact), as in a data set. An empty line begins \
+another object. Every touch is counted exactly once, however bad the line.")]
 pub(crate) struct Arguments {
-    /// A serial port, tcp://host:port, or emulator
+    /// A serial port, tcp://HOST:PORT, or emulator
     port: Port,
     /// Touches to recognize: a data set's directory, a file of lines, or - for standard input
     source: Option<PathBuf>,
-    /// Recognize a data set's touches, and hold every verdict, posterior and evidence against the host's recognizer
-    #[arg(long, value_name = "DIR", conflicts_with = "source")]
+    /// Recognize a data set's touches, and compare every verdict, posterior and evidence with the host's recognizer
+    #[arg(long, value_name = "DIR", conflicts_with = "source", requires = "expected")]
     parity: Option<PathBuf>,
     /// The model to compare with, if it is on the chip already
-    #[arg(long, value_name = "FILE", conflicts_with = "load")]
+    #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Write what happens to a file that palpate watch can follow
+    /// Write what happens to a file that `palpate watch` can follow
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    reach: Reach,
+    chip: ChipOptions,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let named = arguments.model.as_deref().map(read_model).transpose()?;
-    if arguments.parity.is_some() && named.is_none() && arguments.reach.load.is_none() {
-        let fix = "Give it with --model, or load it with --load.";
-        return Err(Error::argument("parity needs the model that the chip has", fix));
-    }
+    let named = arguments.model.as_deref().map(CompiledFile::read).transpose()?;
     let steps = match arguments.parity.as_ref().or(arguments.source.as_ref()) {
-        Some(source) => Some(arguments.reach.steps(source)?),
+        Some(source) => Some(arguments.chip.steps(source)?),
         None => None,
     };
-    let (mut connection, loaded) = arguments.reach.open(&arguments.port)?;
-    let chip = chip_model(&mut connection)?;
+    let (mut connection, loaded) = arguments.chip.open(&arguments.port)?;
+    let chip = connection.model()?;
     let mut printer = Printer::new(&chip, arguments.json, arguments.journal.as_deref())?;
     let Some(steps) = steps else { return printer.model(&arguments.port) };
 
-    let bytes = named.or(loaded);
-    let model = match &bytes {
-        Some(bytes) => {
-            Some(Model::new(bytes).map_err(|e| Error::data(e.to_string(), "Make one with: palpate export."))?)
-        }
-        None => None,
-    };
+    let file = named.or(loaded);
+    let model = file.as_ref().map(|file| file.model()).transpose()?;
     let progress = Bar::new();
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
@@ -158,8 +139,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     printer.summary(&summary)?;
     match summary.first_difference {
         Some(first) if arguments.parity.is_some() => {
-            let what = format!("{} of {} touches differ; the first: {first}", summary.differences, summary.compared);
-            Err(Error::data(what, "Report this as a bug, with the model and the touches."))
+            let Summary { differences, compared, .. } = summary;
+            Err(ChipProblem::Differs { differences, compared, first }.into())
         }
         _ => Ok(()),
     }
@@ -219,8 +200,7 @@ impl<'c> Printer<'c> {
         match update {
             Update::Object(name) => self.object.clone_from(name),
             Update::Touch { verdict, decided, .. } if !self.json && (*decided || every_touch) => {
-                let posterior = verdict.detail.map_or(0, |detail| detail.posterior());
-                let posterior = posterior as f64 / (1_u64 << 56) as f64;
+                let posterior = probability(verdict.detail.map_or(0, |detail| detail.posterior()));
                 let said = match verdict.decision {
                     Decision::Recognized(object) => format!("recognized {}", self.name(object)),
                     Decision::Unknown => "unknown".into(),
@@ -246,15 +226,15 @@ impl<'c> Printer<'c> {
             return print_json(summary);
         }
         let Summary { touches, compared, differences, right, wrong, undecided, .. } = summary;
-        let mut text = format!("{touches} touches in {:.1} s, {:.0} a second\n", summary.seconds, summary.rate());
+        let mut text = format!("{touches} touches in {:.1} s, {:.0} per second\n", summary.seconds, summary.rate());
         if right + wrong + undecided > 0 {
-            text += &format!("objects: {right} recognized rightly, {wrong} wrongly, {undecided} not\n");
+            text += &format!("objects: {right} correct, {wrong} wrong, {undecided} not recognized\n");
         }
         if *compared > 0 {
-            text += &format!("held against the host: {compared} touches, {differences} differences\n");
+            text += &format!("compared with the host: {compared} touches, {differences} differences\n");
         }
         text += &format!(
-            "link: {} frames sent, {} again; garbled {} here and {} there; {} commands came twice, {} too early\n",
+            "link: {} frames sent, {} again; {} garbled here, {} on the chip; {} commands came twice, {} too early\n",
             summary.sent,
             summary.resent,
             summary.garbled,

@@ -1,7 +1,8 @@
-//! One file a command: its arguments, its help, and the call into the library.
+//! One file per command: its arguments, its help, and the call into the library.
 
 mod capture;
 mod cast;
+mod completions;
 mod evaluate;
 mod export;
 mod inspect;
@@ -17,8 +18,10 @@ mod tune;
 mod view;
 mod watch;
 
-use clap::{Parser, Subcommand};
-use palpate::Result;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use palpate::error::Problem;
+use palpate::{Error, Result};
+use std::process::ExitCode;
 
 /// Declares the enum that clap parses and the dispatch, from one list.
 macro_rules! commands {
@@ -39,7 +42,7 @@ macro_rules! commands {
 }
 
 commands! {
-    /// Do all of it: capture, train, export, recognize, report (the default)
+    /// Do all of it: capture, train, export, recognize, report
     Run => run,
     /// Write the ten built-in objects as OBJ files
     Objects => objects,
@@ -47,7 +50,7 @@ commands! {
     View => view,
     /// Touch objects with the virtual probe
     Capture => capture,
-    /// Move spheres against a mesh as a file says, to hold the simulator against another engine
+    /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     Cast => cast,
     /// Train an ensemble on captured touches
     Train => train,
@@ -61,14 +64,16 @@ commands! {
     Evaluate => evaluate,
     /// Find the best model that fits a chip
     Tune => tune,
-    /// Hold a compiled model against its ensemble
+    /// Compare a compiled model with its ensemble
     Parity => parity,
     /// Remake the whole evaluation: every figure, the limit, speed against error
     Report => report,
     /// Recognize on a chip at the end of a line
     Link => link,
-    /// Look on while a chip recognizes
+    /// Watch a chip while it recognizes
     Watch => watch,
+    /// Print a script that completes this program's commands and options in a shell
+    Completions => completions,
 }
 
 /// Recognize objects by touch: virtual touches, boosted trees, a model of a few kilobytes for a microcontroller.
@@ -77,32 +82,96 @@ commands! {
     name = "palpate",
     version,
     about,
-    arg_required_else_help = false,
+    max_term_width = 120,
+    arg_required_else_help = true,
+    subcommand_required = true,
     after_help = "\
 Examples:
-  palpate                            touch, learn, pack and recognize ten built-in objects
-  palpate run meshes/ -o out         the same for your own OBJ files
-  palpate help capture               what a command does, with examples"
+  palpate run                 touch, learn, compile and recognize ten built-in objects
+  palpate run meshes/ -o out  the same for your own OBJ files
+  palpate help capture        what a command does, with examples"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Command,
 }
 
-impl Cli {
-    pub(crate) fn run(self) -> Result<()> {
-        self.command
-            .unwrap_or_else(|| Self::parse_from(["palpate", "run"]).command.unwrap_or_else(|| unreachable!()))
-            .run()
+/// The program's commands and arguments.
+fn cli() -> clap::Command {
+    Cli::command().mut_subcommands(|command| match command.get_after_help().map(|text| unwrapped(&text.to_string())) {
+        Some(text) => command.after_help(text),
+        None => command,
+    })
+}
+
+/// Joins the lines of each paragraph, so that they can be wrapped to the terminal's width. Indented lines stay as they are.
+fn unwrapped(text: &str) -> String {
+    let mut unwrapped = String::new();
+    let mut joins = false;
+    for line in text.lines() {
+        let is_prose = !line.is_empty() && !line.starts_with(' ');
+        if !unwrapped.is_empty() {
+            unwrapped.push(if joins && is_prose { ' ' } else { '\n' });
+        }
+        unwrapped.push_str(line);
+        joins = is_prose;
     }
+    unwrapped
+}
+
+/// Runs the command that the arguments name, prints its error if it has one, and returns the exit code.
+pub(crate) fn run() -> ExitCode {
+    let matches = cli().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    match cli.command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            if !matches!(error, Error::Closed) {
+                eprintln!("palpate: {}", message(&error, matches.subcommand_name().unwrap_or_default()));
+            }
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// The error as the user of `command` understands it: where the library names a setting, this names the option.
+fn message(error: &Error, command: &str) -> String {
+    let Error::At { place, problem: problem @ Problem::Setting { name, value, .. } } = error else {
+        return error.to_string();
+    };
+    let option = name.replace('_', "-");
+    let cli = cli();
+    let mut arguments = cli.find_subcommand(command).into_iter().flat_map(|command| command.get_arguments());
+    if arguments.any(|argument| argument.get_long() == Some(&option)) {
+        return format!("{place}--{option} is {value}. {}", problem.fix());
+    }
+    error.to_string()
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
+    use super::*;
 
     #[test]
     fn every_commands_arguments_are_consistent() {
-        super::Cli::command().debug_assert();
+        cli().debug_assert();
+    }
+
+    #[test]
+    fn paragraphs_of_help_are_joined_and_lists_are_not() {
+        let text = "One\ntwo.\n\nExamples:\n  palpate run\n  palpate view\n\nThree\nfour.";
+        assert_eq!(unwrapped(text), "One two.\n\nExamples:\n  palpate run\n  palpate view\n\nThree four.");
+    }
+
+    #[test]
+    fn a_setting_out_of_range_is_shown_with_its_options_name() {
+        let error = Error::setting("max_touches", 0, "1 to 1000");
+        assert_eq!(message(&error, "recognize"), "--max-touches is 0. Use 1 to 1000.");
+        assert_eq!(error.exit_code(), 2);
+        // No option of this name, and no command: the setting's own name.
+        assert_eq!(message(&error, "view"), "max_touches is 0. Use 1 to 1000.");
+        assert_eq!(message(&error, ""), "max_touches is 0. Use 1 to 1000.");
+        let error = Error::setting("seed", "x", "a number").in_file("probe.json");
+        assert_eq!(message(&error, "run"), "probe.json: --seed is x. Use a number.");
     }
 }

@@ -25,6 +25,11 @@ impl CompiledFile {
         Ok(file)
     }
 
+    /// The file's bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
     /// The model in the file.
     ///
     /// # Errors

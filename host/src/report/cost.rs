@@ -173,7 +173,7 @@ pub(super) fn section(context: &Context, members: &[Member]) -> Result<Section> 
     section.text(format!(
         "A family of models, trained on the first fold and tested on the large capture. Nanoseconds are of this machine, \
          one thread. {}",
-        members.first().map_or("", |member| member.work.explanation())
+        members.first().map_or_else(String::new, |member| member.work.explanation())
     ));
     section.figure(figure(context, members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
     section.figure(figure(context, members, "cost-time", "nanoseconds a touch, this machine", |m| m.nanoseconds)?);

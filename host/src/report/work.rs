@@ -1,8 +1,8 @@
 //! How many instructions a touch takes on the chips.
 
-use crate::chip::emulated::Chip;
+use crate::chip::instructions::Chip;
 use crate::compile::Compiled;
-use crate::error::Result;
+use crate::error::{ChipProblem, Result};
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 
@@ -40,12 +40,20 @@ impl Work {
     }
 
     /// The same, for a text.
-    pub(super) fn explanation(self) -> &'static str {
+    pub(super) fn explanation(self) -> String {
         if self.measured {
-            "Instructions, from contact times to margins, are measured: emulated chips run the compiled models."
-        } else {
-            "Instructions are the export's own estimate (modelled, not measured: the emulator or the firmware's images \
-             are not there; onboard/firmware says how to build them)."
+            return "Instructions, from contact times to margins, are measured: emulated chips run the compiled models."
+                .into();
         }
+        let reason = obstacle().map_or_else(String::new, |problem| format!(": {problem}"));
+        format!(
+            "Instructions are the export's own estimate (modelled, not measured{reason}; onboard/firmware says how to \
+             measure them)."
+        )
     }
+}
+
+/// Why instructions cannot be measured here, if they cannot.
+fn obstacle() -> Option<ChipProblem> {
+    [Chip::M4F, Chip::M0Plus].into_iter().find_map(Chip::obstacle)
 }

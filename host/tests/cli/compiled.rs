@@ -5,16 +5,15 @@ use palpate_shared::Descriptor;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output as Finished, Stdio};
+use std::process::{Output as Finished, Stdio};
 
 fn palpate(arguments: &[&str]) -> Finished {
-    Command::new(env!("CARGO_BIN_EXE_palpate")).args(arguments).stdin(Stdio::null()).output().unwrap()
+    crate::run(arguments)
 }
 
+#[track_caller]
 fn json(arguments: &[&str]) -> Value {
-    let finished = palpate(arguments);
-    assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
-    serde_json::from_slice(&finished.stdout).unwrap()
+    crate::json(palpate(arguments))
 }
 
 /// The exit code and what was said on stderr.
@@ -25,7 +24,7 @@ fn refusal(arguments: &[&str]) -> (i32, String) {
 }
 
 /// One split: flat is a bowl, curved a fork.
-fn ensemble() -> Ensemble {
+pub(crate) fn ensemble() -> Ensemble {
     let leaf = |bowl: f32, fork: f32| Node::Leaf(vec![bowl, fork]);
     let split = Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 };
     let nodes = vec![split, leaf(0.7, -0.7), leaf(-0.7, 0.7)];
@@ -37,13 +36,13 @@ fn ensemble() -> Ensemble {
     }
 }
 
-struct Place {
+pub(crate) struct Place {
     directory: tempfile::TempDir,
 }
 
 impl Place {
     /// A directory with `ensemble.json`, `model.palpate` and touches in `data`.
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let place = Self { directory: tempfile::tempdir().unwrap() };
         ensemble().save(place.path("ensemble.json")).unwrap();
         std::fs::create_dir(place.path("data")).unwrap();
@@ -53,11 +52,11 @@ impl Place {
         place
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.directory.path().join(name)
     }
 
-    fn text(&self, name: &str) -> String {
+    pub(crate) fn text(&self, name: &str) -> String {
         self.path(name).to_str().unwrap().to_owned()
     }
 }
@@ -164,8 +163,8 @@ fn recognize_starts_afresh_after_each_verdict() {
 fn recognize_answers_each_line_of_a_slow_pipe_before_the_next_comes() {
     let place = Place::new();
     for json in [true, false] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
-        command.args(["recognize", &place.text("model.palpate")]).args(json.then_some("--json"));
+        let mut command = crate::command(["recognize", &place.text("model.palpate")]);
+        command.args(json.then_some("--json"));
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         let mut input = child.stdin.take().unwrap();
         let mut output = BufReader::new(child.stdout.take().unwrap());

@@ -1,50 +1,12 @@
-//! The program as its user sees it: a module a command.
+//! The program as its user sees it: one module per group of commands.
 
 mod capture;
 mod cast;
+mod chip;
 mod compiled;
+mod help;
+mod models;
+mod reports;
+mod support;
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-/// The program with these arguments.
-fn command<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
-    command.args(arguments);
-    command
-}
-
-fn run<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Output {
-    command(arguments).output().unwrap()
-}
-
-/// The output of a run that must succeed.
-fn stdout(output: Output) -> String {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-/// The one message of a run that must fail with this code, without a backtrace.
-fn stderr(output: Output, code: i32) -> String {
-    let error = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(code), "{error}");
-    assert!(!error.contains("panicked") && !error.contains("RUST_BACKTRACE"), "{error}");
-    error
-}
-
-/// A mesh of this many triangles, roughly, as an OBJ file.
-fn globe(directory: &Path, name: &str, rings: u32) -> PathBuf {
-    let path = directory.join(format!("{name}.obj"));
-    let mut text = Vec::new();
-    palpate::mesh::obj::write(&palpate::mesh::Mesh::globe(rings), &mut text).unwrap();
-    std::fs::write(&path, text).unwrap();
-    path
-}
-
-/// The names of what a directory holds, sorted.
-fn listing(directory: &Path) -> Vec<String> {
-    let names = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut names: Vec<String> = names.collect();
-    names.sort();
-    names
-}
+use support::{command, globe, json, listing, run, stderr, stdout};

@@ -1,5 +1,5 @@
 //! Instructions a touch of a model that the emulator's loader put into RAM: how `palpate report` measures what models
-//! cost. What is loaded is described in the host's `emulated` module.
+//! cost. What is loaded is described in the host's `chip::instructions` module.
 #![no_std]
 #![no_main]
 

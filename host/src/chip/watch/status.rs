@@ -1,4 +1,4 @@
-//! What a live view shows, whatever shows it.
+//! What is known of a chip that is watched.
 
 use crate::chip::Entry;
 use std::collections::VecDeque;
@@ -6,9 +6,9 @@ use std::collections::VecDeque;
 /// Touches that are kept to be shown.
 const KEPT: usize = 200;
 
-/// What a live view shows.
+/// What is known of a chip that is watched.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct View {
+pub struct Status {
     /// Where it comes from.
     pub source: String,
     /// The objects' names.
@@ -23,7 +23,7 @@ pub struct View {
     pub verdict: String,
     /// Touches in all.
     pub count: u64,
-    /// Touches a second, over the last second or so.
+    /// Touches per second, over the last second or so.
     pub rate: f64,
     /// Frames sent again.
     pub resent: u64,
@@ -37,18 +37,18 @@ pub struct View {
     recent: VecDeque<f64>,
 }
 
-impl View {
-    /// A view that has seen nothing yet.
+impl Status {
+    /// Nothing is known yet, except where it will come from.
     pub fn new(source: impl Into<String>) -> Self {
         Self { source: source.into(), verdict: "undecided".into(), ..Self::default() }
     }
 
-    /// Takes an entry in.
+    /// Learns from an entry. A model resets all the rest: each journal has one, as its first entry.
     pub fn take(&mut self, entry: &Entry) {
         match entry {
             Entry::Model { objects, .. } => {
-                self.objects.clone_from(objects);
-                self.posteriors.clear();
+                let source = std::mem::take(&mut self.source);
+                *self = Self { objects: objects.clone(), ..Self::new(source) };
             }
             Entry::Object { name } => {
                 self.truth.clone_from(name);
@@ -62,9 +62,9 @@ impl View {
                     self.posteriors.clone_from(posteriors);
                 }
                 self.tick(*at);
-                self.keep(super::line(entry));
+                self.keep(entry.to_string());
             }
-            Entry::Fault { .. } => self.keep(super::line(entry)),
+            Entry::Fault { .. } => self.keep(entry.to_string()),
             Entry::Link { resent, garbled, missed } => {
                 (self.resent, self.garbled, self.missed) = (*resent, *garbled, *missed);
             }
@@ -84,5 +84,24 @@ impl View {
         }
         let span = at - self.recent.front().copied().unwrap_or(at);
         self.rate = if span > 0.0 { (self.recent.len() - 1) as f64 / span } else { 0.0 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_journal_in_the_same_place_starts_from_nothing() {
+        let model = |name: &str| Entry::Model { objects: vec![name.into()], length: 1, checksum: 2 };
+        let mut status = Status::new("journal.jsonl");
+        for entry in [model("old"), Entry::Object { name: Some("old".into()) }, Entry::Fault { what: "loose".into() }] {
+            status.take(&entry);
+        }
+        status.take(&Entry::Link { resent: 1, garbled: 2, missed: 3 });
+        assert_eq!(status.touches.len(), 1);
+        status.take(&model("new"));
+        let expected = Status { objects: vec!["new".into()], ..Status::new("journal.jsonl") };
+        assert_eq!(status, expected);
     }
 }

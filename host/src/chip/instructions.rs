@@ -1,16 +1,17 @@
-//! Instructions a touch, measured: a compiled model runs on an emulated chip.
+//! Instructions per touch, measured: a compiled model runs on an emulated chip.
 //!
 //! The firmware's `cost` image (`onboard/firmware`, `cargo build --release --bin cost`) reads from the machine's external
 //! RAM, where QEMU's loader puts it, in little endian: the model's length and the number of touches (u32 each), the
-//! model, then 24 bytes a touch: three contact times in microseconds (u32, the greatest for a missing one), direction and
+//! model, then 24 bytes per touch: three contact times in microseconds (u32, the largest for a missing one), direction and
 //! alignment in Q15 (i16, zeros without a pose).
 
-use crate::error::{Error, Result};
+use super::qemu;
+use crate::error::{ChipProblem, Error, Result};
 use palpate_shared::Touch;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
+use std::time::Duration;
 
 /// A chip that can be emulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +22,7 @@ pub enum Chip {
     M0Plus,
 }
 
-/// Instructions a touch, on average.
+/// Instructions per touch, on average.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cost {
     /// From contact times to the objects' margins.
@@ -46,16 +47,25 @@ impl Chip {
         ["onboard/firmware/target", target, "release/cost"].iter().collect()
     }
 
-    /// Whether the image has been built and the emulator is installed.
+    /// Why instructions cannot be measured here: [`ChipProblem::NoEmulator`] or [`ChipProblem::NoImage`]. `None` if they
+    /// can be.
+    pub fn obstacle(self) -> Option<ChipProblem> {
+        if !qemu::is_installed(Path::new(qemu::PROGRAM)) {
+            return Some(ChipProblem::NoEmulator);
+        }
+        let path = self.image();
+        (!path.is_file()).then_some(ChipProblem::NoImage { path })
+    }
+
+    /// Whether instructions can be measured here.
     pub fn is_there(self) -> bool {
-        let version = Command::new(EMULATOR).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
-        self.image().is_file() && version.is_ok_and(|status| status.success())
+        self.obstacle().is_none()
     }
 
     /// Runs the model on the first [`TOUCHES`] of these touches. Takes some tenths of a second.
     ///
     /// # Errors
-    /// When the emulator or the image is not there, or the image says what is wrong.
+    /// When the emulator is not installed, the image has not been built, or the image says what is wrong.
     pub fn measure(self, model: &[u8], touches: &[Touch]) -> Result<Cost> {
         let machine = match self {
             Self::M4F => "mps2-an386",
@@ -64,18 +74,16 @@ impl Chip {
         let io = |source| Error::io("the emulator's input", "write", source);
         let mut input = tempfile::NamedTempFile::new().map_err(io)?;
         input.write_all(&loaded(model, touches)).and_then(|()| input.flush()).map_err(io)?;
-        let mut command = Command::new(EMULATOR);
+        let mut command = Command::new(qemu::PROGRAM);
         command.args(["-machine", machine, "-display", "none", "-serial", "none", "-monitor", "none"]);
         command.args(["-icount", "shift=0", "-semihosting-config", "enable=on,target=native"]);
         // A comma in a name is doubled for QEMU.
         let file = input.path().display().to_string().replace(',', ",,");
         command.arg("-device").arg(format!("loader,file={file},addr=0x21000000,force-raw=on"));
         command.arg("-kernel").arg(self.image());
-        read_cost(&run(command)?)
+        read_cost(&qemu::output(command, PATIENCE)?)
     }
 }
-
-const EMULATOR: &str = "qemu-system-arm";
 
 fn loaded(model: &[u8], touches: &[Touch]) -> Vec<u8> {
     let touches = &touches[..touches.len().min(TOUCHES)];
@@ -92,33 +100,12 @@ fn loaded(model: &[u8], touches: &[Touch]) -> Vec<u8> {
     bytes
 }
 
-/// What the emulated chip prints, which QEMU passes on to its standard error.
-fn run(mut command: Command) -> Result<String> {
-    let io = |source| Error::io(Path::new(EMULATOR), "run", source);
-    let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().map_err(io)?;
-    let began = Instant::now();
-    while child.try_wait().map_err(io)?.is_none() {
-        if began.elapsed() > PATIENCE {
-            child.kill().and_then(|()| child.wait()).map_err(io)?;
-            break;
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let mut text = String::new();
-    if let (Some(mut out), Some(mut error)) = (child.stdout.take(), child.stderr.take()) {
-        out.read_to_string(&mut text).and_then(|_| error.read_to_string(&mut text)).map_err(io)?;
-    }
-    Ok(text)
-}
-
+/// Reads what the image prints, which QEMU passes on to its standard error.
 fn read_cost(text: &str) -> Result<Cost> {
     let after = |name: &str| text.split_whitespace().skip_while(|&word| word != name).nth(1)?.parse().ok();
     match (after("margins"), after("push")) {
         (Some(margins), Some(push)) => Ok(Cost { margins, push }),
-        _ => {
-            let what = format!("the emulated chip does not say what a touch costs, but: {}", text.trim());
-            Err(Error::data(what, "Build its image anew: cd onboard/firmware && cargo build --release --bin cost."))
-        }
+        _ => Err(ChipProblem::NoCost { said: text.trim().into() }.into()),
     }
 }
 

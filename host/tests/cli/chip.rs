@@ -1,0 +1,181 @@
+//! The commands that talk to a chip: link and watch, with a chip's whole program behind a TCP connection.
+
+use crate::compiled::Place;
+use crate::{command, json, run, stderr, stdout};
+use palpate_onboard::station::{Memory, serve};
+use serde_json::Value;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Output, Stdio};
+
+const OBJECTS: usize = 2;
+
+/// A stream of the standard library as the chip's transport.
+struct Wire(TcpStream);
+
+impl embedded_io::ErrorType for Wire {
+    type Error = std::io::Error;
+}
+
+impl embedded_io::Read for Wire {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        self.0.read(buffer)
+    }
+}
+
+impl embedded_io::Write for Wire {
+    fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
+        self.0.write(buffer)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+/// A port at which `chip` gets the first connection.
+fn port(chip: impl FnOnce(TcpStream) + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp://{}", listener.local_addr().unwrap());
+    std::thread::spawn(move || chip(listener.accept().unwrap().0));
+    port
+}
+
+/// A chip without a model, until its first connection ends.
+fn chip() -> String {
+    port(|stream| {
+        stream.set_nodelay(true).unwrap();
+        let [mut a, mut b] = [(); 2].map(|()| vec![0; 10_000]);
+        let [mut c, mut d] = [(); 2].map(|()| vec![0; Memory::record_length(OBJECTS)]);
+        let memory = Memory { built_in: &[], models: [&mut a, &mut b], records: [&mut c, &mut d] };
+        // It ends with an error where the host hangs up in the middle of something.
+        let _ = serve::<OBJECTS, _>(memory, &mut Wire(stream));
+    })
+}
+
+/// A run of the program that reads `input`.
+fn run_with_input(arguments: &[&str], input: &str) -> Output {
+    let mut command = command(arguments);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn link_loads_a_model_and_says_what_is_on_the_chip() {
+    let place = Place::new();
+    let model = place.text("model.palpate");
+    let length = std::fs::metadata(&model).unwrap().len();
+    let text = stdout(run(["link", &chip(), "--load", &model]));
+    assert!(text.starts_with("tcp://127.0.0.1:"), "{text}");
+    assert!(text.contains(&format!(": a model of {length} bytes, checksum ")), "{text}");
+    assert!(text.ends_with(", curvature, 2 objects: bowl, fork\n"), "{text}");
+    let described = json(run(["link", &chip(), "--load", &model, "--json"]));
+    assert_eq!(described["objects"], serde_json::json!(["bowl", "fork"]));
+    assert_eq!(described["length"], length);
+}
+
+#[test]
+fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
+    let place = Place::new();
+    let (model, data, journal) = (place.text("model.palpate"), place.text("data"), place.text("journal.jsonl"));
+    let arguments = ["--load", &model, "--parity", &data, "--touches", "40", "--sequence", "5"];
+    let mut command = command(["link", &chip()]);
+    let summary = json(command.args(arguments).args(["--journal", &journal, "--json"]).output().unwrap());
+    assert_eq!(
+        (&summary["touches"], &summary["compared"], &summary["differences"]),
+        (&40.into(), &40.into(), &0.into())
+    );
+    assert_eq!((&summary["right"], &summary["wrong"], &summary["undecided"]), (&8.into(), &0.into(), &0.into()));
+
+    let entries = std::fs::read_to_string(&journal).unwrap();
+    let entries: Vec<Value> = entries.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let kinds = |kind: &str| entries.iter().filter(|entry| entry["is"] == kind).count();
+    assert_eq!((kinds("model"), kinds("object"), kinds("touch"), kinds("link")), (1, 8, 40, 1));
+
+    let watched = stdout(run(["watch", &journal]));
+    let lines: Vec<&str> = watched.lines().collect();
+    assert_eq!(lines.len(), entries.len(), "{watched}");
+    assert!(lines[0].starts_with("model of ") && lines[0].ends_with(": bowl, fork"), "{watched}");
+    assert_eq!(lines[1], "another object: bowl");
+    assert!(lines[2].starts_with("    1 ") && lines[2].contains(" ms  perhaps bowl 8"), "{watched}");
+    assert!(lines[5].ends_with(" ms  bowl"), "{watched}");
+    assert!(lines[49].starts_with("link: 0 frames sent again, 0 garbled"), "{watched}");
+}
+
+#[test]
+fn link_counts_every_touch_once_over_a_bad_line() {
+    let place = Place::new();
+    let (model, data) = (place.text("model.palpate"), place.text("data"));
+    let arguments = ["--load", &model, "--parity", &data, "--touches", "500", "--bad-line", "0.001,0.001,0.02,0"];
+    let summary = json(command(["link", &chip(), "--json"]).args(arguments).output().unwrap());
+    assert_eq!((&summary["touches"], &summary["differences"]), (&500.into(), &0.into()));
+    assert!(summary["resent"].as_u64().unwrap() > 0, "{summary}");
+}
+
+#[test]
+fn an_empty_line_begins_another_object_on_the_chip() {
+    let place = Place::new();
+    let arguments = ["link", &chip(), "-", "--load", &place.text("model.palpate")];
+    let text = stdout(run_with_input(&arguments, "0 0 0.08\n0 0 0.08\n\n0 0 0.01\n"));
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines[0].starts_with("most likely fork after 1 touch, posterior 0.8"), "{text}");
+    assert!(lines[1].starts_with("most likely fork after 2 touches, posterior 0.9"), "{text}");
+    assert!(lines[2].starts_with("most likely bowl after 1 touch, posterior 0.8"), "{text}");
+    assert!(lines[3].starts_with("3 touches in "), "{text}");
+}
+
+#[test]
+fn a_line_that_is_no_touch_is_named() {
+    let place = Place::new();
+    let arguments = ["link", &chip(), "-", "--load", &place.text("model.palpate")];
+    let error = stderr(run_with_input(&arguments, "0 0 0.08\nnonsense\n"), 1);
+    assert!(error.contains("standard input:2: ") && error.contains("Write three times in seconds"), "{error}");
+}
+
+#[test]
+fn a_chip_without_a_model_and_a_chip_that_is_gone_say_what_to_do() {
+    let error = stderr(run(["link", &chip()]), 1);
+    assert!(error.contains("the chip has no model. Load a model into it."), "{error}");
+    let error = stderr(run(["link", &port(drop)]), 1);
+    assert!(error.contains("the connection to the chip was lost") && error.contains("Check the cable"), "{error}");
+    // Nobody listens there: the listener is gone again.
+    let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let error = stderr(run(["link", &format!("tcp://{address}")]), 1);
+    assert!(error.contains("cannot connect to the chip") && error.contains("Check the address"), "{error}");
+}
+
+#[test]
+fn bad_arguments_of_link_and_watch_exit_with_2() {
+    let place = Place::new();
+    let error = stderr(run(["link", "emulator", "--parity", &place.text("data")]), 2);
+    assert!(error.contains("--load") && error.contains("--model"), "{error}");
+    for arguments in [["link", "http://host:1"], ["watch", "http://host:1"]] {
+        let error = stderr(run(arguments), 2);
+        assert!(error.contains("`http://host:1` is not a port. Give a serial port"), "{error}");
+    }
+    let error = stderr(run(["link", "emulator", "--bad-line", "often"]), 2);
+    assert!(error.contains("Give three probabilities and milliseconds"), "{error}");
+}
+
+#[test]
+fn watch_shows_a_chip_that_gets_a_data_set() {
+    let place = Place::new();
+    let arguments = ["watch", &chip(), &place.text("data"), "--load", &place.text("model.palpate")];
+    let text = stdout(run(arguments));
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines[0].starts_with("model of ") && lines[1] == "another object: bowl", "{text}");
+    assert_eq!(lines.iter().filter(|line| line.contains(" ms  ")).count(), 4, "{text}");
+    assert!(lines.last().unwrap().starts_with("link: "), "{text}");
+}
+
+#[test]
+fn watch_names_the_line_of_a_journal_that_is_wrong() {
+    let place = Place::new();
+    let journal = place.text("journal.jsonl");
+    std::fs::write(&journal, "{\"is\":\"object\",\"name\":\"cup\"}\nnonsense\n").unwrap();
+    let output = run(["watch", &journal]);
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "another object: cup\n");
+    let error = stderr(output, 1);
+    assert!(error.contains("journal.jsonl:2: not an entry of a journal"), "{error}");
+}
