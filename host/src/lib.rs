@@ -81,7 +81,8 @@
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `serial` | yes | chips at serial ports |
-//! | `cli` | yes | the program `palpate`, and `page`, `report` and `run`, which only it needs; takes in `train` and `objects` |
+//! | `cli` | yes | the program `palpate`, and `page`, `report` and `run`, which only it needs; includes `train`, `objects` and `experiments` |
+//! | `experiments` | yes | `probe::sweep::precision`: other precisions to compare the sweep with |
 //! | `xgboost` | no | XGBoost 1.6.2 as a second trainer, built from its C++ source |
 //!
 //! `palpate = { version = "0.2", default-features = false }` brings no terminal, no progress bar, no plots, no serial

@@ -22,7 +22,7 @@ fn size(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> usize {
 fn captured(pose: bool) -> Dataset {
     let directory = tempfile::tempdir().unwrap();
     let settings = capture::Settings { touches: 1_500, pose, ..capture::Settings::default() };
-    capture(&palpate::mesh::builtin::all(), &settings, directory.path(), &()).unwrap();
+    capture(&palpate::mesh::builtin::all().unwrap(), &settings, directory.path(), &()).unwrap();
     Dataset::read(directory.path()).unwrap()
 }
 

@@ -1,6 +1,7 @@
 use super::progress::Bar;
 use palpate::Result;
 use palpate::capture::{self, Settings, Shard, Summary};
+use palpate::mesh::facts::Facts;
 use palpate::mesh::source;
 use palpate::output;
 use palpate::probe::approach::Probe;
@@ -95,7 +96,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         threads: arguments.threads,
     };
     settings.check()?;
-    let summary = capture::capture(&source::objects(&arguments.sources)?, &settings, &arguments.output, &Bar::new())?;
+    let objects = source::objects(&arguments.sources)?;
+    for (object, complaint) in objects.iter().filter_map(|object| Some((object, Facts::of(&object.mesh).complaint()?)))
+    {
+        eprintln!("{}: {complaint}", object.name);
+    }
+    let summary = capture::capture(&objects, &settings, &arguments.output, &Bar::new())?;
     if arguments.json { output::print_json(&summary) } else { output::print(&table(&summary)) }
 }
 

@@ -9,9 +9,9 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-CASTS is a text file with a cast a line: `set,ox,oy,oz,dx,dy,dz` or `set,ox,oy,oz,dx,dy,dz,t`, where t is the time that
-another engine found, or `miss`. The same lines come back with our time appended. Times are in lengths of the direction,
-which is not renormalized; all numbers are taken as the nearest f32.
+CASTS is a text file with one cast per line: `set,ox,oy,oz,dx,dy,dz` or `set,ox,oy,oz,dx,dy,dz,t`, where t is the time
+that another engine found, or `miss`. The output has the same lines with our time appended. Times are in lengths of the
+direction, which is not renormalized; all numbers are rounded to the nearest f32.
 
 Examples:
   palpate cast cup.obj casts.csv                        lines on standard output
@@ -27,10 +27,10 @@ pub(crate) struct Arguments {
     /// Where to write the lines [default: standard output]
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
-    /// The longest side that the mesh's bounding box is scaled to, centered at the origin
+    /// The longest side of the bounding box that the mesh is scaled to, centered at the origin
     #[arg(long, value_name = "UNITS", default_value_t = 10.0)]
     length: f64,
-    /// Leave the mesh as it is, neither scaled nor centered
+    /// Neither scale nor center the mesh
     #[arg(long, conflicts_with = "length")]
     as_is: bool,
     /// The sphere's radius, in units
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     for (name, value) in [("length", arguments.length), ("radius", f64::from(arguments.radius))] {
         if !(value.is_finite() && value > 0.0) {
-            return Err(Error::argument(format!("the {name} is {value}"), "Give a number greater than 0."));
+            return Err(Error::setting(name, value, "a number greater than 0"));
         }
     }
     let mesh = obj::read(&arguments.mesh)?;

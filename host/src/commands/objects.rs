@@ -18,21 +18,21 @@ Examples:
   palpate objects -o meshes --picture all.png  and a picture of them
   palpate objects -o meshes --varied 7         ten of the same kinds in other proportions; seed 7
 
-The meshes are closed, in centimeters, with z up. The same command writes the same bytes.")]
+The meshes are closed, in centimeters, with z up. The same command always writes the same bytes.")]
 pub(crate) struct Arguments {
-    /// The directory to write NAME.obj into; made if it is missing
+    /// The directory to write NAME.obj into; created if it is missing
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Only this object; may be given several times
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(builtin::names()))]
     only: Vec<String>,
-    /// Vary the proportions by up to a fifth or so, with this seed
+    /// Vary the proportions by up to about a fifth, with this seed
     #[arg(long, value_name = "SEED")]
     varied: Option<u64>,
     /// Also draw a contact sheet of the objects into this PNG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Say what was written as JSON
+    /// Print what was written as JSON
     #[arg(long)]
     json: bool,
 }

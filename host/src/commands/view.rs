@@ -1,34 +1,31 @@
-use palpate::Error;
 use palpate::Result;
-use palpate::mesh::Object;
-use palpate::mesh::builtin;
 use palpate::mesh::source;
 use palpate::output;
 use palpate::probe::approach::Probe;
 use palpate::report::view;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   palpate view bowl -o bowl.html                      a built-in object
-  palpate view cup.obj -o cup.html                    your own mesh: is it right side out, is its scale sensible?
+  palpate view cup.obj -o cup.html                    your own mesh: is it right side out, is its scale plausible?
   palpate view fork -o fork.html --touches 60         more touches
   palpate view cup.obj -o cup.html --radius 0.05      with thinner fingers
 
-The page opens in any browser, without a network. The inside of the surface is orange: a mesh that shows it from
+The page works in any browser, without a network. The inside of the surface is orange: a mesh that shows orange from
 outside is inside out, or has holes.")]
 pub(crate) struct Arguments {
-    /// A built-in object's name, or an OBJ file
+    /// An OBJ file, or the name of a built-in object if there is no such file
     #[arg(value_name = "OBJECT")]
     object: String,
     /// The page to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How many full touches to show
+    /// How many touches with all three fingers to show
     #[arg(long, value_name = "N", default_value_t = view::Settings::default().touches)]
     touches: usize,
-    /// How many approaches to show that not all fingers touched
+    /// How many approaches to show in which a finger missed
     #[arg(long, value_name = "N", default_value_t = view::Settings::default().misses)]
     misses: usize,
     /// The seed of the approaches
@@ -48,23 +45,8 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let Arguments { touches, misses, seed, length, radius, spacing, .. } = arguments;
     let probe = Probe { radius, spacing, ..Probe::default() };
-    let page = view::page(&find(&arguments.object)?, &view::Settings { touches, misses, seed, length, probe })?;
+    let object = source::object(&arguments.object)?;
+    let page = view::page(&object, &view::Settings { touches, misses, seed, length, probe })?;
     output::write_bytes(&arguments.output, page.as_bytes())?;
     output::print(&format!("{}: open it in a browser\n", arguments.output.display()))
-}
-
-/// A built-in object, or else what the file holds.
-fn find(name: &str) -> Result<Object> {
-    if builtin::names().contains(&name) {
-        return builtin::one(name);
-    }
-    if !Path::new(name).exists() {
-        let what = format!("{name} is neither a file nor a built-in object");
-        return Err(Error::argument(what, format!("Give an OBJ file, or one of {}.", builtin::names().join(", "))));
-    }
-    let mut found = source::objects(&[name.to_owned()])?;
-    match (found.pop(), found.is_empty()) {
-        (Some(object), true) => Ok(object),
-        _ => Err(Error::argument(format!("{name} holds several objects"), "Give one OBJ file.")),
-    }
 }

@@ -8,15 +8,16 @@ pub(super) fn names() -> [&'static str; 0] {
     []
 }
 
-/// No objects.
-pub(super) fn all() -> Vec<Object> {
-    Vec::new()
+/// Not these objects.
+pub(super) fn all() -> Result<Vec<Object>> {
+    Err(absent("builtin"))
 }
 
 /// Not this object either.
 pub(super) fn one(name: &str) -> Result<Object> {
-    Err(Error::data(
-        format!("there is no built-in object {name} without the feature `objects`"),
-        "Give a file, or build with the feature `objects`.",
-    ))
+    Err(absent(name))
+}
+
+fn absent(name: &str) -> Error {
+    Error::setting("source", name, "a file or a directory: the built-in objects need the feature `objects`")
 }

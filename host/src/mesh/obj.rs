@@ -1,21 +1,22 @@
-//! Wavefront OBJ files: the faces, and nothing else.
+//! Wavefront OBJ files: vertices and faces; everything else is skipped.
 //!
-//! `tobj` parses and indexes; in front of it, `FacesOnly` lets through vertices and faces only, checked, so that an
-//! error can name its line, and nothing that does not shape the surface (normals, materials, groups, lines) can break
-//! a mesh. Polygons become triangles here, concave ones too.
+//! `tobj` parses and indexes. In front of it, `FacesOnly` lets through only vertices and faces, and checks them: so an
+//! error names its line, and what does not shape the surface (normals, materials, groups, lines) cannot break a mesh.
+//! Polygons become triangles here, concave ones too.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::Mesh;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 
-/// Reads the mesh of an OBJ file: all its objects and groups together, polygons cut into triangles, faces that are a
-/// single point left out.
+/// Reads the mesh of an OBJ file: all its objects and groups together, polygons cut into triangles, without faces that
+/// are a single point. Coordinates stay in the units of the file.
 ///
 /// # Errors
-/// When the file cannot be read, a vertex is not three finite numbers, a face's index is not a whole number or out of
-/// range (line named), when there is no face, or when each is a single point.
+/// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line when a vertex is not three finite numbers
+/// or a face's index is not a whole number or out of range, and with the file when there is no face or each is a single
+/// point.
 pub fn read(path: &Path) -> Result<Mesh> {
     let file = File::open(path).map_err(|source| Error::io(path, "read the mesh", source))?;
     parse(BufReader::with_capacity(1 << 18, file), path)
@@ -23,7 +24,7 @@ pub fn read(path: &Path) -> Result<Mesh> {
 
 /// Reads the mesh of an OBJ text; errors name `path`.
 ///
-/// Memory: at most a few hundred bytes for each byte of the text.
+/// Memory: at most 256 bytes for each byte of the text, and 1 MB.
 ///
 /// # Errors
 /// As [`read`].
@@ -34,14 +35,14 @@ pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
         return Err(error);
     }
     filter.check_indices()?;
-    let unusable = |what: String| Error::file(path, what, "Export the mesh as a Wavefront OBJ file with faces.");
-    let (models, _) = loaded.map_err(|error| unusable(format!("cannot be read as a mesh ({error})")))?;
+    let unusable = |problem| Error::at(Place::file(path), problem);
+    let (models, _) = loaded.map_err(|error| unusable(MeshProblem::Unreadable { reason: error.to_string() }))?;
     let mut mesh = Mesh::default();
     for model in models {
         append(&mut mesh, model.mesh);
     }
     if mesh.triangles.is_empty() {
-        return Err(unusable("the mesh has no faces".into()));
+        return Err(unusable(MeshProblem::NoFaces));
     }
     // A face whose corners are one point is no surface. Left in, it could still be touched where it floats, and would
     // stretch the bounding box.
@@ -49,7 +50,7 @@ pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
     let vertex = |index: u32| vertices[index as usize];
     triangles.retain(|&[a, b, c]| vertex(a) != vertex(b) || vertex(b) != vertex(c));
     if mesh.triangles.is_empty() {
-        return Err(unusable("the mesh has no extent: each of its faces is a single point".into()));
+        return Err(unusable(MeshProblem::NoExtent));
     }
     Ok(mesh)
 }
@@ -95,7 +96,7 @@ impl Cutter {
         }
     }
 
-    /// False when the polygon is too degenerate to be flattened; then a fan is as good as anything.
+    /// Cuts `corners` into `cut`. False when the polygon is too degenerate to be flattened: then a fan serves as well.
     fn cut_ears(&mut self) -> bool {
         let size = self.corners.iter().flatten().fold(0.0, |size: f64, c| size.max(c.abs()));
         self.corners.iter_mut().flatten().for_each(|c| *c /= size);
@@ -116,8 +117,8 @@ fn is_convex(corners: &[[f64; 3]]) -> bool {
     corners.len() <= 3 || (0..corners.len()).all(|i| turn(i).dot(normal) >= 0.0)
 }
 
-/// The vertices and faces of an OBJ text, checked, one clean line after the other; faces keep their position indices
-/// only, all counted from the first vertex.
+/// The vertices and faces of an OBJ text, checked, as clean lines for `tobj`. Faces keep only their vertex indices, all
+/// counted from the first vertex.
 struct FacesOnly<'a, R> {
     text: R,
     path: &'a Path,
@@ -126,12 +127,12 @@ struct FacesOnly<'a, R> {
     clean: Vec<u8>,
     taken: usize,
     vertices: u64,
-    /// The largest vertex index and the line that has it: it may stand before its vertex.
+    /// The largest vertex index and its line. Checked at the end: a face may precede its vertices.
     largest: (u64, u64),
     error: Option<Error>,
 }
 
-/// Clean lines are handed on in portions of about this many bytes.
+/// Clean lines are passed to `tobj` in portions of about this many bytes.
 const PORTION: usize = 1 << 16;
 
 impl<'a, R: BufRead> FacesOnly<'a, R> {
@@ -145,11 +146,11 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         if index <= self.vertices {
             return Ok(());
         }
-        let what = format!("vertex {index} of a face is out of range: the file has {} vertices", self.vertices);
-        Err(Error::line(self.path, line, what, FIX))
+        let problem = MeshProblem::IndexAfterLast { index, vertices: self.vertices };
+        Err(Error::at(Place::line(self.path, line), problem))
     }
 
-    /// Reads the next line, with those that a backslash joins to it; false at the end.
+    /// Reads the next line, with the lines that a backslash joins to it; false at the end of the text.
     fn next_line(&mut self) -> Result<bool> {
         self.raw.clear();
         loop {
@@ -166,7 +167,8 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         }
     }
 
-    fn clean_line(&mut self) -> Result<(), String> {
+    /// Appends the line to the clean ones if it is a vertex or a face.
+    fn clean_line(&mut self) -> Result<(), MeshProblem> {
         let Self { raw, clean, .. } = self;
         let line = raw.split(|&byte| byte == b'#').next().unwrap_or_default();
         let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
@@ -174,11 +176,11 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         match words.next() {
             Some(b"v") => {
                 clean.push(b'v');
-                for name in ["x", "y", "z"] {
-                    let word = words.next().ok_or_else(|| format!("a vertex without {name}"))?;
-                    let value: f32 = number(word).ok_or_else(|| format!("{} is not a number", show(word)))?;
+                for axis in ['x', 'y', 'z'] {
+                    let word = words.next().ok_or(MeshProblem::MissingCoordinate { axis })?;
+                    let value: f32 = number(word).ok_or_else(|| MeshProblem::NotANumber { text: shown(word) })?;
                     if !value.is_finite() {
-                        return Err(format!("the coordinate {name} = {} is not finite", show(word)));
+                        return Err(MeshProblem::NotFinite { axis, text: shown(word) });
                     }
                     clean.push(b' ');
                     clean.extend_from_slice(word);
@@ -192,11 +194,10 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
                 let mut corners = 0;
                 for word in words {
                     let index = word.split(|&byte| byte == b'/').next().and_then(number::<i64>);
-                    let index = index.ok_or_else(|| format!("{} is not a vertex of a face", show(word)))?;
+                    let index = index.ok_or_else(|| MeshProblem::NotAnIndex { text: shown(word) })?;
                     let absolute = if index < 0 { index.saturating_add_unsigned(self.vertices) + 1 } else { index };
-                    let absolute = u64::try_from(absolute).ok().filter(|&absolute| absolute > 0).ok_or_else(|| {
-                        format!("vertex {index} of a face is out of range: {} vertices before it", self.vertices)
-                    })?;
+                    let absolute = u64::try_from(absolute).ok().filter(|&absolute| absolute > 0);
+                    let absolute = absolute.ok_or(MeshProblem::IndexBeforeFirst { index, vertices: self.vertices })?;
                     if absolute > self.largest.0 {
                         self.largest = (absolute, self.line);
                     }
@@ -219,21 +220,19 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         self.clean.clear();
         self.taken = 0;
         while self.clean.len() < PORTION && self.next_line()? {
-            self.clean_line().map_err(|what| Error::line(self.path, self.line, what, FIX))?;
+            self.clean_line().map_err(|problem| Error::at(Place::line(self.path, self.line), problem))?;
         }
         Ok(())
     }
 }
 
-const FIX: &str = "Correct the line, or export the mesh anew.";
-
 fn number<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// A word of the file for an error message: shortened, without control characters.
-fn show(word: &[u8]) -> String {
-    format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(40)]))
+/// A word of the file for an error message: its first 40 bytes.
+fn shown(word: &[u8]) -> String {
+    String::from_utf8_lossy(&word[..word.len().min(40)]).into_owned()
 }
 
 impl<R: BufRead> BufRead for FacesOnly<'_, R> {
@@ -260,7 +259,7 @@ impl<R: BufRead> Read for FacesOnly<'_, R> {
     }
 }
 
-/// Writes a mesh as OBJ: `v` and `f` lines that [`read`] gives back bit for bit.
+/// Writes a mesh as OBJ: `v` and `f` lines from which [`read`] gives the same mesh bit for bit.
 ///
 /// # Errors
 /// Those of `out`.
@@ -303,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_that_real_files_have_is_read_or_passed_over() {
+    fn everything_that_real_files_have_is_read_or_skipped() {
         let text = "\u{feff}# exported\r\nmtllib cup.mtl\r\no body\r\ng a b\r\nv 0 0 0 1 0.5 0.5\r\nv 1 0 0\r\n\
             v\t1 1 0 # corner\r\nvn 0 0 1\r\nvt 0.5\r\nvt 0.5 0.5\r\nusemtl gone\r\ns off\r\nf 1/1/1 2/2/1 3//1\r\n\
             \r\ng c\r\nv 0 1 0 1.0\r\nf -4 -2 \\\r\n  -1\r\nl 1 2 3 4\r\np 1\r\nf 1 2\r\nusemtl\r\nf 1/9/9 3/-7 4";
@@ -377,6 +376,8 @@ mod tests {
         ] {
             let error = parse_text(text).unwrap_err();
             assert!(error.to_string().contains(expected), "{text:?}: {error}");
+            assert!(matches!(error.problem(), Some(crate::error::Problem::Mesh(_))), "{error:?}");
+            assert!(error.to_string().ends_with("Correct the line, or export the mesh again."), "{error}");
             assert_eq!(error.exit_code(), 1);
         }
     }

@@ -1,37 +1,46 @@
-//! Where objects come from: built in, an OBJ file, a directory of them.
+//! Where objects come from: built in, an OBJ file, a directory of OBJ files.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::Object;
 use crate::mesh::builtin;
 use crate::mesh::obj;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The objects of all `sources`, sorted by name. A source is `builtin` (the ten built-in objects), the name of one of
-/// them, an OBJ file, or a directory, which is searched for OBJ files with its folders.
+/// The objects of all `sources`, sorted by name. A source is one of
+///
+/// - `builtin`: the ten built-in objects;
+/// - an OBJ file, or a directory, which is searched for OBJ files, subdirectories included;
+/// - the name of a built-in object, if there is no file of that name.
 ///
 /// An object is named after its file; in ShapeNet's layout (`<category>/<id>/models/model_normalized.obj`) after the
 /// category, or after category and id where the sources hold several of a category.
 ///
 /// # Errors
-/// When a source does not exist, holds no OBJ file, or a file is no usable mesh, and when two objects have one name.
+/// When a source does not exist, holds no OBJ file, or a file is not a usable mesh, and when two objects have the same
+/// name.
 pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
-    let mut objects = Vec::new();
-    for file in files(sources)? {
-        objects.push(match file {
-            Source::BuiltIn(object) => object,
-            Source::File { name, path } => Object { mesh: obj::read(&path)?, name },
-        });
-    }
-    Ok(objects)
+    files(sources)?.into_iter().map(Source::read).collect()
 }
 
-/// An object that is not yet read.
+/// The only object of `source`, found as [`objects`](fn@objects) finds it.
+///
+/// # Errors
+/// As [`objects`](fn@objects), and [`MeshProblem::SeveralObjects`].
+pub fn object(source: &str) -> Result<Object> {
+    let mut found = files(&[source.to_owned()])?;
+    match (found.pop(), found.len()) {
+        (Some(only), 0) => only.read(),
+        (_, others) => Err(Error::at(Place::file(source), MeshProblem::SeveralObjects { count: others + 1 })),
+    }
+}
+
+/// An object whose file is not yet read.
 #[derive(Debug)]
 pub enum Source {
-    /// One that the program makes.
+    /// A built-in object.
     BuiltIn(Object),
-    /// One that a file holds.
+    /// An object in a file.
     File {
         /// The object's name.
         name: String,
@@ -48,30 +57,46 @@ impl Source {
             Self::File { name, .. } => name,
         }
     }
+
+    /// The object itself.
+    ///
+    /// # Errors
+    /// As [`obj::read`].
+    pub fn read(self) -> Result<Object> {
+        match self {
+            Self::BuiltIn(object) => Ok(object),
+            Self::File { name, path } => Ok(Object { mesh: obj::read(&path)?, name }),
+        }
+    }
 }
 
-/// What [`objects`](fn@objects) gives, files not yet read: sorted by name.
+/// The objects of all `sources` as [`objects`](fn@objects) finds them, without reading their files; sorted by name.
 ///
 /// # Errors
-/// As [`objects`](fn@objects), apart from what is wrong inside a file.
+/// As [`objects`](fn@objects), except for what is wrong inside a file.
 pub fn files(sources: &[String]) -> Result<Vec<Source>> {
     let mut paths = Vec::new();
     let mut found = BTreeMap::new();
     for source in sources {
         if source == "builtin" {
-            for object in builtin::all() {
+            for object in builtin::all()? {
                 insert(&mut found, object.name.clone(), Source::BuiltIn(object))?;
             }
         } else if builtin::names().contains(&source.as_str()) && !Path::new(source).exists() {
             insert(&mut found, source.clone(), Source::BuiltIn(builtin::one(source)?))?;
         } else {
             let path = Path::new(source);
-            let metadata = std::fs::metadata(path).map_err(|error| Error::io(path, "read the mesh", error))?;
+            let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
+                std::io::ErrorKind::NotFound => {
+                    Error::at(Place::file(path), MeshProblem::NoSuchSource { builtin: builtin::names().into() })
+                }
+                _ => Error::io(path, "read the mesh", error),
+            })?;
             if metadata.is_dir() {
                 let before = paths.len();
-                search(path, FOLDERS, &mut paths)?;
+                search(path, LEVELS, &mut paths)?;
                 if paths.len() == before {
-                    return Err(Error::file(path, "no OBJ file here", "Give a directory that holds .obj files."));
+                    return Err(Error::at(Place::file(path), MeshProblem::NoMeshes));
                 }
             } else {
                 paths.push(path.to_owned());
@@ -86,7 +111,7 @@ pub fn files(sources: &[String]) -> Result<Vec<Source>> {
         let name = match shapenet(path) {
             Some((category, id)) if in_category[&category] > 1 => format!("{category}-{id}"),
             Some((category, _)) => category,
-            None => text(path.file_stem()),
+            None => lossy(path.file_stem()),
         };
         insert(&mut found, name.clone(), Source::File { name, path: path.clone() })?;
     }
@@ -95,27 +120,26 @@ pub fn files(sources: &[String]) -> Result<Vec<Source>> {
 
 fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) -> Result<()> {
     let place = |source: &Source| match source {
-        Source::BuiltIn(_) => "builtin".to_owned(),
-        Source::File { path, .. } => path.display().to_string(),
+        Source::BuiltIn(_) => "builtin".into(),
+        Source::File { path, .. } => path.clone(),
     };
     if let Some(other) = found.get(&name) {
-        let what = format!("two objects are called {name}: {} and {}", place(other), place(&source));
-        return Err(Error::data(what, "Rename one of the files, or leave one out."));
+        return Err(MeshProblem::SameName { first: place(other), second: place(&source), name }.into());
     }
     found.insert(name, source);
     Ok(())
 }
 
-/// How many folders deep a directory is searched.
-const FOLDERS: usize = 8;
+/// How many levels of subdirectories are searched.
+const LEVELS: usize = 8;
 
-fn search(directory: &Path, folders: usize, paths: &mut Vec<PathBuf>) -> Result<()> {
+fn search(directory: &Path, levels: usize, paths: &mut Vec<PathBuf>) -> Result<()> {
     let io = |error| Error::io(directory, "read the directory", error);
     let mut entries = std::fs::read_dir(directory).map_err(io)?.collect::<std::io::Result<Vec<_>>>().map_err(io)?;
     entries.sort_by_key(std::fs::DirEntry::file_name);
     for path in entries.into_iter().map(|entry| entry.path()) {
-        if path.is_dir() && folders > 0 {
-            search(&path, folders - 1, paths)?;
+        if path.is_dir() && levels > 0 {
+            search(&path, levels - 1, paths)?;
         } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
             paths.push(path);
         }
@@ -123,23 +147,24 @@ fn search(directory: &Path, folders: usize, paths: &mut Vec<PathBuf>) -> Result<
     Ok(())
 }
 
-/// Category and id of a file in ShapeNet's layout.
+/// The category and the id of a file in ShapeNet's layout.
 fn shapenet(path: &Path) -> Option<(String, String)> {
     let models = path.parent()?;
     let id = models.parent()?;
-    let category = text(id.parent()?.file_name());
+    let category = lossy(id.parent()?.file_name());
     let is_shapenet = path.file_stem()? == "model_normalized" && models.file_name()? == "models";
-    let id = text(Some(id.file_name()?));
+    let id = lossy(Some(id.file_name()?));
     is_shapenet.then(|| if category.is_empty() { (id.clone(), id) } else { (category, id) })
 }
 
-fn text(name: Option<&std::ffi::OsStr>) -> String {
+fn lossy(name: Option<&std::ffi::OsStr>) -> String {
     name.unwrap_or_default().to_string_lossy().into_owned()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Problem;
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -197,5 +222,28 @@ mod tests {
         assert!(objects(std::slice::from_ref(&source)).unwrap_err().to_string().contains("no OBJ file here"));
         let error = objects(&[source + "/bultin"]).unwrap_err();
         assert!(error.to_string().contains("bultin: cannot read the mesh"), "{error}");
+        assert!(matches!(error.problem(), Some(Problem::Mesh(MeshProblem::NoSuchSource { .. }))), "{error:?}");
+    }
+
+    #[test]
+    fn a_misspelled_built_in_object_is_refused_with_the_names_of_all() {
+        for error in
+            [objects(&["builtin".into(), "mug".into()]), objects(&["mug".into()]), object("mug").map(|one| vec![one])]
+        {
+            let error = error.unwrap_err().to_string();
+            assert!(error.starts_with("mug: ") && !error.contains("os error"), "{error}");
+            assert!(builtin::names().iter().all(|name| error.contains(name)), "{error}");
+        }
+    }
+
+    #[test]
+    fn several_objects_where_one_is_needed_are_refused_with_their_number() {
+        let error = object("builtin").unwrap_err().to_string();
+        assert!(error.starts_with("builtin: 10 objects"), "{error}");
+        let directory = tempfile::tempdir().unwrap();
+        let source = place(directory.path(), &["cup.obj"]);
+        assert_eq!(object(&source).unwrap().name, "cup");
+        place(directory.path(), &["bowl.obj"]);
+        assert!(object(&source).unwrap_err().to_string().contains("2 objects, where one is needed"));
     }
 }

@@ -10,13 +10,13 @@ use glam::DVec3;
 use palpate_shared::{ContactTime, Pose, Touch};
 use rand::{Rng, RngExt};
 
-/// How many fingers the probe has.
+/// The number of the probe's fingers.
 pub const FINGERS: usize = 3;
 
 /// How far outside the sphere about the object's bounding box an approach starts, in units.
 pub const CLEARANCE: f64 = 5.0;
 
-/// The probe's measures.
+/// The probe's dimensions and motion.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
@@ -24,13 +24,13 @@ pub struct Probe {
     pub radius: f64,
     /// The distance between neighboring fingers' centers, in units.
     pub spacing: f64,
-    /// How fast the probe moves, in units a second.
+    /// How fast the probe moves, in units per second.
     pub speed: f64,
     /// How far the row of fingers may be tilted from the perpendicular to the motion, in degrees, to either side.
     pub tilt: f64,
 }
 
-/// The published probe: radius 0.15, spacing 1.5, 10 units a second, ±10°.
+/// The published probe: radius 0.15, spacing 1.5, 10 units per second, ±10°.
 impl Default for Probe {
     fn default() -> Self {
         Self { radius: 0.15, spacing: 1.5, speed: 10.0, tilt: 10.0 }
@@ -38,38 +38,37 @@ impl Default for Probe {
 }
 
 impl Probe {
-    /// Refuses measures that make no probe, or one too slow for times in microseconds, against an object whose box's
-    /// longest side is `length`.
+    /// Refuses a probe that cannot be: a radius, speed or spacing out of range, or a speed too low for contact times in
+    /// microseconds on an object whose bounding box's longest side is `length` units.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming the measure.
+    /// A [`Problem::Setting`](crate::error::Problem::Setting) that names the field, or `length`.
     pub fn check(&self, length: f64) -> Result<()> {
         let positive = [("length", length), ("radius", self.radius), ("speed", self.speed)];
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
-                return Err(Error::argument(format!("the {name} is {value}"), "Give a number greater than 0."));
+                return Err(Error::setting(name, value, "a number greater than 0"));
             }
         }
         if !(self.spacing.is_finite() && self.spacing >= 0.0) {
-            return Err(Error::argument(format!("the spacing is {}", self.spacing), "Give 0 or more."));
+            return Err(Error::setting("spacing", self.spacing, "a number of 0 or more"));
         }
         if !(0.0..90.0).contains(&self.tilt) {
-            return Err(Error::argument(format!("the tilt is {}°", self.tilt), "Give 0 or more, and less than 90."));
+            return Err(Error::setting("tilt", self.tilt, "a number of degrees from 0 to less than 90"));
         }
         // Twice the diagonal of a cube, the clearance, and the row, generously.
         let longest_way = 4.0 * length + 2.0 * (CLEARANCE + self.spacing + self.radius);
         if longest_way / self.speed * 1e6 >= f64::from(u32::MAX) {
-            let what = format!("the speed {} is too low to keep contact times below 4294 s", self.speed);
-            return Err(Error::argument(what, "Give a higher speed."));
+            return Err(Error::setting("speed", self.speed, "a higher one, to keep contact times below 4294 s"));
         }
         Ok(())
     }
 }
 
-/// Where the probe starts, which way it goes and how its row lies.
+/// Where the probe starts, in which direction it moves, and how its row of fingers is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approach {
-    /// Where the middle finger starts.
+    /// Where the middle finger starts, in units.
     pub start: DVec3,
     /// Unit vector of the motion.
     pub direction: DVec3,
@@ -78,7 +77,7 @@ pub struct Approach {
 }
 
 impl Approach {
-    /// Draws an approach to an object with this bounding box. Start: uniform in direction, at half the box's diagonal
+    /// Draws an approach to an object with this bounding box, in units. Start: uniform in direction, at half the box's diagonal
     /// plus [`CLEARANCE`] from its center. Aim: uniform in the box; the middle finger moves from start to aim. Row:
     /// perpendicular to the motion, rolled uniformly about it, then tilted in the plane of row and motion by a uniform
     /// angle within ± `tilt` degrees.
@@ -94,7 +93,7 @@ impl Approach {
         Self { start, direction, alignment: row * tilt_cos + direction * tilt_sin }
     }
 
-    /// Where the fingers start, first to third.
+    /// Where the fingers start, first to third, in units.
     pub fn fingers(&self, spacing: f64) -> [DVec3; FINGERS] {
         [-1.0, 0.0, 1.0].map(|place| self.start + self.alignment * (place * spacing))
     }
@@ -104,7 +103,7 @@ impl Approach {
         self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius))
     }
 
-    /// The same if all three fingers touch, else none: as soon as one finger misses, the others are left alone.
+    /// The same if all three fingers touch, else none: as soon as one finger misses, no other is cast.
     pub fn full_distances(&self, scene: &Scene, probe: &Probe) -> Option<[f64; FINGERS]> {
         let [first, middle, last] = self.fingers(probe.spacing);
         let may_touch = |finger| scene.may_touch(finger, self.direction, probe.radius);
@@ -119,7 +118,7 @@ impl Approach {
         Some([first, middle, last])
     }
 
-    /// The touch that these distances make: times in whole microseconds after the first contact, and the pose.
+    /// The touch that these distances give: times in whole microseconds after the first contact, and the pose.
     pub fn touch(&self, distances: [Option<f64>; FINGERS], probe: &Probe) -> Touch {
         let earliest = distances.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         let micros =

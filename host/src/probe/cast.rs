@@ -1,11 +1,11 @@
-//! Casts from a file, for holding this simulator against another engine.
+//! Casts from a file, to compare this simulator with another engine.
 //!
-//! A line is `set,ox,oy,oz,dx,dy,dz` or `set,ox,oy,oz,dx,dy,dz,t`: the name of a set of casts, where the sphere's
-//! center starts, its direction (not renormalized: times are in its length), and the time of contact that somebody else
-//! found (`miss` for none). Numbers are taken as the nearest `f32`, as meshes and engines have them. Lines that begin
-//! with `#` and blank lines are kept as they are.
+//! A line is `set,ox,oy,oz,dx,dy,dz` or `set,ox,oy,oz,dx,dy,dz,t`: the name of a set of casts, where the sphere's center
+//! starts, its direction (not renormalized: times are in lengths of the direction), and the time of contact that another
+//! engine found (`miss` for none). Numbers are rounded to the nearest `f32`, because meshes and engines have those. Lines
+//! that begin with `#` and blank lines are kept as they are.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, ProbeProblem, Result};
 use crate::probe::scene::Scene;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ pub enum Line {
     Cast(Cast),
 }
 
-/// A sphere to be moved against a mesh.
+/// A sphere to be moved toward a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cast {
     /// The line as it stands in the file.
@@ -34,14 +34,14 @@ pub struct Cast {
     pub origin: DVec3,
     /// Its direction.
     pub direction: DVec3,
-    /// The time that the file gives, if it does: none within for a miss.
+    /// The time that the file gives: `Some(None)` for a miss, `None` if it gives none.
     pub known: Option<Option<f64>>,
 }
 
 /// Reads a file of casts.
 ///
 /// # Errors
-/// When the file cannot be read or a line is wrong.
+/// [`Error::Io`] when the file cannot be read; a [`ProbeProblem`] with its line when a line is wrong.
 pub fn read(path: &Path) -> Result<Vec<Line>> {
     let io = |error| Error::io(path, "read the casts", error);
     let reader = BufReader::new(File::open(path).map_err(io)?);
@@ -50,39 +50,39 @@ pub fn read(path: &Path) -> Result<Vec<Line>> {
         if text.trim().is_empty() || text.starts_with('#') {
             return Ok(Line::Other(text));
         }
-        let wrong = |what| Error::line(path, index as u64 + 1, what, "Give set,ox,oy,oz,dx,dy,dz and, if known, t.");
+        let wrong = |problem| Error::at(Place::line(path, index as u64 + 1), problem);
         parse(text).map(Line::Cast).map_err(wrong)
     };
     reader.lines().enumerate().map(line).collect()
 }
 
-fn parse(text: String) -> Result<Cast, String> {
+fn parse(text: String) -> Result<Cast, ProbeProblem> {
     let fields: Vec<&str> = text.trim().split(',').map(str::trim).collect();
     if fields.len() != 7 && fields.len() != 8 {
-        return Err(format!("{} fields where a cast has 7, or 8 with a time", fields.len()));
+        return Err(ProbeProblem::CastFields { fields: fields.len() });
     }
-    let vector = |first: usize| -> Result<DVec3, String> {
+    let vector = |first: usize| -> Result<DVec3, ProbeProblem> {
         let mut vector = Vec3::ZERO;
         for axis in 0..3 {
             let field = fields[first + axis];
             let value = field.parse::<f32>().ok().filter(|value| value.is_finite());
-            vector[axis] = value.ok_or_else(|| format!("{field:?} is not a finite number"))?;
+            vector[axis] = value.ok_or_else(|| ProbeProblem::CastCoordinate { text: field.to_owned() })?;
         }
         Ok(vector.as_dvec3())
     };
     let known = match fields.get(7) {
         None => None,
         Some(&"miss") => Some(None),
-        Some(field) => {
+        Some(&field) => {
             let time = field.parse().ok().filter(|time: &f64| time.is_finite() && *time >= 0.0);
-            Some(Some(time.ok_or_else(|| format!("{field:?} is neither a time nor `miss`"))?))
+            Some(Some(time.ok_or_else(|| ProbeProblem::CastTime { text: field.to_owned() })?))
         }
     };
     let (set, origin, direction) = (fields[0].to_owned(), vector(1)?, vector(4)?);
     Ok(Cast { set, origin, direction, known, text })
 }
 
-/// The times of contact of the casts among the lines, in their order.
+/// The times of contact of the casts among the lines, in their order; `radius` in the units of the scene.
 pub fn times(scene: &Scene, lines: &[Line], radius: f64) -> Vec<Option<f64>> {
     let time = |line: &Line| match line {
         Line::Other(_) => None,
@@ -91,7 +91,7 @@ pub fn times(scene: &Scene, lines: &[Line], radius: f64) -> Vec<Option<f64>> {
     lines.par_iter().filter_map(time).collect()
 }
 
-/// The lines with the casts' times appended: the shortest decimals that are read back as the same f64, or `miss`.
+/// The lines with the casts' times appended: the shortest decimals that are read back as the same `f64`, or `miss`.
 pub fn annotate(lines: &[Line], times: &[Option<f64>]) -> String {
     let mut text = String::new();
     let mut times = times.iter();
@@ -108,22 +108,22 @@ pub fn annotate(lines: &[Line], times: &[Option<f64>]) -> String {
     text
 }
 
-/// How times agree with those that a file gives, set by set.
+/// How well the times of one set agree with those that a file gives.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Agreement {
-    /// The set's name.
+    /// The name of the set.
     pub set: String,
     /// How many of its casts have a known time.
     pub casts: usize,
     /// Known contacts that were not found.
     pub missed: usize,
-    /// Contacts that were found where there is none.
+    /// Contacts that were found where the file has none.
     pub false_contacts: usize,
     /// The largest difference between a known and a found time.
     pub largest_error: f64,
 }
 
-/// Holds times against the known ones; sets in the order in which they first appear.
+/// Compares times with the known ones; sets in the order in which they first appear.
 pub fn agreement(lines: &[Line], times: &[Option<f64>]) -> Vec<Agreement> {
     let mut sets: Vec<Agreement> = Vec::new();
     let casts = lines.iter().filter_map(|line| match line {
@@ -190,7 +190,7 @@ mod tests {
             ("a,0,0,0,1,0,0,-1\n", "\"-1\" is neither a time nor `miss`"),
         ] {
             let error = lines(text).unwrap_err().to_string();
-            assert!(error.contains(what), "{error}");
+            assert!(error.contains(what) && error.ends_with("Give set,ox,oy,oz,dx,dy,dz and, if known, t."), "{error}");
         }
     }
 }

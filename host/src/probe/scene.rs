@@ -1,11 +1,11 @@
-//! An object scaled and centered, ready to be touched.
+//! A mesh in the units of the probe, ready to be touched.
 
-use crate::error::{Error, Result};
+use crate::error::{MeshProblem, Result};
 use crate::mesh::Mesh;
 use crate::probe::sweep::{Surface, narrow::Triangle};
 use glam::{DVec3, Vec3};
 
-/// A surface in the units of the probe.
+/// A mesh in the units of the probe, with what makes casting spheres at it fast.
 #[derive(Clone, Debug)]
 pub struct Scene {
     surface: Surface,
@@ -16,14 +16,14 @@ impl Scene {
     /// The mesh, scaled so that its bounding box's longest side has `length` units and centered on the box's center.
     ///
     /// # Errors
-    /// When the mesh has no triangles, an index is out of range, a coordinate is not finite, or all corners are the
-    /// same point.
+    /// A [`MeshProblem`] when the mesh has no triangles, a triangle names a vertex that is missing or not finite, or all
+    /// vertices are at the same point.
     pub fn new(mesh: &Mesh, length: f64) -> Result<Self> {
         let mut triangles = corners(mesh)?;
         let [low, high] = bounds(&triangles);
         let longest = (high - low).max_element();
         if longest <= 0.0 {
-            return Err(Error::data("the mesh has no extent: all its corners are the same point", FIX));
+            return Err(MeshProblem::NoExtent.into());
         }
         let (center, scale) = ((low + high) / 2.0, length / longest);
         triangles.iter_mut().flatten().for_each(|corner| *corner = (*corner - center) * scale);
@@ -33,7 +33,7 @@ impl Scene {
     /// The mesh in its own units and place.
     ///
     /// # Errors
-    /// When the mesh has no triangles, an index is out of range, or a coordinate is not finite.
+    /// A [`MeshProblem`] when the mesh has no triangles, or a triangle names a vertex that is missing or not finite.
     pub fn as_is(mesh: &Mesh) -> Result<Self> {
         Ok(Self::of(corners(mesh)?))
     }
@@ -58,30 +58,27 @@ impl Scene {
         self.bounds
     }
 
-    /// The first t ≥ 0 at which a sphere of this radius, centered at origin + t · direction, touches the object; 0 when
-    /// it starts in contact, none when it never touches. With a unit vector as direction, t is a distance.
+    /// The first time t ≥ 0 at which a sphere of this radius, centered at origin + t · direction, touches the object: 0
+    /// when it starts in contact, none when it never touches. With a unit vector as direction, t is a distance in units.
     pub fn first_contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
         self.surface.first_contact(origin, direction, radius)
     }
 
-    /// Whether such a sphere's path meets the bounding box: if not, it never touches.
+    /// Whether such a sphere's path meets the bounding box; if not, it never touches. Much cheaper than a cast.
     pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
         self.surface.may_touch(origin, direction, radius)
     }
 }
 
-const FIX: &str = "Give a mesh with faces and an extent.";
-
-fn corners(mesh: &Mesh) -> Result<Vec<Triangle>> {
+fn corners(mesh: &Mesh) -> Result<Vec<Triangle>, MeshProblem> {
     let corner = |index: u32| {
-        let position =
-            mesh.vertices.get(index as usize).copied().map(Vec3::from).filter(|position| position.is_finite());
-        position
-            .map(Vec3::as_dvec3)
-            .ok_or_else(|| Error::data(format!("vertex {index} of the mesh is missing or not finite"), FIX))
+        let vertices = mesh.vertices.len();
+        let vertex = mesh.vertices.get(index as usize).ok_or(MeshProblem::MissingVertex { index, vertices })?;
+        let vertex = Vec3::from(*vertex);
+        if vertex.is_finite() { Ok(vertex.as_dvec3()) } else { Err(MeshProblem::VertexNotFinite { index }) }
     };
     if mesh.triangles.is_empty() {
-        return Err(Error::data("the mesh has no triangles", FIX));
+        return Err(MeshProblem::NoFaces);
     }
     mesh.triangles.iter().map(|&[a, b, c]| Ok([corner(a)?, corner(b)?, corner(c)?])).collect()
 }
@@ -110,6 +107,6 @@ mod tests {
             let error = Scene::new(&Mesh { vertices: vertices.clone(), triangles: vec![triangle] }, 10.0).unwrap_err();
             assert!(error.to_string().contains(what), "{error}");
         }
-        assert!(Scene::as_is(&Mesh::default()).unwrap_err().to_string().contains("no triangles"));
+        assert!(Scene::as_is(&Mesh::default()).unwrap_err().to_string().contains("no faces"));
     }
 }

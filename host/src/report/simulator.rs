@@ -9,9 +9,8 @@ use crate::page::scale::Scale;
 use crate::page::table::{Cell, Data, Table};
 use crate::probe::approach::{Approach, Probe};
 use crate::probe::scene::Scene;
-use crate::probe::sweep::narrow::Motion;
-use crate::probe::sweep::narrow::double::{self, Triangle};
-use crate::probe::sweep::{Exact, Plain, Precision, Single};
+use crate::probe::sweep::narrow::{self, Motion, Triangle};
+use crate::probe::sweep::precision::{self, DoubleWithoutReject, Precision, SingleAfterReject};
 use crate::random;
 use glam::DVec3;
 use rand::RngExt;
@@ -96,15 +95,15 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Engine>> {
         engine(name, &passes[0].0, rate)
     };
     Ok(vec![
-        fast("f32 after the f32 reject", &|scene, cast| decide::<Single>(scene, cast, probe.radius)),
-        fast("f64 after the f32 reject (used)", &|scene, cast| decide::<Exact>(scene, cast, probe.radius)),
-        fast("f64 for each triangle of a leaf", &|scene, cast| decide::<Plain>(scene, cast, probe.radius)),
+        fast("f32 after the f32 reject", &|scene, cast| decide::<SingleAfterReject>(scene, cast, probe.radius)),
+        fast("f64 after the f32 reject (used)", &|scene, cast| scene.first_contact(cast.origin, cast.direction, probe.radius)),
+        fast("f64 for each triangle of a leaf", &|scene, cast| decide::<DoubleWithoutReject>(scene, cast, probe.radius)),
         engine("f64 for every triangle, no tree", &truth, slow),
     ])
 }
 
 fn decide<P: Precision>(scene: &Scene, cast: &Cast, radius: f64) -> Option<f64> {
-    scene.surface().first_contact_in::<P>(cast.origin, cast.direction, radius)
+    precision::first_contact::<P>(scene.surface(), cast.origin, cast.direction, radius)
 }
 
 fn every_triangle(triangles: &[Triangle], cast: &Cast, radius: f64) -> Option<f64> {
@@ -114,7 +113,7 @@ fn every_triangle(triangles: &[Triangle], cast: &Cast, radius: f64) -> Option<f6
     let motion = Motion { origin: cast.origin + cast.direction * skipped, direction: cast.direction, radius };
     let first = triangles
         .iter()
-        .fold(f64::INFINITY, |first, triangle| double::first_contact(&motion, triangle, first).unwrap_or(first));
+        .fold(f64::INFINITY, |first, triangle| narrow::first_contact(&motion, triangle, first).unwrap_or(first));
     first.is_finite().then_some(first + skipped)
 }
 

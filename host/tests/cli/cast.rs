@@ -39,6 +39,12 @@ fn wrong_input_writes_nothing_and_says_why() {
     assert!(error.contains("casts.csv:2: 6 fields"), "{error}");
     assert!(!out.exists());
     let error = stderr(command(["cast", "--radius", "0"]).args([&mesh, &casts]).output().unwrap(), 2);
-    assert!(error.contains("the radius is 0"), "{error}");
+    assert!(error.contains("radius is 0. Use a number greater than 0."), "{error}");
     stderr(run(["cast", "a.obj", "b.csv", "--as-is", "--length", "3"]), 2);
+    let broken = directory.path().join("broken.obj");
+    std::fs::write(&broken, "v 0 0 0\nv 0 1\n").unwrap();
+    let error =
+        stderr(command(["cast", "-o"]).args([&out, &broken, &slivers("slivers.casts.csv")]).output().unwrap(), 1);
+    assert!(error.contains("broken.obj:2: a vertex without z. Correct the line"), "{error}");
+    assert!(!out.exists());
 }

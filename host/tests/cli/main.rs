@@ -5,8 +5,11 @@ mod cast;
 mod chip;
 mod compiled;
 mod help;
+mod mesh;
 mod models;
+mod objects;
 mod reports;
 mod support;
+mod view;
 
 use support::{command, globe, json, listing, run, stderr, stdout};

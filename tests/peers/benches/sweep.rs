@@ -15,8 +15,9 @@ use palpate::mesh::Mesh;
 use palpate::probe::approach::{Approach, Probe};
 use palpate::probe::cast;
 use palpate::probe::scene::Scene;
-use palpate::probe::sweep::narrow::double::{self, Motion, Triangle};
-use palpate::probe::sweep::{Exact, Plain, Precision, Single, budget};
+use palpate::probe::sweep::narrow::{self, Motion, Triangle};
+use palpate::probe::sweep::precision::{self, DoubleWithoutReject, SingleAfterReject};
+use palpate::probe::sweep::{Surface, budget};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -153,7 +154,7 @@ fn truth(scene: &Scene, casts: &[Cast], engines: [&[Option<f64>]; 3]) -> Vec<Opt
     let triangles: Vec<Triangle> = scene.triangles().collect();
     let brute = |cast: &Cast| {
         let motion = Motion { origin: cast.origin, direction: cast.direction, radius: RADIUS };
-        let contact = |triangle| double::first_contact(&motion, triangle, f64::INFINITY);
+        let contact = |triangle| narrow::first_contact(&motion, triangle, f64::INFINITY);
         triangles.iter().filter_map(contact).min_by(f64::total_cmp)
     };
     let decide = |(index, cast): (usize, &Cast)| {
@@ -206,13 +207,20 @@ fn speed_against_error() {
         let mesh = palpate::mesh::obj::read(&directory.join(format!("{name}.obj"))).unwrap();
         let lines = cast::read(&directory.join(format!("{name}.casts.csv"))).unwrap();
         let scene = Scene::as_is(&mesh).unwrap();
-        row::<Single>(name, "f32 after f32 reject", &scene, &lines);
-        row::<Plain>(name, "f64", &scene, &lines);
-        row::<Exact>(name, "f64 after f32 reject", &scene, &lines);
+        let surface = scene.surface();
+        row(name, "f32 after f32 reject", &lines, precision::first_contact::<SingleAfterReject>, surface);
+        row(name, "f64", &lines, precision::first_contact::<DoubleWithoutReject>, surface);
+        row(name, "f64 after f32 reject", &lines, Surface::first_contact, surface);
     }
     println!();
 
-    fn row<P: Precision>(name: &str, phase: &str, scene: &Scene, lines: &[cast::Line]) {
+    fn row(
+        name: &str,
+        phase: &str,
+        lines: &[cast::Line],
+        first_contact: impl Fn(&Surface, DVec3, DVec3, f64) -> Option<f64>,
+        surface: &Surface,
+    ) {
         let casts: Vec<&cast::Cast> = lines
             .iter()
             .filter_map(|line| match line {
@@ -221,7 +229,7 @@ fn speed_against_error() {
             })
             .collect();
         let radius = f64::from(0.15_f32);
-        let contact = |cast: &&cast::Cast| scene.surface().first_contact_in::<P>(cast.origin, cast.direction, radius);
+        let contact = |cast: &&cast::Cast| first_contact(surface, cast.origin, cast.direction, radius);
         let (rate, times) = measure(&casts, 3, contact);
         let sets = cast::agreement(lines, &times);
         let missed: usize = sets.iter().map(|set| set.missed).sum();

@@ -7,39 +7,37 @@ use fidget_core::types::Grad;
 use fidget_core::vm::VmShape;
 use glam::Vec3;
 
-/// An implicit shape, where it is, and how finely it is to be meshed.
+/// An implicit shape, the box that it is in, and the resolution at which it is meshed.
 pub(super) struct Form {
     /// Negative inside.
     pub(super) shape: Shape,
     /// The corners of a box that holds it, in centimeters.
     pub(super) bounds: [Vec3; 2],
-    /// How many of the meshing's smallest cells go along the longest side of `bounds`: enough that the thinnest feature
-    /// is three of them thick.
+    /// How many of the smallest cells go along the longest side of `bounds`: enough for the thinnest feature to be three
+    /// cells thick.
     pub(super) cells: f32,
 }
 
 /// The depth of the octree in which shapes are meshed.
 const DEPTH: u8 = 9;
 
-/// Meshes a form in one thread, so that the order of vertices and triangles is always the same.
+/// Meshes a form in one thread, so that the order of vertices and triangles is always the same. None if no resolution
+/// that is tried gives a closed mesh.
 ///
 /// Where two sheets pass through one cell, dual contouring may join them in an edge of four triangles. That depends on
 /// where the cells happen to lie, so a mesh that is not closed is made again with cells a hundredth larger.
-pub(super) fn mesh(form: &Form) -> Mesh {
+pub(super) fn mesh(form: &Form) -> Option<Mesh> {
     const ATTEMPTS: u8 = 12;
-    (0..ATTEMPTS)
-        .map(|attempt| contour(form, form.cells * (1.0 - 0.0117 * f32::from(attempt))))
-        .find(is_closed)
-        .unwrap_or_default()
+    (0..ATTEMPTS).map(|attempt| contour(form, form.cells * (1.0 - 0.0117 * f32::from(attempt)))).find(is_closed)
 }
 
-/// Whether every edge is used once in each direction.
+/// Whether there are edges, and each is used once in each direction.
 fn is_closed(mesh: &Mesh) -> bool {
     let mut edges: Vec<(u32, u32)> = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
     let mut opposites: Vec<(u32, u32)> = edges.iter().map(|&(a, b)| (b, a)).collect();
     edges.sort_unstable();
     opposites.sort_unstable();
-    edges == opposites && edges.windows(2).all(|pair| pair[0] != pair[1])
+    !edges.is_empty() && edges == opposites && edges.windows(2).all(|pair| pair[0] != pair[1])
 }
 
 fn contour(form: &Form, cells: f32) -> Mesh {
@@ -52,7 +50,8 @@ fn contour(form: &Form, cells: f32) -> Mesh {
     let tree = form.shape.0.remap_xyz(x * reach + center.x, y * reach + center.y, z * reach + center.z) / reach;
     let shape = VmShape::from(tree);
     let settings = fidget_mesh::Settings { depth: DEPTH, threads: None, ..Default::default() };
-    // Neither can fail: the shapes have no variables but x, y and z, and nobody cancels.
+    // Neither fails: the shapes have no variables but x, y and z, and nothing cancels. If they did, the mesh would be
+    // empty, which `mesh` refuses.
     let Ok(bound) = shape.clone().try_into() else { return Mesh::default() };
     let Some(octree) = fidget_mesh::Octree::build(&bound, &settings) else { return Mesh::default() };
     let contoured = octree.walk_dual();
@@ -68,7 +67,7 @@ fn values(shape: &VmShape, points: &[Vec3]) -> Vec<(f32, Vec3)> {
     let tape = shape.grad_slice_tape(Default::default());
     let mut evaluator = VmShape::new_grad_slice_eval();
     let mut values = Vec::with_capacity(points.len());
-    // In pieces whose intermediate results stay in the cache.
+    // In pieces small enough for their intermediate results to stay in the cache.
     for points in points.chunks(512) {
         let axis = |i: usize| -> Vec<Grad> {
             let along = |j| f32::from(u8::from(i == j));
@@ -82,11 +81,11 @@ fn values(shape: &VmShape, points: &[Vec3]) -> Vec<(f32, Vec3)> {
 }
 
 /// Straightens the folds that dual contouring leaves where small cells meet large ones: where a triangle faces against
-/// the shape's gradient, its corners are moved between their neighbors and back onto the surface, a few times. Points
-/// move by `cell` at most, each time.
+/// the shape's gradient, its corners are moved to the mean of their neighbors and back onto the surface, a few times.
+/// Each time, the way back onto the surface is limited to `cell`.
 fn unfold(points: &mut [Vec3], triangles: &[[u32; 3]], shape: &VmShape, cell: f32) {
     const PASSES: usize = 12;
-    /// The cosine between a triangle's normal and the gradient from which on it counts as folded.
+    /// A triangle counts as folded if the cosine between its normal and the gradient is below this.
     const FOLDED: f32 = 0.1;
     let mut around: Vec<Vec<usize>> = vec![Vec::new(); points.len()];
     for (i, triangle) in triangles.iter().enumerate() {
@@ -126,5 +125,23 @@ fn unfold(points: &mut [Vec3], triangles: &[[u32; 3]], shape: &VmShape, cell: f3
         suspects.extend(moving.iter().flat_map(|&vertex| around[vertex as usize].iter().copied()));
         suspects.sort_unstable();
         suspects.dedup();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin::shape::{below, ellipsoid};
+
+    fn form(shape: Shape) -> Form {
+        Form { shape, bounds: [Vec3::splat(-1.0), Vec3::splat(1.0)], cells: 40.0 }
+    }
+
+    #[test]
+    fn a_shape_that_has_no_closed_mesh_gives_no_empty_mesh() {
+        // One that goes on forever, and one that is outside of the box.
+        assert_eq!(mesh(&form(below(Vec3::Z, 0.1))), None);
+        assert_eq!(mesh(&form(ellipsoid(Vec3::splat(0.5)).moved(Vec3::X * 1e3))), None);
+        assert!(mesh(&form(ellipsoid(Vec3::splat(0.5)))).is_some());
     }
 }

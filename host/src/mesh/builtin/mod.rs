@@ -1,8 +1,16 @@
 //! The ten built-in objects, made from implicit functions.
 //!
 //! Each object is a function from its proportions to an implicit shape (in centimeters, z up, lying or standing as it
-//! does on a table), meshed by manifold dual contouring ([`fidget_mesh`]). The canonical proportions are those of a
-//! real thing; [`varied`] makes other members of the same family.
+//! would on a table), which manifold dual contouring ([`fidget_mesh`]) turns into a mesh. The canonical proportions are
+//! those of a real object; [`varied`] makes others of the same kind.
+//!
+//! ```
+//! # fn main() -> palpate::Result<()> {
+//! let bowl = palpate::mesh::builtin::one("bowl")?;
+//! assert!(palpate::mesh::facts::Facts::of(&bowl.mesh).is_right_side_out());
+//! # Ok(())
+//! # }
+//! ```
 
 mod bowl;
 mod camera;
@@ -18,16 +26,16 @@ mod spoon;
 mod winebottle;
 mod wristwatch;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, MeshProblem, Result};
 use crate::mesh::Object;
-use contour::{Form, mesh};
+use contour::Form;
 use proportions::Proportions;
 use rayon::prelude::*;
 
-/// A name, and the shape that proportions give.
+/// An object's name, and the function from its proportions to its shape.
 type Kind = (&'static str, fn(&mut Proportions) -> Form);
 
-/// The built-in objects' names and shapes, in the order in which [`builtin`] gives them.
+/// In the order in which [`all`] gives them.
 const KINDS: [Kind; 10] = [
     ("bowl", bowl::form),
     ("camera", camera::form),
@@ -41,56 +49,64 @@ const KINDS: [Kind; 10] = [
     ("winebottle", winebottle::form),
 ];
 
-/// The names of the built-in objects, in the order of [`builtin`].
+/// The names of the built-in objects, in the order of [`all`].
 pub fn names() -> [&'static str; 10] {
     KINDS.map(|(name, _)| name)
 }
 
 /// The ten built-in objects: closed, their triangles anticlockwise seen from outside, in centimeters with z up.
 ///
-/// The same meshes on any number of threads. A few seconds of work for one thread.
-pub fn all() -> Vec<Object> {
+/// The meshes are the same on any number of threads. Takes a few seconds of one thread's time.
+///
+/// # Errors
+/// [`MeshProblem::NotMeshed`], never so far.
+pub fn all() -> Result<Vec<Object>> {
     make_all(&KINDS, None)
 }
 
-/// The built-in object `name`, as [`builtin`] makes it.
+/// The built-in object `name`, the same that [`all`] gives.
 ///
 /// # Errors
-/// [`Error::Argument`] if there is no such object.
+/// [`Problem::Setting`](crate::error::Problem::Setting) if there is no such object; as [`all`].
 pub fn one(name: &str) -> Result<Object> {
-    Ok(make_one(&kind(name)?, None))
+    make_one(&kind(name)?, None)
 }
 
-/// Another object of the kind `name`: its lengths, radii, curvatures and angles each vary by up to a fifth or so. The
-/// same seed gives the same object. Its name is the kind's.
+/// Another object of the kind `name`: its lengths, radii, curvatures and angles each vary by up to about a fifth. The
+/// same seed gives the same object. It has the kind's name.
 ///
 /// # Errors
-/// [`Error::Argument`] if there is no such kind.
+/// [`Problem::Setting`](crate::error::Problem::Setting) if there is no such kind; [`MeshProblem::NotMeshed`] if the
+/// proportions that the seed gives have no closed mesh.
 pub fn varied(name: &str, seed: u64) -> Result<Object> {
-    Ok(make_one(&kind(name)?, Some(seed)))
+    make_one(&kind(name)?, Some(seed))
 }
 
 /// The objects `names`, in that order: canonical, or with a seed [`varied`].
 ///
 /// # Errors
-/// [`Error::Argument`] if there is no object of one of the names.
+/// As [`one`] and [`varied`].
 pub fn make(names: &[&str], seed: Option<u64>) -> Result<Vec<Object>> {
     let kinds = names.iter().map(|name| kind(name)).collect::<Result<Vec<_>>>()?;
-    Ok(make_all(&kinds, seed))
+    make_all(&kinds, seed)
 }
 
-fn make_all(kinds: &[Kind], seed: Option<u64>) -> Vec<Object> {
+fn make_all(kinds: &[Kind], seed: Option<u64>) -> Result<Vec<Object>> {
     kinds.par_iter().map(|kind| make_one(kind, seed)).collect()
 }
 
-fn make_one(&(name, form): &Kind, seed: Option<u64>) -> Object {
+fn make_one(&(name, form): &Kind, seed: Option<u64>) -> Result<Object> {
     let mut proportions = seed.map_or(Proportions::canonical(), Proportions::varied);
-    Object { name: name.into(), mesh: mesh(&form(&mut proportions)) }
+    match contour::mesh(&form(&mut proportions)) {
+        Some(mesh) => Ok(Object { name: name.into(), mesh }),
+        None => Err(MeshProblem::NotMeshed { name: name.into(), seed }.into()),
+    }
 }
 
 fn kind(name: &str) -> Result<Kind> {
-    KINDS.into_iter().find(|kind| kind.0 == name).ok_or_else(|| {
-        Error::argument(format!("no built-in object \"{name}\""), format!("Choose one of {}.", names().join(", ")))
+    let found = KINDS.into_iter().find(|kind| kind.0 == name);
+    found.ok_or_else(|| {
+        Error::setting("name", format!("{name:?}"), format!("the name of a built-in object: {}", names().join(", ")))
     })
 }
 

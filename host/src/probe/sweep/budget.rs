@@ -1,18 +1,24 @@
-//! The error budget: which step of a cast may be wrong by how much, and why that is enough.
+//! The error budget: by how much each step of a cast may be wrong, and why that is good enough.
 //!
 //! Lengths are in the frame of the casts, where the mesh's longest side is between 1 and 2. The steps take their
 //! constants from here, so the table and the code cannot disagree.
 
-/// What one step may be wrong by.
+/// The precision in which contacts are decided.
+pub type Real = f64;
+
+/// A vector of that precision.
+pub type Vector = glam::DVec3;
+
+/// By how much one step may be wrong.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowance {
     /// The step.
     pub step: &'static str,
     /// The most that it may be off by.
     pub error: f64,
-    /// Off in what.
+    /// In what unit, or as a share of what.
     pub of: &'static str,
-    /// Why it is not more, and why it does no harm.
+    /// Why it is not larger, and why it does no harm.
     pub reason: &'static str,
 }
 
@@ -20,15 +26,15 @@ pub struct Allowance {
 pub const BOX: f64 = 4e-6;
 /// Moving the start up to the mesh's box, where the start is near.
 pub const ENTRY: f64 = 1e-9;
-/// The same where the start is far away, as a share of its distance.
+/// Moving a start that is far away up to the box, as a share of its distance.
 pub const ENTRY_FAR: f64 = 1e-15;
-/// A triangle narrower than this share of its length has no face.
+/// A triangle narrower than this share of its length is treated as having no face.
 pub const FLAT: f64 = 1e-8;
-/// An edge nearer to the motion's direction than this angle has no cylinder.
+/// An edge closer to the direction of motion than this angle, in radians, is treated as having no cylinder.
 pub const PARALLEL: f64 = 1e-12;
-/// A contact that is dated this much before the start counts.
+/// A contact up to this much before the start counts as one at the start.
 pub const EARLY: f64 = 1e-12;
-/// The plane's contact, when it is used to skip a triangle.
+/// The time of contact with a triangle's plane, when it is used to skip the triangle.
 pub const PLANE: f64 = 1e-9;
 
 /// Every step of a cast that is not exact up to the last bits of an f64.
@@ -37,7 +43,7 @@ pub const BUDGET: [Allowance; 8] = [
         step: "boxes of the tree, eight-wide reject (f32)",
         error: BOX,
         of: "1 + radius + start, added to the radius",
-        reason: "a few roundings of 6e-8 each; they can only let too many triangles through, never too few",
+        reason: "a few roundings of 6e-8 each; they let more triangles through, never fewer",
     },
     Allowance {
         step: "moving the start up to the box",
@@ -49,7 +55,7 @@ pub const BUDGET: [Allowance; 8] = [
         step: "the same from far away",
         error: ENTRY_FAR,
         of: "the start's distance, sideways",
-        reason: "the start itself has no more digits; a path that grazes by d turns it into 1/sqrt(d) of it in time",
+        reason: "the start itself has no more digits; a path that grazes by d magnifies it to 1/sqrt(d) of it in time",
     },
     Allowance {
         step: "needles count as their edges",
@@ -61,10 +67,10 @@ pub const BUDGET: [Allowance; 8] = [
         step: "edges along the motion count as their corners",
         error: PARALLEL,
         of: "the edge's length",
-        reason: "so far does the sphere drift from the edge between its ends",
+        reason: "the most by which the sphere drifts away from the edge between its ends",
     },
     Allowance {
-        step: "contacts dated just before the start",
+        step: "contacts just before the start",
         error: EARLY,
         of: "length",
         reason: "a start within rounding of contact is neither lost nor found late",

@@ -1,93 +1,48 @@
 //! First contact of a moving sphere with a triangle mesh.
 //!
-//! Boxes in f32 with slack find the leaves that the sphere may reach (`tree`), an f32 test on eight triangles at once
-//! throws out those that it cannot (`pack`), and the rest is decided in f64 ([`narrow`]).
+//! Boxes in f32 with slack find the leaves that the sphere may reach (`tree`; in fine meshes with the help of `disc`), a
+//! test on eight triangles at once in f32 rejects those that it cannot touch (`pack`), and the rest is decided in f64
+//! ([`narrow`]). [`budget`] says by how much each step may be wrong.
 
 pub mod budget;
-mod flat;
+mod disc;
 pub mod narrow;
 mod pack;
+#[cfg(feature = "experiments")]
+pub mod precision;
 mod tree;
 
 #[cfg(test)]
 mod tests;
 
 use glam::DVec3;
-use narrow::{Motion, Triangle, double, single};
+use narrow::{Motion, Triangle};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use tree::Tree;
 
-/// How the triangles of a leaf are decided: the choices that there are between speed and error.
-pub trait Precision {
-    /// Whether the eight-wide f32 test goes first.
-    const REJECT: bool;
-
-    /// The distance until the sphere touches the triangle, if that is less than `limit`.
-    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64>;
-}
-
-/// f64 after the f32 reject: what casts use.
-#[derive(Clone, Copy, Debug)]
-pub struct Exact;
-
-/// f64 for every triangle of a leaf.
-#[derive(Clone, Copy, Debug)]
-pub struct Plain;
-
-/// f32 after the f32 reject, only to measure what that costs.
-#[derive(Clone, Copy, Debug)]
-pub struct Single;
-
-impl Precision for Exact {
-    const REJECT: bool = true;
-
-    #[inline]
-    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
-        double::first_contact(motion, triangle, limit)
-    }
-}
-
-impl Precision for Plain {
-    const REJECT: bool = false;
-
-    #[inline]
-    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
-        double::first_contact(motion, triangle, limit)
-    }
-}
-
-impl Precision for Single {
-    const REJECT: bool = true;
-
-    #[inline]
-    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
-        let motion = single::Motion {
-            origin: motion.origin.as_vec3(),
-            direction: motion.direction.as_vec3(),
-            radius: motion.radius as f32,
-        };
-        single::first_contact(&motion, &triangle.map(|corner| corner.as_vec3()), limit as f32).map(f64::from)
-    }
-}
-
-/// A triangle mesh, ready for spheres to be moved against it.
+/// A triangle mesh, ready for casting spheres at it.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// Where the mesh's box has its center.
+    /// The center of the mesh's box.
     center: DVec3,
-    /// A power of two: the mesh's units in one unit of the frame that casts are made in, where the box's longest side
-    /// is between 1 and 2. Exact, and it keeps f32 in its range for meshes of any size.
+    /// How many of the mesh's units are one unit in the frame of the casts, where the box's longest side is between 1 and
+    /// 2. A power of two, so that scaling is exact; it keeps meshes of any size in the range of f32.
     unit: f64,
     /// Half the box's sides, in the frame of the casts.
     half: DVec3,
-    /// In the frame of the casts, in the tree's order.
+    /// In the frame of the casts, in the order of the tree.
     triangles: Vec<Triangle>,
     tree: Tree,
 }
 
 impl Surface {
-    /// A surface of these triangles (corners with finite coordinates, at least one triangle).
+    /// A surface of these triangles, in any unit.
+    ///
+    /// # Panics
+    /// If there are no triangles, or a coordinate is not finite. [`Scene`](crate::probe::Scene) returns an error instead.
     pub fn new(mut triangles: Vec<Triangle>) -> Self {
+        assert!(!triangles.is_empty(), "a surface needs a triangle");
+        assert!(triangles.iter().flatten().all(|corner| corner.is_finite()), "a surface needs finite corners");
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &corner in triangles.iter().flatten() {
             (low, high) = (low.min(corner), high.max(corner));
@@ -102,12 +57,12 @@ impl Surface {
         Self { center, unit, half: (high - low) / (2.0 * unit), triangles, tree }
     }
 
-    /// The triangles, in the order of the tree; one that the mesh repeats comes once.
+    /// The triangles, in the order of the tree; repeated ones only once.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = Triangle> + '_ {
         self.triangles.iter().map(|triangle| triangle.map(|corner| corner * self.unit + self.center))
     }
 
-    /// The box around the mesh: its lowest and highest corner.
+    /// The mesh's bounding box: its lowest and highest corner.
     pub fn bounds(&self) -> [DVec3; 2] {
         [self.center - self.half * self.unit, self.center + self.half * self.unit]
     }
@@ -116,11 +71,14 @@ impl Surface {
     /// the surface; 0 when it starts in contact, none when it never does. The direction need not have unit length;
     /// without a direction (zero, or not finite) only a contact at the start counts.
     pub fn first_contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
-        self.first_contact_in::<Exact>(origin, direction, radius)
+        let start = self.start(origin, direction, radius)?;
+        let distance = start.skipped + self.tree.first_contact(&self.triangles, &start.motion)?;
+        Some(distance * self.unit / start.length)
     }
 
-    /// The same in another [`Precision`].
-    pub fn first_contact_in<P: Precision>(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
+    /// The cast in the frame of the casts, its start moved up to the mesh's box; none if it never gets there.
+    #[inline]
+    fn start(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<Start> {
         let length = direction.length();
         let moves = length > 0.0 && length.is_finite();
         let motion = Motion {
@@ -128,20 +86,19 @@ impl Surface {
             direction: if moves { direction / length } else { DVec3::ZERO },
             radius: radius / self.unit,
         };
-        let entry = self.entry(&motion)?;
-        let near = Motion { origin: motion.origin + motion.direction * entry, ..motion };
-        let distance = entry + self.tree.first_contact::<P>(&self.triangles, &near)?;
-        Some(if moves { distance * self.unit / length } else { 0.0 })
+        let skipped = self.entry(&motion)?;
+        let motion = Motion { origin: motion.origin + motion.direction * skipped, ..motion };
+        Some(Start { motion, skipped, length: if moves { length } else { f64::INFINITY } })
     }
 
-    /// Whether the sphere's path meets the mesh's box at all: a cheap necessary condition for a contact.
+    /// Whether the sphere's path meets the mesh's box: a cheap necessary condition for a contact.
     pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
         let motion = Motion { origin: (origin - self.center) / self.unit, direction, radius: radius / self.unit };
         self.entry(&motion).is_some()
     }
 
-    /// How far the sphere can be moved up to the mesh's box, stopping short of any contact; none when it never gets
-    /// there. From far away this saves the digits that the distance would cost.
+    /// How far the sphere can move toward the mesh's box without any contact; none when it never gets there. This saves
+    /// the digits that a start from far away would cost.
     fn entry(&self, motion: &Motion) -> Option<f64> {
         // Rounding moves a point that is far away by this much at most.
         let slack = budget::ENTRY + budget::ENTRY_FAR * motion.origin.abs().max_element();
@@ -163,8 +120,17 @@ impl Surface {
     }
 }
 
-/// Leaves out triangles that have the corners of an earlier one. They change no contact, but many boxes that coincide
-/// cost the tree's builder a time that grows with the square of their number.
+/// A cast in the frame of the casts, with its start at the mesh's box.
+struct Start {
+    motion: Motion,
+    /// How far the start was moved.
+    skipped: f64,
+    /// The length of the direction that was given; infinite for a sphere that does not move.
+    length: f64,
+}
+
+/// Leaves out triangles that have the same corners as an earlier one. They change no contact, but the time to build the
+/// tree grows with the square of the number of boxes that coincide.
 fn without_repeats(mut triangles: Vec<Triangle>) -> Vec<Triangle> {
     let corners = |triangle: &Triangle| {
         let mut corners = triangle.map(|corner| corner.to_array().map(|value| (value + 0.0).to_bits()));

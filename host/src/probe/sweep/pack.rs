@@ -2,8 +2,8 @@
 //!
 //! Seen along the motion, the sphere's path is a disc and a triangle is a triangle: they are apart if a line separates
 //! them (the sides of the triangle's bounding rectangle and its edges are tried). Along the motion, a triangle behind
-//! the start is out of reach, and one at a distance from the path is touched late. Slack makes up for the rounding, so
-//! a triangle that is thrown out is surely not touched; of those that stay, most are.
+//! the start is out of reach, and one at a distance from the path is touched late. Slack makes up for rounding, so a
+//! triangle that is rejected is certainly not touched; of those that remain, most are.
 
 use super::budget::BOX;
 use super::narrow::{Motion, Triangle};
@@ -15,7 +15,7 @@ pub(super) const LANES: usize = 2 * WIDTH;
 /// How many lanes a register of the baseline instruction sets has; `glam` keeps a [`Vec4`] in one.
 pub(super) const WIDTH: usize = 4;
 
-/// Up to eight triangles, in two halves of four: corner by corner, axis by axis. Free lanes repeat the first triangle.
+/// Up to eight triangles, in two halves of four: corner by corner, axis by axis. Unused lanes repeat the first triangle.
 #[derive(Clone, Debug)]
 pub(super) struct Pack {
     halves: [[[Vec4; 3]; 3]; 2],
@@ -37,12 +37,6 @@ impl Pack {
             }
         }
         Self { halves, first, count: triangles.len() as u32 }
-    }
-
-    /// For each triangle, that the sphere may touch it at once.
-    #[inline]
-    pub(super) fn unknown(&self) -> [f32; LANES] {
-        std::array::from_fn(|lane| if lane < self.count as usize { 0.0 } else { f32::INFINITY })
     }
 
     /// For each triangle, a distance before which the sphere does not touch it; infinite if it does not before `limit`.
@@ -79,8 +73,8 @@ fn half_earliest(corners: &[[Vec4; 3]; 3], ray: &Ray, limit: f32) -> Vec4 {
         out |= beyond.cmpgt(zero) & (beyond * beyond).cmpgt(margin_squared * (eu * eu + ev * ev));
     }
     if limit < f32::INFINITY {
-        // With the sphere at the limit, in the direction of the triangle's middle: if that points forward and all of the
-        // triangle lies beyond the radius, the sphere has not reached it there, nor before.
+        // Seen from the sphere at the limit, in the direction of the triangle's middle: if that points forward and all of
+        // the triangle lies beyond the radius, the sphere does not touch it there, nor before.
         let ends = ws.map(|w| w - limit);
         let (mu, mv, mw) = (us[0] + us[1] + us[2], vs[0] + vs[1] + vs[2], ends[0] + ends[1] + ends[2]);
         let nearest = least([0, 1, 2].map(|corner| us[corner] * mu + vs[corner] * mv + ends[corner] * mw));
@@ -93,13 +87,13 @@ fn half_earliest(corners: &[[Vec4; 3]; 3], ray: &Ray, limit: f32) -> Vec4 {
 /// A motion as the f32 tests need it.
 pub(super) struct Ray {
     pub(super) origin: Vec3,
-    /// One over the direction, zeros replaced by something tiny.
+    /// One over the direction, with tiny components in place of zeros.
     pub(super) inverse: Vec3,
-    /// Two directions across the motion, and the motion's own.
+    /// Two directions perpendicular to the motion, and the direction of the motion.
     axes: [Vec3; 3],
     /// The origin along each of them.
     offsets: [f32; 3],
-    /// The radius and what rounding in f32 can move anything by.
+    /// The radius, and the most by which rounding in f32 can move anything.
     pub(super) margin: f32,
 }
 

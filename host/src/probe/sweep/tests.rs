@@ -1,4 +1,4 @@
-//! Casts in four classes (listed cases, edges, random, spaced) against analytic answers and against brute force.
+//! Casts in four classes (listed cases, edges, random, spaced), compared with analytic answers and with brute force.
 
 use super::*;
 use crate::mesh::Mesh;
@@ -25,7 +25,7 @@ fn assert_contact(triangles: &[Triangle], origin: DVec3, direction: DVec3, radiu
     assert!(close, "from {origin} along {direction}: {found:?}, expected {expected:?}");
 }
 
-// ---- listed cases, against analytic answers
+// ---- listed cases, compared with analytic answers
 
 #[test]
 fn a_plane_is_touched_a_radius_before_its_face() {
@@ -166,7 +166,7 @@ fn size_and_place_of_the_mesh_scale_the_times() {
     }
 }
 
-// ---- against brute force
+// ---- compared with brute force
 
 fn globe(rings: u32) -> Vec<Triangle> {
     Scene::new(&Mesh::globe(rings), 10.0).unwrap().triangles().collect()
@@ -176,7 +176,7 @@ fn globe(rings: u32) -> Vec<Triangle> {
 fn brute(triangles: &[Triangle], origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
     let length = direction.length();
     let motion = Motion { origin, direction: direction / length, radius };
-    let contact = |triangle| narrow::double::first_contact(&motion, triangle, f64::INFINITY);
+    let contact = |triangle| narrow::first_contact(&motion, triangle, f64::INFINITY);
     triangles.iter().filter_map(contact).min_by(f64::total_cmp).map(|distance| distance / length)
 }
 
@@ -288,7 +288,7 @@ fn random_casts_agree_with_brute_force_and_with_advancing_step_by_step() {
 }
 
 #[test]
-fn meshes_that_are_fine_against_the_sphere_agree_with_brute_force() {
+fn meshes_that_are_fine_compared_with_the_sphere_agree_with_brute_force() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     // Smooth, bumpy, folded so sharply that mean normals say nothing, and flat.
     let smooth = globe(30);
@@ -381,7 +381,7 @@ fn a_spaced_grid_of_axis_parallel_casts_agrees_with_brute_force() {
 }
 
 #[test]
-fn a_mesh_that_stands_for_a_cylinder_is_touched_like_one() {
+fn a_mesh_that_approximates_a_cylinder_is_touched_like_one() {
     // 720 corners on a circle of radius 2: the mesh lies within 2 · (1 - cos(π / 720)) = 1.9e-5 of the cylinder.
     let corner = |k: u32, z: f64| {
         let angle = std::f64::consts::TAU * f64::from(k) / 720.0;
@@ -404,7 +404,7 @@ fn a_mesh_that_stands_for_a_cylinder_is_touched_like_one() {
 }
 
 #[test]
-fn one_triangle_and_a_million_are_both_touched_right() {
+fn one_triangle_and_a_million_are_both_touched_at_the_correct_time() {
     assert_contact(&[FLOOR], at(0.0, 0.0, 3.0), at(0.0, 0.0, -1.0), 0.5, Some(2.5));
     let million = globe(501);
     assert_eq!(million.len(), 1_002_000);
@@ -419,4 +419,16 @@ fn one_triangle_and_a_million_are_both_touched_right() {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
     }
+}
+
+#[test]
+#[should_panic(expected = "a surface needs a triangle")]
+fn a_surface_without_triangles_is_refused_as_documented() {
+    Surface::new(Vec::new());
+}
+
+#[test]
+#[should_panic(expected = "a surface needs finite corners")]
+fn a_surface_with_a_corner_that_is_not_finite_is_refused_as_documented() {
+    Surface::new(vec![[DVec3::ZERO, DVec3::X, DVec3::Y * f64::NAN]]);
 }

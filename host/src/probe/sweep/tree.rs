@@ -1,8 +1,7 @@
-//! The bounding volume hierarchy: built by `obvhs`, then flattened to four children a node.
+//! The bounding volume hierarchy: built by `obvhs`, then flattened to nodes of four children.
 
-use super::Precision;
-use super::flat::Flats;
-use super::narrow::{Motion, Triangle};
+use super::disc::Discs;
+use super::narrow::{self, Motion, Triangle};
 use super::pack::{LANES, Pack, Ray, WIDTH};
 use glam::{BVec4A, DVec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
@@ -11,7 +10,7 @@ use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-/// Boxes of four children in f32, axis by axis, and where the children are. An unused child has a box that nothing
+/// The boxes of four children in f32, axis by axis, and where the children are. An unused child has a box that nothing
 /// meets.
 #[derive(Clone, Debug)]
 struct Node {
@@ -21,14 +20,14 @@ struct Node {
     children: [u32; WIDTH],
 }
 
-/// A child that is a pack has this bit set.
+/// This bit is set in the link to a child that is a pack.
 const PACK: u32 = 1 << 31;
 
-/// A child that may have to be looked into.
-struct Open {
+/// A child that the sphere may touch.
+pub(super) struct Candidate {
     /// The sphere does not touch it before this.
     near: f32,
-    /// What is expected to be touched first is looked into first.
+    /// When it is likely to be touched: the candidate where this is least is searched first.
     expected: f32,
     node: u32,
     child: u32,
@@ -38,14 +37,14 @@ struct Open {
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     nodes: Vec<Node>,
-    /// For each node.
-    flats: Vec<Flats>,
+    /// For each node, those of its children.
+    discs: Vec<Discs>,
     packs: Vec<Pack>,
     /// Half the longest side of a pack's box, on average.
     grain: f32,
 }
 
-/// Where the sphere is this many times as large as the packs, many boxes touch it that the surface in them does not.
+/// Where the sphere is this many times as large as the packs, it touches many boxes without touching the surface inside.
 const FINE: f32 = 2.0;
 
 struct Bounds(Aabb);
@@ -66,70 +65,88 @@ impl Tree {
             bvh: &bvh,
             triangles: &triangles,
             ordered: Vec::with_capacity(triangles.len()),
-            tree: Self { nodes: Vec::new(), flats: Vec::new(), packs: Vec::new(), grain: 0.0 },
+            tree: Self { nodes: Vec::new(), discs: Vec::new(), packs: Vec::new(), grain: 0.0 },
         };
         flattened.add_node(0);
         flattened.tree.grain /= flattened.tree.packs.len() as f32;
         (flattened.ordered, flattened.tree)
     }
 
+    /// Whether the mesh is so fine compared with the sphere that discs are worth looking at.
+    pub(super) fn is_fine_for(&self, ray: &Ray) -> bool {
+        ray.margin > FINE * self.grain
+    }
+
     /// The distance that the sphere travels until it touches one of the triangles.
-    pub(super) fn first_contact<P: Precision>(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
+    pub(super) fn first_contact(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
         let ray = Ray::new(motion);
-        if ray.margin > FINE * self.grain {
-            self.search::<P, true>(triangles, motion, &ray)
+        if self.is_fine_for(&ray) {
+            self.search::<true>(triangles, motion, &ray)
         } else {
-            self.search::<P, false>(triangles, motion, &ray)
+            self.search::<false>(triangles, motion, &ray)
         }
     }
 
-    /// `IS_FINE`: what lies flat in the boxes is worth a look.
-    fn search<P: Precision, const IS_FINE: bool>(
-        &self,
-        triangles: &[Triangle],
-        motion: &Motion,
-        ray: &Ray,
-    ) -> Option<f64> {
-        let mut first = if motion.direction == DVec3::ZERO { f64::MIN_POSITIVE } else { f64::INFINITY };
+    /// `IS_FINE`: whether to look at the discs.
+    fn search<const IS_FINE: bool>(&self, triangles: &[Triangle], motion: &Motion, ray: &Ray) -> Option<f64> {
+        let mut first = farthest(motion);
         let mut limit = first as f32;
-        // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this.
-        let mut stack = Vec::with_capacity(96);
-        self.visit::<IS_FINE>(0, ray, limit, &mut stack);
-        while let Some(Open { near, node, child, .. }) = stack.pop() {
-            // The limit may have come nearer since the child was put there.
-            if near > limit || self.passed::<IS_FINE>(node, ray, limit).test(child as usize) {
-                continue;
-            }
-            let link = self.nodes[node as usize].children[child as usize];
-            if link & PACK == 0 {
-                self.visit::<IS_FINE>(link, ray, limit, &mut stack);
-                continue;
-            }
-            let pack = &self.packs[(link & !PACK) as usize];
-            let mut earliest = if P::REJECT { pack.earliest(ray, limit) } else { pack.unknown() };
+        let mut stack = self.candidates::<IS_FINE>(ray, limit);
+        while let Some(candidate) = stack.pop() {
+            let Some(pack) = self.resolve::<IS_FINE>(&candidate, ray, limit, &mut stack) else { continue };
+            let mut earliest = pack.earliest(ray, limit);
             while let Some(lane) = pop_least(&mut earliest, limit) {
                 let triangle = &triangles[pack.first as usize + lane];
-                if let Some(distance) = P::first_contact(motion, triangle, first) {
+                if let Some(distance) = narrow::first_contact(motion, triangle, first) {
                     first = distance;
-                    // Rounded up, and with room for the boxes' own rounding.
-                    limit = first as f32 + 2.0 * (ray.margin - motion.radius as f32);
+                    limit = limit_after(first, motion, ray);
                 }
             }
         }
-        let is_contact = if motion.direction == DVec3::ZERO { first == 0.0 } else { first < f64::INFINITY };
-        is_contact.then_some(first)
+        (first < farthest(motion)).then_some(first)
     }
 
-    /// Puts the node's children that the sphere may touch before `limit` on the stack, which has the one that is expected
-    /// to be touched first on top.
+    /// The children of the root that the sphere may touch before `limit`.
     #[inline]
-    fn visit<const IS_FINE: bool>(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Open>) {
+    pub(super) fn candidates<const IS_FINE: bool>(&self, ray: &Ray, limit: f32) -> Vec<Candidate> {
+        // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this.
+        let mut stack = Vec::with_capacity(96);
+        self.visit::<IS_FINE>(0, ray, limit, &mut stack);
+        stack
+    }
+
+    /// The candidate, if it is a pack that the sphere may touch before `limit`; if it is a node, its children go on the
+    /// stack.
+    #[inline]
+    pub(super) fn resolve<const IS_FINE: bool>(
+        &self,
+        &Candidate { near, node, child, .. }: &Candidate,
+        ray: &Ray,
+        limit: f32,
+        stack: &mut Vec<Candidate>,
+    ) -> Option<&Pack> {
+        // The limit may have become lower since the child was put there.
+        if near > limit || self.passed::<IS_FINE>(node, ray, limit).test(child as usize) {
+            return None;
+        }
+        let link = self.nodes[node as usize].children[child as usize];
+        if link & PACK == 0 {
+            self.visit::<IS_FINE>(link, ray, limit, stack);
+            return None;
+        }
+        Some(&self.packs[(link & !PACK) as usize])
+    }
+
+    /// Puts the node's children that the sphere may touch before `limit` on the stack; the one that is expected to be
+    /// touched first comes on top.
+    #[inline]
+    fn visit<const IS_FINE: bool>(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Candidate>) {
         let node = &self.nodes[index as usize];
         let (mut near, mut met) = node.met(ray, limit);
         let mut expected = near;
         if IS_FINE {
-            let reach = self.flats[index as usize].reach(&node.center, ray, near);
-            (near, expected) = (reach.near, reach.expected);
+            let bounds = self.discs[index as usize].contact_bounds(&node.center, ray, near);
+            (near, expected) = (bounds.near, bounds.expected);
             met &= near.cmple(Vec4::splat(limit));
         }
         if limit < f32::INFINITY {
@@ -139,23 +156,23 @@ impl Tree {
         while met != 0 {
             let child = met.trailing_zeros();
             met &= met - 1;
-            let open = Open { near: near[child as usize], expected: expected[child as usize], node: index, child };
+            let (near, expected) = (near[child as usize], expected[child as usize]);
             let mut place = stack.len();
-            stack.push(open);
-            while place > 0 && stack[place - 1].expected < expected[child as usize] {
+            stack.push(Candidate { near, expected, node: index, child });
+            while place > 0 && stack[place - 1].expected < expected {
                 stack.swap(place - 1, place);
                 place -= 1;
             }
         }
     }
 
-    /// Which children the sphere has not reached when it has gone as far as `limit`, nor before.
+    /// Which children the sphere has not reached when it has traveled as far as `limit`.
     #[inline]
     fn passed<const IS_FINE: bool>(&self, index: u32, ray: &Ray, limit: f32) -> BVec4A {
         let node = &self.nodes[index as usize];
         let mut passed = node.passed(ray, limit);
         if IS_FINE {
-            passed |= self.flats[index as usize].passed(&node.center, ray, limit);
+            passed |= self.discs[index as usize].passed(&node.center, ray, limit);
         }
         passed
     }
@@ -175,8 +192,8 @@ impl Node {
             far = far.min(middle + half);
         }
         // A box that is inflated like that has corners where the sphere is round. Seen along the motion, a box at a
-        // distance from the path is met later than its depth says, or never: on fine meshes this is what keeps the
-        // search to the few triangles about the point of contact.
+        // distance from the path is met later than its depth says, or never: in fine meshes this limits the search to the
+        // few triangles around the point of contact.
         let [beside, above, depth] = [0, 1, 2].map(|axis| ray.extent(&self.center, &self.half, axis));
         let u = (beside[0].abs() - beside[1]).max(Vec4::ZERO);
         let v = (above[0].abs() - above[1]).max(Vec4::ZERO);
@@ -185,7 +202,7 @@ impl Node {
         (near, near.cmple(far) & reach.cmpge(Vec4::ZERO))
     }
 
-    /// Which boxes the sphere has not reached when it has gone as far as `limit`: from there, all of the box lies beyond
+    /// Which boxes the sphere has not reached when it has traveled as far as `limit`: from there, all of the box lies beyond
     /// the radius in a direction that points forward, and so from everywhere before it.
     #[inline]
     fn passed(&self, ray: &Ray, limit: f32) -> BVec4A {
@@ -201,9 +218,21 @@ impl Node {
     }
 }
 
-/// The lane with the least value, if that is at most `limit`; it does not come again.
+/// Where the search begins: beyond any contact. A sphere that does not move touches at 0 or never.
 #[inline]
-fn pop_least(values: &mut [f32; LANES], limit: f32) -> Option<usize> {
+pub(super) fn farthest(motion: &Motion) -> f64 {
+    if motion.direction == DVec3::ZERO { f64::MIN_POSITIVE } else { f64::INFINITY }
+}
+
+/// The limit for boxes and packs once there is a contact at `first`: rounded up, with room for the boxes' own rounding.
+#[inline]
+pub(super) fn limit_after(first: f64, motion: &Motion, ray: &Ray) -> f32 {
+    first as f32 + 2.0 * (ray.margin - motion.radius as f32)
+}
+
+/// The lane with the least value, if that is at most `limit`. Each lane is returned only once.
+#[inline]
+pub(super) fn pop_least(values: &mut [f32; LANES], limit: f32) -> Option<usize> {
     let (mut least, mut lane) = (f32::INFINITY, 0);
     for (index, &value) in values.iter().enumerate() {
         if value < least {
@@ -214,7 +243,7 @@ fn pop_least(values: &mut [f32; LANES], limit: f32) -> Option<usize> {
     (least <= limit && least < f32::INFINITY).then_some(lane)
 }
 
-/// As obvhs's fast preset, but with full packs rather than many.
+/// As the fast preset of obvhs, but with fewer, fuller packs.
 fn build(bounds: &[Bounds]) -> Bvh2 {
     let indices = (0..bounds.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(bounds.len());
@@ -232,12 +261,12 @@ struct Flattened<'a> {
 }
 
 impl Flattened<'_> {
-    /// Adds the node that stands for this one of the binary tree, and all below it.
+    /// Adds a node for the node `root` of the binary tree, and all nodes below it. Returns its index.
     fn add_node(&mut self, root: u32) -> u32 {
         let bvh = self.bvh;
         let node = |index: u32| &bvh.nodes[index as usize];
         let mut members = vec![root];
-        // Open the member with the largest box until there are enough.
+        // Replace the member with the largest box by its children until there are enough.
         while members.len() < WIDTH {
             let largest = (0..members.len())
                 .filter(|&member| !node(members[member]).is_leaf())
@@ -248,7 +277,7 @@ impl Flattened<'_> {
         }
         let index = self.tree.nodes.len();
         self.tree.nodes.push(Node::EMPTY);
-        self.tree.flats.push(Flats::UNKNOWN);
+        self.tree.discs.push(Discs::UNKNOWN);
         for (child, member) in members.into_iter().enumerate() {
             let aabb = *node(member).aabb();
             let first = self.ordered.len();
@@ -262,7 +291,7 @@ impl Flattened<'_> {
             }
             place.children[child] = link;
             let center = [0, 1, 2].map(|axis| f64::from(place.center[axis][child])).into();
-            self.tree.flats[index].set(child, &self.ordered[first..], center);
+            self.tree.discs[index].set(child, &self.ordered[first..], center);
         }
         index as u32
     }

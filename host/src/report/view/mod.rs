@@ -8,6 +8,7 @@ mod shown;
 
 use crate::error::{Error, Result};
 use crate::mesh::Object;
+use crate::mesh::facts::Facts;
 use crate::probe::approach::{Approach, FINGERS, Probe};
 use crate::probe::scene::Scene;
 use base64::Engine;
@@ -15,7 +16,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, PreEscaped, html};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
-use shown::{Facts, Shown};
+use shown::Shown;
 
 /// What a page shows.
 #[derive(Clone, Copy, Debug)]

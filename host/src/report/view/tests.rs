@@ -102,31 +102,6 @@ fn a_mesh_of_a_million_triangles_and_a_soup_of_them_make_pages_below_six_megabyt
 }
 
 #[test]
-fn a_cube_is_closed_and_right_side_out_until_it_is_turned_over_or_opened() {
-    let facts = |mesh: &Mesh| {
-        let facts = Facts::of(mesh);
-        (facts.closed(), facts.side())
-    };
-    let mut mesh = cube();
-    assert_eq!(facts(&mesh), ("yes".into(), "yes".into()));
-    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(0, 1));
-    assert_eq!(facts(&mesh), ("yes".into(), "no: inside out".into()));
-    mesh.triangles[0].swap(0, 1);
-    assert_eq!(facts(&mesh), ("yes".into(), "no: at 3 edges the two triangles face opposite sides".into()));
-    mesh.triangles.remove(0);
-    assert_eq!(facts(&mesh).0, "no: 3 open edges");
-    assert!(facts(&mesh).1.contains("open surface"));
-}
-
-#[test]
-fn vertices_at_the_same_place_are_one() {
-    let whole = cube();
-    let vertices = whole.triangles.iter().flatten().map(|&i| whole.vertices[i as usize]).collect();
-    let apart = Mesh { vertices, triangles: (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect() };
-    assert!(Facts::of(&apart).is_right_side_out());
-}
-
-#[test]
 fn numbers_are_short() {
     assert_eq!(
         [short(16.0), short(0.15), short(1234.5), short(0.0), short(2e-9)],

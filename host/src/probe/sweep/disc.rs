@@ -1,8 +1,8 @@
-//! What lies flat in the boxes of a fine mesh.
+//! Discs that bound the surface in the boxes of a fine mesh more closely than the boxes do.
 //!
-//! Where triangles are small against the sphere, the surface in a box is nearly flat, and mostly aslant: the box's
-//! corners stand out of it, toward the sphere. A disc about the box's center, across the surface's mean normal and
-//! hardly thicker than the surface is bent, tells the sphere's neighbors from what it touches.
+//! Where triangles are small compared with the sphere, the surface in a box is nearly flat, and mostly oblique: the box's
+//! corners stand out of it, toward the sphere. A disc about the box's center, perpendicular to the surface's mean normal
+//! and only a little thicker than the surface is bent, excludes boxes that the sphere passes close to without touching.
 
 use super::narrow::Triangle;
 use super::pack::Ray;
@@ -10,35 +10,35 @@ use glam::{BVec4A, DVec3, Vec4};
 
 /// Discs about the centers of the boxes of four children.
 #[derive(Clone, Debug)]
-pub(super) struct Flats {
-    /// Unit vectors.
+pub(super) struct Discs {
+    /// Unit vectors, axis by axis.
     normal: [Vec4; 3],
-    /// How far the surface reaches from the center along the normal, to either side.
+    /// How far the surface extends from the center along the normal, to either side.
     thickness: Vec4,
-    /// How far it reaches across the normal.
+    /// How far it extends perpendicular to the normal.
     spread: Vec4,
 }
 
-/// When the sphere may touch the discs.
-pub(super) struct Reach {
-    /// Not before this; infinite for never.
+/// How far the sphere travels until it may touch the discs.
+pub(super) struct ContactBounds {
+    /// No contact before this; infinite for never.
     pub(super) near: Vec4,
-    /// Likely at this or soon after: an order to look in, not a bound.
+    /// Contact is likely at this distance or soon after: a search order, not a bound.
     pub(super) expected: Vec4,
 }
 
-/// Larger parts of a mesh are seldom flat, and would cost time to look at again on every level of the tree.
+/// Larger parts of a mesh are seldom flat, and would take time to measure again on every level of the tree.
 const MOST_TRIANGLES: usize = 512;
 
-/// Where the motion is more aslant than this, dividing by its slope would cost too many digits.
+/// Where the cosine between motion and normal is less than this, dividing by it would cost too many digits.
 const LEAST_SLOPE: f32 = 0.2;
 
-impl Flats {
+impl Discs {
     /// Discs so large that they exclude nothing.
     pub(super) const UNKNOWN: Self =
         Self { normal: [Vec4::ZERO; 3], thickness: Vec4::splat(1e30), spread: Vec4::splat(1e30) };
 
-    /// Makes the disc of one child: of these triangles, about the center of their box.
+    /// Sets the disc of one child: about the center of its box, around its triangles.
     pub(super) fn set(&mut self, child: usize, triangles: &[Triangle], center: DVec3) {
         if triangles.len() > MOST_TRIANGLES {
             return;
@@ -59,14 +59,14 @@ impl Flats {
         for axis in 0..3 {
             self.normal[axis][child] = normal[axis];
         }
-        // Rounding these to f32 is part of the slack that the ray's margin has.
+        // The slack in the ray's margin covers the rounding of these to f32.
         self.thickness[child] = thickness as f32;
         self.spread[child] = spread.sqrt() as f32;
     }
 
-    /// When the sphere may touch the discs, given a bound `near` that holds already.
+    /// When the sphere may touch the discs, given that it does not before `near`.
     #[inline]
-    pub(super) fn reach(&self, center: &[Vec4; 3], ray: &Ray, near: Vec4) -> Reach {
+    pub(super) fn contact_bounds(&self, center: &[Vec4; 3], ray: &Ray, near: Vec4) -> ContactBounds {
         let direction = ray.direction().to_array().map(Vec4::splat);
         let way = [0, 1, 2].map(|axis| center[axis] - ray.origin[axis]);
         let (height, slope) = (dot(&self.normal, &way), dot(&self.normal, &direction));
@@ -75,16 +75,16 @@ impl Flats {
         let is_steep = slope.abs().cmpge(Vec4::splat(LEAST_SLOPE));
         let plane = gap.max(Vec4::ZERO) / slope.abs().max(Vec4::splat(LEAST_SLOPE));
         let near = near.max(Vec4::select(is_steep & approaches, plane, Vec4::ZERO));
-        // With the sphere at the disc's plane but its center beside the disc's, it still has to sink in.
+        // Where the sphere touches the disc's plane, but beside the disc's center, it has to travel a little further.
         let there = [0, 1, 2].map(|axis| way[axis] - direction[axis] * near);
         let height = dot(&self.normal, &there);
         let beside = (dot(&there, &there) - height * height).max(Vec4::ZERO);
         let expected = near + (beside / (2.0 * ray.margin)).min(beside.sqrt());
         let never = gap.cmpgt(Vec4::ZERO) & !approaches;
-        Reach { near: Vec4::select(never, Vec4::INFINITY, near), expected }
+        ContactBounds { near: Vec4::select(never, Vec4::INFINITY, near), expected }
     }
 
-    /// Which discs the sphere has not reached when it has gone as far as `limit`: as for boxes, all of the disc lies
+    /// Which discs the sphere has not reached when it has traveled as far as `limit`: as for boxes, all of the disc lies
     /// beyond the radius in a direction that points forward.
     #[inline]
     pub(super) fn passed(&self, center: &[Vec4; 3], ray: &Ray, limit: f32) -> BVec4A {

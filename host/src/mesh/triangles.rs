@@ -1,0 +1,104 @@
+//! The triangle mesh itself.
+
+use glam::Vec3;
+use std::collections::HashMap;
+
+/// An indexed triangle mesh, in its file's own units.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertex positions.
+    pub vertices: Vec<[f32; 3]>,
+    /// Triangles as indices into `vertices`, anticlockwise when seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// The bounding box of the triangles: its lowest and highest corner. Both are zero if there are no triangles.
+    ///
+    /// # Panics
+    /// If a triangle names a vertex that the mesh does not have.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let corners = self.triangles.iter().flatten().map(|&i| Vec3::from(self.vertices[i as usize]));
+        corners.map(|v| [v, v]).reduce(|[low, high], [v, _]| [low.min(v), high.max(v)]).unwrap_or([Vec3::ZERO; 2])
+    }
+
+    /// The mesh with vertices at the same place merged into one, without the triangles that thereby lose a corner. Files
+    /// often repeat a vertex for each triangle; merged, neighbors share their edges.
+    ///
+    /// # Panics
+    /// If a triangle names a vertex that the mesh does not have.
+    pub fn welded(&self) -> Self {
+        let mut places = HashMap::new();
+        let mut vertices = Vec::new();
+        let merged: Vec<u32> = self
+            .vertices
+            .iter()
+            .map(|&vertex| {
+                // Zeros of either sign are the same place.
+                *places.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
+                    vertices.push(vertex);
+                    vertices.len() as u32 - 1
+                })
+            })
+            .collect();
+        let triangles = self.triangles.iter().map(|triangle| triangle.map(|i| merged[i as usize]));
+        let triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+        Self { vertices, triangles }
+    }
+
+    /// A globe with hills, for tests and benchmarks that need a mesh of a certain size: closed, right side out, about 2
+    /// units wide, with 4 · `rings` · (`rings` − 1) triangles. `rings` is at least 2; fewer give no triangles.
+    pub fn globe(rings: u32) -> Self {
+        let columns = 2 * rings;
+        let position = |ring: u32, column: u32| {
+            let latitude = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
+            let longitude = std::f64::consts::TAU * f64::from(column) / f64::from(columns);
+            let height = 1.0 + 0.1 * libm::sin(5.0 * longitude) * libm::sin(7.0 * latitude);
+            let ring_radius = height * libm::sin(latitude);
+            [ring_radius * libm::cos(longitude), ring_radius * libm::sin(longitude), height * libm::cos(latitude)]
+                .map(|coordinate| coordinate as f32)
+        };
+        let mut mesh = Self { vertices: vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], triangles: Vec::new() };
+        for ring in 1..rings {
+            mesh.vertices.extend((0..columns).map(|column| position(ring, column)));
+        }
+        let vertex = |ring: u32, column: u32| match ring {
+            0 => 0,
+            ring if ring == rings => 1,
+            ring => 2 + (ring - 1) * columns + column % columns,
+        };
+        for ring in 0..rings {
+            for column in 0..columns {
+                let [a, b] = [vertex(ring, column), vertex(ring, column + 1)];
+                let [c, d] = [vertex(ring + 1, column), vertex(ring + 1, column + 1)];
+                if ring > 0 {
+                    mesh.triangles.push([a, c, b]);
+                }
+                if ring + 1 < rings {
+                    mesh.triangles.push([b, c, d]);
+                }
+            }
+        }
+        mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_globe_is_closed_and_right_side_out() {
+        let globe = Mesh::globe(9);
+        assert_eq!(globe.triangles.len(), 4 * 9 * 8);
+        let mut edges = HashMap::new();
+        let mut volume = 0.0;
+        for &[a, b, c] in &globe.triangles {
+            [(a, b), (b, c), (c, a)].into_iter().for_each(|edge| *edges.entry(edge).or_insert(0) += 1);
+            let [a, b, c] = [a, b, c].map(|index| Vec3::from(globe.vertices[index as usize]));
+            volume += a.dot(b.cross(c)) / 6.0;
+        }
+        assert!(edges.iter().all(|(&(a, b), &count)| count == 1 && edges.contains_key(&(b, a))));
+        assert!((3.0..5.0).contains(&volume), "{volume}");
+    }
+}

@@ -1,0 +1,144 @@
+//! Experiments (feature `experiments`): what would other precisions save, and cost?
+//!
+//! The production search rejects triangles in f32 and decides the rest in f64. Benchmarks and the report compare it with
+//! the two searches here, which share its tree but decide otherwise.
+
+use super::Surface;
+use super::narrow::{self, Motion, Triangle};
+use super::pack::{LANES, Pack, Ray};
+use super::tree::{self, Tree};
+use glam::DVec3;
+
+/// A way to decide which triangle of a pack the sphere touches first.
+pub trait Precision {
+    /// Whether triangles are rejected in f32 first, eight at a time.
+    const REJECT: bool;
+
+    /// The distance that the sphere travels until it touches the triangle, if that is less than `limit`.
+    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64>;
+}
+
+/// Every triangle of a pack in f64, none rejected first.
+#[derive(Clone, Copy, Debug)]
+pub struct DoubleWithoutReject;
+
+/// The reject in f32, then the remaining triangles in f32, too.
+#[derive(Clone, Copy, Debug)]
+pub struct SingleAfterReject;
+
+impl Precision for DoubleWithoutReject {
+    const REJECT: bool = false;
+
+    #[inline]
+    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
+        narrow::first_contact(motion, triangle, limit)
+    }
+}
+
+impl Precision for SingleAfterReject {
+    const REJECT: bool = true;
+
+    #[inline]
+    fn first_contact(motion: &Motion, triangle: &Triangle, limit: f64) -> Option<f64> {
+        let motion = single::narrow::Motion {
+            origin: motion.origin.as_vec3(),
+            direction: motion.direction.as_vec3(),
+            radius: motion.radius as f32,
+        };
+        let triangle = triangle.map(|corner| corner.as_vec3());
+        single::narrow::first_contact(&motion, &triangle, limit as f32).map(f64::from)
+    }
+}
+
+/// The text of [`narrow`] compiled in f32.
+#[allow(unreachable_pub, clippy::duplicate_mod, reason = "the same text in two precisions")]
+#[path = "."]
+mod single {
+    /// The constants of the error budget, in f32.
+    mod budget {
+        pub type Real = f32;
+        pub type Vector = glam::Vec3;
+
+        pub const EARLY: Real = 1e-6;
+        pub const FLAT: Real = 1e-4;
+        pub const PARALLEL: Real = 1e-6;
+        pub const PLANE: Real = 1e-5;
+    }
+
+    #[path = "narrow.rs"]
+    pub mod narrow;
+}
+
+/// As [`Surface::first_contact`], in another precision.
+pub fn first_contact<P: Precision>(surface: &Surface, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
+    let start = surface.start(origin, direction, radius)?;
+    let (tree, triangles, motion) = (&surface.tree, &surface.triangles, &start.motion);
+    let ray = Ray::new(motion);
+    let distance = if tree.is_fine_for(&ray) {
+        search::<P, true>(tree, triangles, motion, &ray)?
+    } else {
+        search::<P, false>(tree, triangles, motion, &ray)?
+    };
+    Some((start.skipped + distance) * surface.unit / start.length)
+}
+
+/// The production search, with the contacts decided by `P`.
+fn search<P: Precision, const IS_FINE: bool>(
+    tree: &Tree,
+    triangles: &[Triangle],
+    motion: &Motion,
+    ray: &Ray,
+) -> Option<f64> {
+    let mut first = tree::farthest(motion);
+    let mut limit = first as f32;
+    let mut stack = tree.candidates::<IS_FINE>(ray, limit);
+    while let Some(candidate) = stack.pop() {
+        let Some(pack) = tree.resolve::<IS_FINE>(&candidate, ray, limit, &mut stack) else { continue };
+        let mut earliest = if P::REJECT { pack.earliest(ray, limit) } else { at_once(pack) };
+        while let Some(lane) = tree::pop_least(&mut earliest, limit) {
+            let triangle = &triangles[pack.first as usize + lane];
+            if let Some(distance) = P::first_contact(motion, triangle, first) {
+                first = distance;
+                limit = tree::limit_after(first, motion, ray);
+            }
+        }
+    }
+    (first < tree::farthest(motion)).then_some(first)
+}
+
+/// Earliest distances that reject nothing.
+#[inline]
+fn at_once(pack: &Pack) -> [f32; LANES] {
+    std::array::from_fn(|lane| if lane < pack.count as usize { 0.0 } else { f32::INFINITY })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::probe::approach::Approach;
+    use crate::probe::scene::Scene;
+    use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+
+    #[test]
+    fn the_experiments_search_as_the_production_search_does() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut contacts = 0;
+        // The second is fine compared with the spheres.
+        for (rings, radius) in [(8, 0.15), (60, 1.0)] {
+            let scene = Scene::new(&Mesh::globe(rings), 10.0).unwrap();
+            for _ in 0..500 {
+                let Approach { start, direction, .. } = Approach::draw(&mut rng, scene.bounds(), 10.0);
+                let used = scene.first_contact(start, direction, radius);
+                let surface = scene.surface();
+                assert_eq!(first_contact::<DoubleWithoutReject>(surface, start, direction, radius), used);
+                let single = first_contact::<SingleAfterReject>(surface, start, direction, radius);
+                if let Some((single, used)) = single.zip(used) {
+                    assert!((single - used).abs() < 0.01, "{single} {used}");
+                    contacts += 1;
+                }
+            }
+        }
+        assert!((500..1000).contains(&contacts), "{contacts}");
+    }
+}

@@ -1,0 +1,56 @@
+use crate::{command, globe, listing, run, stderr, stdout};
+
+#[test]
+fn a_page_shows_a_mesh_of_ones_own_with_the_touches_that_were_asked_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let (mesh, page) = (globe(directory.path(), "my globe", 8), directory.path().join("pages/globe.html"));
+    let view = || {
+        let mut command = command(["view", "--touches", "5", "--misses", "2"]);
+        let said = stdout(command.arg(&mesh).arg("-o").arg(&page).output().unwrap());
+        assert!(said.contains("globe.html"), "{said}");
+        std::fs::read_to_string(&page).unwrap()
+    };
+    let text = view();
+    assert!(text.contains("<title>my globe"));
+    assert_eq!(text.matches("<tr tabindex").count(), 7);
+    assert_eq!(listing(page.parent().unwrap()), ["globe.html"]);
+    // The same seed gives the same page.
+    assert_eq!(view(), text);
+}
+
+#[test]
+fn a_built_in_object_is_shown_by_its_name() {
+    let directory = tempfile::tempdir().unwrap();
+    let page = directory.path().join("bowl.html");
+    stdout(command(["view", "bowl", "-o"]).arg(&page).output().unwrap());
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.contains("<title>bowl") && text.contains("<dt>Right side out</dt><dd>yes</dd>"));
+}
+
+#[test]
+fn wrong_arguments_write_no_page() {
+    let directory = tempfile::tempdir().unwrap();
+    let page = directory.path().join("page.html");
+    for (wrong, expected) in [
+        (["--radius", "0"], "radius is 0. Use a number greater than 0."),
+        (["--length", "nan"], "length is NaN."),
+        (["--spacing", "-1"], "-1"),
+        (["--touches", "many"], "many"),
+    ] {
+        let error = stderr(command(["view", "bowl", "-o"]).arg(&page).args(wrong).output().unwrap(), 2);
+        assert!(error.contains(expected), "{error}");
+    }
+    stderr(run(["view", "bowl"]), 2);
+    assert!(!page.exists());
+}
+
+#[test]
+fn a_directory_of_several_objects_is_refused_with_their_number() {
+    let directory = tempfile::tempdir().unwrap();
+    globe(directory.path(), "one", 4);
+    globe(directory.path(), "two", 4);
+    let page = directory.path().join("page.html");
+    let error = stderr(command(["view", "-o"]).args([&page, directory.path()]).output().unwrap(), 1);
+    assert!(error.contains("2 objects, where one is needed. Give one OBJ file"), "{error}");
+    assert!(!page.exists());
+}
