@@ -1,30 +1,122 @@
-//! Recognize objects by touch: simulate a three-fingered probe, train, compile and evaluate.
-//!
-//! The data's way through this crate:
+//! Recognize objects by touch: simulate a probe with three fingers, train boosted trees on its virtual touches, compile
+//! them for a microcontroller, and measure how well they recognize.
 //!
 //! ```text
-//! mesh ──► scene ──► approach ──► contact times ──► touch ──► ensemble ──► compiled model ──► verdicts
+//! mesh ──► scene ──► approach ──► contact times ──► touch ──► ensemble ──► compiled model ──► verdict
 //! ```
 //!
-//! A touch's features come from [`palpate_shared`], verdicts from [`palpate_onboard`]: the same lines of code that run
-//! on the chip.
+//! # From a mesh to a verdict
+//!
+#![cfg_attr(feature = "train", doc = "```")]
+#![cfg_attr(not(feature = "train"), doc = "```ignore")]
+//! use palpate::capture::{self, capture};
+//! use palpate::compile::{self, compile};
+//! use palpate::ensemble::train::{self, train};
+//! use palpate::mesh::{Mesh, Object};
+//! use palpate::onboard::{Model, Recognizer, Stopping, Verdict};
+//! use palpate::probe::scene::Scene;
+//! use palpate::touches::Dataset;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // Two objects. `palpate::mesh::source::objects` reads yours from files.
+//! let globe = Mesh::globe(12);
+//! let mut disc = globe.clone();
+//! disc.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.1);
+//! let objects = [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh });
+//!
+//! // Touch each a thousand times, and train on the touches.
+//! let settings = capture::Settings { touches: 1000, ..Default::default() };
+//! let directory = tempfile::tempdir()?;
+//! capture(&objects, &settings, directory.path(), &())?;
+//! let ensemble = train(&Dataset::read(directory.path())?, &train::Settings::compact(), &())?;
+//!
+//! // Compile the trees to the bytes that a chip reads, and recognize with the code that runs there.
+//! let compiled = compile(&ensemble, &compile::Settings::default())?;
+//! let model = Model::new(&compiled.bytes)?;
+//! let mut recognizer = Recognizer::<2>::new(&model, Stopping::from_model(&model))?;
+//! let scene = Scene::new(&objects[0].mesh, settings.length)?;
+//! let unseen = capture::Settings { seed: 2, ..settings };
+//! let mut verdict = Verdict::Undecided;
+//! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {
+//!     verdict = recognizer.push(&touch);
+//!     if verdict != Verdict::Undecided {
+//!         break;
+//!     }
+//! }
+//! let Verdict::Recognized { object, touches } = verdict else { panic!("{verdict:?}") };
+//! println!("{} after {touches} touches", model.object_name(object.into()));
+//! assert_eq!(model.object_name(object.into()), "disc");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The `examples` folder has four programs to start from: `mesh_to_model`, `touches_to_verdicts`, `own_trees` and
+//! `compare_models`.
+//!
+//! # Modules, in the data's order
+//!
+//! | module | what it does | start with |
+//! |---|---|---|
+//! | [`mesh`] | reads triangles from files; makes the built-in objects | [`mesh::source::objects`](fn@mesh::source::objects) |
+//! | [`probe`] | the simulator: scene, approach, first contact | [`probe::scene::Scene`] |
+//! | [`touches`] | touches in memory and on disk; noise; splits | [`touches::Dataset`] |
+//! | [`capture`] | touches objects, many times | [`capture::capture`](fn@capture::capture) |
+//! | [`ensemble`] | the full model: trees in `f32`, XGBoost JSON, training | [`ensemble::Ensemble`] |
+//! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
+//! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
+//! | `tune` | searches for the best model that fits a chip | `tune::tune` |
+//! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
+//! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
+//!
+//! [`shared`] (touches, descriptors, the model format) and [`onboard`] (models, recognizers) are the crates that run on
+//! the chip; the host uses the same code. [`progress::Progress`] follows and cancels long calls. Errors are
+//! [`Error`], with a [`Problem`](error::Problem) that can be matched on.
+//!
+//! # Features
+//!
+//! | feature | default | what it adds |
+//! |---|---|---|
+//! | none | | simulator, compiler, evaluator |
+//! | `train` | yes | `ensemble::train` and `tune`; the trainer is hessboost |
+//! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
+//! | `parquet` | yes | touches as Parquet. 11 crates more |
+//! | `serial` | yes | chips at serial ports |
+//! | `cli` | yes | the program `palpate`, and `page`, `report` and `run`, which only it needs; includes `train`, `objects` and `experiments` |
+//! | `experiments` | yes | `probe::sweep::precision`: other precisions to compare the sweep with |
+//! | `xgboost` | no | XGBoost 1.6.2 as a second trainer, built from its C++ source |
+//!
+//! `palpate = { version = "0.2", default-features = false }` brings no terminal, no progress bar, no plots, no serial
+//! port and no trainer.
 
 pub mod error;
 pub mod output;
 pub mod progress;
 mod random;
 
-pub mod capture;
-pub mod chip;
-pub mod compile;
-pub mod ensemble;
-pub mod evaluate;
 pub mod mesh;
-pub mod page;
 pub mod probe;
-pub mod report;
-pub mod run;
 pub mod touches;
+
+pub mod capture;
+pub mod ensemble;
+
+pub mod compile;
+pub mod evaluate;
+
+#[cfg(feature = "train")]
 pub mod tune;
 
+pub mod chip;
+
+#[cfg(feature = "cli")]
+pub mod page;
+#[cfg(feature = "cli")]
+pub mod report;
+#[cfg(feature = "cli")]
+pub mod run;
+
 pub use error::{Error, Result};
+pub use glam;
+pub use palpate_onboard as onboard;
+pub use palpate_shared as shared;
+pub use rand;

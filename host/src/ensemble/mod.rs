@@ -1,5 +1,6 @@
 //! The full model: boosted trees in f32 as the trainer left them.
 
+#[cfg(feature = "train")]
 pub mod train;
 mod xgboost_json;
 

@@ -547,5 +547,5 @@ fn reachable(count: usize, read: impl Fn(usize) -> Result<Node, Problem>) -> Res
         .collect())
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests;

@@ -17,7 +17,7 @@ mod margins;
 pub mod model_file;
 pub mod parity;
 mod sequential;
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests;
 
 pub use curve::{Confidence, Curve};

@@ -48,7 +48,7 @@ fn open<'b>(path: &Path, bytes: &'b [u8]) -> Result<Model<'b>> {
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
     use crate::compile::{self, compile};

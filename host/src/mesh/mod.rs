@@ -31,7 +31,11 @@
 //! # }
 //! ```
 
+#[cfg(feature = "objects")]
 pub mod builtin;
+#[cfg(not(feature = "objects"))]
+#[path = "no_builtin.rs"]
+mod builtin;
 pub mod facts;
 pub mod obj;
 pub mod source;

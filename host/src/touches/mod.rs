@@ -5,7 +5,7 @@ pub mod manifest;
 pub mod noise;
 #[cfg(feature = "parquet")]
 pub mod parquet;
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 pub(crate) mod synthetic;
 pub mod text;
 

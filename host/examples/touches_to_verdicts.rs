@@ -1,0 +1,59 @@
+//! A stream of touches to verdicts.
+//!
+//! ```text
+//! cargo run --release --example touches_to_verdicts -- model.palpate < touches.txt
+//! ```
+//!
+//! Each line holds three contact times in seconds. Without arguments it simulates touches of two built-in objects, one
+//! after the other, and recognizes them with the model in `models/`.
+
+use palpate::capture;
+use palpate::mesh::builtin;
+use palpate::onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate::probe::scene::Scene;
+use palpate::shared::Touch;
+use palpate::touches::text;
+use std::error::Error;
+use std::path::Path;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let Some(path) = std::env::args().nth(1) else {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/household.palpate");
+        return recognize(&std::fs::read(path)?, simulated(&["bowl", "wristwatch"])?.into_iter().map(Ok));
+    };
+    recognize(&std::fs::read(path)?, text::touches(std::io::stdin().lock(), Path::new("standard input")))
+}
+
+/// Prints each verdict as soon as it is reached; the next touch is the first of another object.
+fn recognize(bytes: &[u8], touches: impl Iterator<Item = palpate::Result<Touch>>) -> Result<(), Box<dyn Error>> {
+    // The bytes are checked once, here; a `Recognizer` has room for a number of objects that is fixed when compiling.
+    let model = Model::new(bytes)?;
+    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model))?;
+    for touch in touches {
+        match recognizer.push(&touch?) {
+            Verdict::Undecided => continue,
+            Verdict::Recognized { object, touches } => {
+                let object = usize::from(object);
+                let posterior = recognizer.posterior(object).to_f64();
+                println!("{} after {touches} touches, posterior {posterior:.4}", model.object_name(object));
+            }
+            Verdict::Unknown => println!("unknown"),
+        }
+        recognizer.reset();
+    }
+    if recognizer.touches() > 0 {
+        println!("undecided after {} touches", recognizer.touches());
+    }
+    Ok(())
+}
+
+/// Touches of the built-in objects `names`, each touched until the model in `models/` has surely decided.
+fn simulated(names: &[&str]) -> palpate::Result<Vec<Touch>> {
+    let settings = capture::Settings { seed: 2, ..Default::default() };
+    let mut all = Vec::new();
+    for name in names {
+        let scene = Scene::new(&builtin::one(name)?.mesh, settings.length)?;
+        all.extend(capture::touches(&scene, name, &settings, 0..100)?);
+    }
+    Ok(all)
+}

@@ -1,0 +1,23 @@
+//! In place of the built-in objects where the feature `objects` is off: there are none.
+
+use crate::error::{Error, Result};
+use crate::mesh::Object;
+
+/// No names.
+pub(super) fn names() -> [&'static str; 0] {
+    []
+}
+
+/// Not these objects.
+pub(super) fn all() -> Result<Vec<Object>> {
+    Err(absent("builtin"))
+}
+
+/// Not this object either.
+pub(super) fn one(name: &str) -> Result<Object> {
+    Err(absent(name))
+}
+
+fn absent(name: &str) -> Error {
+    Error::setting("source", name, "a file or a directory: the built-in objects need the feature `objects`")
+}
