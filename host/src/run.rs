@@ -131,7 +131,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let began = Instant::now();
     let data = out.join("data");
     let captured = capture::capture(objects, &settings.capture, &data, progress)?;
-    let seed = settings.capture.seed;
+    let seed = settings.capture.origin.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
     let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);
     let paper = method("paper", "paper", train::Settings { seed, ..train::Settings::paper() })?;
@@ -183,8 +183,8 @@ impl Trial {
         progress.begin(&format!("compiling and testing {name}"), None);
         let compile = compile::Settings {
             error_rate: settings.error_rate,
-            spacing: settings.capture.probe.spacing as f32,
-            speed: settings.capture.probe.speed as f32,
+            spacing: settings.capture.origin.probe.spacing as f32,
+            speed: settings.capture.origin.probe.speed as f32,
             ..compile::Settings::default()
         };
         let compiled = compile::compile(&ensemble, &compile)?;
@@ -193,7 +193,7 @@ impl Trial {
         let model = open(&compiled)?;
         let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
         let fewest = margins.fewest_touches();
-        let seed = settings.capture.seed;
+        let seed = settings.capture.origin.seed;
         let evaluation = evaluate::evaluate(
             &margins,
             &evaluate::Settings {

@@ -4,7 +4,6 @@ use palpate::Result;
 use palpate::chip::{ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, stream};
 use palpate::output::{print, print_json};
 use palpate::progress::Progress;
-use palpate::touches::Dataset;
 use palpate_onboard::Model;
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;
@@ -65,7 +64,7 @@ impl Reach {
             return Ok(Steps::lines(Box::new(BufReader::new(std::io::stdin())), Path::new("standard input")));
         }
         if source.is_dir() {
-            let dataset = Dataset::read(source)?;
+            let dataset = super::dataset(source)?;
             let count = self.touches.unwrap_or(dataset.len() as u64);
             return Ok(Steps::sequences(dataset, self.sequence, count));
         }

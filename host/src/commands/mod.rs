@@ -6,6 +6,7 @@ mod evaluate;
 mod export;
 mod inspect;
 mod link;
+mod numbers;
 mod objects;
 mod parity;
 mod progress;
@@ -18,7 +19,9 @@ mod view;
 mod watch;
 
 use clap::{Parser, Subcommand};
-use palpate::Result;
+use palpate::touches::{Dataset, Format, Listing};
+use palpate::{Error, Result};
+use std::path::{Path, PathBuf};
 
 /// Declares the enum that clap parses and the dispatch, from one list.
 macro_rules! commands {
@@ -90,11 +93,39 @@ pub(crate) struct Cli {
 }
 
 impl Cli {
+    /// What to add to the error with which the command ends: which of its options help.
+    pub(crate) fn hints(&self) -> fn(&Error) -> Option<&'static str> {
+        match self.command {
+            Some(Command::Capture(_)) => capture::hint,
+            _ => |_| None,
+        }
+    }
+
     pub(crate) fn run(self) -> Result<()> {
         self.command
             .unwrap_or_else(|| Self::parse_from(["palpate", "run"]).command.unwrap_or_else(|| unreachable!()))
             .run()
     }
+}
+
+/// Reads a data set; its warnings go to stderr.
+fn dataset(directory: &Path) -> Result<Dataset> {
+    let dataset = Dataset::read(directory)?;
+    for warning in &dataset.warnings {
+        eprintln!("palpate: warning: {warning}");
+    }
+    Ok(dataset)
+}
+
+/// The files that a data set consists of, as far as they can be found: what a command that reads it must not write.
+fn files_of(directory: &Path) -> Vec<PathBuf> {
+    let is_touches = |path: &PathBuf| {
+        let extension = path.extension().unwrap_or_default();
+        path.file_name().is_some_and(|name| name == Listing::FILE)
+            || Format::ALL.iter().any(|format| extension == format.extension())
+    };
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    entries.map(|entry| entry.path()).filter(is_touches).collect()
 }
 
 #[cfg(test)]

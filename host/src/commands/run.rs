@@ -1,9 +1,9 @@
 use super::progress::Bar;
 use palpate::Result;
-use palpate::capture;
 use palpate::mesh::source;
 use palpate::output;
 use palpate::run;
+use palpate::touches::Origin;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -24,7 +24,7 @@ pub(crate) struct Arguments {
     #[arg(short, long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Touches of each object, a tenth of them to test on
-    #[arg(long, value_name = "N", default_value_t = 21_000, value_parser = clap::value_parser!(u64).range(100..))]
+    #[arg(long, value_name = "N", default_value_t = 21_000, value_parser = touches)]
     touches: u64,
     /// Seed of all that is random
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -35,12 +35,21 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_stdout(&arguments.out)?;
     let Arguments { sources, out, touches, seed, json } = arguments;
     let settings = run::Settings {
-        capture: capture::Settings { touches, seed, ..capture::Settings::default() },
+        capture: Origin { touches, seed, ..Origin::default() }.into(),
         command: format!("palpate run {} -o {} --touches {touches} --seed {seed}", sources.join(" "), out.display()),
         ..run::Settings::default()
     };
     let summary = run::run(&source::objects(&sources)?, &settings, &out, &Bar::new())?;
     if json { output::print_json(&summary) } else { output::print(&run::text(&summary, &out)) }
+}
+
+/// As many touches as can be divided and trained on.
+fn touches(text: &str) -> Result<u64, String> {
+    match super::numbers::count(text)? {
+        count if count < 100 => Err("give 100 or more".to_owned()),
+        count => Ok(count),
+    }
 }

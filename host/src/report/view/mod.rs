@@ -10,11 +10,10 @@ use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::probe::approach::{Approach, FINGERS, Probe};
 use crate::probe::scene::Scene;
+use crate::random::{self, Purpose};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, PreEscaped, html};
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
 use shown::{Facts, Shown};
 
 /// What a page shows.
@@ -92,7 +91,7 @@ struct Approaches {
 }
 
 fn draw(scene: &Scene, settings: &Settings) -> Approaches {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
+    let mut rng = random::generator(settings.seed, Purpose::View, "", 0);
     let (mut touches, mut misses) = (Vec::new(), Vec::new());
     let (mut tried, mut full) = (0, 0);
     while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < settings.misses) {
