@@ -157,7 +157,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     }
     let data = out.join("data");
     let captured = capture::capture(objects, &settings.capture, &data, progress)?;
-    let seed = settings.capture.seed;
+    let seed = settings.capture.origin.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
     let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);
     let paper = method("paper", "paper", train::Settings { seed, ..train::Settings::paper() })?;
@@ -194,7 +194,7 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
         "job": "run",
         "sources": settings.sources,
         "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
-        "capture": results::json("capture's settings", &settings.capture)?,
+        "capture": results::json("capture's settings", &settings.capture.origin)?,
         "test_share": settings.test_share,
         "groups": settings.groups,
         "error_rate": settings.error_rate,
@@ -227,8 +227,8 @@ impl Trial {
         progress.begin(&format!("compiling and testing {name}"), None);
         let compile = compile::Settings {
             error_rate: settings.error_rate,
-            spacing: settings.capture.probe.spacing as f32,
-            speed: settings.capture.probe.speed as f32,
+            spacing: settings.capture.origin.probe.spacing as f32,
+            speed: settings.capture.origin.probe.speed as f32,
             ..compile::Settings::default()
         };
         let compiled = compile::compile(&ensemble, &compile)?;
@@ -237,7 +237,7 @@ impl Trial {
         let model = open(&compiled)?;
         let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
         let fewest = margins.fewest_touches();
-        let seed = settings.capture.seed;
+        let seed = settings.capture.origin.seed;
         let evaluation = evaluate::evaluate(
             &margins,
             &evaluate::Settings {
@@ -476,7 +476,7 @@ mod tests {
     fn settings(touches: u64) -> Settings {
         Settings {
             sources: vec!["meshes".into()],
-            capture: capture::Settings { touches, ..capture::Settings::default() },
+            capture: Origin { touches, ..Origin::default() }.into(),
             groups: 50,
             command: "palpate run 'my meshes'".into(),
             ..Settings::default()

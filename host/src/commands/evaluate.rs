@@ -4,7 +4,6 @@ use palpate::evaluate::model_file::ModelFile;
 use palpate::evaluate::{self, Evaluation, Margins, Settings};
 use palpate::output;
 use palpate::progress::Progress;
-use palpate::touches::Dataset;
 use palpate::touches::noise;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -34,7 +33,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 1000)]
     groups: usize,
     /// Stop touching when the posterior passes one less this
-    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    #[arg(long, default_value_t = 0.01, value_parser = super::numbers::share, value_name = "RATE")]
     error_rate: f64,
     /// Give up after so many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
@@ -52,7 +51,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
-    let mut dataset = Dataset::read(&arguments.directory)?;
+    let mut dataset = super::dataset(&arguments.directory)?;
     if let Some(deviation) = arguments.noise {
         for object in &mut dataset.objects {
             object.touches = noise::noisy(&object.name, &object.touches, deviation, arguments.seed);

@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid")]
     layout: LayoutChoice,
     /// The error rate at which recognizers stop unless told otherwise
-    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    #[arg(long, default_value_t = 0.01, value_parser = super::numbers::share, value_name = "RATE")]
     error_rate: f64,
     /// The touches after which they give up
     #[arg(long, default_value_t = 200, value_name = "N")]
@@ -54,6 +54,7 @@ struct Exported {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_input(&arguments.output, [&arguments.ensemble])?;
     let ensemble = Ensemble::load(&arguments.ensemble)?;
     let settings = Settings {
         leaf: arguments.leaf,
@@ -74,9 +75,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         margin_error: compiled.margin_error,
     };
     if arguments.json {
-        return output::print_json(&exported);
+        return output::print_json_about(&arguments.output, &exported);
     }
-    output::print(&format!(
+    let text = format!(
         "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}), margins within {:.2e} nats\n\
          A chip that reads no other models needs these features of palpate-onboard: {}, {}-leaves\n",
         arguments.output.display(),
@@ -89,7 +90,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         exported.margin_error,
         exported.layout,
         exported.leaf,
-    ))
+    );
+    output::print_about(&arguments.output, &text)
 }
 
 fn leaf(name: &str) -> Result<Leaf, String> {

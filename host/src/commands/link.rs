@@ -67,7 +67,7 @@ impl ChipOptions {
             return Ok(Steps::lines(Box::new(BufReader::new(std::io::stdin())), Path::new("standard input")));
         }
         if source.is_dir() {
-            let dataset = Dataset::read(source)?;
+            let dataset = super::dataset(source)?;
             let count = self.touches.unwrap_or(dataset.len() as u64);
             return Ok(Steps::sequences(dataset, self.sequence, count));
         }

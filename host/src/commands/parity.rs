@@ -4,7 +4,6 @@ use palpate::compile::CompiledFile;
 use palpate::ensemble::Ensemble;
 use palpate::evaluate::parity;
 use palpate::output;
-use palpate::touches::Dataset;
 use std::path::PathBuf;
 
 /// Hold a compiled model against its ensemble.
@@ -37,7 +36,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let ensemble = Ensemble::load(&arguments.ensemble)?;
     let file = CompiledFile::read(&arguments.model)?;
-    let dataset = Dataset::read(&arguments.directory)?;
+    let dataset = super::dataset(&arguments.directory)?;
     let model = file.model()?;
     let parity = parity::parity(&ensemble, &model, &dataset, arguments.sequences, arguments.seed, &Bar::new())
         .map_err(|error| error.in_file(&arguments.model))?;

@@ -1,6 +1,7 @@
 use palpate::Error;
 use palpate::Result;
 use palpate::compile::CompiledFile;
+use palpate::error::{Place, TouchesProblem};
 use palpate::output;
 use palpate::touches::parse_touch;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -26,7 +27,7 @@ pub(crate) struct Arguments {
     #[arg(default_value = "-")]
     file: PathBuf,
     /// Stop at this error rate instead of the model's
-    #[arg(long, value_name = "RATE")]
+    #[arg(long, value_parser = super::numbers::share, value_name = "RATE")]
     error_rate: Option<f64>,
     /// Give up after this many touches instead of the model's limit
     #[arg(long, value_name = "N")]
@@ -88,8 +89,8 @@ fn stream(
         if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
             break;
         }
-        let wrong = |what: String| Error::line(path, number, what, "Correct the line.");
-        let line = std::str::from_utf8(&bytes).map_err(|_| wrong("not text (no UTF-8)".to_owned()))?.trim();
+        let wrong = |problem| Error::at(Place::line(path, number), problem);
+        let line = std::str::from_utf8(&bytes).map_err(|_| wrong(TouchesProblem::NotText))?.trim();
         if line.is_empty() {
             continue;
         }

@@ -2,7 +2,6 @@ use super::progress::Bar;
 use palpate::Result;
 use palpate::ensemble::train::{self, Engine, Settings};
 use palpate::output;
-use palpate::touches::Dataset;
 use palpate_shared::Descriptor;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -103,7 +102,8 @@ struct Trained {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let settings = arguments.settings();
-    let dataset = Dataset::read(&arguments.directory)?;
+    output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
+    let dataset = super::dataset(&arguments.directory)?;
     let start = Instant::now();
     let ensemble = train::train(&dataset, &settings, &Bar::new())?;
     let seconds = start.elapsed().as_secs_f64();
@@ -122,9 +122,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         seconds,
     };
     if arguments.json {
-        return output::print_json(&trained);
+        return output::print_json_about(&arguments.output, &trained);
     }
-    output::print(&format!(
+    let text = format!(
         "{}: {} trees, {} splits on {} of {} touches of {} objects, trained in {:.1} s\n",
         arguments.output.display(),
         trained.trees,
@@ -133,7 +133,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         trained.touches,
         trained.objects,
         trained.seconds
-    ))
+    );
+    output::print_about(&arguments.output, &text)
 }
 
 impl Arguments {

@@ -1,7 +1,6 @@
 use super::progress::Bar;
 use palpate::Result;
 use palpate::output;
-use palpate::touches::Dataset;
 use palpate::tune::{self, Row, Settings, Tuned};
 use palpate_shared::Descriptor;
 use std::fmt::Write as _;
@@ -36,7 +35,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "NAME")]
     descriptor: Descriptor,
     /// Stop touching when the posterior passes one less this
-    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    #[arg(long, default_value_t = 0.01, value_parser = super::numbers::share, value_name = "RATE")]
     error_rate: f64,
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]
@@ -50,7 +49,10 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let dataset = Dataset::read(&arguments.directory)?;
+    for path in [&arguments.output, &arguments.ensemble].into_iter().flatten() {
+        output::refuse_input(path, super::files_of(&arguments.directory))?;
+    }
+    let dataset = super::dataset(&arguments.directory)?;
     let tuned = tune::tune(
         &dataset,
         &Settings {
@@ -69,7 +71,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     if let Some(path) = &arguments.output {
         output::write_bytes(path, &tuned.model)?;
     }
-    if arguments.json { output::print_json(&tuned) } else { output::print(&table(&tuned)) }
+    let written = arguments.output.unwrap_or_default();
+    if arguments.json {
+        output::print_json_about(&written, &tuned)
+    } else {
+        output::print_about(&written, &table(&tuned))
+    }
 }
 
 /// The frontier, the choice marked, and what it achieves on touches of its own.

@@ -2,7 +2,7 @@
 
 use crate::ensemble::{Ensemble, feature_row};
 use crate::error::{Error, Result};
-use crate::random;
+use crate::random::{self, Purpose};
 use crate::touches::Dataset;
 use palpate_onboard::Model;
 use palpate_shared::{Descriptor, Touch};
@@ -135,7 +135,7 @@ impl<'m> Margins<'m> {
     /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
     pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> rand::seq::index::IndexVec {
         let group = u64::try_from(group).unwrap_or(u64::MAX);
-        let mut random = random::generator(seed, &self.tested_names[position], group);
+        let mut random = random::generator(seed, Purpose::Groups, &self.tested_names[position], group);
         rand::seq::index::sample(&mut random, self.tested[position].touches, count)
     }
 }

@@ -3,11 +3,11 @@
 use crate::ensemble::Ensemble;
 use crate::error::{Error, Result};
 use crate::progress::{self, Progress};
+use crate::random::{self, Purpose};
 use crate::touches::Dataset;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use rayon::prelude::*;
 
 /// How far two models are apart.
@@ -54,7 +54,7 @@ pub fn parity(
     progress.begin("verdicts", Some(sequences as u64));
     let runs = (0..sequences).into_par_iter().map(|index| -> Result<_> {
         progress::advance(progress, 1)?;
-        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64));
+        let mut rng = random::generator(seed, Purpose::Sequences, "", index as u64);
         let object = &dataset.objects[rng.random_range(0..dataset.objects.len())];
         let draw = std::iter::repeat_with(|| object.touches[rng.random_range(0..object.touches.len())]);
         Ok(differ(ensemble, model, draw))

@@ -210,7 +210,7 @@ mod tests {
                 })
                 .collect(),
         };
-        Dataset { objects: vec![object("a", 0), object("b", 30_000)] }
+        Dataset::new(vec![object("a", 0), object("b", 30_000)])
     }
 
     #[test]

@@ -69,15 +69,13 @@ pub(super) struct Large {
 pub(super) fn large(context: &Context) -> Result<Large> {
     let count = context.settings.limit_touches;
     let touched = context.touch(count, context.settings.seed.wrapping_add(0x11_1117))?;
-    let part = |range: std::ops::Range<usize>| Dataset {
-        objects: touched
-            .iter()
-            .map(|(object, _)| ObjectTouches {
-                name: object.name.clone(),
-                touches: object.touches[range.start.min(object.touches.len())..range.end.min(object.touches.len())]
-                    .to_vec(),
-            })
-            .collect(),
+    let part = |range: std::ops::Range<usize>| {
+        let objects = touched.iter().map(|(object, _)| ObjectTouches {
+            name: object.name.clone(),
+            touches: object.touches[range.start.min(object.touches.len())..range.end.min(object.touches.len())]
+                .to_vec(),
+        });
+        Dataset::new(objects.collect())
     };
     let (train, held) = (count * 85 / 100, count * 90 / 100);
     Ok(Large { train: part(0..train), held: part(train..held), test: part(held..count) })
@@ -89,7 +87,7 @@ fn half(data: &Dataset) -> Dataset {
         name: object.name.clone(),
         touches: object.touches[..object.touches.len() / 2].to_vec(),
     };
-    Dataset { objects: data.objects.iter().map(first).collect() }
+    data.with(data.objects.iter().map(first).collect())
 }
 
 /// Estimates the limit and tests the first fold's models on the same groups.

@@ -89,7 +89,7 @@ fn noisy(data: &Dataset, deviation: f64, seed: u64) -> Dataset {
         name: object.name.clone(),
         touches: noise::noisy(&object.name, &object.touches, deviation * 1e3, seed),
     };
-    Dataset { objects: data.objects.iter().map(one).collect() }
+    data.with(data.objects.iter().map(one).collect())
 }
 
 /// Accuracy of a method at the level nearest to `deviation` ms: mean and deviation over folds.
