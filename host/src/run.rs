@@ -11,10 +11,11 @@ use crate::output;
 use crate::page::render;
 use crate::progress::Progress;
 use crate::report::{self, Cell, Data, Picture, RunMethod, RunResults};
-use crate::touches::Dataset;
 use crate::touches::folds::{self, Split};
+use crate::touches::{Dataset, Listing};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -130,7 +131,12 @@ pub struct Recognition {
 pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn Progress) -> Result<Summary> {
     let began = Instant::now();
     let data = out.join("data");
-    let captured = capture::capture(objects, &settings.capture, &data, progress)?;
+    // A run replaces what an earlier run on the same objects left, finished or not, and no other touches.
+    let names: BTreeSet<&str> = objects.iter().map(|object| object.name.as_str()).collect();
+    let is_same = |listing: &Listing| listing.objects.iter().map(|entry| entry.name.as_str()).eq(names.iter().copied());
+    let force = settings.capture.force || Listing::read(&data)?.as_ref().is_some_and(is_same);
+    let captured =
+        capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
     let seed = settings.capture.origin.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
     let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);

@@ -19,6 +19,7 @@ mod view;
 mod watch;
 
 use clap::{Parser, Subcommand};
+use palpate::error::{Problem, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -97,7 +98,12 @@ impl Cli {
     pub(crate) fn hints(&self) -> fn(&Error) -> Option<&'static str> {
         match self.command {
             Some(Command::Capture(_)) => capture::hint,
-            _ => |_| None,
+            _ => |error| match error.problem() {
+                Some(Problem::Touches(TouchesProblem::Incomplete)) => {
+                    Some("Repeat the command of the capture with --resume.")
+                }
+                _ => None,
+            },
         }
     }
 

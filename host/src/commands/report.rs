@@ -1,6 +1,6 @@
 use super::progress::Bar;
 use palpate::Result;
-use palpate::output::{print, print_json};
+use palpate::output::{print, print_json, refuse_stdout};
 use palpate::report::{self, Settings};
 use std::path::PathBuf;
 
@@ -34,6 +34,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let Arguments { sources, output, seed, quick, resume, json } = arguments;
+    refuse_stdout(&output)?;
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
     let written = report::full(&settings, &output, resume, &Bar::new())?;
     if json {
