@@ -15,10 +15,11 @@ use crate::progress::{self, Progress};
 use crate::report::results;
 use crate::report::run_page::{RunMethod, RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
-use crate::touches::Dataset;
 use crate::touches::folds::{self, Split};
+use crate::touches::{Dataset, Listing};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -156,7 +157,12 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         results::refuse_others(out, &made_from, &FILES, "data/dataset.json")?;
     }
     let data = out.join("data");
-    let captured = capture::capture(objects, &settings.capture, &data, progress)?;
+    // A run replaces what an earlier run on the same objects left, finished or not, and no other touches.
+    let names: BTreeSet<&str> = objects.iter().map(|object| object.name.as_str()).collect();
+    let is_same = |listing: &Listing| listing.objects.iter().map(|entry| entry.name.as_str()).eq(names.iter().copied());
+    let force = settings.capture.force || settings.replace || Listing::read(&data)?.as_ref().is_some_and(is_same);
+    let captured =
+        capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
     let seed = settings.capture.origin.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
     let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);

@@ -1,7 +1,7 @@
 use super::numbers::count;
 use super::progress::Bar;
 use palpate::capture::{self, Settings, Summary};
-use palpate::error::{CaptureProblem, Problem};
+use palpate::error::{CaptureProblem, Problem, TouchesProblem};
 use palpate::mesh::facts::Facts;
 use palpate::mesh::source;
 use palpate::output;
@@ -60,10 +60,10 @@ pub(crate) struct Arguments {
     #[arg(long)]
     approaches: bool,
     /// How to keep the touches: text, or parquet (columns t1, t2, t3, direction, alignment, object) [default: text]
-    #[arg(long, value_name = "text|parquet")]
+    #[arg(long, value_name = "text|parquet", value_parser = parsed::<Format>)]
     format: Option<Format>,
     /// Capture only the K-th of N parts; the parts, one after the other, are the whole [default: 1/1]
-    #[arg(long, value_name = "K/N")]
+    #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
     shard: Option<Shard>,
     /// Resume an interrupted capture
     #[arg(long, conflicts_with = "force")]
@@ -122,6 +122,11 @@ impl Arguments {
             shard: self.shard.unwrap_or(base.shard),
         })
     }
+}
+
+/// An option's value; what is wrong with it, with what to do.
+fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|problem: TouchesProblem| format!("{problem}. {}", problem.fix()))
 }
 
 /// Which options help, where the library refuses what is in the directory.

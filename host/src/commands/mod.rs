@@ -21,7 +21,7 @@ mod view;
 mod watch;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::Problem;
+use palpate::error::{Problem, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -105,7 +105,12 @@ impl Command {
     fn hint(&self) -> fn(&Error) -> Option<&'static str> {
         match self {
             Self::Capture(_) => capture::hint,
-            _ => |_| None,
+            _ => |error| match error.problem() {
+                Some(Problem::Touches(TouchesProblem::Incomplete)) => {
+                    Some("Repeat the command of the capture with --resume.")
+                }
+                _ => None,
+            },
         }
     }
 }

@@ -398,9 +398,9 @@ mod tests {
     #[test]
     fn a_lone_direction_or_alignment_is_refused() {
         let x = Some([1.0, 0.0, 0.0]);
-        let error = |poses| with_poses(poses).unwrap_err().to_string();
-        assert!(error(&[(x, x), (x, None)]).contains("row 2: a direction without an alignment. Give both or neither."));
-        assert!(error(&[(None, x)]).contains("row 1: an alignment without a direction"));
+        let error = |direction, alignment| with_poses(&[(x, x), (direction, alignment)]).unwrap_err().to_string();
+        assert!(error(x, None).contains("row 2: a direction without an alignment. Give both or neither."));
+        assert!(error(None, x).contains("row 2: an alignment without a direction"));
     }
 
     /// Bytes of a file of a few touches, and where its metadata begins.

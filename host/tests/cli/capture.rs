@@ -306,6 +306,24 @@ fn an_unfinished_capture_is_neither_overwritten_nor_forgotten() {
 }
 
 #[test]
+fn a_run_replaces_its_own_results_and_keeps_touches_of_other_objects() {
+    let directory = meshes();
+    let run = |sources: &[PathBuf], touches: &str| {
+        let mut command = command(["run", "--touches", touches, "-o"]);
+        command.arg(directory.path().join("mine")).args(sources).output().unwrap()
+    };
+    let both = [directory.path().join("meshes")];
+    stdout(run(&both, "100"));
+    stdout(run(&both, "120"));
+    let data = directory.path().join("mine/data");
+    let before = files(&data);
+    assert_eq!(before["apple.txt"].iter().filter(|&&byte| byte == b'\n').count(), 120);
+    let error = stderr(run(&["bowl".into(), "mouse".into()], "100"), 1);
+    assert!(error.contains("data: holds 240 touches of apple, globe, which this capture would not write"), "{error}");
+    assert_eq!(files(&data), before);
+}
+
+#[test]
 fn numbers_in_another_notation_are_refused_with_a_hint() {
     let directory = meshes();
     for text in ["1e6", "1_000_000"] {
@@ -313,7 +331,9 @@ fn numbers_in_another_notation_are_refused_with_a_hint() {
         assert!(error.contains("write the number out: 1000000"), "{error}");
     }
     let error = stderr(capture(directory.path(), "out", &["--format", "csv"]).output().unwrap(), 2);
-    assert!(error.contains("\"csv\" is no format of touches"), "{error}");
+    assert!(error.contains("\"csv\" is no format of touches. Use text or parquet."), "{error}");
+    let error = stderr(capture(directory.path(), "out", &["--shard", "3/2"]).output().unwrap(), 2);
+    assert!(error.contains("Give K/N with K from 1 to N, like 2/5."), "{error}");
     assert!(!directory.path().join("out").exists());
 }
 
