@@ -1,21 +1,11 @@
 //! Any bytes offered as an OBJ file give an error or a mesh whose indices are in range, and take memory in proportion to
 //! their length; a mesh can be touched.
 #![no_main]
-#![allow(dead_code, unreachable_pub, reason = "parts of the host crate, without all that it depends on")]
 
-#[path = "../../host/src/error.rs"]
-mod error;
-#[path = "../../host/src/mesh.rs"]
-mod mesh;
-#[path = "../../host/src/obj.rs"]
-mod obj;
-#[path = "../../host/src/scene.rs"]
-mod scene;
-#[path = "../../host/src/sweep/mod.rs"]
-mod sweep;
-
-use glam::DVec3;
 use libfuzzer_sys::fuzz_target;
+use palpate::glam::DVec3;
+use palpate::mesh::obj;
+use palpate::probe::Scene;
 use peak_alloc::PeakAlloc;
 use std::path::Path;
 
@@ -36,7 +26,7 @@ fuzz_target!(|bytes: &[u8]| {
     if let Ok(mesh) = parsed {
         assert!(mesh.triangles.iter().flatten().all(|&index| (index as usize) < mesh.vertices.len()));
         assert!(mesh.vertices.iter().flatten().all(|coordinate| coordinate.is_finite()));
-        let scene = scene::Scene::new(&mesh, 10.0).expect("a mesh that was read has an extent");
+        let scene = Scene::new(&mesh, 10.0).expect("a mesh that was read has an extent");
         for corner in scene.triangles().take(4).flatten() {
             // Aimed at a corner, a sphere touches that or something before it.
             let start = DVec3::new(9.0, 8.0, 7.0);
