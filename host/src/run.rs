@@ -1,16 +1,20 @@
-//! The whole way: capture, train, compile, recognize, report.
+//! The main job: capture, train, compile, recognize, report.
 
 use crate::capture;
 use crate::compile::{self, Compiled};
 use crate::ensemble::train;
-use crate::error::{Error, Result};
+use crate::error::{ReportProblem, Result};
 use crate::evaluate::parity::{self, Parity};
 use crate::evaluate::{self, Candidate, Curve, Evaluation, Margins};
 use crate::mesh::Object;
 use crate::output;
+use crate::page::document::Picture;
 use crate::page::render;
-use crate::progress::Progress;
-use crate::report::{self, Cell, Data, Picture, RunMethod, RunResults};
+use crate::page::table::{Cell, Records};
+use crate::progress::{self, Progress};
+use crate::report::results;
+use crate::report::run_page::{RunMethod, RunResults, run_page};
+use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use crate::touches::Dataset;
 use crate::touches::folds::{self, Split};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -21,21 +25,30 @@ use std::time::Instant;
 
 /// Numbers of touches after which accuracy is reported.
 const AT: [usize; 6] = [1, 5, 10, 20, 30, 60];
+/// Those of them that the table shows.
+const TABLE_AT: [usize; 2] = [10, 30];
 /// The most touches that accuracy is followed to.
 const MOST: usize = 200;
 /// Random sequences whose verdicts are compared with the full model's.
 const PARITY_SEQUENCES: usize = 10_000;
-/// Pictures in the page, in pixels.
+/// The width and height of a picture in the page, in pixels.
 const PICTURE: u32 = 160;
+
+/// Files in the output directory besides `data/` and `summary.json`.
+const FILES: [&str; 5] = ["paper.json", "paper.palpate", "ensemble.json", "model.palpate", "report.html"];
 
 /// How to run.
 #[derive(Clone, Debug)]
 pub struct Settings {
+    /// Where the objects come from; the results state it.
+    pub sources: Vec<String>,
+    /// Whether to replace another run's or a report's results.
+    pub replace: bool,
     /// How objects are touched.
     pub capture: capture::Settings,
     /// The share of touches that is kept from training, to test on.
     pub test_share: f64,
-    /// Groups, and sequences, drawn for each object.
+    /// Groups, and also sequences, drawn for each object.
     pub groups: usize,
     /// The error rate that recognizers stop at.
     pub error_rate: f64,
@@ -46,6 +59,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            sources: vec!["builtin".into()],
+            replace: false,
             capture: capture::Settings::default(),
             test_share: 0.1,
             groups: 1000,
@@ -58,13 +73,15 @@ impl Default for Settings {
 /// What a run measured; `summary.json`. Shares are between 0 and 1, times in seconds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
+    /// What it was made from: another run with the same may replace it unasked.
+    pub made_from: serde_json::Value,
     /// The program's version.
     pub tool_version: &'static str,
     /// The command that remakes it.
     pub command: String,
     /// Seed of all that is random.
     pub seed: u64,
-    /// Touching the objects.
+    /// The capture.
     pub capture: capture::Summary,
     /// Touches trained on and tested on, of all objects together.
     pub touches: Touches,
@@ -72,9 +89,9 @@ pub struct Summary {
     pub paper: Method,
     /// The compact one.
     pub ours: Method,
-    /// One sequence of test touches an object, as the compiled compact model recognizes it.
+    /// One sequence of test touches per object, as the compiled compact model recognizes it.
     pub recognized: Vec<Recognition>,
-    /// All of it.
+    /// The whole run.
     pub seconds: f64,
 }
 
@@ -103,9 +120,12 @@ pub struct Method {
     /// Accuracies, and the recognizer that stops by itself.
     #[serde(flatten)]
     pub evaluation: Evaluation,
-    /// The least fixed number of touches from which on the error is at most the error rate; none within reach is null.
+    /// The least fixed number of touches from which on the error is at most the error rate; null if there is none up to
+    /// `followed_to`.
     pub fixed_touches: Option<usize>,
-    /// The compiled model held against the ensemble, on the test touches.
+    /// The most touches that accuracy was followed to: as many as still make enough distinct groups of test touches.
+    pub followed_to: usize,
+    /// The compiled model compared with the ensemble, on the test touches.
     pub parity: Parity,
 }
 
@@ -123,12 +143,18 @@ pub struct Recognition {
 }
 
 /// Runs all of it on `objects` and writes into `out`: `data/` (the touches), `paper.json`, `paper.palpate`,
-/// `ensemble.json`, `model.palpate`, `summary.json` and `report.html`.
+/// `ensemble.json`, `model.palpate`, `report.html` and, last, `summary.json`.
 ///
 /// # Errors
-/// What capture, training, compiling, evaluating or writing return.
+/// [`ReportProblem::OtherResults`] if `out` holds results that were made from something else, unless
+/// [`Settings::replace`]; [`Error::Cancelled`](crate::Error::Cancelled); and what capture, training, compiling,
+/// evaluating or writing return.
 pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn Progress) -> Result<Summary> {
     let began = Instant::now();
+    let made_from = made_from(objects, settings)?;
+    if !settings.replace {
+        results::refuse_others(out, &made_from, &FILES, "data/dataset.json")?;
+    }
     let data = out.join("data");
     let captured = capture::capture(objects, &settings.capture, &data, progress)?;
     let seed = settings.capture.seed;
@@ -138,31 +164,48 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let ours = method("ours", "ensemble", train::Settings { seed, ..train::Settings::compact() })?;
     let model = open(&ours.compiled)?;
     let summary = Summary {
+        made_from,
         tool_version: env!("CARGO_PKG_VERSION"),
         command: settings.command.clone(),
         seed,
         capture: captured,
         touches: Touches { train: split.train.len(), test: split.test.len() },
         recognized: split.test.objects.iter().map(|o| recognize(&model, &o.name, &o.touches)).collect::<Result<_>>()?,
-        paper: paper.method,
-        ours: ours.method,
+        paper: paper.method.clone(),
+        ours: ours.method.clone(),
         seconds: began.elapsed().as_secs_f64(),
     };
-    let page = report::short(&RunResults {
+    let page = run_page(&RunResults {
         command: settings.command.clone(),
         pictures: pictures(objects, &summary.capture),
-        methods: vec![shown("paper", &paper.curve, &summary.paper), shown("ours", &ours.curve, &summary.ours)],
+        methods: vec![shown("paper", &paper), shown("ours", &ours)],
         table: table(&summary),
+        note: note(&summary),
         facts: facts(&summary),
     })?;
-    report::write(&page, &out.join("report.html"))?;
+    page.write(&out.join("report.html"))?;
     output::write_json(&out.join("summary.json"), &summary)?;
     Ok(summary)
 }
 
-/// A method, trained, compiled and tried.
+/// What the results depend on.
+fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Value> {
+    Ok(serde_json::json!({
+        "job": "run",
+        "sources": settings.sources,
+        "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
+        "capture": results::json("capture's settings", &settings.capture)?,
+        "test_share": settings.test_share,
+        "groups": settings.groups,
+        "error_rate": settings.error_rate,
+    }))
+}
+
+/// A method, trained, compiled and tested.
 struct Trial {
     compiled: Compiled,
+    /// The fewest test touches that an object has.
+    fewest: usize,
     curve: Curve,
     method: Method,
 }
@@ -180,6 +223,7 @@ impl Trial {
         let began = Instant::now();
         let ensemble = train::train(&split.train, &preset, progress)?;
         let train_seconds = began.elapsed().as_secs_f64();
+        progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
         let compile = compile::Settings {
             error_rate: settings.error_rate,
@@ -197,14 +241,14 @@ impl Trial {
         let evaluation = evaluate::evaluate(
             &margins,
             &evaluate::Settings {
-                at: AT.into_iter().filter(|&at| at <= fewest).collect(),
+                at: AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS).collect(),
                 groups: settings.groups,
                 error_rate: settings.error_rate,
                 max_touches: None,
                 seed,
             },
         )?;
-        let curve = margins.curve(MOST.min(fewest), settings.groups, seed)?;
+        let curve = margins.curve(MOST.min(largest_group(fewest)), settings.groups, seed)?;
         let parity = parity::parity(&ensemble, &model, &split.test, PARITY_SEQUENCES, seed, progress)?;
         let method = Method {
             trees: ensemble.trees.len(),
@@ -212,11 +256,12 @@ impl Trial {
             model_bytes: compiled.bytes.len(),
             layout: compiled.layout.name().into(),
             leaf: compile.leaf.name().into(),
-            fixed_touches: curve.touches_to_error(settings.error_rate),
+            fixed_touches: if curve.most() == 0 { None } else { curve.touches_to_error(settings.error_rate) },
+            followed_to: curve.most(),
             evaluation,
             parity,
         };
-        Ok(Self { compiled, curve, method })
+        Ok(Self { compiled, fewest, curve, method })
     }
 }
 
@@ -225,14 +270,13 @@ fn model_path(out: &Path, stem: &str) -> PathBuf {
 }
 
 fn open(compiled: &Compiled) -> Result<Model<'_>> {
-    Model::new(&compiled.bytes)
-        .map_err(|error| Error::data(format!("the compiled model cannot be read: {error}"), "Report this as a bug."))
+    Model::new(&compiled.bytes).map_err(|error| ReportProblem::Compiled { reason: error.to_string() }.into())
 }
 
 /// Pushes one object's test touches until the recognizer has its verdict.
 fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]) -> Result<Recognition> {
     let mut recognizer = Recognizer::<256>::new(model, Stopping::from_model(model))
-        .map_err(|_| Error::data(format!("a model of {} objects", model.object_count()), "Use at most 256 objects."))?;
+        .map_err(|_| ReportProblem::TooManyObjects { objects: model.object_count() })?;
     let verdict = touches.iter().map(|touch| recognizer.push(touch)).find(|verdict| *verdict != Verdict::Undecided);
     let best = recognizer.best();
     let recognized = matches!(verdict, Some(Verdict::Recognized { .. })).then(|| model.object_name(best).into());
@@ -252,9 +296,11 @@ fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<Picture> {
     objects.iter().map(picture).collect()
 }
 
-fn shown(name: &str, curve: &Curve, method: &Method) -> RunMethod {
-    let touches: Vec<usize> =
-        [1, 2, 3, 5, 7, 10, 14, 20, 30, 42, 60, 85, 120].into_iter().filter(|&n| n <= curve.most()).collect();
+fn shown(name: &str, Trial { curve, method, fewest, .. }: &Trial) -> RunMethod {
+    let touches: Vec<usize> = [1, 2, 3, 5, 7, 10, 14, 20, 30, 42, 60, 85, 120]
+        .into_iter()
+        .filter(|&n| n <= curve.most() && distinct_groups(*fewest, n) >= LEAST_GROUPS)
+        .collect();
     let objects = method.evaluation.per_object.keys().enumerate();
     RunMethod {
         name: name.into(),
@@ -274,11 +320,11 @@ fn shown(name: &str, curve: &Curve, method: &Method) -> RunMethod {
 }
 
 /// The table that the program prints and the page shows: the paper's method and ours, side by side.
-pub fn table(summary: &Summary) -> Data {
-    let mut table = Data::new(["", "paper", "ours"]);
-    let both = |of: &dyn Fn(&Method) -> Cell| [of(&summary.paper), of(&summary.ours)];
+fn table(summary: &Summary) -> Records {
+    let mut table = Records::new(["measure", "paper", "ours"]);
+    let both = |cell: &dyn Fn(&Method) -> Cell| [cell(&summary.paper), cell(&summary.ours)];
     let mut row = |name: String, [paper, ours]: [Cell; 2]| table.push([Cell::Text(name), paper, ours]);
-    for at in [10, 30] {
+    for at in TABLE_AT {
         let cell = |method: &Method| {
             let evaluation = &method.evaluation;
             match (evaluation.accuracy.get(&at), evaluation.accuracy_standard_error.get(&at)) {
@@ -296,10 +342,16 @@ pub fn table(summary: &Summary) -> Data {
             Cell::Spread(sequential.mean_touches, sequential.mean_touches_standard_error, 1)
         }),
     );
-    row("  errors made so".into(), both(&|m| Cell::Percent(m.evaluation.sequential.error, 2)));
+    row("  wrong verdicts".into(), both(&|m| Cell::Percent(m.evaluation.sequential.error, 2)));
+    row("  undecided when touches ran out".into(), both(&|m| Cell::Percent(m.evaluation.sequential.undecided, 2)));
     row(
         format!("touches to a {rate} % error rate, a fixed number"),
-        both(&|m| m.fixed_touches.map_or_else(|| Cell::Text(format!("over {MOST}")), Cell::count)),
+        both(&|m| {
+            m.fixed_touches.map_or_else(
+                || if m.followed_to == 0 { Cell::Missing } else { Cell::Text(format!("over {}", m.followed_to)) },
+                Cell::count,
+            )
+        }),
     );
     row("model bytes".into(), both(&|m| Cell::count(m.model_bytes)));
     row("trees".into(), both(&|m| Cell::count(m.trees)));
@@ -308,13 +360,25 @@ pub fn table(summary: &Summary) -> Data {
     let same = |cell: Cell| [cell.clone(), cell];
     row("capture, seconds".into(), same(Cell::Number(capture.seconds, 1)));
     row(
-        "touches captured a second".into(),
+        "touches captured per second".into(),
         same(Cell::Number(capture.touches() as f64 / capture.seconds.max(1e-9), 0)),
     );
     row("largest margin error, nats".into(), both(&|m| Cell::Number(m.parity.max_margin_error, 5)));
     row("  bound that the model states".into(), both(&|m| Cell::Number(m.parity.stated_bound, 5)));
     row("verdicts that differ from the full model's".into(), both(&|m| Cell::count(m.parity.verdict_differs)));
     table
+}
+
+/// What a missing accuracy means, if one is missing.
+fn note(summary: &Summary) -> String {
+    let missing = |method: &Method| TABLE_AT.iter().any(|at| !method.evaluation.accuracy.contains_key(at));
+    if !missing(&summary.paper) && !missing(&summary.ours) {
+        return String::new();
+    }
+    format!(
+        "– stands for an accuracy that would rest on fewer than {LEAST_GROUPS} distinct groups of test touches; capture \
+         more touches to measure it."
+    )
 }
 
 fn facts(summary: &Summary) -> Vec<(String, String)> {
@@ -353,7 +417,10 @@ pub fn text(summary: &Summary, out: &Path) -> String {
                 writeln!(text, "  {touched:width$}  recognized after {touches:>3} touches, posterior {posterior:.4}")
             }
             Some(name) => {
-                writeln!(text, "  {touched:width$}  taken for {name} after {touches} touches, posterior {posterior:.4}")
+                writeln!(
+                    text,
+                    "  {touched:width$}  mistaken for {name} after {touches} touches, posterior {posterior:.4}"
+                )
             }
             None => writeln!(text, "  {touched:width$}  undecided after {touches} touches"),
         };
@@ -377,6 +444,10 @@ pub fn text(summary: &Summary, out: &Path) -> String {
             w2 = widths[2]
         );
     }
+    let note = note(summary);
+    if !note.is_empty() {
+        _ = writeln!(text, "\n{note}");
+    }
     _ = writeln!(
         text,
         "\n± is a standard error. {:.1} s in all. The page: {}",
@@ -384,4 +455,106 @@ pub fn text(summary: &Summary, out: &Path) -> String {
         out.join("report.html").display()
     );
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::{Error, Problem};
+    use crate::mesh::Mesh;
+
+    fn objects() -> Vec<Object> {
+        [("ball", [1.0, 1.0, 1.0]), ("cigar", [1.0, 0.3, 0.3]), ("disc", [1.0, 1.0, 0.2])]
+            .map(|(name, sides)| {
+                let mut mesh = Mesh::globe(10);
+                mesh.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= sides[axis]));
+                Object { name: name.into(), mesh }
+            })
+            .to_vec()
+    }
+
+    fn settings(touches: u64) -> Settings {
+        Settings {
+            sources: vec!["meshes".into()],
+            capture: capture::Settings { touches, ..capture::Settings::default() },
+            groups: 50,
+            command: "palpate run 'my meshes'".into(),
+            ..Settings::default()
+        }
+    }
+
+    fn row<'a>(text: &'a str, name: &str) -> Vec<&'a str> {
+        let line =
+            text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{name}\n{text}"));
+        line.trim_start()
+            .strip_prefix(name)
+            .unwrap_or_default()
+            .split("  ")
+            .map(str::trim)
+            .filter(|c| !c.is_empty())
+            .collect()
+    }
+
+    #[test]
+    fn a_run_with_few_touches_shows_what_is_undecided_and_no_accuracy_over_a_single_possible_group() {
+        let place = tempfile::tempdir().unwrap();
+        let out = place.path().join("out");
+        // A tenth, 30 touches of each object, are tested on: one group of 30 can be drawn.
+        let summary = run(&objects(), &settings(300), &out, &()).unwrap();
+        assert_eq!((summary.touches.train, summary.touches.test), (810, 90));
+        let evaluation = &summary.ours.evaluation;
+        assert_eq!(evaluation.accuracy.keys().copied().collect::<Vec<_>>(), [5, 10, 20]);
+        assert_eq!(summary.ours.followed_to, 28);
+        let text = text(&summary, &out);
+        assert_eq!(row(&text, "accuracy after 30 touches"), ["–", "–"]);
+        assert_eq!(row(&text, "accuracy after 10 touches").len(), 2);
+        let undecided = format!("{:.2}\u{a0}%", 100.0 * evaluation.sequential.undecided);
+        assert_eq!(row(&text, "undecided when touches ran out")[1], undecided);
+        assert!(text.contains("fewer than 300 distinct groups"), "{text}");
+
+        let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+        assert!(page.contains("undecided when touches ran out") && page.contains("fewer than 300 distinct groups"));
+        assert!(page.contains("palpate run &#39;my meshes&#39;") || page.contains("palpate run 'my meshes'"));
+        let written: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+        assert_eq!(written["ours"]["sequential"]["undecided"], serde_json::json!(evaluation.sequential.undecided));
+        for file in FILES {
+            assert!(out.join(file).is_file(), "{file}");
+        }
+
+        // The same again may replace them, and gives the same models; anything else may not, and changes nothing.
+        let model = std::fs::read(out.join("model.palpate")).unwrap();
+        let error = run(&objects()[..2], &settings(300), &out, &()).unwrap_err();
+        assert!(matches!(error.problem(), Some(Problem::Report(ReportProblem::OtherResults { .. }))), "{error}");
+        let error = run(&objects(), &settings(200), &out, &()).unwrap_err().to_string();
+        assert!(error.contains("summary.json: ") && error.contains("touches was 300, and is 200 now"), "{error}");
+        assert_eq!(std::fs::read(out.join("model.palpate")).unwrap(), model);
+        assert!(out.join("data/ball.txt").is_file());
+        run(&objects(), &settings(300), &out, &()).unwrap();
+        assert_eq!(std::fs::read(out.join("model.palpate")).unwrap(), model);
+    }
+
+    #[test]
+    fn a_run_does_not_replace_a_model_that_somebody_put_there() {
+        let place = tempfile::tempdir().unwrap();
+        std::fs::write(place.path().join("model.palpate"), "mine").unwrap();
+        let error = run(&objects(), &settings(100), place.path(), &()).unwrap_err();
+        assert!(error.to_string().contains("model.palpate: "), "{error}");
+        assert_eq!(std::fs::read(place.path().join("model.palpate")).unwrap(), b"mine");
+        assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_cancelled_run_stops_and_leaves_no_summary() {
+        struct Cancelled;
+        impl Progress for Cancelled {
+            fn is_cancelled(&self) -> bool {
+                true
+            }
+        }
+        let place = tempfile::tempdir().unwrap();
+        let error = run(&objects(), &settings(100), place.path(), &Cancelled).unwrap_err();
+        assert!(matches!(error, Error::Cancelled), "{error}");
+        assert!(!place.path().join("summary.json").exists());
+    }
 }

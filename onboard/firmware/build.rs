@@ -1,30 +1,15 @@
-//! Hands memory.x and cortex-m-rt's linker script to the linker, the built-in model to the images, and the benchmark's
-//! models to the benchmark.
+//! Hands memory.x to the linker, the built-in model to the images, and the benchmark's models to the benchmark.
+
+mod image;
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
+    image::link()?;
+    image::build_in("../../models/household.palpate")?;
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or(io::ErrorKind::NotFound)?);
-    fs::copy("memory.x", out.join("memory.x"))?;
-    println!("cargo::rerun-if-changed=memory.x");
-    println!("cargo::rustc-link-search={}", out.display());
-    // Here and not in .cargo/config.toml, where RUSTFLAGS would override them.
-    println!("cargo::rustc-link-arg-bins=-Tlink.x");
-    println!("cargo::rustc-link-arg-bins=--nmagic");
-    built_in()?;
     models(&out.join("bench"))
-}
-
-/// The model that the images have built in, unless `PALPATE_MODEL` names another.
-const MODEL: &str = "../../models/household.palpate";
-
-fn built_in() -> io::Result<()> {
-    println!("cargo::rerun-if-env-changed=PALPATE_MODEL");
-    let model = fs::canonicalize(env::var_os("PALPATE_MODEL").unwrap_or_else(|| MODEL.into()))?;
-    println!("cargo::rerun-if-changed={}", model.display());
-    println!("cargo::rustc-env=PALPATE_MODEL={}", model.display());
-    Ok(())
 }
 
 /// What `palpate-tests`' `bench_models` writes.

@@ -4,9 +4,37 @@
 //! Touch ──► features ──► ranks ──► trees ──► margins ──► evidence ──► Verdict
 //! ```
 //!
-//! A [`Model`] is opened from bytes, which are checked once; a [`Recognizer`] turns each touch into margins, whole
-//! numbers one for each object, adds them to the evidence, and stops as soon as one object is sure enough. All of it is
-//! integer arithmetic (unless the model has f32 leaves), so every machine gives the same bits.
+//! A [`Model`] is opened from bytes, which are checked once. A [`Recognizer`] turns each touch into margins, one integer
+//! per object, adds them to the evidence, and stops as soon as it is sure of one object. All of it is integer
+//! arithmetic (unless the model has f32 leaves), so every machine gives the same bits.
+//!
+//! ```
+//! use palpate_onboard::shared::Touch;
+//! use palpate_onboard::{Model, Recognizer, Stopping, Verdict, include_model};
+//!
+//! // Bytes in flash: the file that `palpate run` or `palpate export` wrote.
+//! # macro_rules! model { () => { concat!(env!("CARGO_MANIFEST_DIR"), "/../models/household.palpate") } }
+//! # /*
+//! let model = Model::new(include_model!("household.palpate"))?;
+//! # */
+//! # let model = Model::new(include_model!(model!()))?;
+//! let mut recognizer = Recognizer::<16>::new(&model, Stopping::from_model(&model))?;
+//! // Contact times of the three fingers in microseconds, as an `effector` measures them.
+//! match recognizer.push(&Touch::from_micros([30_000, 0, 50_000])) {
+//!     Verdict::Undecided => { /* touch again */ }
+//!     Verdict::Recognized { object, touches } => {
+//!         let _ = (model.object_name(object.into()), touches);
+//!     }
+//!     Verdict::Unknown => { /* the limit of touches was reached */ }
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | module or item | what |
+//! |---|---|
+//! | [`effector`] | edges of three switches to touches |
+//! | [`Model`], [`Recognizer`] | touches to verdicts |
+//! | [`station`] | touches, verdicts and models to and from a host, and what lasts through a power cut |
 //!
 //! `no_std`, without a heap and without `unsafe`; once a model has been validated nothing here can panic.
 #![no_std]
@@ -16,33 +44,16 @@
 #[cfg(test)]
 extern crate std;
 
-mod aligned;
-mod built_in;
 mod bytes;
-mod complete;
+mod decide;
 pub mod effector;
-mod error;
-mod evidence;
-mod exp;
-mod fixed;
-mod grid;
-mod leaves;
-mod margins;
+mod layouts;
 mod model;
-mod preorder;
-mod ranks;
-mod recognizer;
-mod snapshot;
 pub mod station;
-mod stopping;
-mod validate;
 
-pub use aligned::Aligned;
-pub use error::ModelError;
-pub use evidence::Posterior;
-pub use exp::exp2_negative;
+pub use bytes::{Aligned, ModelError};
+pub use decide::{
+    CapacityError, Posterior, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative,
+};
 pub use model::Model;
 pub use palpate_shared as shared;
-pub use recognizer::{CapacityError, Recognizer, Verdict};
-pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
-pub use stopping::Stopping;

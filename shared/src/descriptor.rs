@@ -3,10 +3,10 @@
 //! A touch and its mirror image (fingers counted from the other end) are the same touch, so every descriptor but the
 //! paper's own [`Descriptor::Times`] gives the same features for both.
 
-use crate::touch::{ContactTime, Pose, Touch};
+use crate::touch::{ContactTime, Touch};
 
 /// The most features that a built-in descriptor has.
-pub const MAX_FEATURES: usize = 8;
+pub const MAX_FEATURES: usize = 10;
 
 /// The value of a feature that a missing contact or an unknown pose leaves open.
 pub const MISSING_FEATURE: i32 = i32::MIN;
@@ -16,6 +16,10 @@ pub const MISSING_FEATURE: i32 = i32::MIN;
 pub const FEATURE_LIMIT: i32 = (1 << 24) - 1;
 
 /// Which features a touch is turned into. Times in microseconds, direction cosines in Q15.
+///
+/// The first four were made for full touches; of a partial touch they know the slope of both outer fingers at most. The
+/// `Contacts` forms are for touches with any contacts: they begin with the contact pattern, and a pair of neighboring
+/// fingers gives its time difference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Descriptor {
     /// `t1, t2, t3`: the published method's own; the baseline.
@@ -26,9 +30,16 @@ pub enum Descriptor {
     Gravity,
     /// Curvature, direction and alignment in the object's frame: an object whose orientation is known.
     Oriented,
+    /// The [contact pattern](crate::ContactPattern), κ where all three fingers touched, the slope where both outer
+    /// fingers did, and `t2 − t` where the middle finger and one outer finger (at time t) did.
+    ContactsCurvature,
+    /// [`Descriptor::ContactsCurvature`], and the vertical components of direction and alignment.
+    ContactsGravity,
+    /// [`Descriptor::ContactsCurvature`], direction and alignment in the object's frame.
+    ContactsOriented,
 }
 
-/// The features of one touch: at most [`MAX_FEATURES`] whole numbers, [`MISSING_FEATURE`] where there is none.
+/// The features of one touch: at most [`MAX_FEATURES`] whole numbers, [`MISSING_FEATURE`] where one is missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Features {
     values: [i32; MAX_FEATURES],
@@ -36,23 +47,54 @@ pub struct Features {
 }
 
 impl Features {
+    const EMPTY: Self = Self { values: [MISSING_FEATURE; MAX_FEATURES], len: 0 };
+
     /// The features in the descriptor's order.
     pub fn as_slice(&self) -> &[i32] {
         self.values.get(..usize::from(self.len)).unwrap_or(&self.values)
     }
+
+    /// Appends features; there is always room for those of a descriptor.
+    fn push<const N: usize>(&mut self, features: [i32; N]) {
+        for feature in features {
+            if let Some(slot) = self.values.get_mut(usize::from(self.len)) {
+                *slot = feature;
+                self.len += 1;
+            }
+        }
+    }
+}
+
+/// What a descriptor takes from the pose.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Frame {
+    Nothing,
+    Vertical,
+    Object,
 }
 
 impl Descriptor {
     /// Every descriptor, in the order of their codes in the model format.
-    pub const ALL: [Self; 4] = [Self::Times, Self::Curvature, Self::Gravity, Self::Oriented];
+    pub const ALL: [Self; 7] = [
+        Self::Times,
+        Self::Curvature,
+        Self::Gravity,
+        Self::Oriented,
+        Self::ContactsCurvature,
+        Self::ContactsGravity,
+        Self::ContactsOriented,
+    ];
 
-    /// The descriptor's name in files and on the command line.
+    /// The descriptor's name in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Times => "times",
             Self::Curvature => "curvature",
             Self::Gravity => "gravity",
             Self::Oriented => "oriented",
+            Self::ContactsCurvature => "contacts-curvature",
+            Self::ContactsGravity => "contacts-gravity",
+            Self::ContactsOriented => "contacts-oriented",
         }
     }
 
@@ -68,6 +110,9 @@ impl Descriptor {
             Self::Curvature => 1,
             Self::Gravity => 2,
             Self::Oriented => 3,
+            Self::ContactsCurvature => 4,
+            Self::ContactsGravity => 5,
+            Self::ContactsOriented => 6,
         }
     }
 
@@ -92,6 +137,20 @@ impl Descriptor {
                 "alignment_y",
                 "alignment_z",
             ],
+            Self::ContactsCurvature => &["pattern", "curvature", "slope", "pair"],
+            Self::ContactsGravity => &["pattern", "curvature", "slope", "pair", "direction_z", "alignment_z"],
+            Self::ContactsOriented => &[
+                "pattern",
+                "curvature",
+                "slope",
+                "pair",
+                "direction_x",
+                "direction_y",
+                "direction_z",
+                "alignment_x",
+                "alignment_y",
+                "alignment_z",
+            ],
         }
     }
 
@@ -102,43 +161,91 @@ impl Descriptor {
 
     /// Whether the features need the probe's pose; without one those features are missing.
     pub const fn needs_pose(self) -> bool {
-        matches!(self, Self::Gravity | Self::Oriented)
+        !matches!(self.frame(), Frame::Nothing)
+    }
+
+    /// Whether touches with missing contacts have features of their own: the `Contacts` forms.
+    pub const fn uses_partial_touches(self) -> bool {
+        matches!(self, Self::ContactsCurvature | Self::ContactsGravity | Self::ContactsOriented)
+    }
+
+    /// The form of this descriptor for touches with any contacts; `None` for [`Descriptor::Times`], which has none.
+    pub const fn for_contacts(self) -> Option<Self> {
+        match self {
+            Self::Times => None,
+            Self::Curvature | Self::ContactsCurvature => Some(Self::ContactsCurvature),
+            Self::Gravity | Self::ContactsGravity => Some(Self::ContactsGravity),
+            Self::Oriented | Self::ContactsOriented => Some(Self::ContactsOriented),
+        }
+    }
+
+    /// The form of this descriptor for full touches: the inverse of [`Descriptor::for_contacts`].
+    pub const fn for_full_touches(self) -> Self {
+        match self {
+            Self::ContactsCurvature => Self::Curvature,
+            Self::ContactsGravity => Self::Gravity,
+            Self::ContactsOriented => Self::Oriented,
+            _ => self,
+        }
+    }
+
+    const fn frame(self) -> Frame {
+        match self {
+            Self::Times | Self::Curvature | Self::ContactsCurvature => Frame::Nothing,
+            Self::Gravity | Self::ContactsGravity => Frame::Vertical,
+            Self::Oriented | Self::ContactsOriented => Frame::Object,
+        }
     }
 
     /// The features of a touch, clamped to ±[`FEATURE_LIMIT`].
     ///
-    /// Cost: about 50 instructions on a Cortex-M without a pose. Cannot fail.
+    /// Cost: about 60 instructions on a Cortex-M without a pose. Cannot fail.
     pub fn features(self, touch: &Touch) -> Features {
         const NONE: i32 = MISSING_FEATURE;
-        let [first, middle, last] = touch.times();
-        let (first, middle, last) = (within_limit(first), within_limit(middle), within_limit(last));
+        let [first, middle, last] = touch.times().map(within_limit);
+        let mut features = Features::EMPTY;
         if self == Self::Times {
-            return Features {
-                values: [clamp(first), clamp(middle), clamp(last), NONE, NONE, NONE, NONE, NONE],
-                len: 3,
-            };
+            features.push([clamp(first), clamp(middle), clamp(last)]);
+            return features;
         }
-        let (mut curvature, mut slope) = (NONE, NONE);
+        let (mut curvature, mut slope, mut pair) = (NONE, NONE, NONE);
         if first != NONE && last != NONE {
             slope = clamp((last - first).abs());
             if middle != NONE {
                 curvature = clamp(first - 2 * middle + last);
             }
+        } else if middle != NONE {
+            // The one outer finger that touched, if one did: the other is missing, which is the least number.
+            let outer = first.max(last);
+            if outer != NONE {
+                pair = clamp(middle - outer);
+            }
         }
-        if let (true, Some(Pose { direction, alignment })) = (self.needs_pose(), touch.pose()) {
-            let [x, y, z] = direction.map(i32::from);
-            let [u, v, w] = canonical_alignment(alignment, touch.times()).map(i32::from);
-            return match self {
-                Self::Gravity => Features { values: [curvature, slope, z, w, NONE, NONE, NONE, NONE], len: 4 },
-                _ => Features { values: [curvature, slope, x, y, z, u, v, w], len: 8 },
-            };
+        let contacts = self.uses_partial_touches();
+        if contacts {
+            features.push([touch.pattern().code().into(), curvature, slope, pair]);
+        } else {
+            features.push([curvature, slope]);
         }
-        let len = match self {
-            Self::Gravity => 4,
-            Self::Oriented => 8,
-            _ => 2,
+        let (direction, alignment) = match touch.pose() {
+            Some(pose) => {
+                let ends = if contacts { by_height } else { by_first };
+                (pose.direction.map(i32::from), oriented(pose.alignment, touch.times(), ends).map(i32::from))
+            }
+            None => ([NONE; 3], [NONE; 3]),
         };
-        Features { values: [curvature, slope, NONE, NONE, NONE, NONE, NONE, NONE], len }
+        match self.frame() {
+            Frame::Nothing => {}
+            Frame::Vertical => {
+                let ([_, _, down], [_, _, along]) = (direction, alignment);
+                features.push([down, along]);
+            }
+            Frame::Object => {
+                features.push(direction);
+                features.push(alignment);
+            }
+        }
+        features
     }
 }
 
@@ -154,25 +261,45 @@ fn clamp(value: i32) -> i32 {
     if value == MISSING_FEATURE { value } else { value.clamp(-FEATURE_LIMIT, FEATURE_LIMIT) }
 }
 
-/// The alignment counted from the finger that touched first to the one that touched last (a missing contact counts as
-/// later than any other); where both touched at once, from whichever end makes its first non-zero component positive.
-fn canonical_alignment(alignment: [i16; 3], times: [ContactTime; 3]) -> [i16; 3] {
+/// The alignment from the outer finger that touched first to the other one; a missing contact counts as later than any
+/// other. If the times do not say which end is first, `is_reversed` does.
+fn oriented(alignment: [i16; 3], times: [ContactTime; 3], is_reversed: fn([i16; 3]) -> bool) -> [i16; 3] {
     let [first, _, last] = times.map(|t| t.micros().unwrap_or(u32::MAX));
     let flip = match first.cmp(&last) {
         core::cmp::Ordering::Less => false,
         core::cmp::Ordering::Greater => true,
-        core::cmp::Ordering::Equal => alignment.into_iter().find(|&c| c != 0).is_some_and(|c| c < 0),
+        core::cmp::Ordering::Equal => is_reversed(alignment),
     };
     if flip { alignment.map(i16::saturating_neg) } else { alignment }
+}
+
+/// Makes the first component that is not zero positive. It depends on which way an object is turned about the vertical,
+/// which the models made with it have learned; hence not [`by_height`].
+fn by_first(alignment: [i16; 3]) -> bool {
+    alignment.into_iter().find(|&c| c != 0).is_some_and(|c| c < 0)
+}
+
+/// Makes the vertical component positive; of a level row the first component, from the last to the first, that is not
+/// zero. So the vertical component is the same whichever way an object is turned about the vertical.
+fn by_height(alignment: [i16; 3]) -> bool {
+    alignment.into_iter().rfind(|&c| c != 0).is_some_and(|c| c < 0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{ContactPattern, Pose};
     use std::vec::Vec;
 
     fn touch() -> Touch {
         Touch::from_micros([30_000, 0, 50_000]).with_pose(Pose { direction: [1, 2, 3], alignment: [-4, 5, 6] })
+    }
+
+    /// A touch with one finger.
+    fn alone(finger: usize) -> Touch {
+        let mut times = [ContactTime::MISSING; 3];
+        times[finger] = ContactTime::FIRST;
+        Touch::new(times)
     }
 
     #[test]
@@ -190,8 +317,11 @@ mod tests {
     fn every_descriptor_but_times_is_blind_to_mirroring() {
         let level = Touch::from_micros([7, 0, 7]).with_pose(Pose { direction: [1, 2, 3], alignment: [0, -5, 6] });
         let partial = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(9)]);
-        for descriptor in [Descriptor::Curvature, Descriptor::Gravity, Descriptor::Oriented] {
-            for touch in [touch(), level, partial] {
+        let pose = Pose { direction: [1, 2, 3], alignment: [7, 8, -9] };
+        let all =
+            [touch(), level, partial, partial.with_pose(pose), alone(1).with_pose(pose), alone(2).with_pose(pose)];
+        for descriptor in Descriptor::ALL.into_iter().filter(|&descriptor| descriptor != Descriptor::Times) {
+            for touch in all {
                 assert_eq!(descriptor.features(&touch), descriptor.features(&touch.mirrored()));
             }
         }
@@ -207,9 +337,77 @@ mod tests {
     }
 
     #[test]
+    fn contacts_begin_with_the_pattern_and_have_the_differences_that_exist() {
+        const NONE: i32 = MISSING_FEATURE;
+        let some = ContactTime::from_micros;
+        let missing = ContactTime::MISSING;
+        let cases = [
+            (touch(), ContactPattern::All, [80_000, 20_000, NONE]),
+            (Touch::new([some(5), missing, some(9)]), ContactPattern::BothOuter, [NONE, 4, NONE]),
+            (Touch::new([some(5), some(9), missing]), ContactPattern::OuterAndMiddle, [NONE, NONE, 4]),
+            (Touch::new([missing, some(5), some(9)]), ContactPattern::OuterAndMiddle, [NONE, NONE, -4]),
+            (alone(1), ContactPattern::Middle, [NONE; 3]),
+            (alone(2), ContactPattern::Outer, [NONE; 3]),
+            (Touch::new([missing; 3]), ContactPattern::None, [NONE; 3]),
+        ];
+        for (touch, pattern, [curvature, slope, pair]) in cases {
+            let expected = [i32::from(pattern.code()), curvature, slope, pair];
+            assert_eq!(Descriptor::ContactsCurvature.features(&touch).as_slice(), expected, "{pattern}");
+            for descriptor in [Descriptor::ContactsGravity, Descriptor::ContactsOriented] {
+                assert_eq!(descriptor.features(&touch).as_slice()[..4], expected, "{pattern}");
+            }
+        }
+        assert_eq!(
+            Descriptor::ContactsOriented.features(&touch()).as_slice(),
+            [5, 80_000, 20_000, NONE, 1, 2, 3, -4, 5, 6]
+        );
+        assert_eq!(Descriptor::ContactsGravity.features(&touch()).as_slice(), [5, 80_000, 20_000, NONE, 3, 6]);
+    }
+
+    #[test]
+    fn the_vertical_component_of_the_alignment_is_the_same_however_an_object_is_turned_about_the_vertical() {
+        // Half a turn about the vertical; both outer fingers touch at once, or neither does.
+        let level = Touch::from_micros([7, 0, 7]);
+        for touch in [level, alone(1), Touch::new([ContactTime::MISSING; 3])] {
+            for alignment in [[20_000, 5, 9_000], [20_000, 5, -9_000], [0, 3, -1], [-4, 0, 0]] {
+                let turned = [-alignment[0], -alignment[1], alignment[2]];
+                let pose = |alignment| touch.with_pose(Pose { direction: [0, 0, -32_767], alignment });
+                let [as_is, turned] =
+                    [alignment, turned].map(|alignment| Descriptor::ContactsGravity.features(&pose(alignment)));
+                assert_eq!(as_is, turned, "{alignment:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_alignment_points_away_from_the_only_outer_finger_that_touched() {
+        let pose = Pose { direction: [1, 2, 3], alignment: [4, 5, 6] };
+        let alignment =
+            |touch: Touch| Descriptor::ContactsOriented.features(&touch.with_pose(pose)).as_slice()[7..].to_vec();
+        assert_eq!(alignment(alone(0)), [4, 5, 6]);
+        assert_eq!(alignment(alone(2)), [-4, -5, -6]);
+    }
+
+    #[test]
+    fn every_descriptor_but_times_has_a_form_for_contacts() {
+        for descriptor in Descriptor::ALL {
+            let Some(contacts) = descriptor.for_contacts() else {
+                assert_eq!(descriptor, Descriptor::Times);
+                continue;
+            };
+            assert!(contacts.uses_partial_touches());
+            assert_eq!(contacts.for_full_touches(), descriptor.for_full_touches());
+            assert_eq!(contacts.needs_pose(), descriptor.needs_pose());
+            assert_eq!(contacts.feature_count(), descriptor.for_full_touches().feature_count() + 2);
+        }
+    }
+
+    #[test]
     fn features_are_clamped_to_what_f32_holds_exactly() {
         let slow = Touch::from_micros([0, u32::MAX - 1, 0]);
         assert_eq!(Descriptor::Curvature.features(&slow).as_slice(), [-FEATURE_LIMIT, 0]);
+        let late = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(u32::MAX - 1)]);
+        assert_eq!(Descriptor::ContactsCurvature.features(&late).as_slice()[3], -FEATURE_LIMIT);
         assert_eq!(FEATURE_LIMIT as f32 as i32, FEATURE_LIMIT);
     }
 

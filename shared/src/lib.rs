@@ -25,10 +25,14 @@
 #[cfg(test)]
 extern crate std;
 
+mod checksum;
 mod descriptor;
 pub mod format;
 pub mod link;
+mod pattern;
 mod touch;
 
+pub use checksum::checksum;
 pub use descriptor::{Descriptor, FEATURE_LIMIT, Features, MAX_FEATURES, MISSING_FEATURE};
+pub use pattern::{ContactPattern, Patterns};
 pub use touch::{ContactTime, Pose, Q15_ONE, Touch};

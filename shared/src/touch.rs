@@ -1,5 +1,7 @@
 //! What one approach of the probe yields.
 
+use crate::pattern::ContactPattern;
+
 /// When a finger first touched: whole microseconds after the first finger did, or missing when it never did.
 ///
 /// Four bytes; every bit pattern is valid, so a touch can be read from a stream without a check.
@@ -80,6 +82,16 @@ impl Touch {
         self.pose
     }
 
+    /// Which fingers touched.
+    pub fn pattern(&self) -> ContactPattern {
+        ContactPattern::of(self.times.map(|time| !time.is_missing()))
+    }
+
+    /// Microseconds between the first and the last contact; 0 with fewer than two contacts.
+    pub fn spread(&self) -> u32 {
+        self.times.iter().filter_map(|time| time.micros()).max().unwrap_or(0)
+    }
+
     /// Whether all three fingers touched.
     pub fn is_full(&self) -> bool {
         self.times.iter().all(|t| !t.is_missing())
@@ -115,6 +127,9 @@ mod tests {
         let touch = Touch::new([ContactTime::MISSING, ContactTime::from_micros(7), ContactTime::MISSING]);
         assert_eq!(touch.times().map(|t| t.micros()), [None, Some(0), None]);
         assert!(!touch.is_full() && !touch.is_empty());
+        assert_eq!((touch.pattern(), touch.spread()), (ContactPattern::Middle, 0));
+        assert_eq!(Touch::new([ContactTime::MISSING; 3]).spread(), 0);
+        assert_eq!(Touch::new([ContactTime::from_micros(9), ContactTime::MISSING, ContactTime::FIRST]).spread(), 9);
         assert!(Touch::new([ContactTime::MISSING; 3]).is_empty());
     }
 

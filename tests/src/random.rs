@@ -1,4 +1,4 @@
-//! Random ensembles and the touches that could tell them apart.
+//! Random ensembles and the touches that could distinguish them.
 
 use palpate::ensemble::{Ensemble, Node, Output, Tree};
 use palpate_shared::{ContactTime, Descriptor, Pose, Touch};
@@ -16,7 +16,7 @@ pub struct Shape {
     pub trees: usize,
     /// Their depth at most.
     pub depth: usize,
-    /// One value a leaf for each object, or one for one object.
+    /// One value per leaf for each object, or one for one object.
     pub each: bool,
     /// How many different thresholds there may be.
     pub thresholds: usize,

@@ -38,7 +38,7 @@ fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     layouts.into_iter().filter_map(|layout| compile(ensemble, &settings(layout)).ok()).collect()
 }
 
-/// The same trees over so many features of f32 values, as an imported model has them.
+/// The same trees over this many f32 features, as an imported model has them.
 fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {
         for (index, node) in tree.nodes.iter_mut().enumerate() {

@@ -8,7 +8,9 @@ use palpate::compile::{Leaf, Settings, compile};
 use palpate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 use palpate_onboard::station::Station;
-use palpate_shared::link::{Decision, Decoder, Device, Event, HostSettings, Message, TouchMessage, VerdictMessage};
+use palpate_shared::link::{
+    Decision, Decoder, Device, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
+};
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::random::{self, Shape};
 use rand::rngs::ChaCha8Rng;
@@ -89,7 +91,7 @@ fn ten_thousand_touches_give_the_hosts_verdicts_on_both_chips_and_for_both_descr
     for target in [M4F, M0] {
         for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
             let summary = parity(target, &model(descriptor, 1), 10_000, None, PATIENT, |_, _| ());
-            eprintln!("{target}, {}: {:.0} touches a second", descriptor.name(), summary.rate());
+            eprintln!("{target}, {}: {:.0} touches per second", descriptor.name(), summary.rate());
             assert_eq!((summary.touches, summary.compared, summary.differences), (10_000, 10_000, 0), "{summary:?}");
             assert_eq!((summary.chip_repeated, summary.garbled, summary.chip_garbled), (0, 0, 0), "{summary:?}");
         }
@@ -136,7 +138,7 @@ fn soak_the_emulated_chip_neither_drifts_nor_loses_a_frame() {
     let summary = parity(M4F, &model(Descriptor::Curvature, 1), touches, None, PATIENT, |_, update| {
         events += u32::from(matches!(update, Update::Event(..)));
     });
-    eprintln!("{:.0} touches a second, {summary:?}", summary.rate());
+    eprintln!("{:.0} touches per second, {summary:?}", summary.rate());
     assert_eq!((summary.touches, summary.compared, summary.differences), (touches, touches, 0), "{summary:?}");
     assert_eq!((summary.chip_repeated, summary.garbled, summary.chip_garbled, events), (0, 0, 0, 0), "{summary:?}");
 }
@@ -220,7 +222,7 @@ fn edges_on_pins_become_the_hosts_verdicts() {
         let measured = Touch::new([u32::MAX, u32::MAX, 0].map(palpate_shared::ContactTime::from_micros));
         let verdict = host.push(&measured, true).unwrap();
         expected.push(Event::Touch { touch: TouchMessage::from(&measured), verdict });
-        expected.push(Event::Fault { kind: 0, finger: 2 });
+        expected.push(Event::Fault { kind: FaultKind::Stuck, finger: 2 });
 
         let heard = run_gpio(&build("gpio", target, Some(file.path())), machine, recording.bytes, expected.len());
         for (number, (heard, expected)) in heard.iter().zip(&expected).enumerate() {
@@ -230,7 +232,7 @@ fn edges_on_pins_become_the_hosts_verdicts() {
     }
 }
 
-/// Plays a recording into the image's pins, and listens until it has told of `count` events.
+/// Plays a recording into the image's pins, and listens until it has reported `count` events.
 fn run_gpio(image: &Path, machine: &str, recording: Vec<u8>, count: usize) -> Vec<(u32, Event)> {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let mut qemu = Command::new("qemu-system-arm");
@@ -241,7 +243,7 @@ fn run_gpio(image: &Path, machine: &str, recording: Vec<u8>, count: usize) -> Ve
     let mut uart = child.stdout.take().unwrap();
     let (done, wait) = std::sync::mpsc::channel::<()>();
     let guard = std::thread::spawn(move || {
-        // Longer than a busy machine takes; without it a lost event would keep the test waiting for ever.
+        // Longer than a busy machine takes; without it a lost event would keep the test waiting forever.
         let in_time = wait.recv_timeout(Duration::from_secs(300)) != Err(RecvTimeoutError::Timeout);
         child.kill().unwrap();
         child.wait().unwrap();

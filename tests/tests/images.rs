@@ -34,7 +34,7 @@ fn image(name: &str, features: &str) -> Image {
 
 /// What an ELF file says about itself.
 struct Image {
-    /// Bytes of all sections that stand in flash.
+    /// Bytes of all sections that are in flash.
     flash: usize,
     symbols: Vec<String>,
 }

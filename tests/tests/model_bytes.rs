@@ -2,11 +2,24 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate_onboard::{Model, ModelError, Recognizer, Stopping};
-use palpate_shared::Descriptor;
-use palpate_shared::format::{HEADER_LENGTH, checksum};
+use palpate_shared::format::{Counted, HEADER_LENGTH, Trained, TrainedNoise, TrainedTouches, checksum};
+use palpate_shared::{Descriptor, Patterns};
 use palpate_tests::random::{self, Shape};
+use palpate_tests::sections::trained;
 
-/// A small model in each layout and leaf type.
+/// What half of the models state.
+const TRAINED: Trained = Trained {
+    probe: None,
+    touches: Some(TrainedTouches {
+        patterns: Patterns::ALL,
+        counted: Counted::All,
+        needs_pose: false,
+        largest_spread: 1_000_000,
+    }),
+    noise: Some(TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 0 }),
+};
+
+/// A small model in each layout and leaf type, of either version.
 fn models() -> Vec<Vec<u8>> {
     let shape = Shape {
         descriptor: Descriptor::Curvature,
@@ -24,6 +37,8 @@ fn models() -> Vec<Vec<u8>> {
             for &layout in Layout::ALL {
                 let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
                 models.push(compile(&ensemble, &settings).unwrap().bytes);
+                // The same with optional sections.
+                models.push(trained(models.last().unwrap(), &TRAINED));
             }
         }
     }
@@ -108,10 +123,10 @@ fn a_change_with_a_right_checksum_is_refused_or_can_be_walked() {
 #[test]
 fn another_version_is_refused_by_name_before_anything_else() {
     let mut bytes = models().remove(0);
-    bytes[4] = 2;
+    bytes[4] = 3;
     bytes.truncate(200);
-    assert_eq!(Model::new(&bytes).unwrap_err(), ModelError::Version(2));
-    assert!(ModelError::Version(2).to_string().contains("version 2"));
+    assert_eq!(Model::new(&bytes).unwrap_err(), ModelError::Version(3));
+    assert!(ModelError::Version(3).to_string().contains("version 3"));
 }
 
 #[test]

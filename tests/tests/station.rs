@@ -1,4 +1,4 @@
-//! A chip's whole program at the end of a link: what it says is what a recognizer of its own would say, through loading,
+//! A chip's whole program at the end of a link: its verdicts are those of a recognizer, through loading,
 //! power cuts and torn records.
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
@@ -84,9 +84,9 @@ struct Desk {
     open: bool,
     now: u64,
     rng: ChaCha8Rng,
-    /// A power cut in so many writes, on average; 0 for none.
+    /// Writes per power cut, on average; 0 for no cuts.
     cut_every: u32,
-    /// The last command that the chip executed had not been told of when the power went.
+    /// The outcome of the last executed command had not been sent when the power was cut.
     untold: bool,
     newest: Option<u32>,
 }
@@ -346,7 +346,7 @@ fn through_power_cuts_and_torn_records_no_touch_is_lost_or_doubled() {
     assert!(cuts > 100 && torn > 30, "{cuts} {torn}");
     let told: Vec<Outcome> = desk.outcomes.iter().filter(|o| matches!(o, Outcome::Verdict(_))).copied().collect();
     assert_eq!(told, verdicts);
-    assert!(!desk.outcomes.iter().any(|o| matches!(o, Outcome::Refused(_))), "loading goes on after a cut, too");
+    assert!(!desk.outcomes.iter().any(|o| matches!(o, Outcome::Refused(_))), "loading continues after a power cut");
 }
 
 /// The place of the newest record, by its counter: postcard's first number.

@@ -117,10 +117,7 @@ impl Entry {
                 Self::of(&touch, chip, at)
             }
             Update::Event(Event::Fault { kind, finger }, _) => {
-                let kind = ["stuck closed", "bouncing", "silent", "unreadable", "edges lost"]
-                    .get(usize::from(*kind))
-                    .unwrap_or(&"unknown fault");
-                let what = if *finger < 3 { format!("finger {}: {kind}", finger + 1) } else { (*kind).to_owned() };
+                let what = if *finger < 3 { format!("finger {}: {kind}", finger + 1) } else { kind.to_string() };
                 Some(Self::Fault { what })
             }
             Update::Event(..) | Update::Idle => None,

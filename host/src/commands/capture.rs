@@ -15,12 +15,12 @@ The touches go to DIR/<object>.txt: a line a touch, three contact times in secon
 finger that never touched. DIR/dataset.json says how they were made.
 
 Examples:
-  palpate capture builtin -o touches                       21,000 touches of each built-in object
-  palpate capture cup.obj bowls/ builtin -o touches        your own meshes beside them
-  palpate capture meshes/ -o touches --pose                for models that know the probe's direction
-  palpate capture meshes/ -o touches --approaches          every approach, also those that miss
-  palpate capture meshes/ -o part2 --shard 2/8             the second of eight parts of the same data set
-  palpate capture meshes/ -o touches --touches 100000000   long; if it is interrupted: the same with --resume")]
+  palpate capture builtin -o data                 21,000 touches per object
+  palpate capture cup.obj bowls/ builtin -o data  your own meshes beside them
+  palpate capture meshes/ -o data --pose          with the probe's direction
+  palpate capture meshes/ -o data --approaches    every approach, also misses
+  palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts
+  palpate capture meshes/ -o data --resume        continue an interrupted one")]
 pub(crate) struct Arguments {
     /// What to touch: `builtin` or a built-in object's name, an OBJ file, or a directory that is searched for OBJ files
     #[arg(value_name = "SOURCE", required = true)]

@@ -14,9 +14,9 @@ that another engine found, or `miss`. The output has the same lines with our tim
 direction, which is not renormalized; all numbers are rounded to the nearest f32.
 
 Examples:
-  palpate cast cup.obj casts.csv                        lines on standard output
-  palpate cast cup.obj casts.csv -o ours.csv            lines in a file, and how the times agree on standard output
-  palpate cast cup.obj casts.csv -o ours.csv --as-is    for a mesh that is already in the units of the probe")]
+  palpate cast cup.obj casts.csv              print the lines
+  palpate cast cup.obj casts.csv -o ours.csv  write them, compare the times
+  palpate cast cup.obj casts.csv --as-is      the mesh is in units of the probe")]
 pub(crate) struct Arguments {
     /// The mesh, as an OBJ file
     #[arg(value_name = "MESH.obj")]

@@ -15,7 +15,7 @@ Leaves:
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
-  palpate export ensemble.json -o strict.palpate --error-rate 0.001 --max-touches 500")]
+  palpate export ensemble.json -o strict.palpate --error-rate 0.001")]
 pub(crate) struct Arguments {
     /// Ensemble that `palpate train` saved
     ensemble: PathBuf,

@@ -13,6 +13,7 @@ mod progress;
 mod recognize;
 mod report;
 mod run;
+mod shell;
 mod train;
 mod tune;
 mod view;
@@ -87,7 +88,7 @@ commands! {
     subcommand_required = true,
     after_help = "\
 Examples:
-  palpate run                 touch, learn, compile and recognize ten built-in objects
+  palpate run                 capture, train and recognize built-in objects
   palpate run meshes/ -o out  the same for your own OBJ files
   palpate help capture        what a command does, with examples"
 )]

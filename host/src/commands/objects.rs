@@ -13,10 +13,10 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate objects -o meshes                    ten files: meshes/bowl.obj, meshes/camera.obj, ...
+  palpate objects -o meshes                    ten files: meshes/bowl.obj, ...
   palpate objects -o meshes --only fork        one of them
   palpate objects -o meshes --picture all.png  and a picture of them
-  palpate objects -o meshes --varied 7         ten of the same kinds in other proportions; seed 7
+  palpate objects -o meshes --varied 7         other proportions, from seed 7
 
 The meshes are closed, in centimeters, with z up. The same command always writes the same bytes.")]
 pub(crate) struct Arguments {

@@ -1,16 +1,17 @@
 use super::progress::Bar;
+use super::shell;
 use palpate::Result;
 use palpate::output::{print, print_json};
-use palpate::report::{self, Settings};
+use palpate::report::{self, Existing, Settings};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate report                         the built-in objects, in about ten minutes
-  palpate report --quick -o quick        the same figures from fewer touches, in half a minute
-  palpate report meshes/ -o report       your own OBJ files
-  palpate report --resume                go on where an interrupted report was")]
+  palpate report                    the built-in objects, in about ten minutes
+  palpate report --quick -o quick   fewer touches, in half a minute
+  palpate report meshes/ -o report  your own OBJ files
+  palpate report --resume           continue an interrupted report")]
 pub(crate) struct Arguments {
     /// Where objects come from: `builtin` or a built-in object's name, an OBJ file, or a directory of OBJ files
     #[arg(default_value = "builtin", value_name = "SOURCE")]
@@ -24,22 +25,52 @@ pub(crate) struct Arguments {
     /// Fewer folds, levels and touches; the same figures
     #[arg(long)]
     quick: bool,
-    /// Take what an interrupted report with the same settings and objects has measured
+    /// Measure growth and generalization too, which use built-in objects; the default for `builtin` alone
+    #[arg(long)]
+    growth: bool,
+    /// Continue an interrupted report of the same program with the same settings and objects
     #[arg(long)]
     resume: bool,
+    /// Replace results of another report or run in the same directory
+    #[arg(long)]
+    force: bool,
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { sources, output, seed, quick, resume, json } = arguments;
+    let Arguments { sources, output, seed, quick, growth, resume, force, json } = arguments;
+    let command = command(&sources, seed, quick, growth);
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
-    let written = report::full(&settings, &output, resume, &Bar::new())?;
+    let settings = Settings { command, growth: settings.growth || growth, ..settings };
+    let existing = Existing { resume, replace: force };
+    let written = report::report(&settings, &output, existing, &Bar::new())?;
     if json {
         return print_json(&written.summary);
     }
     let times = written.stages.iter().map(|(name, seconds)| format!("  {name:<18}{seconds:8.1} s\n"));
     let page = output.join("index.html");
     print(&format!("{}\n\n{}\n{}\n", written.sentence, times.collect::<String>(), page.display()))
+}
+
+/// The command that makes this report again, wherever it is written.
+fn command(sources: &[String], seed: u64, quick: bool, growth: bool) -> String {
+    let seed = seed.to_string();
+    let words = ["palpate", "report"].into_iter().chain(sources.iter().map(String::as_str)).chain(["--seed", &seed]);
+    shell::command(words.chain(quick.then_some("--quick")).chain(growth.then_some("--growth")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_of_a_report_makes_it_again() {
+        assert_eq!(command(&["builtin".into()], 1, false, false), "palpate report builtin --seed 1");
+        assert_eq!(
+            command(&["my meshes".into(), "cup.obj".into()], 2, true, true),
+            "palpate report 'my meshes' cup.obj --seed 2 --quick --growth"
+        );
+    }
 }

@@ -1,4 +1,5 @@
 use super::progress::Bar;
+use super::shell;
 use palpate::Result;
 use palpate::capture;
 use palpate::mesh::source;
@@ -9,9 +10,9 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate run                          ten built-in objects, 21,000 touches each; results in out/
-  palpate run meshes/ -o mine          your own OBJ files
-  palpate run --touches 2000           a quick look
+  palpate run                  ten built-in objects; results in out/
+  palpate run meshes/ -o mine  your own OBJ files
+  palpate run --touches 2000   a quick look
   palpate run --json | jq .ours.accuracy
 
 Written into the output directory: data/ (the touches), paper.json and ensemble.json (the full models), paper.palpate
@@ -29,18 +30,39 @@ pub(crate) struct Arguments {
     /// Seed of all that is random
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Replace results of another run in the same directory
+    #[arg(long)]
+    force: bool,
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { sources, out, touches, seed, json } = arguments;
+    let Arguments { sources, out, touches, seed, force, json } = arguments;
+    let objects = source::objects(&sources)?;
+    if !json {
+        // At once: the capture takes a while.
+        output::print(&format!(
+            "Touching {} objects {touches} times each, then training, compiling and testing two methods. Results in {}\n",
+            objects.len(),
+            out.display()
+        ))?;
+    }
     let settings = run::Settings {
         capture: capture::Settings { touches, seed, ..capture::Settings::default() },
-        command: format!("palpate run {} -o {} --touches {touches} --seed {seed}", sources.join(" "), out.display()),
+        replace: force,
+        command: shell::command(["palpate", "run"].into_iter().chain(sources.iter().map(String::as_str)).chain([
+            "-o",
+            &out.to_string_lossy(),
+            "--touches",
+            &touches.to_string(),
+            "--seed",
+            &seed.to_string(),
+        ])),
+        sources: sources.clone(),
         ..run::Settings::default()
     };
-    let summary = run::run(&source::objects(&sources)?, &settings, &out, &Bar::new())?;
+    let summary = run::run(&objects, &settings, &out, &Bar::new())?;
     if json { output::print_json(&summary) } else { output::print(&run::text(&summary, &out)) }
 }

@@ -18,7 +18,7 @@ Examples:
   palpate train data -o ensemble.json
   palpate train data -o paper.json --preset paper
   palpate train data -o small.json --rounds 20 --depth 5
-  palpate train data -o table.json --bins 64,16     few thresholds: compiles to a small, very fast table
+  palpate train data -o table.json --bins 64,16  for a small, very fast table
   palpate train data -o robust.json --noise 5ms")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled

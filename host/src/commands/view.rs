@@ -8,10 +8,10 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate view bowl -o bowl.html                      a built-in object
-  palpate view cup.obj -o cup.html                    your own mesh: is it right side out, is its scale plausible?
-  palpate view fork -o fork.html --touches 60         more touches
-  palpate view cup.obj -o cup.html --radius 0.05      with thinner fingers
+  palpate view bowl -o bowl.html                  a built-in object
+  palpate view cup.obj -o cup.html                your own mesh: right side out?
+  palpate view fork -o fork.html --touches 60     more touches
+  palpate view cup.obj -o cup.html --radius 0.05  with thinner fingers
 
 The page works in any browser, without a network. The inside of the surface is orange: a mesh that shows orange from
 outside is inside out, or has holes.")]

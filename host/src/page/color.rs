@@ -6,30 +6,69 @@
 use plotters::style::RGBColor;
 
 /// Text, axes, and what is no series.
-pub const INK: RGBColor = RGBColor(0, 0, 0);
+pub(crate) const INK: RGBColor = RGBColor(0, 0, 0);
 /// Grid lines and what should stay in the background.
-pub const GRID: RGBColor = RGBColor(221, 221, 221);
+pub(crate) const GRID: RGBColor = RGBColor(221, 221, 221);
 /// Axis text and leader lines.
-pub const GRAY: RGBColor = RGBColor(102, 102, 102);
+pub(crate) const GRAY: RGBColor = RGBColor(102, 102, 102);
 /// The paper's method, everywhere.
-pub const PAPER: RGBColor = VERMILION;
+pub(crate) const PAPER: RGBColor = VERMILION;
 /// Our method, everywhere.
-pub const OURS: RGBColor = BLUE;
+pub(crate) const OURS: RGBColor = BLUE;
 /// Okabe–Ito blue.
-pub const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub(crate) const BLUE: RGBColor = RGBColor(0, 114, 178);
 /// Okabe–Ito vermilion.
-pub const VERMILION: RGBColor = RGBColor(213, 94, 0);
+pub(crate) const VERMILION: RGBColor = RGBColor(213, 94, 0);
 /// Okabe–Ito bluish green.
-pub const GREEN: RGBColor = RGBColor(0, 158, 115);
+pub(crate) const GREEN: RGBColor = RGBColor(0, 158, 115);
 /// Okabe–Ito reddish purple.
-pub const PURPLE: RGBColor = RGBColor(204, 121, 167);
+pub(crate) const PURPLE: RGBColor = RGBColor(204, 121, 167);
 /// Okabe–Ito orange.
-pub const ORANGE: RGBColor = RGBColor(230, 159, 0);
+pub(crate) const ORANGE: RGBColor = RGBColor(230, 159, 0);
 /// Okabe–Ito sky blue.
-pub const SKY: RGBColor = RGBColor(86, 180, 233);
+pub(crate) const SKY: RGBColor = RGBColor(86, 180, 233);
+
+/// The color for text about something drawn in `color`: the same, or a darker one where that would be hard to read.
+pub(crate) fn text(color: RGBColor) -> RGBColor {
+    DARKER.iter().find(|(pale, _)| *pale == color).map_or(color, |&(_, dark)| dark)
+}
+
+/// Colors too pale for text on white, and what text has instead. `page.css` gives these, too, their counterparts on a dark
+/// ground.
+const DARKER: [(RGBColor, RGBColor); 5] = [
+    (VERMILION, RGBColor(178, 76, 0)),
+    (GREEN, RGBColor(0, 117, 85)),
+    (PURPLE, RGBColor(158, 74, 118)),
+    (ORANGE, RGBColor(138, 94, 0)),
+    (SKY, RGBColor(0, 104, 156)),
+];
 
 /// The color of the `index`-th of several series without a fixed meaning.
-pub fn series(index: usize) -> RGBColor {
+pub(crate) fn series(index: usize) -> RGBColor {
     const ORDER: [RGBColor; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
     ORDER[index % ORDER.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The contrast of a color with white, by WCAG 2.
+    fn contrast(RGBColor(r, g, b): RGBColor) -> f64 {
+        let linear = |channel: u8| match f64::from(channel) / 255.0 {
+            dark @ ..=0.04045 => dark / 12.92,
+            bright => libm::pow((bright + 0.055) / 1.055, 2.4),
+        };
+        1.05 / (0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b) + 0.05)
+    }
+
+    #[test]
+    fn text_in_charts_has_a_contrast_of_at_least_four_and_a_half_and_a_counterpart_in_the_dark() {
+        for color in [INK, GRAY, BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY].map(text) {
+            assert!(contrast(color) >= 4.5, "{color:?}: {}", contrast(color));
+            let RGBColor(r, g, b) = color;
+            let rule = format!("svg [fill=\"#{r:02X}{g:02X}{b:02X}\"]");
+            assert!(include_str!("page.css").contains(&rule), "{rule}");
+        }
+    }
 }

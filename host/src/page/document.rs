@@ -1,30 +1,37 @@
-//! The page: one HTML file with its style, script, drawings and pictures inside, so that it opens anywhere and asks the
-//! network for nothing.
+//! A page of sections: one HTML file with its style, script, drawings and pictures inside.
 
-use super::chart::Svg;
-use super::table::{Data, Table};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use super::table::{Cell, Records, Table};
+use super::{chart::Svg, html};
+use crate::error::Result;
+use crate::output::write_bytes;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, PreEscaped, html};
+use std::path::{Path, PathBuf};
+
+/// The page's style.
+pub(crate) const STYLE: &str = include_str!("page.css");
 
 /// A figure: one or more drawings side by side, with the numbers behind them.
 #[derive(Clone, Debug)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// Its anchor, and its files' stem.
-    pub id: String,
+    pub(crate) id: String,
     /// What it shows.
-    pub title: String,
+    pub(crate) title: String,
     /// What to see in it, and how it was made.
-    pub caption: String,
+    pub(crate) caption: String,
     /// The command that remakes it.
-    pub command: String,
+    pub(crate) command: String,
     /// Its drawings, at least one.
-    pub panels: Vec<Svg>,
+    pub(crate) panels: Vec<Svg>,
     /// The numbers drawn.
-    pub data: Data,
+    pub(crate) data: Records,
 }
 
 impl Figure {
-    /// All panels in one drawing on white, `columns` side by side as fit 1,160 pixels.
-    pub fn whole_svg(&self) -> Svg {
+    /// All panels in one drawing on white, in rows of at most 1,160 pixels.
+    pub(crate) fn whole_svg(&self) -> Svg {
         let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
         let (width, height) = (cell(|panel| panel.width), cell(|panel| panel.height));
         let columns = (1160 / width.max(1)).clamp(1, self.panels.len().max(1) as u32);
@@ -44,48 +51,59 @@ impl Figure {
 
 /// What a section is made of.
 #[derive(Clone, Debug)]
-pub enum Block {
+pub(crate) enum Block {
     /// A paragraph.
     Text(String),
     /// A figure.
     Figure(Figure),
     /// A table.
     Table(Table),
-    /// Small pictures with a name and a line below each: `(PNG as a data URL, name, line)`.
-    Pictures(Vec<(String, String, String)>),
+    /// Small pictures, each with a name and a line below it.
+    Pictures(Vec<Picture>),
+}
+
+/// A small picture in the page.
+#[derive(Clone, Debug)]
+pub(crate) struct Picture {
+    /// What it shows.
+    pub(crate) name: String,
+    /// The bytes of a PNG file.
+    pub(crate) png: Vec<u8>,
+    /// A few words below it.
+    pub(crate) line: String,
 }
 
 /// A heading with what belongs below it.
 #[derive(Clone, Debug)]
-pub struct Section {
+pub(crate) struct Section {
     /// Its anchor.
-    pub id: String,
+    pub(crate) id: String,
     /// Its heading.
-    pub title: String,
+    pub(crate) title: String,
     /// What it holds.
-    pub blocks: Vec<Block>,
+    pub(crate) blocks: Vec<Block>,
 }
 
 impl Section {
     /// An empty section.
-    pub fn new(id: &str, title: &str) -> Self {
+    pub(crate) fn new(id: &str, title: &str) -> Self {
         Self { id: id.to_string(), title: title.to_string(), blocks: Vec::new() }
     }
 
     /// Adds a paragraph.
-    pub fn text(&mut self, text: impl Into<String>) -> &mut Self {
+    pub(crate) fn text(&mut self, text: impl Into<String>) -> &mut Self {
         self.blocks.push(Block::Text(text.into()));
         self
     }
 
     /// Adds a figure.
-    pub fn figure(&mut self, figure: Figure) -> &mut Self {
+    pub(crate) fn figure(&mut self, figure: Figure) -> &mut Self {
         self.blocks.push(Block::Figure(figure));
         self
     }
 
     /// Adds a table.
-    pub fn table(&mut self, table: Table) -> &mut Self {
+    pub(crate) fn table(&mut self, table: Table) -> &mut Self {
         self.blocks.push(Block::Table(table));
         self
     }
@@ -93,27 +111,27 @@ impl Section {
 
 /// A whole page.
 #[derive(Clone, Debug)]
-pub struct Page {
+pub(crate) struct Page {
     /// Its title.
-    pub title: String,
+    pub(crate) title: String,
     /// One or two sentences below the title.
-    pub summary: String,
+    pub(crate) summary: String,
     /// The sections, in order.
-    pub sections: Vec<Section>,
-    /// What stands at the foot: settings and version, as name and value.
-    pub facts: Vec<(String, String)>,
-    /// Whether figures' and tables' files lie beside the page and are linked to.
-    pub files: bool,
+    pub(crate) sections: Vec<Section>,
+    /// The footer: settings and version, as name and value.
+    pub(crate) facts: Vec<(String, String)>,
+    /// Whether the files of figures and tables are written next to the page and linked.
+    pub(crate) files: bool,
 }
 
 impl Page {
     /// All figures, in order.
-    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
+    pub(crate) fn figures(&self) -> impl Iterator<Item = &Figure> {
         self.blocks().filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
     }
 
     /// All tables, in order.
-    pub fn tables(&self) -> impl Iterator<Item = &Table> {
+    pub(crate) fn tables(&self) -> impl Iterator<Item = &Table> {
         self.blocks().filter_map(|block| if let Block::Table(table) = block { Some(table) } else { None })
     }
 
@@ -122,46 +140,57 @@ impl Page {
     }
 
     /// The page as HTML.
-    pub fn html(&self) -> String {
-        html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    // The browser itself refuses whatever this page might ask the network for.
-                    meta http-equiv="Content-Security-Policy"
-                        content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
-                    // No icon, so that a browser does not ask for one.
-                    link rel="icon" href="data:,";
-                    title { (self.title) }
-                    style { (PreEscaped(include_str!("page.css"))) }
-                }
-                body {
-                    header {
-                        h1 { (self.title) }
-                        p.lead { (self.summary) }
-                        @if self.sections.len() > 2 {
-                            nav { @for section in &self.sections { a href={ "#" (section.id) } { (section.title) } " " } }
-                        }
+    pub(crate) fn html(&self) -> String {
+        let body = html! {
+            header {
+                h1 { (self.title) }
+                p.lead { (self.summary) }
+                @if self.sections.len() > 2 {
+                    nav aria-label="Sections" {
+                        @for section in &self.sections { a href={ "#section-" (section.id) } { (section.title) } " " }
                     }
-                    main {
-                        @for section in &self.sections {
-                            section id=(section.id) {
-                                h2 { (section.title) }
-                                @for block in &section.blocks { (self.block(block)) }
-                            }
-                        }
-                    }
-                    footer {
-                        dl { @for (name, value) in &self.facts { div { dt { (name) } dd { (value) } } } }
-                    }
-                    script { (PreEscaped(include_str!("page.js"))) }
                 }
             }
+            main {
+                @for section in &self.sections {
+                    // Figures and tables have anchors of their own, and some the same name.
+                    section id={ "section-" (section.id) } {
+                        h2 { (section.title) }
+                        @for block in &section.blocks { (self.block(block)) }
+                    }
+                }
+            }
+            footer {
+                dl { @for (name, value) in &self.facts { div { dt { (name) } dd { (value) } } } }
+            }
+            (html::script(include_str!("page.js")))
+        };
+        html::file(&self.title, &[STYLE], &body)
+    }
+
+    /// Writes the page to `path`, and with [`Page::files`] every figure's SVG and CSV and every table's CSV beside it.
+    /// The page comes last, each file whole or not at all. Returns what was written.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] naming the file.
+    pub(crate) fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
+        let mut written = Vec::new();
+        let mut put = |path: PathBuf, bytes: &[u8]| -> Result<()> {
+            write_bytes(&path, bytes)?;
+            written.push(path);
+            Ok(())
+        };
+        if self.files {
+            for figure in self.figures() {
+                put(path.with_file_name(format!("{}.svg", figure.id)), figure.whole_svg().text.as_bytes())?;
+                put(path.with_file_name(format!("{}.csv", figure.id)), &figure.data.csv()?)?;
+            }
+            for table in self.tables() {
+                put(path.with_file_name(format!("{}.csv", table.id)), &table.data.csv()?)?;
+            }
         }
-        .into_string()
+        put(path.to_path_buf(), self.html().as_bytes())?;
+        Ok(written)
     }
 
     fn block(&self, block: &Block) -> Markup {
@@ -189,8 +218,11 @@ impl Page {
             },
             Block::Pictures(pictures) => html! {
                 div.pictures {
-                    @for (url, name, line) in pictures {
-                        div { img src=(url) alt=(name); strong { (name) } span { (line) } }
+                    @for Picture { name, png, line } in pictures {
+                        div {
+                            img src={ "data:image/png;base64," (STANDARD.encode(png)) } alt=(name);
+                            strong { (name) } span { (line) }
+                        }
                     }
                 }
             },
@@ -211,17 +243,20 @@ impl Page {
     }
 }
 
-fn rows(data: &Data) -> Markup {
+fn rows(data: &Records) -> Markup {
     // A column reads as numbers if none of its cells is words.
     let numeric: Vec<bool> = (0..data.columns.len())
-        .map(|column| !data.rows.iter().any(|row| matches!(row[column], super::table::Cell::Text(_))))
+        .map(|column| !data.rows.iter().any(|row| matches!(row[column], Cell::Text(_))))
         .collect();
     html! {
         div.scroll {
             table {
                 thead {
                     tr { @for (name, numeric) in data.columns.iter().zip(&numeric) {
-                        th scope="col" class=[numeric.then_some("number")] { button type="button" { (name) } }
+                        // A column of row headings may have no name of its own, and then nothing to click.
+                        @if name.is_empty() { td {} } @else {
+                            th scope="col" class=[numeric.then_some("number")] { button type="button" { (name) } }
+                        }
                     } }
                 }
                 tbody {
@@ -239,12 +274,11 @@ fn rows(data: &Data) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::page::table::Cell;
 
     #[test]
     fn a_page_escapes_what_it_is_given_and_holds_everything_itself() {
         let mut section = Section::new("one", "One & only");
-        let mut data = Data::new(["name", "value"]);
+        let mut data = Records::new(["name", "value"]);
         data.push(["<b>".into(), Cell::Number(2.0, 0)]);
         section.table(Table {
             id: "t".into(),
@@ -285,7 +319,7 @@ mod tests {
             caption: String::new(),
             command: String::new(),
             panels: vec![panel; 3],
-            data: Data::default(),
+            data: Records::default(),
         };
         let whole = figure.whole_svg();
         assert_eq!((whole.width, whole.height), (1000, 200));

@@ -1,9 +1,17 @@
-//! Drawing, and nothing else: pages, tables, charts, pictures of meshes. Knows no touch and no model.
+//! Drawing, and nothing else: pages, tables, charts, pictures of meshes, 3-D scenes. Knows no touch and no model.
+//!
+//! ```text
+//! color ──► axis ──► chart ──► heat map ──► document (html) ──► a file
+//!            └─────► table ───────────────────┘
+//! mesh  ──► render: PNG        mesh, lines ──► scene: for a page of its own
+//! ```
 
-pub mod chart;
-pub mod color;
-pub mod document;
-pub mod kinds;
+pub(crate) mod axis;
+pub(crate) mod chart;
+pub(crate) mod color;
+pub(crate) mod document;
+pub(crate) mod heat_map;
+pub(crate) mod html;
 pub mod render;
-pub mod scale;
-pub mod table;
+pub(crate) mod scene;
+pub(crate) mod table;

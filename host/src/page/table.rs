@@ -1,20 +1,20 @@
 //! Tables: shown in the page with columns that sort, and written as CSV.
 
-use super::scale::number;
-use crate::error::{Error, Result};
+use super::axis::number;
+use crate::error::{PageProblem, Result};
 
 /// One cell.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Cell {
+pub(crate) enum Cell {
     /// Words.
     Text(String),
     /// A number and how many decimals are shown; CSV has all of them.
     Number(f64, usize),
     /// A number, its uncertainty, and how many decimals are shown; two columns in CSV.
     Spread(f64, f64, usize),
-    /// A share of one, shown in per cent with so many decimals; CSV has the share.
+    /// A share of one, shown as a percentage with this many decimals; CSV has the share.
     Percent(f64, usize),
-    /// A share of one and its uncertainty, shown in per cent; two columns in CSV.
+    /// A share of one and its uncertainty, shown as percentages; two columns in CSV.
     PercentSpread(f64, f64, usize),
     /// Not measured.
     Missing,
@@ -34,12 +34,12 @@ impl From<String> for Cell {
 
 impl Cell {
     /// A whole number.
-    pub fn count(value: impl TryInto<u64>) -> Self {
+    pub(crate) fn count(value: impl TryInto<u64>) -> Self {
         value.try_into().map_or(Self::Missing, |value| Self::Number(value as f64, 0))
     }
 
     /// What the page shows.
-    pub fn shown(&self) -> String {
+    pub(crate) fn shown(&self) -> String {
         match *self {
             Self::Text(ref text) => text.clone(),
             Self::Number(value, decimals) => grouped(&finite(value, decimals)),
@@ -58,7 +58,7 @@ impl Cell {
     }
 
     /// What the column sorts by, if this is a number.
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         match *self {
             Self::Number(value, _)
             | Self::Spread(value, _, _)
@@ -84,7 +84,7 @@ fn finite(value: f64, decimals: usize) -> String {
     if value.is_finite() { number(value, decimals) } else { "–".to_string() }
 }
 
-/// Thousands set apart by a thin space from 10,000 up.
+/// Groups of three digits separated by thin spaces, from 10,000 up.
 fn grouped(text: &str) -> String {
     let whole = text.find('.').unwrap_or(text.len());
     let digits = text[..whole].chars().filter(char::is_ascii_digit).count();
@@ -105,23 +105,23 @@ fn grouped(text: &str) -> String {
     out + &text[whole..]
 }
 
-/// Rows under named columns: a figure's data, or a table's.
+/// Rows under named columns: the numbers behind a figure, or a table's.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Data {
-    /// The columns' names, units in brackets.
-    pub columns: Vec<String>,
+pub(crate) struct Records {
+    /// The columns' names, units in parentheses.
+    pub(crate) columns: Vec<String>,
     /// The rows, each as long as `columns`.
-    pub rows: Vec<Vec<Cell>>,
+    pub(crate) rows: Vec<Vec<Cell>>,
 }
 
-impl Data {
+impl Records {
     /// No rows yet.
-    pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
+    pub(crate) fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
         Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }
     }
 
     /// Adds a row; one that is too short is filled with [`Cell::Missing`].
-    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
+    pub(crate) fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
         let mut row: Vec<Cell> = row.into_iter().collect();
         row.resize(self.columns.len(), Cell::Missing);
         self.rows.push(row);
@@ -131,11 +131,11 @@ impl Data {
     ///
     /// # Errors
     /// If the CSV library refuses, which it has no reason to.
-    pub fn csv(&self) -> Result<Vec<u8>> {
+    pub(crate) fn csv(&self) -> Result<Vec<u8>> {
         let spread: Vec<bool> = (0..self.columns.len())
             .map(|c| self.rows.iter().any(|row| matches!(row[c], Cell::Spread(..) | Cell::PercentSpread(..))))
             .collect();
-        let bug = |e: String| Error::data(format!("cannot write CSV: {e}"), "Report this as a bug.");
+        let bug = |reason: String| PageProblem::Csv { reason };
         let mut writer = csv::Writer::from_writer(Vec::new());
         let header = self
             .columns
@@ -151,23 +151,23 @@ impl Data {
             });
             writer.write_record(fields).map_err(|e| bug(e.to_string()))?;
         }
-        writer.into_inner().map_err(|e| bug(e.to_string()))
+        Ok(writer.into_inner().map_err(|e| bug(e.to_string()))?)
     }
 }
 
 /// A table in the page.
 #[derive(Clone, Debug)]
-pub struct Table {
+pub(crate) struct Table {
     /// Its anchor, and its file's stem.
-    pub id: String,
+    pub(crate) id: String,
     /// What it shows.
-    pub title: String,
+    pub(crate) title: String,
     /// What to see in it, and how it was made.
-    pub caption: String,
+    pub(crate) caption: String,
     /// The command that remakes it.
-    pub command: String,
+    pub(crate) command: String,
     /// Its contents.
-    pub data: Data,
+    pub(crate) data: Records,
 }
 
 #[cfg(test)]
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn csv_quotes_and_gives_uncertainties_their_own_column() {
-        let mut data = Data::new(["object", "accuracy"]);
+        let mut data = Records::new(["object", "accuracy"]);
         data.push(["a, b".into(), Cell::PercentSpread(0.75, 0.01, 1)]);
         data.push(["c".into()]);
         assert_eq!(

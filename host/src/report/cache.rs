@@ -1,18 +1,23 @@
-//! What was measured already, so that an interrupted report goes on where it was.
+//! What was already measured, so that an interrupted report can be resumed.
 //!
 //! Each stage's result is a file in the report's `.stages` directory, named after the stage and the key of everything
-//! that it depends on: settings, tool version, and the objects' meshes. Another key is another file, so no old result is
-//! ever taken for a new one.
+//! that it depends on: the settings, the objects' meshes, the program (its version and its executable's bytes), and the
+//! emulator's images. Another key is another file, so an outdated result is never reused.
 
+use super::results::json;
+use crate::chip::instructions::Chip;
 use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::output::write_json;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 const CHECKSUM: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
+
+/// Where a report keeps the results of its stages.
+pub(super) const DIRECTORY: &str = ".stages";
 
 /// Results of stages, kept in a directory.
 #[derive(Debug)]
@@ -37,7 +42,7 @@ impl Cache {
     /// # Errors
     /// [`Error::Io`] if the directory cannot be read or made.
     pub(super) fn open(directory: &Path, settings: &impl Serialize, objects: &[Object], resume: bool) -> Result<Self> {
-        let cache = Self { directory: directory.join(".stages"), key: key(settings, objects)? };
+        let cache = Self { directory: directory.join(DIRECTORY), key: key(settings, objects, &Surroundings::here())? };
         let io = |source| Error::io(&cache.directory, "keep the stages of the report", source);
         std::fs::create_dir_all(&cache.directory).map_err(io)?;
         for entry in std::fs::read_dir(&cache.directory).map_err(io)? {
@@ -51,7 +56,7 @@ impl Cache {
     }
 
     /// The result of `stage`: from its file, or measured now and written there. A file that cannot be read back is
-    /// measured anew.
+    /// measured again.
     ///
     /// # Errors
     /// What `measure` returns, or [`Error::Io`].
@@ -81,17 +86,54 @@ impl Cache {
     }
 }
 
+/// What results depend on besides settings and objects.
+#[derive(Clone, Debug, PartialEq)]
+struct Surroundings {
+    /// A checksum of the program's version and bytes.
+    program: u64,
+    /// For each emulated chip a checksum of the image that measures costs on it, where it can be measured.
+    images: Vec<Option<u64>>,
+}
+
+impl Surroundings {
+    /// Those of this process. If the program's file cannot be read, nothing is reused. Where another
+    /// program loads this library, the library is identified by its version alone.
+    fn here() -> Self {
+        let mut program = CHECKSUM.digest();
+        program.update(env!("CARGO_PKG_VERSION").as_bytes());
+        match std::env::current_exe().and_then(std::fs::read) {
+            Ok(bytes) => program.update(&bytes),
+            Err(_) => {
+                program.update(&std::process::id().to_le_bytes());
+                let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+                program.update(&now.as_nanos().to_le_bytes());
+            }
+        }
+        let image = |chip: Chip| {
+            let bytes = if chip.is_there() { std::fs::read(chip.image()).ok() } else { None };
+            bytes.map(|bytes| CHECKSUM.checksum(&bytes))
+        };
+        Self { program: program.finalize(), images: [Chip::M4F, Chip::M0Plus].map(image).to_vec() }
+    }
+}
+
 /// A checksum of all that results depend on.
-fn key(settings: &impl Serialize, objects: &[Object]) -> Result<u64> {
-    let settings = serde_json::to_vec(settings)
-        .map_err(|e| Error::data(format!("cannot write the settings as JSON: {e}"), "Report this as a bug."))?;
+fn key(settings: &impl Serialize, objects: &[Object], surroundings: &Surroundings) -> Result<u64> {
     let mut digest = CHECKSUM.digest();
-    digest.update(env!("CARGO_PKG_VERSION").as_bytes());
-    digest.update(&settings);
+    digest.update(&surroundings.program.to_le_bytes());
+    for image in &surroundings.images {
+        digest.update(&[u8::from(image.is_some())]);
+        digest.update(&image.unwrap_or(0).to_le_bytes());
+    }
+    let settings = json("settings", settings)?.to_string();
+    digest.update(&(settings.len() as u64).to_le_bytes());
+    digest.update(settings.as_bytes());
     for object in objects {
+        digest.update(&(object.name.len() as u64).to_le_bytes());
         digest.update(object.name.as_bytes());
-        digest.update(&object.mesh.vertices.len().to_le_bytes());
+        digest.update(&(object.mesh.vertices.len() as u64).to_le_bytes());
         object.mesh.vertices.iter().flatten().for_each(|c| digest.update(&c.to_le_bytes()));
+        digest.update(&(object.mesh.triangles.len() as u64).to_le_bytes());
         object.mesh.triangles.iter().flatten().for_each(|i| digest.update(&i.to_le_bytes()));
     }
     Ok(digest.finalize())
@@ -107,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_is_measured_once_and_anew_after_any_change() {
+    fn a_stage_is_measured_once_and_again_after_any_change() {
         let directory = tempfile::tempdir().unwrap();
         let measured = |settings: &str, object, resume| {
             let cache = Cache::open(directory.path(), &settings, &[object], resume).unwrap();
@@ -129,12 +171,24 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_that_failed_or_was_cut_off_is_measured_anew() {
+    fn a_stage_that_failed_or_was_cut_off_is_measured_again() {
         let directory = tempfile::tempdir().unwrap();
         let cache = Cache::open(directory.path(), &1, &[], true).unwrap();
-        assert!(cache.stage::<u32>("one", || Err(Error::data("no", "Try."))).is_err());
+        assert!(cache.stage::<u32>("one", || Err(Error::Cancelled)).is_err());
         std::fs::write(cache.path("one", "json"), b"{\"result\": 3, \"sec").unwrap();
         assert_eq!(cache.stage("one", || Ok(4)).unwrap().result, 4);
         assert_eq!(cache.stage("one", || Ok(5)).unwrap().result, 4);
+    }
+
+    #[test]
+    fn a_result_of_another_build_or_measured_without_the_emulator_is_not_reused() {
+        let surroundings = |program, image| Surroundings { program, images: vec![image, None] };
+        let key = |surroundings| super::key(&"settings", &[object(1.0)], &surroundings).unwrap();
+        let own = key(surroundings(1, Some(7)));
+        assert_eq!(own, key(surroundings(1, Some(7))));
+        for other in [surroundings(2, Some(7)), surroundings(1, None), surroundings(1, Some(8))] {
+            assert_ne!(own, key(other.clone()), "{other:?}");
+        }
+        assert_eq!(Surroundings::here(), Surroundings::here(), "the running program cannot be read");
     }
 }

@@ -1,14 +1,16 @@
-//! Calibration: whether a posterior of nine tenths is right nine times in ten.
+//! Calibration: whether an object with a posterior of 90 % is the right one nine times in ten.
 
 use super::context::{Context, compiled, compiled_f32, opened};
 use super::limit::Large;
 use super::statistics::wilson;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Confidence, Margins};
+use crate::page::axis::Axis;
+use crate::page::chart::{Chart, Mark, Shape, Stroke, Svg};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::kinds::{ReliabilityBin, reliability};
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
+use plotters::style::RGBColor;
 use serde::{Deserialize, Serialize};
 
 /// Numbers of touches looked at.
@@ -16,15 +18,30 @@ const AT: [usize; 4] = [1, 5, 10, 20];
 const BINS: usize = 10;
 const METHODS: [&str; 2] = ["paper's method", "ours"];
 
-/// What the posteriors were worth.
+/// How well calibrated the posteriors are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Calibration {
-    /// Groups an object.
+    /// Groups per object.
     pub(super) groups: usize,
     /// For each method, for each number of touches: bins.
     pub(super) bins: Vec<Vec<Vec<ReliabilityBin>>>,
     /// For each method, for each number of touches: expected calibration error.
     pub(super) error: Vec<Vec<f64>>,
+}
+
+/// A bin of a reliability diagram.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct ReliabilityBin {
+    /// Mean posterior of the best object.
+    pub(super) posterior: f64,
+    /// Share of verdicts that were right.
+    pub(super) right: f64,
+    /// Lower end of its 95 % interval.
+    pub(super) low: f64,
+    /// Upper end.
+    pub(super) high: f64,
+    /// Share of all verdicts that are in this bin.
+    pub(super) share: f64,
 }
 
 /// Tests the first fold's models on the test touches of the large capture.
@@ -36,6 +53,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Calibration> {
     let groups = if settings.quick { 500 } else { 2_000 };
     let mut result = Calibration { groups, bins: Vec::new(), error: Vec::new() };
     for candidate in [Candidate::Compiled(&paper), Candidate::Compiled(&ours)] {
+        context.check()?;
         let margins = Margins::new(candidate, &large.test)?;
         let bins = AT.iter().map(|&at| Ok(binned(&margins.confidences(at, groups, settings.seed)?)));
         let bins = bins.collect::<Result<Vec<_>>>()?;
@@ -69,16 +87,39 @@ fn expected_error(bins: &[ReliabilityBin]) -> f64 {
     bins.iter().map(|bin| bin.share * (bin.posterior - bin.right).abs()).sum()
 }
 
+/// A reliability diagram: how often verdicts with about the same posterior are right. `bins` holds for each bin the mean
+/// posterior, the share right, its 95 % interval, and the share of all verdicts in it.
+///
+/// # Errors
+/// If the chart cannot be drawn.
+fn reliability(title: &str, bins: &[ReliabilityBin], color: RGBColor) -> Result<Svg> {
+    let mut chart = Chart::new("posterior of the best object", Axis::share(), "share right", Axis::share())
+        .sized(280, 260)
+        .titled(title);
+    chart.marks.push(Mark::Line { points: vec![(0.0, 0.0), (1.0, 1.0)], color: color::GRAY, stroke: Stroke::Dashed });
+    let spread = bins.iter().map(|bin| (bin.posterior, bin.low, bin.high)).collect();
+    chart.marks.push(Mark::Spread { points: spread, color });
+    let points: Vec<(f64, f64)> = bins.iter().map(|bin| (bin.posterior, bin.right)).collect();
+    chart.marks.push(Mark::Line { points: points.clone(), color, stroke: Stroke::Thin });
+    chart.marks.push(Mark::Dots { points, color, shape: Shape::Disc });
+    for bin in bins {
+        let half = 0.008;
+        let (from, to) = ((bin.posterior - half, 0.0), (bin.posterior + half, 0.3 * bin.share));
+        chart.marks.push(Mark::Box { from, to, color: color::GRAY, opacity: 0.6 });
+    }
+    chart.svg()
+}
+
 /// The figure and the table.
 pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Section> {
     let mut section = Section::new("calibration", "Calibration");
     section.text(format!(
-        "Is an object with a posterior of 90 % the right one nine times in ten? {} groups an object from the large capture, \
+        "Is an object with a posterior of 90 % the right one nine times in ten? {} groups per object from the large capture, \
          in ten bins of the best object's posterior.",
         calibration.groups
     ));
     let mut panels = Vec::new();
-    let mut data = Data::new(["method", "touches", "posterior", "right", "low", "high", "share of groups"]);
+    let mut data = Records::new(["method", "touches", "posterior", "right", "low", "high", "share of groups"]);
     for (method, name) in METHODS.iter().enumerate() {
         let color = if method == 0 { color::PAPER } else { color::OURS };
         for (index, at) in AT.iter().enumerate() {
@@ -97,14 +138,14 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
         id: "reliability".into(),
         title: "Reliability diagrams".into(),
         caption:
-            "On the dashed line a posterior is what it says; above it the model is too modest, below it too sure. Bars \
+            "On the dashed line a posterior is the share right; above it the model is underconfident, below it overconfident. Bars \
                   are 95 % intervals (Wilson); gray columns show how many of the groups are in each bin."
                 .into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels,
         data,
     });
-    let mut data = Data::new(
+    let mut data = Records::new(
         std::iter::once("method".to_string())
             .chain(AT.iter().map(|at| format!("after {at} {}", if *at == 1 { "touch" } else { "touches" }))),
     );
@@ -116,7 +157,7 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
         id: "calibration".into(),
         title: "Expected calibration error".into(),
         caption: "The mean distance between posterior and share right, over ten bins of equal width.".into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
     });
     Ok(section)
@@ -127,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn posteriors_that_keep_their_word_have_no_error() {
+    fn posteriors_equal_to_the_share_right_have_no_error() {
         let confidences: Vec<Confidence> =
             (0..1000).map(|k| Confidence { posterior: 0.75, correct: k % 4 != 0 }).collect();
         let bins = binned(&confidences);

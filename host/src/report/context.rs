@@ -6,7 +6,7 @@ use crate::capture::{self, Sampler};
 use crate::compile;
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
-use crate::error::{Error, Result};
+use crate::error::{ReportProblem, Result};
 use crate::mesh::Object;
 use crate::mesh::builtin;
 use crate::probe::scene::Scene;
@@ -76,11 +76,7 @@ impl<'a> Context<'a> {
     /// `count` full touches of each object, and the approaches that they took.
     pub(super) fn touch(&self, count: usize, seed: u64) -> Result<Vec<(ObjectTouches, u64)>> {
         self.progress.begin("touching", Some((count * self.objects.len()) as u64));
-        let one = |(object, scene): (&Object, &Scene)| {
-            let touched = touch(scene, &object.name, count, seed);
-            progress::advance(self.progress, count as u64)?;
-            touched
-        };
+        let one = |(object, scene): (&Object, &Scene)| touch(scene, &object.name, count, seed, self.progress);
         self.objects.iter().zip(&self.scenes).map(one).collect()
     }
 
@@ -102,7 +98,7 @@ impl<'a> Context<'a> {
                 if let Ok(kept) = Ensemble::load(&path) {
                     return Ok(kept);
                 }
-                let ensemble = train::train(&self.first()?.train, settings, &())?;
+                let ensemble = self.train(&self.first()?.train, settings)?;
                 ensemble.save(&path)?;
                 Ok(ensemble)
             };
@@ -143,6 +139,16 @@ impl<'a> Context<'a> {
         .map(Vec::as_slice)
     }
 
+    /// Trains an ensemble; the context's progress is told, and may cancel it.
+    pub(super) fn train(&self, data: &Dataset, settings: &train::Settings) -> Result<Ensemble> {
+        train::train(data, settings, self.progress)
+    }
+
+    /// Stops the stage if the report was cancelled.
+    pub(super) fn check(&self) -> Result<()> {
+        progress::check(self.progress)
+    }
+
     /// How the paper's method is trained.
     pub(super) fn paper(&self) -> train::Settings {
         train::Settings { rounds: self.settings.paper_rounds, seed: self.settings.seed, ..train::Settings::paper() }
@@ -169,17 +175,31 @@ impl<'a> Context<'a> {
     }
 }
 
+/// Touches between two looks at the progress.
+const CHUNK: usize = 1_000;
+
 /// `count` full touches of a scene, and the approaches that they took.
 ///
 /// # Errors
-/// If the object cannot be touched with three fingers.
-pub(super) fn touch(scene: &Scene, name: &str, count: usize, seed: u64) -> Result<(ObjectTouches, u64)> {
+/// If the object cannot be touched with three fingers, or the report was cancelled.
+pub(super) fn touch(
+    scene: &Scene,
+    name: &str,
+    count: usize,
+    seed: u64,
+    progress: &dyn Progress,
+) -> Result<(ObjectTouches, u64)> {
     let settings = capture::Settings { seed, ..capture::Settings::default() };
     let sampler = Sampler::new(scene, name, &settings);
-    let samples: Vec<(Touch, u64)> =
-        (0..count as u64).into_par_iter().map(|index| sampler.sample(index)).collect::<Result<_>>()?;
-    let approaches = samples.iter().map(|sample| sample.1).sum();
-    let touches = samples.into_iter().map(|sample| sample.0).collect();
+    let chunk = |chunk: usize| -> Result<Vec<(Touch, u64)>> {
+        let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
+        progress::advance(progress, indices.len() as u64)?;
+        indices.map(|index| sampler.sample(index as u64)).collect()
+    };
+    let chunks: Vec<Vec<(Touch, u64)>> =
+        (0..count.div_ceil(CHUNK)).into_par_iter().map(chunk).collect::<Result<_>>()?;
+    let approaches = chunks.iter().flatten().map(|sample| sample.1).sum();
+    let touches = chunks.into_iter().flatten().map(|sample| sample.0).collect();
     Ok((ObjectTouches { name: name.into(), touches }, approaches))
 }
 
@@ -188,7 +208,8 @@ pub(super) fn compiled(ensemble: &Ensemble) -> Result<compile::Compiled> {
     compile::compile(ensemble, &compile::Settings::default())
 }
 
-fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+/// What the cell holds, made first if it holds nothing.
+pub(super) fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
     if let Some(value) = cell.get() {
         return Ok(value);
     }
@@ -204,6 +225,5 @@ pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
 
 /// A compiled model, checked.
 pub(super) fn opened(bytes: &[u8]) -> Result<Model<'_>> {
-    Model::new(bytes)
-        .map_err(|e| Error::data(format!("a model just compiled does not open: {e}"), "Report this as a bug."))
+    Model::new(bytes).map_err(|error| ReportProblem::Compiled { reason: error.to_string() }.into())
 }

@@ -1,18 +1,18 @@
 //! Speed against error: a family of compiled models, what each costs, and how good it is.
 
 use super::context::{Context, opened};
+use super::instructions::Instructions;
 use super::limit::Large;
-use super::work::Work;
 use crate::compile::{self, Leaf};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::{Candidate, Margins};
+use crate::page::axis::{Axis, short_number};
 use crate::page::chart::{Chart, Mark, Shape, Side, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::scale::{Scale, short_number};
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
 use rayon::prelude::*;
@@ -32,10 +32,10 @@ pub(super) struct Member {
     pub(super) layout: String,
     /// Size.
     pub(super) bytes: usize,
-    /// Nanoseconds a touch on this machine.
+    /// Nanoseconds per touch on this machine.
     pub(super) nanoseconds: f64,
-    /// Instructions a touch on the chips.
-    pub(super) work: Work,
+    /// Instructions per touch on the chips.
+    pub(super) instructions: Instructions,
     /// The largest difference to the ensemble's margins over the test touches, in nats.
     pub(super) margin_error: f64,
     /// What the model states.
@@ -63,11 +63,10 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
         |name: &str, ensemble: &Ensemble, leaves: &[Leaf], layouts: &[Option<compile::Layout>]| -> Result<()> {
             for &layout in layouts {
                 for &leaf in leaves {
-                    let compiled =
-                        compile::compile(ensemble, &compile::Settings { leaf, layout, ..Default::default() });
-                    // Not every ensemble fits every layout.
-                    let Ok(compiled) = compiled else { continue };
-                    members.push(member(context, large, &touches, name, ensemble, leaf, &compiled)?);
+                    context.check()?;
+                    if let Some(compiled) = fitting(ensemble, leaf, layout)? {
+                        members.push(member(context, large, &touches, name, ensemble, leaf, &compiled)?);
+                    }
                 }
             }
             Ok(())
@@ -85,7 +84,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
             // Few trees have to learn faster.
             family.eta = 0.6;
         }
-        let ensemble = train::train(&first.train, &family, &())?;
+        let ensemble = context.train(&first.train, &family)?;
         let name = format!("{rounds} trees, depth {depth}, {bins} bins");
         let layouts: &[_] = if settings.quick {
             &[None]
@@ -95,6 +94,28 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
         add(&name, &ensemble, &[Leaf::I8, Leaf::I16], layouts)?;
     }
     Ok(members)
+}
+
+/// The ensemble compiled into this layout, or into the best; none if it does not fit.
+///
+/// # Errors
+/// Whatever else is wrong with the ensemble.
+fn fitting(ensemble: &Ensemble, leaf: Leaf, layout: Option<compile::Layout>) -> Result<Option<compile::Compiled>> {
+    match compile::compile(ensemble, &compile::Settings { leaf, layout, ..compile::Settings::default() }) {
+        Ok(compiled) => Ok(Some(compiled)),
+        Err(error) if is_too_large(&error) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether an ensemble is not wrong, but fits no layout, or not the one asked for.
+fn is_too_large(error: &Error) -> bool {
+    match error {
+        Error::Data { what, .. } | Error::Argument { what, .. } => {
+            what.starts_with("the ensemble fits no layout") || what.starts_with("the ensemble does not fit the layout")
+        }
+        _ => false,
+    }
 }
 
 fn member(
@@ -118,7 +139,7 @@ fn member(
         layout: compiled.layout.name().into(),
         bytes: compiled.bytes.len(),
         nanoseconds: nanoseconds(&model, touches),
-        work: Work::of(compiled, touches)?,
+        instructions: Instructions::new(compiled, touches)?,
         margin_error: margin_error(&model, ensemble, touches),
         stated_error: f64::from(compiled.margin_error),
         at_10: curve.accuracy(10).value,
@@ -173,11 +194,17 @@ pub(super) fn section(context: &Context, members: &[Member]) -> Result<Section> 
     section.text(format!(
         "A family of models, trained on the first fold and tested on the large capture. Nanoseconds are of this machine, \
          one thread. {}",
-        members.first().map_or_else(String::new, |member| member.work.explanation())
+        members.first().map_or_else(String::new, |member| member.instructions.explanation())
     ));
     section.figure(figure(context, members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
-    section.figure(figure(context, members, "cost-time", "nanoseconds a touch, this machine", |m| m.nanoseconds)?);
-    section.figure(figure(context, members, "cost-work", "instructions a touch, Cortex-M4F", |m| m.work.m4f as f64)?);
+    section.figure(figure(context, members, "cost-time", "nanoseconds per touch, this machine", |m| m.nanoseconds)?);
+    section.figure(figure(
+        context,
+        members,
+        "cost-work",
+        &format!("instructions per touch, Cortex-M4F ({})", sources(members)[0]),
+        |m| m.instructions.m4f.number as f64,
+    )?);
     section.table(table(context, members));
     Ok(section)
 }
@@ -192,10 +219,10 @@ fn figure(
     let all = || members.iter().map(&cost);
     let low = members.iter().map(|member| member.at_10).fold(1.0, f64::min);
     let high = members.iter().map(|member| member.at_10).fold(0.0, f64::max);
-    let x = Scale::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.6);
-    let y = Scale::percent((low * 20.0).floor() / 20.0, ((high + 0.02) * 20.0).ceil() / 20.0);
+    let x = Axis::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.6);
+    let y = Axis::percent((low * 20.0).floor() / 20.0, ((high + 0.02) * 20.0).ceil() / 20.0);
     let mut chart = Chart::new(unit, x, "accuracy after 10 touches", y).sized(660, 400);
-    let mut data = Data::new(["model", "leaf", "layout", unit, "accuracy after 10 touches"]);
+    let mut data = Records::new(["model", "leaf", "layout", unit, "accuracy after 10 touches"]);
     let mut by_cost: Vec<&Member> = members.iter().collect();
     by_cost.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     let mut best = f64::NEG_INFINITY;
@@ -224,7 +251,7 @@ fn figure(
                 format!("paper, {}", member.leaf)
             } else {
                 let trees = member.name.split(',').next().unwrap_or_default();
-                // Leaves of one or two bytes hardly tell: both have the label.
+                // Leaves of one byte and of two hardly differ, so both share the label.
                 format!("{trees}, {}", member.layout)
             };
             let side =
@@ -243,23 +270,30 @@ fn figure(
     Ok(Figure {
         id: id.into(),
         title: format!("Accuracy against {unit}"),
-        caption: "Dashed: the frontier, the best that can be had for so much.".into(),
-        command: context.settings.command(),
+        caption: "Dashed: the frontier, the best accuracy up to each cost.".into(),
+        command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
     })
 }
 
+/// Where the instructions on a Cortex-M4F and on a Cortex-M0+ come from.
+fn sources(members: &[Member]) -> [&'static str; 2] {
+    members.first().map_or(["estimated"; 2], |member| {
+        [member.instructions.m4f, member.instructions.m0_plus].map(|count| count.source())
+    })
+}
+
 fn table(context: &Context, members: &[Member]) -> Table {
-    let how = members.first().map_or("modelled", |member| member.work.how());
-    let chips = ["M4F", "M0+"].map(|chip| format!("instructions, {chip} ({how})"));
-    let mut data = Data::new([
+    let [m4f, m0_plus] = sources(members);
+    let chips = [("M4F", m4f), ("M0+", m0_plus)].map(|(chip, source)| format!("instructions, {chip} ({source})"));
+    let mut data = Records::new([
         "model",
         "frontier",
         "leaf",
         "layout",
         "bytes",
-        "ns a touch",
+        "ns per touch",
         &chips[0],
         &chips[1],
         "largest margin error (nats)",
@@ -278,8 +312,8 @@ fn table(context: &Context, members: &[Member]) -> Table {
             member.layout.as_str().into(),
             Cell::count(member.bytes),
             Cell::Number(member.nanoseconds, 0),
-            Cell::count(member.work.m4f),
-            Cell::count(member.work.m0_plus),
+            Cell::count(member.instructions.m4f.number),
+            Cell::count(member.instructions.m0_plus.number),
             Cell::Number(member.margin_error, 5),
             Cell::Number(member.stated_error, 5),
             Cell::Percent(member.at_10, 1),
@@ -294,7 +328,7 @@ fn table(context: &Context, members: &[Member]) -> Table {
             "The frontier is of bytes and accuracy at ten touches; the smallest model on it has {} bytes.",
             best.first().map_or("0".into(), |member| short_number(member.bytes as f64))
         ),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
     }
 }
@@ -302,6 +336,38 @@ fn table(context: &Context, members: &[Member]) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ensemble::{Node, Output, Tree};
+    use crate::report::instructions::Count;
+
+    /// A chain of splits of curvature, `depth` of them one below the other.
+    fn chain(depth: usize, leaf: f32) -> Ensemble {
+        let mut nodes = Vec::new();
+        for k in 0..depth {
+            nodes.push(Node::Split {
+                feature: 0,
+                threshold: k as f32,
+                missing_left: true,
+                left: 2 * k + 1,
+                right: 2 * k + 2,
+            });
+            nodes.push(Node::Leaf(vec![leaf, 0.0]));
+        }
+        nodes.push(Node::Leaf(vec![0.0, leaf]));
+        Ensemble {
+            descriptor: palpate_shared::Descriptor::Curvature,
+            objects: vec!["a".into(), "b".into()],
+            base_margins: vec![0.0; 2],
+            trees: vec![Tree { nodes, output: Output::Each }],
+        }
+    }
+
+    #[test]
+    fn a_compile_error_that_is_not_about_size_is_not_taken_for_one() {
+        assert!(fitting(&chain(3, 0.5), Leaf::I16, None).unwrap().is_some());
+        assert!(fitting(&chain(9, 0.5), Leaf::I16, Some(compile::Layout::Complete)).unwrap().is_none());
+        let error = fitting(&chain(3, f32::NAN), Leaf::I16, Some(compile::Layout::Complete)).unwrap_err();
+        assert!(!is_too_large(&error), "{error}");
+    }
 
     #[test]
     fn the_frontier_holds_what_nothing_smaller_beats() {
@@ -312,7 +378,10 @@ mod tests {
             layout: String::new(),
             bytes,
             nanoseconds: 1.0,
-            work: Work { m4f: 1, m0_plus: 1, measured: true },
+            instructions: Instructions {
+                m4f: Count { number: 1, measured: true },
+                m0_plus: Count { number: 1, measured: true },
+            },
             margin_error: 0.0,
             stated_error: 0.0,
             at_10,

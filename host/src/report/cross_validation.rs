@@ -1,21 +1,21 @@
-//! Cross-validation: accuracy against the number of touches, and who is taken for whom (the paper's figures 8 and 9).
+//! Cross-validation: accuracy against the number of touches, and confusion (the paper's figures 8 and 9).
 
+use super::confusion::{self, normalized, recall_precision};
 use super::context::{Context, compiled, compiled_f32, opened};
-use super::short::method_style;
-use super::statistics::mean_deviation;
+use super::run_page::method_style;
+use super::statistics::{LEAST_GROUPS, largest_group, mean_deviation};
 use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::kinds::confusion;
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// The methods held side by side, in the order of [`Fold::methods`].
+/// The methods compared, in the order of [`Fold::methods`].
 pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 
 /// The longest groups.
@@ -28,16 +28,17 @@ pub(super) struct Fold {
     pub(super) methods: Vec<MethodFold>,
 }
 
-/// What one fold showed of one method. Accuracies are after 1, 2, … [`MOST`] touches.
+/// What one fold showed of one method. Accuracies are after 1, 2, … touches, up to [`MOST`] or to as many as still make
+/// [enough distinct groups](super::statistics::LEAST_GROUPS).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct MethodFold {
-    /// Accuracy over the paper's ten groups an object.
+    /// Accuracy over the paper's ten groups per object.
     pub(super) few: Vec<f64>,
     /// The same for each object.
     pub(super) few_of_object: Vec<Vec<f64>>,
     /// Accuracy over many groups.
     pub(super) many: Vec<f64>,
-    /// How often each object (rows) was taken for each (columns) after ten touches, over many groups.
+    /// How often each object (rows) was recognized as each (columns) after ten touches, over many groups.
     pub(super) confusion: Vec<Vec<usize>>,
     /// Seconds of training.
     pub(super) seconds: f64,
@@ -54,7 +55,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     let split = context.fold(fold)?;
     let timed = |settings: &train::Settings| -> Result<_> {
         let began = Instant::now();
-        Ok((train::train(&split.train, settings, &())?, began.elapsed().as_secs_f64()))
+        Ok((context.train(&split.train, settings)?, began.elapsed().as_secs_f64()))
     };
     let (paper, paper_seconds) =
         if fold == 0 { (context.models()?.paper.clone(), 0.0) } else { timed(&context.paper())? };
@@ -62,7 +63,8 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     let bytes = [compiled_f32(&paper)?.bytes, compiled(&ours)?.bytes];
     let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
     let settings = context.settings;
-    let most = MOST.min(split.test.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0));
+    let fewest = split.test.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
+    let most = MOST.min(largest_group(fewest));
     let tested = |candidate, seconds| -> Result<MethodFold> {
         let margins = Margins::new(candidate, &split.test)?;
         // Other folds draw other groups.
@@ -94,27 +96,6 @@ pub(super) fn shares(folds: &[Fold], method: usize) -> Vec<Vec<f64>> {
     normalized(&matrices)
 }
 
-/// The sum of matrices of counts, as shares of each row.
-pub(super) fn normalized(matrices: &[&Vec<Vec<usize>>]) -> Vec<Vec<f64>> {
-    let Some(first) = matrices.first() else { return Vec::new() };
-    let row = |row: usize| {
-        let sum = |column: usize| matrices.iter().map(|matrix| matrix[row][column]).sum::<usize>() as f64;
-        let counts: Vec<f64> = (0..first[row].len()).map(sum).collect();
-        let all = counts.iter().sum::<f64>().max(1.0);
-        counts.into_iter().map(|count| count / all).collect()
-    };
-    (0..first.len()).map(row).collect()
-}
-
-/// Recall and precision of each object, from shares of rows that count alike.
-pub(super) fn recall_precision(shares: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    let of = |object: usize| {
-        let taken: f64 = shares.iter().map(|row| row[object]).sum();
-        (shares[object][object], if taken > 0.0 { shares[object][object] / taken } else { 0.0 })
-    };
-    (0..shares.len()).map(of).collect()
-}
-
 /// The figures and tables.
 pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     let mut section = Section::new("cross-validation", "Accuracy against touches");
@@ -140,8 +121,8 @@ fn over_folds(folds: &[Fold], value: impl Fn(&Fold) -> Option<f64>) -> (f64, f64
 fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let levels = context.settings.levels();
     let mut chart =
-        Chart::new("touches", Scale::logarithmic(10.0, 120.0), "accuracy", Scale::percent(0.4, 1.0)).sized(620, 400);
-    let mut data = Data::new(["method", "touches", "accuracy", "accuracy, many groups"]);
+        Chart::new("touches", Axis::logarithmic(10.0, 120.0), "accuracy", Axis::percent(0.4, 1.0)).sized(620, 400);
+    let mut data = Records::new(["method", "touches", "accuracy", "accuracy, many groups"]);
     for (index, name) in METHODS.iter().enumerate() {
         let (color, shape) = method_style(index);
         let mut points = Vec::new();
@@ -165,11 +146,11 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
         id: "accuracy".into(),
         title: "Groups recognized, mean over folds (the paper's figure 8a)".into(),
         caption: format!(
-            "Bars are one standard deviation over folds, of {} groups an object each. The CSV also has the same over {} \
-             groups an object.",
+            "Bars are one standard deviation over folds, of {} groups per object. The CSV also has the same over {} \
+             groups per object. – stands where an object's test touches make fewer than {LEAST_GROUPS} distinct groups.",
             context.settings.groups, context.settings.many_groups
         ),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
     })
@@ -178,9 +159,9 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
 fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let levels = context.settings.levels();
     let mut panels = Vec::new();
-    let mut data = Data::new(["object", "method", "touches", "accuracy"]);
+    let mut data = Records::new(["object", "method", "touches", "accuracy"]);
     for (position, name) in context.names().iter().enumerate() {
-        let mut chart = Chart::new("touches", Scale::logarithmic(10.0, 120.0), "", Scale::share())
+        let mut chart = Chart::new("touches", Axis::logarithmic(10.0, 120.0), "", Axis::share())
             .sized(270, 200)
             .titled(name.as_str());
         for (index, method) in METHODS.iter().enumerate() {
@@ -206,7 +187,7 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
         id: "accuracy-objects".into(),
         title: "The same for each object (figure 8b)".into(),
         caption: "Mean over folds; the CSV has the standard deviations.".into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels,
         data,
     })
@@ -214,41 +195,37 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let names = context.names();
-    let mut data = Data::new(["method", "touched", "recognized as", "share"]);
+    let mut data = Records::new(["method", "touched", "recognized as", "share"]);
     let mut panels = Vec::new();
     for (index, method) in METHODS.iter().enumerate() {
         let shares = shares(folds, index);
         let color = if index == 0 { color::PAPER } else { color::OURS };
         let title = if index == 0 { "the paper's method" } else { "ours" };
-        panels.push(confusion(title, &names, &shares, color)?);
-        push_matrix(&mut data, method, &names, &shares);
+        panels.push(confusion::drawn(title, &names, &shares, color)?);
+        confusion::push_matrix(&mut data, method, &names, &shares);
     }
     Ok(Figure {
         id: "confusion".into(),
-        title: "Who is taken for whom after ten touches (figure 9)".into(),
+        title: "Which object is recognized as which after ten touches (figure 9)".into(),
         caption: format!(
-            "Per cent of the groups of an object (row) that were recognized as another (column), all folds together, {} \
-             groups an object and fold. Shares under half a per cent are blank.",
+            "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
+             groups per object and fold. Shares below half a percent are blank.",
             context.settings.many_groups
         ),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels,
         data,
     })
 }
 
-/// Adds a matrix of shares to a figure's data, a row a cell.
-pub(super) fn push_matrix(data: &mut Data, method: &str, names: &[String], shares: &[Vec<f64>]) {
-    for (touched, row) in names.iter().zip(shares) {
-        for (taken, &share) in names.iter().zip(row) {
-            data.push([method.into(), touched.as_str().into(), taken.as_str().into(), Cell::Percent(share, 1)]);
-        }
-    }
-}
-
 fn recall(context: &Context, folds: &[Fold]) -> Table {
-    let mut data =
-        Data::new(["object", "recall, paper's method", "precision, paper's method", "recall, ours", "precision, ours"]);
+    let mut data = Records::new([
+        "object",
+        "recall, paper's method",
+        "precision, paper's method",
+        "recall, ours",
+        "precision, ours",
+    ]);
     let [paper, ours] = [0, 1].map(|method| recall_precision(&shares(folds, method)));
     let percent = |value| Cell::Percent(value, 1);
     for (position, name) in context.names().into_iter().enumerate() {
@@ -267,21 +244,7 @@ fn recall(context: &Context, folds: &[Fold]) -> Table {
         id: "recall".into(),
         title: "Recall and precision after ten touches".into(),
         caption: "From the matrices above. A click on a heading sorts.".into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn recall_is_along_rows_and_precision_along_columns() {
-        let shares = normalized(&[&vec![vec![8, 2], vec![1, 9]], &vec![vec![8, 2], vec![3, 7]]]);
-        assert_eq!(shares, [[0.8, 0.2], [0.2, 0.8]]);
-        let both = recall_precision(&[vec![0.8, 0.2], vec![0.0, 1.0]]);
-        assert_eq!(both[0], (0.8, 1.0));
-        assert!((both[1].1 - 1.0 / 1.2).abs() < 1e-12);
     }
 }

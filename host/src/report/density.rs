@@ -1,14 +1,14 @@
 //! A classifier by density estimation, for descriptors of two features.
 //!
-//! Both features are taken to the scale of their ranks among all touches, where every stretch holds equally many; a change
-//! of scale multiplies all objects' densities alike, so it changes no posterior. There each object's touches are counted
+//! Both features are taken to the scale of their ranks among all touches, where every interval holds equally many; a
+//! change of scale multiplies all objects' densities by the same factor, so it changes no posterior. There each object's touches are counted
 //! into a grid and smoothed by a Gaussian kernel that is mirrored at the borders, its width the one of several that
 //! explains held-out touches best.
 //!
-//! The result is written as an [`Ensemble`] of a single tree, a leaf a cell, so that it is evaluated like any other model.
+//! The result is written as an [`Ensemble`] of a single tree with one leaf per cell, so that it is evaluated like any other model.
 
 use crate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
-use crate::error::{Error, Result};
+use crate::error::{ReportProblem, Result};
 use crate::touches::Dataset;
 use palpate_shared::Descriptor;
 use rayon::prelude::*;
@@ -17,11 +17,10 @@ use rayon::prelude::*;
 const CELLS: usize = 256;
 /// Kernel widths to choose from, in cells.
 const WIDTHS: [f64; 7] = [0.5, 0.8, 1.2, 1.8, 2.7, 4.0, 6.0];
-/// The share of every touch's evidence that no single cell may take back: densities are mixed with so much of the mean
-/// density of all objects.
+/// Densities are mixed with this share of the mean density of all objects, so that no single cell rules an object out.
 const FLOOR: f64 = 1e-3;
 
-/// Counts of touches in the cells of a grid, `rows × columns`, one grid an object.
+/// Counts of touches in the cells of a grid, `rows × columns`, one grid per object.
 struct Grids {
     rows: usize,
     columns: usize,
@@ -32,7 +31,7 @@ struct Grids {
 /// all touches.
 ///
 /// # Errors
-/// [`Error::Data`] unless the descriptor has two features.
+/// [`ReportProblem::NotTwoFeatures`].
 pub(super) fn density_model(descriptor: Descriptor, train: &Dataset, held_out: &Dataset) -> Result<(Ensemble, f64)> {
     let (train_rows, held_rows) = (rows(descriptor, train)?, rows(descriptor, held_out)?);
     let edges = [0, 1].map(|feature| edges(&train_rows, feature));
@@ -46,15 +45,15 @@ pub(super) fn density_model(descriptor: Descriptor, train: &Dataset, held_out: &
     Ok((Ensemble { descriptor, objects, base_margins, trees: vec![tree] }, best))
 }
 
-/// The features of every touch, an object a list.
+/// The features of every touch, one list per object.
 fn rows(descriptor: Descriptor, data: &Dataset) -> Result<Vec<Vec<[f32; 2]>>> {
     data.objects
         .iter()
         .map(|object| {
             let row = |touch| <[f32; 2]>::try_from(feature_row(descriptor, touch)).ok();
             object.touches.par_iter().map(row).collect::<Option<Vec<_>>>().ok_or_else(|| {
-                let what = format!("the descriptor {} has not two features", descriptor.name());
-                Error::data(what, "Estimate densities for curvature only.")
+                let features = descriptor.feature_count();
+                ReportProblem::NotTwoFeatures { descriptor: descriptor.name().into(), features }.into()
             })
         })
         .collect()
@@ -112,7 +111,7 @@ fn log_densities(grids: &Grids, width: f64) -> Vec<Vec<f64>> {
     smooth.iter().map(log).collect()
 }
 
-/// `lines` lines of `length` cells, each blurred by a Gaussian of so many cells, mirrored at both ends. Cells of a line
+/// `lines` lines of `length` cells, each blurred by a Gaussian `width` cells wide, mirrored at both ends. Cells of a line
 /// are `step` apart, lines `line_step`.
 fn blurred(cells: &[f64], lines: usize, length: usize, step: usize, line_step: usize, width: f64) -> Vec<f64> {
     let reach = (4.0 * width).ceil() as usize;
@@ -144,7 +143,7 @@ fn mirrored(place: usize, offset: i64, length: usize) -> usize {
     (if at < length { at } else { 2 * length - 1 - at }) as usize
 }
 
-/// Mean negative logarithm of the right object's posterior over held-out counts, objects counting alike.
+/// Mean negative logarithm of the right object's posterior over held-out counts, objects weighted equally.
 fn loss(logs: &[Vec<f64>], held: &Grids) -> f64 {
     let mut loss = 0.0;
     for (object, counts) in held.counts.iter().enumerate() {
@@ -200,7 +199,7 @@ mod tests {
     use crate::touches::ObjectTouches;
     use palpate_shared::Touch;
 
-    /// Two objects whose curvature lies around 0 and around 40 ms, with slopes alike.
+    /// Two objects whose curvature lies around 0 and around 40 ms, with the same slopes.
     fn data(count: u32, offset: u32) -> Dataset {
         let object = |name: &str, bend: u32| ObjectTouches {
             name: name.into(),

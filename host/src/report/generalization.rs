@@ -1,17 +1,16 @@
-//! Generalization: recognizing a fork that was never touched by what other forks felt like.
+//! Generalization: recognizing a fork that was never touched by the touches of other forks.
 
 use super::context::{Context, compiled, opened, touch};
 use super::statistics::mean_deviation;
 use crate::capture;
-use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::Object;
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Side};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data};
+use crate::page::table::{Cell, Records};
 use crate::probe::scene::Scene;
 use crate::touches::{Dataset, ObjectTouches};
 use serde::{Deserialize, Serialize};
@@ -19,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// Numbers of touches looked at.
 const AT: [usize; 2] = [10, 30];
 
-/// What training on so many instances of each kind is worth.
+/// How accurate training on a number of instances of each kind is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Instances {
     /// How many instances of each kind were trained on.
@@ -36,11 +35,11 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
     let most = settings.instances.iter().copied().max().unwrap_or(1);
     let kinds = context.kinds()?;
     let (train, test) = (&kinds[..most], &kinds[kinds.len() - settings.test_instances..]);
-    let tested = test.iter().map(|objects| touched(objects, settings.instance_touches / 4, settings.seed));
+    let tested = test.iter().map(|objects| touched(context, objects, settings.instance_touches / 4));
     let tested: Vec<Dataset> = tested.collect::<Result<_>>()?;
     // Instance k's touches, as many as training on it alone takes, and some more to test on.
     let count = settings.instance_touches;
-    let felt = train.iter().map(|objects| touched(objects, count + count / 4, settings.seed));
+    let felt = train.iter().map(|objects| touched(context, objects, count + count / 4));
     let felt: Vec<Dataset> = felt.collect::<Result<_>>()?;
 
     let of = |&instances: &usize| -> Result<Instances> {
@@ -55,7 +54,7 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
                 .collect(),
         };
         let training = gathered(&|_| (0, count / instances));
-        let ensemble = train::train(&training, &context.ours(), &())?;
+        let ensemble = context.train(&training, &context.ours())?;
         let bytes = compiled(&ensemble)?.bytes;
         let model = opened(&bytes)?;
         let accuracies = |data: &Dataset| -> Result<Vec<f64>> {
@@ -89,9 +88,12 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
     settings.instances.iter().map(of).collect()
 }
 
-fn touched(objects: &[Object], count: usize, seed: u64) -> Result<Dataset> {
+fn touched(context: &Context, objects: &[Object], count: usize) -> Result<Dataset> {
     let length = capture::Settings::default().length;
-    let one = |object: &Object| Ok(touch(&Scene::new(&object.mesh, length)?, &object.name, count, seed)?.0);
+    let one = |object: &Object| {
+        let scene = Scene::new(&object.mesh, length)?;
+        Ok(touch(&scene, &object.name, count, context.settings.seed, context.progress)?.0)
+    };
     let mut objects: Vec<ObjectTouches> = objects.iter().map(one).collect::<Result<_>>()?;
     objects.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(Dataset { objects })
@@ -103,15 +105,15 @@ pub(super) fn section(context: &Context, results: &[Instances]) -> Result<Sectio
     let mut section = Section::new("generalization", "Objects never touched");
     section.text(format!(
         "Our method was trained on some instances of each built-in kind, their proportions varied by up to a fifth, and \
-         tested on {} others of each that it never touched. The touches of a kind are as many ({}) however many \
+         tested on {} others of each that it never touched. Each kind has the same number of touches ({}), however many \
          instances share them.",
         settings.test_instances, settings.instance_touches
     ));
     let most = results.iter().map(|result| result.count as f64).fold(2.0, f64::max);
     let ticks = results.iter().map(|result| (result.count as f64, result.count.to_string())).collect();
-    let scale = Scale::logarithmic(1.0, most).with_ticks(ticks);
-    let mut chart = Chart::new("instances of each kind in training", scale, "accuracy", Scale::share()).sized(620, 400);
-    let mut data = Data::new(["instances", "touches", "accuracy, never touched", "accuracy, trained on"]);
+    let scale = Axis::logarithmic(1.0, most).with_ticks(ticks);
+    let mut chart = Chart::new("instances of each kind in training", scale, "accuracy", Axis::share()).sized(620, 400);
+    let mut data = Records::new(["instances", "touches", "accuracy, never touched", "accuracy, trained on"]);
     for (index, at) in AT.iter().enumerate() {
         let (color, shape) = [(color::OURS, Shape::Disc), (color::GREEN, Shape::Triangle)][index];
         let (mut unseen, mut spread, mut seen) = (Vec::new(), Vec::new(), Vec::new());
@@ -146,7 +148,7 @@ pub(super) fn section(context: &Context, results: &[Instances]) -> Result<Sectio
             "Solid: instances never touched. Dashed: other touches of the instances trained on. Each group of touches \
                   is of one instance."
                 .into(),
-        command: settings.command(),
+        command: settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
     });

@@ -1,17 +1,16 @@
-//! Growth: what more objects, and finer meshes, cost.
+//! Growth: what more objects and finer meshes cost.
 
 use super::context::{Context, compiled, opened, touch};
-use super::work::Work;
+use super::instructions::Instructions;
 use crate::capture;
-use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::{Mesh, Object};
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Side};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use crate::probe::scene::Scene;
 use crate::touches::Dataset;
 use crate::touches::folds;
@@ -28,7 +27,7 @@ pub(super) struct Growth {
     pub(super) triangles: Vec<Triangles>,
 }
 
-/// What so many objects cost.
+/// What a number of objects costs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Objects {
     /// How many.
@@ -39,22 +38,22 @@ pub(super) struct Objects {
     pub(super) train: f64,
     /// Bytes of the compiled model.
     pub(super) bytes: usize,
-    /// Instructions a touch on the chips.
-    pub(super) work: Work,
+    /// Instructions per touch on the chips.
+    pub(super) instructions: Instructions,
     /// Accuracy after ten touches.
     pub(super) at_10: f64,
     /// Accuracy after sixty touches.
     pub(super) at_60: f64,
 }
 
-/// What so many triangles cost.
+/// What a number of triangles costs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Triangles {
     /// How many.
     pub(super) count: usize,
     /// Seconds of building the scene and its tree.
     pub(super) build: f64,
-    /// Approaches a second, all threads.
+    /// Approaches per second, all threads.
     pub(super) approaches: f64,
 }
 
@@ -82,14 +81,14 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let began = Instant::now();
     let touched = objects.iter().map(|object| {
         let scene = Scene::new(&object.mesh, length)?;
-        Ok(touch(&scene, &object.name, settings.growth_touches, settings.seed)?.0)
+        Ok(touch(&scene, &object.name, settings.growth_touches, settings.seed, context.progress)?.0)
     });
     let mut data = Dataset { objects: touched.collect::<Result<_>>()? };
     let capture = began.elapsed().as_secs_f64();
     data.objects.sort_by(|a, b| a.name.cmp(&b.name));
     let split = folds::split(&data, 0.2, settings.seed)?;
     let began = Instant::now();
-    let ensemble = train::train(&split.train, &context.ours(), &())?;
+    let ensemble = context.train(&split.train, &context.ours())?;
     let train = began.elapsed().as_secs_f64();
     let compiled = compiled(&ensemble)?;
     let model = opened(&compiled.bytes)?;
@@ -101,7 +100,7 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
         capture,
         train,
         bytes: compiled.bytes.len(),
-        work: Work::of(&compiled, &touches)?,
+        instructions: Instructions::new(&compiled, &touches)?,
         at_10: curve.accuracy(10).value,
         at_60: curve.accuracy(60).value,
     })
@@ -114,9 +113,20 @@ fn triangles_cost(context: &Context, count: usize) -> Result<Triangles> {
     let build = began.elapsed().as_secs_f64();
     let touches = if context.settings.quick { 5_000 } else { 40_000 };
     let began = Instant::now();
-    let (_, approaches) = touch(&scene, "globe", touches, context.settings.seed)?;
+    let (_, approaches) = touch(&scene, "globe", touches, context.settings.seed, context.progress)?;
     let seconds = began.elapsed().as_secs_f64();
     Ok(Triangles { count: mesh.triangles.len(), build, approaches: approaches as f64 / seconds })
+}
+
+/// Replaces growth and generalization where they were not measured.
+pub(super) fn left_out() -> Section {
+    let mut section = Section::new("left-out", "Not measured");
+    section.text(
+        "Growth (what more objects and finer meshes cost) and generalization (recognizing objects that were never touched) \
+         are measured on built-in objects and say nothing about these. A report on other objects leaves them out unless \
+         they are asked for.",
+    );
+    section
 }
 
 /// The figures and the tables.
@@ -124,7 +134,7 @@ pub(super) fn section(context: &Context, growth: &Growth) -> Result<Section> {
     let mut section = Section::new("growth", "Growth");
     section.text(format!(
         "More objects: the ten built-in ones, then others of the same kinds with varied proportions, which are harder to \
-         tell apart; {} touches each, four fifths of them for training our method. Finer meshes: the same bumpy \
+         distinguish; {} touches each, four fifths of them for training our method. Finer meshes: the same bumpy \
          globe, cut into more and more triangles. Times are of this machine, all threads.",
         context.settings.growth_touches
     ));
@@ -139,11 +149,11 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
     let most = counts.iter().copied().fold(2.0, f64::max);
     let x = || {
         let ticks = growth.objects.iter().map(|objects| (objects.count as f64, objects.count.to_string())).collect();
-        Scale::logarithmic(2.0, most).with_ticks(ticks)
+        Axis::logarithmic(2.0, most).with_ticks(ticks)
     };
     let panel = |title: &str, unit: &str, lines: &[(&str, plotters::style::RGBColor, Shape, Vec<f64>)]| {
         let all = || lines.iter().flat_map(|line| line.3.iter().copied());
-        let y = Scale::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.4);
+        let y = Axis::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.4);
         let mut chart = Chart::new("objects", x(), unit, y).sized(370, 270).titled(title);
         for (name, color, shape, values) in lines {
             let points: Vec<(f64, f64)> = counts.iter().copied().zip(values.iter().copied()).collect();
@@ -152,7 +162,7 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
         chart.svg()
     };
     let of = |value: fn(&Objects) -> f64| growth.objects.iter().map(value).collect::<Vec<f64>>();
-    let how = how(growth);
+    let source = source(growth);
     let panels = vec![
         panel(
             "Time",
@@ -164,32 +174,33 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
         )?,
         panel("Size", "bytes", &[("model", color::OURS, Shape::Disc, of(|o| o.bytes as f64))])?,
         panel(
-            &format!("Work ({how})"),
-            "instructions a touch, M4F",
-            &[("model", color::OURS, Shape::Disc, of(|o| o.work.m4f as f64))],
+            &format!("Instructions ({source})"),
+            "instructions per touch, M4F",
+            &[("model", color::OURS, Shape::Disc, of(|o| o.instructions.m4f.number as f64))],
         )?,
     ];
     Ok(Figure {
         id: "growth-objects-figure".into(),
         title: "More objects".into(),
         caption: "All axes are logarithmic.".into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels,
         data: objects_data(growth),
     })
 }
 
-fn how(growth: &Growth) -> &'static str {
-    growth.objects.first().map_or("modelled", |objects| objects.work.how())
+/// Where the instructions come from.
+fn source(growth: &Growth) -> &'static str {
+    growth.objects.first().map_or("estimated", |objects| objects.instructions.m4f.source())
 }
 
-fn objects_data(growth: &Growth) -> Data {
-    let mut data = Data::new([
+fn objects_data(growth: &Growth) -> Records {
+    let mut data = Records::new([
         "objects",
         "capture (s)",
         "training (s)",
         "bytes",
-        &format!("instructions, M4F ({})", how(growth)),
+        &format!("instructions, M4F ({})", source(growth)),
         "accuracy at 10",
         "accuracy at 60",
     ]);
@@ -199,7 +210,7 @@ fn objects_data(growth: &Growth) -> Data {
             Cell::Number(objects.capture, 2),
             Cell::Number(objects.train, 2),
             Cell::count(objects.bytes),
-            Cell::count(objects.work.m4f),
+            Cell::count(objects.instructions.m4f.number),
             Cell::Percent(objects.at_10, 1),
             Cell::Percent(objects.at_60, 1),
         ]);
@@ -211,8 +222,8 @@ fn objects_table(context: &Context, growth: &Growth) -> Table {
     Table {
         id: "growth-objects".into(),
         title: "More objects, in numbers".into(),
-        caption: "Accuracy is over all objects: beyond ten, a fork has other forks to be taken for.".into(),
-        command: context.settings.command(),
+        caption: "Accuracy is over all objects: beyond ten, a fork can be mistaken for another fork.".into(),
+        command: context.settings.command.clone(),
         data: objects_data(growth),
     }
 }
@@ -220,8 +231,8 @@ fn objects_table(context: &Context, growth: &Growth) -> Table {
 fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {
     let most = growth.triangles.iter().map(|t| t.count as f64).fold(1e4, f64::max);
     let least = growth.triangles.iter().map(|t| t.count as f64).fold(most, f64::min);
-    let x = || Scale::logarithmic(least * 0.8, most * 1.2);
-    let mut data = Data::new(["triangles", "building (s)", "approaches a second"]);
+    let x = || Axis::logarithmic(least * 0.8, most * 1.2);
+    let mut data = Records::new(["triangles", "building (s)", "approaches per second"]);
     let (mut fast, mut build) = (Vec::new(), Vec::new());
     for triangles in &growth.triangles {
         fast.push((triangles.count as f64, triangles.approaches));
@@ -234,10 +245,10 @@ fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {
     }
     let panel = |title: &str, unit: &str, color, points: Vec<(f64, f64)>| {
         let y = || points.iter().map(|point| point.1);
-        let scale = Scale::logarithmic(y().fold(f64::INFINITY, f64::min) * 0.5, y().fold(0.0, f64::max) * 2.0);
+        let scale = Axis::logarithmic(y().fold(f64::INFINITY, f64::min) * 0.5, y().fold(0.0, f64::max) * 2.0);
         let mut chart = Chart::new("triangles", x(), unit, scale).sized(420, 270).titled(title);
         for &at in &points {
-            let text = crate::page::scale::short_number(at.1);
+            let text = crate::page::axis::short_number(at.1);
             chart.marks.push(Mark::Text { at, text, color: color::INK, side: Side::Above });
         }
         chart.series("", color, Shape::Disc, &points);
@@ -248,12 +259,12 @@ fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {
         id: "growth-triangles".into(),
         title: "Finer meshes".into(),
         caption:
-            "Approaches a second, full touches and failed ones together, all threads; seconds to scale the mesh and \
+            "Approaches per second, full touches and failed ones together, all threads; seconds to scale the mesh and \
                   build its tree."
                 .into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels: vec![
-            panel("Speed", "approaches a second", color::OURS, fast)?,
+            panel("Speed", "approaches per second", color::OURS, fast)?,
             panel("Building", "seconds", color::GREEN, build)?,
         ],
         data,

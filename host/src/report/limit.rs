@@ -7,11 +7,11 @@ use crate::ensemble::Ensemble;
 use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Descriptor;
 use serde::{Deserialize, Serialize};
@@ -28,13 +28,13 @@ pub(super) struct Limit {
     pub(super) captured: usize,
     /// Of these, tested on.
     pub(super) tested: usize,
-    /// Groups an object.
+    /// Groups per object.
     pub(super) groups: usize,
     /// Kernel width of the density estimate, in cells.
     pub(super) width: f64,
     /// All candidates on the same groups.
     pub(super) candidates: Vec<Measured>,
-    /// Index of the limit among them: the best of those trained on the whole capture, or ours should it be better.
+    /// Index of the limit among them: the best of those trained on the whole capture, or ours if it is better.
     pub(super) best: usize,
 }
 
@@ -65,7 +65,7 @@ pub(super) struct Large {
     pub(super) test: Dataset,
 }
 
-/// Captures anew, with another seed than the folds' touches.
+/// Captures again, with another seed than that of the folds' touches.
 pub(super) fn large(context: &Context) -> Result<Large> {
     let count = context.settings.limit_touches;
     let touched = context.touch(count, context.settings.seed.wrapping_add(0x11_1117))?;
@@ -105,8 +105,8 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let halved = half(&large.train);
     let (density, width) = density_model(Descriptor::Curvature, &large.train, &large.held)?;
     let (density_half, _) = density_model(Descriptor::Curvature, &halved, &large.held)?;
-    let ensemble = train::train(&large.train, &large_ensemble, &())?;
-    let ensemble_half = train::train(&halved, &large_ensemble, &())?;
+    let ensemble = context.train(&large.train, &large_ensemble)?;
+    let ensemble_half = context.train(&halved, &large_ensemble)?;
     let models = context.models()?;
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
     let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
@@ -161,17 +161,17 @@ impl Limit {
 pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
     let mut section = Section::new("limit", "The limit");
     section.text(format!(
-        "How well could any classifier do? {} full touches of each object were captured afresh. On 85 % of them a large \
+        "How well could any classifier do? {} full touches of each object were captured separately. On 85 % of them a large \
          ensemble was trained ({} multi-output trees of depth 7), and the density of each object's touches over the two \
          features of the curvature descriptor was estimated (a grid of 256 × 256 ranks, smoothed by a Gaussian kernel \
          {:.1} cells wide, mirrored at the borders, the width chosen on 5 % held out). The limit is the better of the \
-         two (or our own model, should it be better than both), here: {}, on groups from the remaining 10 %. Doubling the \
+         two (or our own model, if it is better than both), here: {}, on groups from the remaining 10 %. Doubling the \
          capture changed the estimate by {} points at ten touches.",
         limit.captured,
         context.settings.limit_rounds,
         limit.width,
         limit.candidates[limit.best].name,
-        crate::page::scale::number(limit.doubling() * 100.0, 2)
+        crate::page::axis::number(limit.doubling() * 100.0, 2)
     ));
     section.text(
         "The limit holds for the paper's descriptor too: the row of fingers is rolled at random, so a touch and its mirror \
@@ -184,8 +184,8 @@ pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
 
 fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
     let mut chart =
-        Chart::new("touches", Scale::logarithmic(1.0, MOST as f64), "accuracy", Scale::share()).sized(620, 400);
-    let mut data = Data::new(["model", "touches", "accuracy"]);
+        Chart::new("touches", Axis::logarithmic(1.0, MOST as f64), "accuracy", Axis::share()).sized(620, 400);
+    let mut data = Records::new(["model", "touches", "accuracy"]);
     for candidate in &limit.candidates {
         for (index, &accuracy) in candidate.curve.iter().enumerate() {
             data.push([candidate.name.as_str().into(), Cell::count(index + 1), Cell::Percent(accuracy, 2)]);
@@ -202,8 +202,8 @@ fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
     Ok(Figure {
         id: "limit-curves".into(),
         title: "Accuracy against touches, and the best possible".into(),
-        caption: format!("{} groups an object, the same for all.", limit.groups),
-        command: context.settings.command(),
+        caption: format!("{} groups per object, the same for all.", limit.groups),
+        command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
     })
@@ -211,7 +211,7 @@ fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
 
 fn table(context: &Context, limit: &Limit) -> Table {
     let columns = AT.iter().map(|n| format!("at {n}"));
-    let mut data = Data::new(
+    let mut data = Records::new(
         std::iter::once("model".to_string())
             .chain(columns)
             .chain(["behind the limit at 10 (points)".into(), "95 % interval".into()]),
@@ -220,7 +220,7 @@ fn table(context: &Context, limit: &Limit) -> Table {
         let (gap, low, high) = limit.gap_at_10(index);
         let name = if index == limit.best { format!("{} (the limit)", candidate.name) } else { candidate.name.clone() };
         let accuracies = AT.iter().map(|&n| Cell::Percent(candidate.curve[n - 1], 1));
-        let [low, high] = [low, high].map(|value| crate::page::scale::number(value * 100.0, 1));
+        let [low, high] = [low, high].map(|value| crate::page::axis::number(value * 100.0, 1));
         let interval = if index == limit.best { Cell::Missing } else { format!("{low} to {high}").into() };
         data.push(std::iter::once(name.into()).chain(accuracies).chain([Cell::Number(gap * 100.0, 1), interval]));
     }
@@ -228,12 +228,12 @@ fn table(context: &Context, limit: &Limit) -> Table {
         id: "limit".into(),
         title: "Gaps to the limit".into(),
         caption: format!(
-            "Accuracies on the same {} groups an object; gaps are paired over groups. One standard error of an accuracy \
+            "Accuracies on the same {} groups per object; gaps are paired over groups. One standard error of an accuracy \
              is at most {} points.",
             limit.groups,
-            crate::page::scale::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
+            crate::page::axis::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
         ),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
     }
 }

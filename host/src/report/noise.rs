@@ -1,17 +1,16 @@
 //! Noise on contact times: signal-to-noise ratio, accuracy and confusion (the paper's figures 10 to 13).
 
+use super::confusion::{self, normalized, push_matrix};
 use super::context::{Context, Models, NOISE, compiled, compiled_f32, opened};
-use super::cross_validation::{normalized, push_matrix};
-use super::statistics::{mean_deviation, savitzky_golay};
+use super::statistics::{mean_deviation, savitzky_golay, wilson};
 use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::kinds::confusion;
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data};
+use crate::page::table::{Cell, Records};
 use crate::touches::folds::Split;
 use crate::touches::noise;
 use crate::touches::{Dataset, ObjectTouches};
@@ -23,7 +22,7 @@ pub(super) const METHODS: [&str; 3] = ["paper", "ours", "ours, trained for noise
 const COLORS: [RGBColor; 3] = [color::PAPER, color::OURS, color::GREEN];
 const SHAPES: [Shape; 3] = [Shape::Ring, Shape::Disc, Shape::Triangle];
 
-/// What one fold showed, one entry a method and noise level.
+/// What one fold showed, one entry per method and noise level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Fold {
     /// For each of [`METHODS`], for each level: accuracy after ten touches of each object.
@@ -44,7 +43,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     if fold == 0 {
         return tested(context, fold, &split, context.models()?);
     }
-    let train = |settings: &train::Settings| train::train(&split.train, settings, &());
+    let train = |settings: &train::Settings| context.train(&split.train, settings);
     let models = Models {
         paper: train(&context.paper())?,
         ours: train(&context.ours())?,
@@ -62,6 +61,7 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
     // Noise that no training saw: training uses the seed itself.
     let seed = settings.seed.wrapping_add(1_000 + fold as u64);
     for deviation in settings.deviations() {
+        context.check()?;
         let test = noisy(&split.test, deviation, seed);
         for (method, candidate) in candidates.into_iter().enumerate() {
             let margins = Margins::new(candidate, &test)?;
@@ -83,7 +83,7 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
     Ok(result)
 }
 
-/// A data set with noise of so many milliseconds.
+/// A data set with noise of `deviation` milliseconds.
 fn noisy(data: &Dataset, deviation: f64, seed: u64) -> Dataset {
     let one = |object: &ObjectTouches| ObjectTouches {
         name: object.name.clone(),
@@ -108,7 +108,7 @@ pub(super) fn accuracy_at(context: &Context, folds: &[Fold], method: usize, devi
     mean_deviation(&folds.iter().map(right).collect::<Vec<_>>())
 }
 
-/// The signal-to-noise ratio in decibels of one object's touches under noise of so many milliseconds: the signal of a
+/// The signal-to-noise ratio in decibels of one object's touches under noise of `deviation` milliseconds: the signal of a
 /// touch is the sum of its three contact times, and its noise the sum of three independent ones; powers are means of
 /// squares over touches.
 fn signal_to_noise(object: &ObjectTouches, deviation: f64) -> f64 {
@@ -126,7 +126,7 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     section.text(format!(
         "Gaussian noise was added to each contact time independently, then the earliest time subtracted, so that the \
          first contact is 0 again. {} and {} were trained on clean touches, as in the paper; the third was trained on \
-         touches with noise of 5 ms (palpate train --noise 5ms). {} test touches an object and fold, {} folds.",
+         touches with noise of 5 ms. {} test touches per object and fold, {} folds.",
         "The paper's method",
         "ours",
         context.settings.touches / context.settings.folds,
@@ -142,7 +142,7 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
 fn signal(context: &Context) -> Result<Figure> {
     let captured = context.captured()?;
     let deviations: Vec<f64> = context.settings.deviations().into_iter().filter(|&d| d > 0.0).collect();
-    let mut data = Data::new(["object", "noise (ms)", "signal-to-noise ratio (dB)"]);
+    let mut data = Records::new(["object", "noise (ms)", "signal-to-noise ratio (dB)"]);
     let mut lines = Vec::new();
     for object in &captured.data.objects {
         let points: Vec<(f64, f64)> = deviations.iter().map(|&d| (d, signal_to_noise(object, d))).collect();
@@ -155,9 +155,9 @@ fn signal(context: &Context) -> Result<Figure> {
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     let mut chart = Chart::new(
         "standard deviation of the noise (ms)",
-        Scale::linear(0.0, 10.0, 5),
+        Axis::linear(0.0, 10.0, 5),
         "signal-to-noise ratio (dB)",
-        Scale::linear((low / 5.0).floor() * 5.0, (high / 5.0).ceil() * 5.0, 6),
+        Axis::linear((low / 5.0).floor() * 5.0, (high / 5.0).ceil() * 5.0, 6),
     )
     .sized(620, 400);
     for (index, (name, points)) in lines.iter().enumerate() {
@@ -170,7 +170,7 @@ fn signal(context: &Context) -> Result<Figure> {
         caption: "The signal of a touch is the sum of its three contact times; the ratio is of mean squares, over all \
                   captured touches."
             .into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
     })
@@ -185,14 +185,18 @@ fn over_levels(context: &Context, folds: &[Fold], method: usize, of: impl Fn(&[f
     context.settings.deviations().into_iter().enumerate().map(mean).collect()
 }
 
-/// A smoothed curve at the same places: cubic, over eleven levels.
-fn smoothed(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+/// A smoothed curve at the same places: cubic, over eleven levels. It stays within the 95 % interval of what was measured
+/// in `trials` groups, so that it never denies a steep fall that was measured.
+fn smoothed(points: &[(f64, f64)], trials: usize) -> Vec<(f64, f64)> {
     let values: Vec<f64> = points.iter().map(|point| point.1).collect();
     let half = 5.min((points.len().max(1) - 1) / 2);
     points
         .iter()
         .zip(savitzky_golay(&values, half, 3.min(half)))
-        .map(|(point, y)| (point.0, y.clamp(0.0, 1.0)))
+        .map(|(&(x, share), y)| {
+            let (low, high) = wilson(share * trials as f64, trials as f64);
+            (x, y.clamp(low, high))
+        })
         .collect()
 }
 
@@ -203,14 +207,15 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let (low, high) = (all().fold(1.0, f64::min), all().fold(0.0, f64::max));
     let mut chart = Chart::new(
         "standard deviation of the noise (ms)",
-        Scale::linear(0.0, 10.0, 5),
+        Axis::linear(0.0, 10.0, 5),
         "accuracy after 10 touches",
-        Scale::percent((low * 10.0 - 0.5).floor() / 10.0, ((high * 10.0 + 0.5).ceil() / 10.0).min(1.0)),
+        Axis::percent((low * 10.0 - 0.5).floor() / 10.0, ((high * 10.0 + 0.5).ceil() / 10.0).min(1.0)),
     )
     .sized(660, 400);
-    let mut data = Data::new(["method", "noise (ms)", "accuracy", "smoothed"]);
+    let mut data = Records::new(["method", "noise (ms)", "accuracy", "smoothed"]);
     for ((method, name), raw) in METHODS.iter().enumerate().zip(raws) {
-        let smooth = smoothed(&raw);
+        let trials = context.settings.many_groups * folds.len() * context.objects.len();
+        let smooth = smoothed(&raw, trials);
         for (point, smooth) in raw.iter().zip(&smooth) {
             let row = [Cell::Number(point.0, 2), Cell::Percent(point.1, 1), Cell::Percent(smooth.1, 1)];
             data.push(std::iter::once((*name).into()).chain(row));
@@ -221,23 +226,26 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
     Ok(Figure {
         id: "noise".into(),
         title: "Accuracy after ten touches against noise, over all objects (figure 12)".into(),
-        caption: "Points are measured; lines are smoothed by a cubic Savitzky–Golay filter over eleven levels.".into(),
-        command: context.settings.command(),
+        caption:
+            "Points are measured; lines are smoothed by a cubic Savitzky–Golay filter over eleven levels, within the \
+                  95 % interval (Wilson) of each point."
+                .into(),
+        command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
     })
 }
 
 fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
-    let mut data = Data::new(["object", "method", "noise (ms)", "accuracy", "smoothed"]);
+    let mut data = Records::new(["object", "method", "noise (ms)", "accuracy", "smoothed"]);
     let mut panels = Vec::new();
     for (position, name) in context.names().iter().enumerate() {
-        let mut chart = Chart::new("noise (ms)", Scale::linear(0.0, 10.0, 5), "", Scale::share())
+        let mut chart = Chart::new("noise (ms)", Axis::linear(0.0, 10.0, 5), "", Axis::share())
             .sized(280, 200)
             .titled(name.as_str());
         for (method, label) in ["paper", "ours", "for noise"].into_iter().enumerate() {
             let raw = over_levels(context, folds, method, |objects| objects[position]);
-            let smooth = smoothed(&raw);
+            let smooth = smoothed(&raw, context.settings.many_groups * folds.len());
             for (point, smooth) in raw.iter().zip(&smooth) {
                 data.push([
                     name.as_str().into(),
@@ -257,7 +265,7 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
         id: "noise-objects".into(),
         title: "The same for each object (figure 11)".into(),
         caption: "Thin lines are measured, thick ones smoothed.".into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels,
         data,
     })
@@ -265,19 +273,19 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let names = context.names();
-    let mut data = Data::new(["method", "touched", "recognized as", "share"]);
+    let mut data = Records::new(["method", "touched", "recognized as", "share"]);
     let mut panels = Vec::new();
     for (method, name) in METHODS.iter().enumerate() {
         let matrices: Vec<&Vec<Vec<usize>>> = folds.iter().map(|fold| &fold.confusion[method]).collect();
         let shares = normalized(&matrices);
-        panels.push(confusion(name, &names, &shares, COLORS[method])?);
+        panels.push(confusion::drawn(name, &names, &shares, COLORS[method])?);
         push_matrix(&mut data, name, &names, &shares);
     }
     Ok(Figure {
         id: "noise-confusion".into(),
-        title: "Who is taken for whom after ten touches with noise of 5 ms (figure 13)".into(),
-        caption: "Per cent of an object's groups (row) that were recognized as another (column).".into(),
-        command: context.settings.command(),
+        title: "Which object is recognized as which after ten touches with noise of 5 ms (figure 13)".into(),
+        caption: "Percentage of an object's groups (row) that were recognized as another (column).".into(),
+        command: context.settings.command.clone(),
         panels,
         data,
     })
@@ -287,6 +295,18 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
 mod tests {
     use super::*;
     use palpate_shared::Touch;
+
+    #[test]
+    fn a_smoothed_line_does_not_say_85_percent_where_93_were_measured() {
+        // A model that collapses under the least noise.
+        let measured: Vec<(f64, f64)> =
+            (0..41).map(|k| (f64::from(k) / 4.0, if k == 0 { 0.93 } else { 0.55 - f64::from(k) / 500.0 })).collect();
+        let smooth = smoothed(&measured, 30_000);
+        for (measured, smooth) in measured.iter().zip(&smooth) {
+            assert!((measured.1 - smooth.1).abs() < 0.006, "{measured:?} {smooth:?}");
+        }
+        assert!((smoothed(&measured, 4)[0].1 - 0.93).abs() > 0.05, "the filter itself smooths more than that");
+    }
 
     #[test]
     fn the_ratio_falls_by_six_decibels_when_noise_doubles() {

@@ -1,15 +1,14 @@
 //! The objects and their curvature (the paper's figures 5 and 6).
 
 use super::context::Context;
-use super::short::{Picture, shown};
 use super::statistics::{density, quantile};
 use crate::error::Result;
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
-use crate::page::document::{Block, Figure, Section};
+use crate::page::document::{Block, Figure, Picture, Section};
 use crate::page::render;
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use palpate_shared::Touch;
 
 /// The figure of the objects, that of their curvature, and a table of what capturing took.
@@ -19,11 +18,11 @@ pub(super) fn section(context: &Context) -> Result<Section> {
     let touches = context.settings.touches;
     let pictures = context.objects.iter().zip(&captured.approaches).map(|(object, &approaches)| {
         let line = format!("{:.1} % of approaches are full touches", 100.0 * touches as f64 / approaches.max(1) as f64);
-        shown(&Picture { name: object.name.clone(), png: render::thumbnail(&object.mesh, 240), line })
+        Picture { name: object.name.clone(), png: render::thumbnail(&object.mesh, 240), line }
     });
     section.blocks.push(Block::Pictures(pictures.collect()));
     section.figure(densities(context)?);
-    let mut data = Data::new(["object", "triangles", "full touches", "approaches", "share of full touches"]);
+    let mut data = Records::new(["object", "triangles", "full touches", "approaches", "share of full touches"]);
     for (object, &approaches) in context.objects.iter().zip(&captured.approaches) {
         data.push([
             object.name.as_str().into(),
@@ -38,10 +37,10 @@ pub(super) fn section(context: &Context) -> Result<Section> {
         title: "What was captured".into(),
         caption: format!(
             "An approach is a full touch when all three fingers touch. Each object's longest side is 10 units; fingers \
-                  of radius 0.15 are 1.5 apart and move at 10 units a second. This capture took {:.1} s.",
+                  of radius 0.15 are 1.5 apart and move at 10 units per second. This capture took {:.1} s.",
             captured.seconds
         ),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
     });
     Ok(section)
@@ -60,7 +59,7 @@ fn densities(context: &Context) -> Result<Figure> {
     // The middle nine tenths of every object fit.
     let ends = values.iter().flat_map(|values| [quantile(values, 0.05).abs(), quantile(values, 0.95).abs()]);
     let reach = ends.fold(1.0, f64::max).min(400.0);
-    let mut data = Data::new(["object", "curvature (ms)", "density (1/ms)"]);
+    let mut data = Records::new(["object", "curvature (ms)", "density (1/ms)"]);
     let mut panels = Vec::new();
     for (object, values) in captured.data.objects.iter().zip(&values) {
         let curve = density(values, -reach, reach, 241);
@@ -68,8 +67,8 @@ fn densities(context: &Context) -> Result<Figure> {
         for (value, density) in &curve {
             data.push([object.name.as_str().into(), Cell::Number(*value, 2), Cell::Number(*density, 6)]);
         }
-        let y = Scale::linear(0.0, top * 1.05, 3).without_grid().with_ticks(Vec::new());
-        let mut chart = Chart::new("curvature κ (ms)", Scale::linear(-reach, reach, 4), "", y)
+        let y = Axis::linear(0.0, top * 1.05, 3).without_grid().with_ticks(Vec::new());
+        let mut chart = Chart::new("curvature κ (ms)", Axis::linear(-reach, reach, 4), "", y)
             .sized(270, 180)
             .titled(object.name.as_str());
         chart.marks.push(Mark::Area { points: curve.clone(), base: 0.0, color: color::OURS, opacity: 0.25 });
@@ -84,7 +83,7 @@ fn densities(context: &Context) -> Result<Figure> {
                   bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface; to its right the \
                   surface is bent toward the probe, to its left away from it."
             .into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels,
         data,
     })

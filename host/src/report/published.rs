@@ -1,12 +1,13 @@
-//! The paper's own numbers beside ours.
+//! The published numbers compared with ours.
 
+use super::confusion::recall_precision;
 use super::context::Context;
-use super::cross_validation::{Fold, accuracies, recall_precision, shares};
+use super::cross_validation::{Fold, accuracies, shares};
 use super::limit::{self, Limit};
 use super::noise;
 use super::sequential::Sequences;
 use super::statistics::{mean_deviation, paired_difference};
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use serde::Serialize;
 
 /// The numbers that `summary.json` holds: accuracies as shares of one.
@@ -97,7 +98,7 @@ pub(super) fn summary(
 
 /// The table that the report opens with.
 pub(super) fn table(context: &Context, summary: &Summary) -> Table {
-    let mut data = Data::new(["measure", "paper, as published", "paper's method here", "ours here", "limit here"]);
+    let mut data = Records::new(["measure", "paper, as published", "paper's method here", "ours here", "limit here"]);
     let spread = |(value, deviation): (f64, f64)| Cell::PercentSpread(value, deviation, 1);
     let percent = |value| Cell::Percent(value, 1);
     let (paper, ours) = (&summary.paper, &summary.ours);
@@ -137,7 +138,7 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
     let fixed = |method: &Method| method.fixed.map_or(Cell::Missing, Cell::count);
     data.push(["fixed number of touches with no more errors".into(), Cell::Missing, fixed(paper), fixed(ours)]);
     let (mean, low, high) = summary.difference_at_10;
-    let points = |value: f64| crate::page::scale::number(value * 100.0, 1);
+    let points = |value: f64| crate::page::axis::number(value * 100.0, 1);
     let interval = match (low, high) {
         (Some(low), Some(high)) => format!(" (95 % interval {} to {}, paired over folds)", points(low), points(high)),
         _ => String::new(),
@@ -146,29 +147,29 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
         id: "published".into(),
         title: "Accuracy, recall and touches".into(),
         caption: format!(
-            "The paper's meshes are not ours: it used ten ShapeNet models that cannot be had here, so its own numbers \
+            "The paper's meshes are not ours: it used ten ShapeNet models that cannot be had here, so its numbers \
              cannot be compared with the others directly; the columns beside them share their objects and touches. ± is \
              one standard deviation over {} folds. At ten touches ours is right {} points more often than the paper's \
              method{interval}. Touches until sure and the limit are measured on the large capture.",
             context.settings.folds_used,
             points(mean)
         ),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
     }
 }
 
 /// What the summary says in two sentences.
 pub(super) fn sentence(summary: &Summary) -> String {
-    let percent = |value: f64| crate::page::scale::number(value * 100.0, 1);
+    let percent = |value: f64| crate::page::axis::number(value * 100.0, 1);
     format!(
-        "After ten touches the paper's method knows the object {}\u{a0}% of the time, ours {}\u{a0}%, and the best that any classifier could \
-         do with what three contact times say is about {}\u{a0}%. Stopping when sure, ours takes {} touches on average \
+        "After ten touches the paper's method recognizes the object {}\u{a0}% of the time, ours {}\u{a0}%, and the best that any classifier could \
+         do with three contact times is about {}\u{a0}%. Stopping when sure, ours takes {} touches on average \
          for {}\u{a0}% errors.",
         percent(summary.paper.at_10.0),
         percent(summary.ours.at_10.0),
         percent(summary.limit_at_10),
-        crate::page::scale::number(summary.ours.touches_until_sure.0, 1),
-        crate::page::scale::number(summary.ours.touches_until_sure.1 * 100.0, 2),
+        crate::page::axis::number(summary.ours.touches_until_sure.0, 1),
+        crate::page::axis::number(summary.ours.touches_until_sure.1 * 100.0, 2),
     )
 }

@@ -1,20 +1,20 @@
-//! Sequential recognition: how many touches it takes to be sure, against how often that was wrong.
+//! Sequential recognition: how many touches it takes to be sure, and how often the verdict is wrong.
 
 use super::context::{Context, compiled, compiled_f32, opened};
 use super::limit::Large;
-use super::short::method_style;
+use super::run_page::method_style;
 use super::statistics::quantile;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::document::{Figure, Section};
-use crate::page::scale::{Scale, number};
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use serde::{Deserialize, Serialize};
 
 /// Thresholds: the recognizer stops when the posterior passes one less these.
 const RATES: [f64; 13] = [0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003, 0.002, 0.001];
-/// Touches after which a sequence gives up: so many that hardly any does.
+/// Touches after which a sequence gives up: enough that hardly any does.
 const MOST: usize = 1_000;
 /// The threshold whose distributions are drawn.
 const DRAWN: f64 = 0.01;
@@ -25,7 +25,7 @@ pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 /// What sequences showed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Sequences {
-    /// Sequences an object.
+    /// Sequences per object.
     pub(super) count: usize,
     /// For each of [`METHODS`], for each threshold.
     pub(super) methods: Vec<Vec<Stopped>>,
@@ -33,7 +33,7 @@ pub(super) struct Sequences {
     pub(super) used: Vec<Vec<Vec<usize>>>,
 }
 
-/// What one threshold comes to.
+/// The results for one threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Stopped {
     /// The threshold.
@@ -44,6 +44,8 @@ pub(super) struct Stopped {
     pub(super) touches_error: f64,
     /// Share of sequences that were wrong, or gave up.
     pub(super) error: f64,
+    /// Share of sequences that gave up.
+    pub(super) undecided: f64,
     /// Its standard error.
     pub(super) error_error: f64,
     /// The fixed number of touches that is wrong no more often, if one up to the longest group is.
@@ -71,6 +73,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
         let curve = margins.curve(most, count, settings.seed.wrapping_add(1))?;
         let mut stopped = Vec::new();
         for rate in RATES {
+            context.check()?;
             let sequential = margins.sequential(&SequentialSettings {
                 error_rate: rate,
                 max_touches: u32::try_from(most).ok(),
@@ -83,6 +86,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
                 touches: sequential.mean_touches,
                 touches_error: sequential.mean_touches_standard_error,
                 error,
+                undecided: sequential.undecided,
                 error_error: sequential.error_standard_error,
                 fixed: curve.touches_to_error(error),
             });
@@ -102,7 +106,7 @@ pub(super) fn section(context: &Context, sequences: &Sequences) -> Result<Sectio
     section.text(format!(
         "The recognizer stops as soon as the posterior of an object passes one less the threshold. {} sequences of each \
          object's touches, from the large capture that no model was trained on; a sequence of {MOST} touches without a \
-         verdict counts as an error. Beside it: the fixed number of touches that is wrong no more often.",
+         verdict counts as an error. It is compared with the fixed number of touches that is wrong no more often.",
         sequences.count
     ));
     section.figure(trade(context, sequences)?);
@@ -118,13 +122,12 @@ fn trade(context: &Context, sequences: &Sequences) -> Result<Figure> {
     let near = points().map(|s| s.touches).fold(far, f64::min);
     let ticks = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005, 0.0002, 0.0001];
     let ticks = ticks.into_iter().filter(|tick| *tick >= low * 0.9);
-    let errors = Scale::logarithmic(low * 0.9, 0.5).with_ticks(
-        ticks.map(|tick| (tick, format!("{} %", crate::page::scale::short_number(tick * 100.0)))).collect(),
-    );
+    let errors = Axis::logarithmic(low * 0.9, 0.5)
+        .with_ticks(ticks.map(|tick| (tick, format!("{} %", crate::page::axis::short_number(tick * 100.0)))).collect());
     let mut chart =
-        Chart::new("mean touches", Scale::logarithmic(near * 0.9, far * 1.1), "errors", errors).sized(660, 420);
+        Chart::new("mean touches", Axis::logarithmic(near * 0.9, far * 1.1), "errors", errors).sized(660, 420);
     let mut data =
-        Data::new(["method", "threshold", "mean touches", "errors", "fixed number with no more errors", "ratio"]);
+        Records::new(["method", "threshold", "mean touches", "errors", "fixed number with no more errors", "ratio"]);
     for (index, name) in METHODS.iter().enumerate() {
         let (color, shape) = method_style(index);
         let stopped = &sequences.methods[index];
@@ -166,21 +169,23 @@ fn trade(context: &Context, sequences: &Sequences) -> Result<Figure> {
             "Both axes are logarithmic. Solid: stopping when sure; dashed: a fixed number. Bars are 95 % intervals \
                   (Wilson)."
                 .into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
     })
 }
 
 fn table(context: &Context, sequences: &Sequences) -> Table {
-    let mut data = Data::new([
+    let mut data = Records::new([
         "threshold",
         "paper: touches",
         "paper: errors",
+        "paper: undecided",
         "paper: fixed",
         "paper: fixed ÷ sure",
         "ours: touches",
         "ours: errors",
+        "ours: undecided",
         "ours: fixed",
         "ours: fixed ÷ sure",
     ]);
@@ -190,6 +195,7 @@ fn table(context: &Context, sequences: &Sequences) -> Table {
             [
                 Cell::Spread(s.touches, s.touches_error, 1),
                 Cell::PercentSpread(s.error, s.error_error, 2),
+                Cell::Percent(s.undecided, 2),
                 s.fixed.map_or(Cell::Missing, Cell::count),
                 s.ratio().map_or(Cell::Missing, |ratio| Cell::Number(ratio, 2)),
             ]
@@ -200,17 +206,18 @@ fn table(context: &Context, sequences: &Sequences) -> Table {
         id: "sequential".into(),
         title: "Thresholds".into(),
         caption:
-            "Errors come out below the threshold, since evidence overshoots it on the last touch. ± is one standard \
-                  error; – stands where no fixed number up to the longest group is wrong that seldom."
+            "Errors come out below the threshold, since evidence overshoots it on the last touch; they include undecided \
+             sequences. ± is one standard error; – stands where no fixed number up to the longest group is wrong as \
+             rarely."
                 .into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
     }
 }
 
 fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
     let names = context.names();
-    let mut data = Data::new(["method", "object", "touches used", "share of sequences"]);
+    let mut data = Records::new(["method", "object", "touches used", "share of sequences"]);
     let far = sequences.used.iter().flatten().map(|used| quantile(&floats(used), 0.98)).fold(10.0, f64::max);
     let width = (far / 30.0).ceil().max(1.0) as usize;
     let mut panels = Vec::new();
@@ -219,7 +226,7 @@ fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
         sequences.used.iter().flatten().map(share).fold(0.05, f64::max)
     };
     for (position, name) in names.iter().enumerate() {
-        let mut chart = Chart::new("touches", Scale::linear(0.0, (30 * width) as f64, 4), "", Scale::percent(0.0, top))
+        let mut chart = Chart::new("touches", Axis::linear(0.0, (30 * width) as f64, 4), "", Axis::percent(0.0, top))
             .sized(280, 190)
             .titled(name.as_str());
         for (index, method) in METHODS.iter().enumerate() {
@@ -244,7 +251,7 @@ fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
         id: "sequential-objects".into(),
         title: format!("Touches used until sure, threshold {DRAWN}"),
         caption: format!("Share of sequences in bins of {width} touches; beside the method's name, its mean."),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         panels,
         data,
     })

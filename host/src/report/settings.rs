@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a report is made with. A change of any of these starts it afresh.
+/// What a report is made with. A change of any of these but the command starts it from the beginning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Where the objects come from, as on the command line.
+    /// Where the objects come from: see [`crate::mesh::source::objects`].
     pub sources: Vec<String>,
+    /// The command that remakes the report, as its page shows it; may be empty.
+    pub command: String,
     /// The seed of everything random.
     pub seed: u64,
     /// Fewer folds, levels and touches; the same figures.
@@ -21,9 +23,9 @@ pub struct Settings {
     pub paper_rounds: usize,
     /// Numbers of touches at which cross-validation looks, log-spaced from 10 to 120.
     pub levels: usize,
-    /// Groups an object in a fold, as in the paper.
+    /// Groups per object and fold, as in the paper.
     pub groups: usize,
-    /// Groups an object in a fold, for figures with narrower intervals.
+    /// Groups per object and fold, for figures with narrower intervals.
     pub many_groups: usize,
     /// Noise levels from 0 to 10 ms, evenly spaced.
     pub noise_levels: usize,
@@ -33,13 +35,15 @@ pub struct Settings {
     pub limit_touches: usize,
     /// Boosting rounds of the ensemble that estimates the limit.
     pub limit_rounds: usize,
+    /// Whether to measure growth and generalization, which use built-in objects no matter what the sources are.
+    pub growth: bool,
     /// Numbers of objects in the growth figures.
     pub growth_objects: Vec<usize>,
     /// Numbers of triangles in the growth figures.
     pub growth_triangles: Vec<usize>,
-    /// Touches an object in the growth figures.
+    /// Touches of each object in the growth figures.
     pub growth_touches: usize,
-    /// Numbers of instances of each kind that are trained on, to see how well they stand for others.
+    /// Numbers of instances of each kind that are trained on, to see how well others are recognized.
     pub instances: Vec<usize>,
     /// Instances of each kind that are tested on.
     pub test_instances: usize,
@@ -48,10 +52,13 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Everything the paper did, and a capture large enough for the limit.
+    /// Everything the paper did, and a capture large enough for the limit. Growth and generalization are measured only
+    /// for the source `builtin`, since they say nothing about other objects.
     pub fn full(sources: Vec<String>, seed: u64) -> Self {
         Self {
+            growth: sources == ["builtin"],
             sources,
+            command: String::new(),
             seed,
             quick: false,
             touches: 21_000,
@@ -97,14 +104,6 @@ impl Settings {
         }
     }
 
-    /// The command that makes this report.
-    pub fn command(&self) -> String {
-        let quoted = |source: &String| if source.contains(' ') { format!("\"{source}\"") } else { source.clone() };
-        let sources: Vec<String> = self.sources.iter().map(quoted).collect();
-        let quick = if self.quick { " --quick" } else { "" };
-        format!("palpate report {} --seed {}{quick}", sources.join(" "), self.seed)
-    }
-
     /// The numbers of touches at which cross-validation looks: log-spaced from 10 to 120, rounded, without repeats.
     pub fn levels(&self) -> Vec<usize> {
         let last = self.levels.max(2) - 1;
@@ -133,6 +132,12 @@ mod tests {
         assert_eq!((levels[0], levels[29]), (10, 120));
         let deviations = settings.deviations();
         assert_eq!((deviations[1], deviations[20], deviations[40]), (0.25, 5.0, 10.0));
-        assert_eq!(settings.command(), "palpate report builtin --seed 1");
+    }
+
+    #[test]
+    fn a_report_on_own_meshes_measures_nothing_on_built_in_ones_unless_asked() {
+        assert!(Settings::full(vec!["builtin".into()], 1).growth);
+        assert!(!Settings::full(vec!["meshes".into()], 1).growth);
+        assert!(!Settings::quick(vec!["builtin".into(), "mug.obj".into()], 1).growth);
     }
 }

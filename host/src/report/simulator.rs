@@ -1,12 +1,12 @@
-//! The simulator's speed against its error: the choices there are for deciding a contact.
+//! The simulator's speed against its error, for several ways to decide a contact.
 
 use super::context::Context;
 use crate::error::Result;
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Side};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::scale::Scale;
-use crate::page::table::{Cell, Data, Table};
+use crate::page::table::{Cell, Records, Table};
 use crate::probe::approach::{Approach, Probe};
 use crate::probe::scene::Scene;
 use crate::probe::sweep::narrow::{self, Motion, Triangle};
@@ -19,18 +19,18 @@ use serde::{Deserialize, Serialize};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// What one way of deciding contacts came to, all objects together.
+/// What one way of deciding contacts achieved, all objects together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Engine {
     /// What it does.
     pub(super) name: String,
-    /// Casts a second, one thread.
+    /// Casts per second, one thread.
     pub(super) rate: f64,
     /// Casts compared with a decision over every triangle.
     pub(super) casts: usize,
     /// Contacts missed.
     pub(super) missed: usize,
-    /// Contacts that are none.
+    /// Contacts where there are none.
     pub(super) false_contacts: usize,
     /// The largest difference in time, in seconds.
     pub(super) largest_error: f64,
@@ -61,7 +61,7 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Engine>> {
         let rate = times.len() as f64 / began.elapsed().as_secs_f64();
         (times, rate)
     };
-    // Every triangle in f64, without a tree: slow, and right by construction.
+    // Every triangle in f64, without a tree: slow, and correct by construction.
     let began = Instant::now();
     let truth: Vec<Option<f64>> = scenes
         .par_iter()
@@ -142,18 +142,24 @@ fn casts(scene: &Scene, name: &str, count: usize, seed: u64, probe: &Probe) -> V
 /// Adds the figure and the table to the section on speed against error.
 pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) -> Result<()> {
     section.text(
-        "The same for the simulator: fingers cast at the objects, one thread, against a decision in f64 over every triangle. \
+        "The same for the simulator: fingers cast at the objects, one thread, compared with a decision in f64 over every triangle. \
          A sixth of the casts graze a triangle at a clearance of 1e−7 to 1e−2 units.",
     );
     let rates = || engines.iter().map(|engine| engine.rate);
-    let x = Scale::logarithmic(rates().fold(f64::INFINITY, f64::min) * 0.5, rates().fold(0.0, f64::max) * 8.0);
-    // An error of nothing has no logarithm.
+    let x = Axis::logarithmic(rates().fold(f64::INFINITY, f64::min) * 0.5, rates().fold(0.0, f64::max) * 8.0);
+    // An error of 0 has no logarithm.
     let shown = |error: f64| error.max(1e-17);
     let top = engines.iter().map(|engine| shown(engine.largest_error)).fold(1e-6, f64::max);
-    let mut chart = Chart::new("casts a second", x, "largest time error (s)", Scale::logarithmic(3e-18, top * 10.0))
+    let mut chart = Chart::new("casts per second", x, "largest time error (s)", Axis::logarithmic(3e-18, top * 10.0))
         .sized(660, 330);
-    let mut data =
-        Data::new(["decided in", "casts a second", "casts compared", "missed", "false contacts", "largest error (s)"]);
+    let mut data = Records::new([
+        "decided in",
+        "casts per second",
+        "casts compared",
+        "missed",
+        "false contacts",
+        "largest error (s)",
+    ]);
     for (index, engine) in engines.iter().enumerate() {
         let at = (engine.rate, shown(engine.largest_error));
         let color = if index == 1 { color::OURS } else { color::GRAY };
@@ -172,9 +178,9 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
     }
     section.figure(Figure {
         id: "simulator-figure".into(),
-        title: "Casts a second against time error".into(),
-        caption: "To the right is faster, further down more exact; errors of nothing stand at 1e−17.".into(),
-        command: context.settings.command(),
+        title: "Casts per second against time error".into(),
+        caption: "Farther right is faster, farther down more exact; errors of 0 are drawn at 1e−17.".into(),
+        command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data: data.clone(),
     });
@@ -182,7 +188,7 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
         id: "simulator".into(),
         title: "The simulator's choices".into(),
         caption: "The last row is what the others are compared with.".into(),
-        command: context.settings.command(),
+        command: context.settings.command.clone(),
         data,
     });
     Ok(())

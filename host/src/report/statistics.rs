@@ -1,25 +1,25 @@
 //! Statistics that the report needs beyond `statrs`: densities, smoothing, and intervals for differences.
 //!
 //! The densities and the smoothing filter are written here since no kept-up crate fits: `statrs`' estimator builds a
-//! search tree anew for every place at which the density is asked for, `kernel-density-estimation` has stood still since
+//! search tree again for every place at which the density is evaluated, `kernel-density-estimation` had no release since
 //! 2022, and `savgol-rs` 0.1 copies SciPy's interface onto a solver of its own.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 use statrs::statistics::{Data, Distribution, OrderStatistics, Statistics};
 
 /// Mean and sample standard deviation; the latter 0 for fewer than two values.
-pub fn mean_deviation(values: &[f64]) -> (f64, f64) {
+pub(crate) fn mean_deviation(values: &[f64]) -> (f64, f64) {
     let deviation = if values.len() < 2 { 0.0 } else { values.std_dev() };
     (Statistics::mean(values), deviation)
 }
 
-/// How many standard deviations a two-sided 95 % interval of a normal distribution reaches.
-pub fn z95() -> f64 {
+/// The half-width of a two-sided 95 % interval of a normal distribution, in standard deviations.
+pub(crate) fn z95() -> f64 {
     Normal::standard().inverse_cdf(0.975)
 }
 
 /// The two-sided 95 % interval of a share, `successes` out of `trials`, after Wilson (1927); 0 to 1 without trials.
-pub fn wilson(successes: f64, trials: f64) -> (f64, f64) {
+pub(crate) fn wilson(successes: f64, trials: f64) -> (f64, f64) {
     if trials <= 0.0 {
         return (0.0, 1.0);
     }
@@ -32,7 +32,7 @@ pub fn wilson(successes: f64, trials: f64) -> (f64, f64) {
 
 /// The mean of the paired differences `b − a` and its two-sided 95 % interval by Student's t over pairs: folds that both
 /// methods saw. Not a number for fewer than two pairs.
-pub fn paired_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
+pub(crate) fn paired_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| b - a).collect();
     let pairs = differences.len() as f64;
     let (mean, deviation) = mean_deviation(&differences);
@@ -43,8 +43,32 @@ pub fn paired_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     (mean, mean - half, mean + half)
 }
 
+/// How many distinct groups an accuracy must rest on to be given.
+pub(crate) const LEAST_GROUPS: usize = 300;
+
+/// How many different groups of `size` can be drawn from `touches` touches, without regard to order; at most
+/// [`LEAST_GROUPS`] are counted.
+pub(crate) fn distinct_groups(touches: usize, size: usize) -> usize {
+    let Some(rest) = touches.checked_sub(size) else { return 0 };
+    let mut groups = 1;
+    for k in 1..=size.min(rest) {
+        // The product of k consecutive numbers is divisible by k!.
+        groups = groups * (touches - k + 1) / k;
+        if groups >= LEAST_GROUPS {
+            return LEAST_GROUPS;
+        }
+    }
+    groups
+}
+
+/// The largest groups of which at least [`LEAST_GROUPS`] different ones can be drawn from `touches` touches; 0 if there
+/// are none.
+pub(crate) fn largest_group(touches: usize) -> usize {
+    (1..=touches).rev().find(|&size| distinct_groups(touches, size) >= LEAST_GROUPS).unwrap_or(0)
+}
+
 /// The value below which the share `at` of `values` lies.
-pub fn quantile(values: &[f64], at: f64) -> f64 {
+pub(crate) fn quantile(values: &[f64], at: f64) -> f64 {
     Data::new(values.to_vec()).quantile(at)
 }
 
@@ -52,7 +76,7 @@ pub fn quantile(values: &[f64], at: f64) -> f64 {
 /// theirs. The bandwidth is Silverman's, 0.9 · min(deviation, interquartile range / 1.34) · n^(−1/5), but no less than
 /// half the distance of two places. Values are first counted into eight bins a place, which moves each by less than a
 /// sixteenth of that distance.
-pub fn density(values: &[f64], low: f64, high: f64, places: usize) -> Vec<(f64, f64)> {
+pub(crate) fn density(values: &[f64], low: f64, high: f64, places: usize) -> Vec<(f64, f64)> {
     let step = (high - low) / (places.max(2) - 1) as f64;
     let mut data = Data::new(values.to_vec());
     let spread = (data.upper_quartile() - data.lower_quartile()) / 1.34;
@@ -84,7 +108,7 @@ pub fn density(values: &[f64], low: f64, high: f64, places: usize) -> Vec<(f64, 
 /// Evenly spaced `values` smoothed after Savitzky and Golay (1964): each becomes the value, at its place, of the
 /// polynomial of degree `degree` through the `2 · half + 1` values around it in the least-squares sense; near an end, of
 /// the polynomial through the first or last of them. Fewer values than that are returned as they are.
-pub fn savitzky_golay(values: &[f64], half: usize, degree: usize) -> Vec<f64> {
+pub(crate) fn savitzky_golay(values: &[f64], half: usize, degree: usize) -> Vec<f64> {
     let window = 2 * half + 1;
     if values.len() < window || degree >= window {
         return values.to_vec();
@@ -137,6 +161,14 @@ mod tests {
             let (l, h) = wilson(successes, trials);
             assert!((l - low).abs() < 1e-4 && (h - high).abs() < 1e-4, "{successes}/{trials}: {l} {h}");
         }
+    }
+
+    #[test]
+    fn an_accuracy_over_a_single_possible_group_is_no_accuracy() {
+        assert_eq!([distinct_groups(30, 30), distinct_groups(30, 29), distinct_groups(30, 31)], [1, 30, 0]);
+        assert_eq!([distinct_groups(30, 1), distinct_groups(30, 2), distinct_groups(10, 3)], [30, LEAST_GROUPS, 120]);
+        assert_eq!(distinct_groups(2_100, 1_000), LEAST_GROUPS);
+        assert_eq!([largest_group(30), largest_group(2_100), largest_group(5), largest_group(0)], [28, 2_099, 0, 0]);
     }
 
     #[test]

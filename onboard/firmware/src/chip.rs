@@ -88,12 +88,12 @@ pub fn take_retained() -> &'static mut [u8] {
     TAKEN.store(true, Ordering::Relaxed);
     let length = addr_of!(_retained_end) as usize - addr_of!(_retained_start) as usize;
     // SAFETY: memory.x sets this region aside, so nothing else lies in it, and it is handed out once. It is RAM, so
-    // whatever it holds are bytes.
+    // any content is valid bytes.
     unsafe { core::slice::from_raw_parts_mut(addr_of_mut!(_retained_start), length) }
 }
 
 /// The emulated machines' external RAM, 16 MB of it, where QEMU's `-device loader,addr=0x21000000` puts what an image is
-/// to work on. Only for images that run nowhere else.
+/// to work on. Only for images that run only there.
 pub fn loaded() -> &'static [u8] {
     // SAFETY: both machines have RAM there, which memory.x does not mention, so nobody writes to it; RAM holds bytes.
     unsafe { core::slice::from_raw_parts(core::ptr::without_provenance(0x2100_0000), 16 << 20) }
@@ -111,13 +111,13 @@ pub const PINS_RECEIVED: Interrupt = Interrupt(2);
 pub const PIN_CHANGED: Interrupt = Interrupt(6);
 
 impl Interrupt {
-    /// The interrupt with this number, as `DefaultHandler` is told it.
+    /// The interrupt with this number, as `DefaultHandler` gets it.
     pub const fn from_number(number: i16) -> Self {
         Self(number as u16)
     }
 }
 
-// SAFETY: the number is what the NVIC counts from 0, for every number.
+// SAFETY: the number is what the NVIC counts from 0, forevery number.
 unsafe impl cortex_m::interrupt::InterruptNumber for Interrupt {
     fn number(self) -> u16 {
         self.0

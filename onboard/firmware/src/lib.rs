@@ -6,6 +6,7 @@
 //! | [`sections`] | flash and RAM of the running image, by section |
 //! | [`uart`] | the UART, received by interrupt |
 //! | [`pins`] | three pins that a host plays |
+//! | [`identity`] | what every machine must make of a touch |
 //! | [`chip`] | the only place with `unsafe`: registers, linker symbols, the stack |
 //!
 //! Under emulation an image prints through semihosting ([`println!`]) and ends with [`exit`]; a panic or a fault ends
@@ -13,6 +14,7 @@
 #![no_std]
 
 pub mod chip;
+pub mod identity;
 pub mod meter;
 pub mod pins;
 pub mod sections;

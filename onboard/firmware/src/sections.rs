@@ -9,7 +9,7 @@ pub struct Sections {
     pub text: usize,
     /// Constants, in flash.
     pub rodata: usize,
-    /// Initialized statics, in RAM; their values stand in flash too.
+    /// Initialized statics, in RAM; their values are in flash too.
     pub data: usize,
     /// Zeroed statics, in RAM.
     pub bss: usize,

@@ -16,7 +16,7 @@ pub(super) struct Debounce {
     closed_since: u32,
 }
 
-/// What has become of a switch.
+/// What happened to a switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Change {
     /// It has closed, its first closing edge was at this time.
@@ -94,7 +94,7 @@ impl Debounce {
         }
     }
 
-    /// What has become of the switch at `now`. Call it until it returns `None`.
+    /// What happened to the switch by `now`. Call it until it returns `None`.
     pub(super) fn fire(&mut self, now: u32, settings: &Settings) -> Option<Change> {
         let Some(left) = self.left else {
             let stuck = self.settled && !self.stuck_told && after(now, self.closed_since) >= settings.stuck;

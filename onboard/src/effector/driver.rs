@@ -43,7 +43,7 @@ pub struct Effector {
     faults: Faults,
 }
 
-/// Faults that have not been told yet, one of each kind and finger.
+/// Faults that have not been reported yet, one per kind and finger.
 #[derive(Clone, Copy, Debug, Default)]
 struct Faults {
     stuck: [bool; 3],
@@ -99,7 +99,7 @@ impl Effector {
     /// Returns a touch that was over before the edge, if there was one.
     ///
     /// # Errors
-    /// A [`Fault`]. The edge has been taken in nevertheless; [`Effector::poll`] tells what else there is.
+    /// A [`Fault`]. The edge has been taken in nevertheless; [`Effector::poll`] returns what else there is.
     pub fn edge(&mut self, edge: Edge) -> Result<Option<Touch>, Fault> {
         self.advance(edge.at);
         if edge.after_loss {

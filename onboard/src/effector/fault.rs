@@ -2,7 +2,7 @@
 
 use super::Finger;
 use core::fmt;
-use palpate_shared::link::Event;
+use palpate_shared::link::{Event, FaultKind};
 
 /// A fault of the effector, and which finger has it. The driver goes on: every other touch is still reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -34,15 +34,15 @@ impl Fault {
     }
 }
 
-/// As the link tells it.
+/// As the link reports it.
 impl From<Fault> for Event {
     fn from(fault: Fault) -> Self {
         let kind = match fault {
-            Fault::Stuck(_) => 0,
-            Fault::Bouncing(_) => 1,
-            Fault::Silent(_) => 2,
-            Fault::Unreadable(_) => 3,
-            Fault::Overrun => 4,
+            Fault::Stuck(_) => FaultKind::Stuck,
+            Fault::Bouncing(_) => FaultKind::Bouncing,
+            Fault::Silent(_) => FaultKind::Silent,
+            Fault::Unreadable(_) => FaultKind::Unreadable,
+            Fault::Overrun => FaultKind::Overrun,
         };
         let finger = match fault.finger() {
             Some(Finger::First) => 0,

@@ -4,12 +4,12 @@
 //!
 //! | layer | what it does |
 //! |---|---|
-//! | [`Effector`] | edges (finger, closed or open, microsecond) in, touches and faults out; no pins, no clock of its own |
+//! | [`Effector`] | edges (finger, closed or open, microsecond) in, touches and faults out; without pins or a clock |
 //! | [`Fingers`] | three [`embedded_hal::digital::InputPin`]s, active high or low, read into edges |
 //! | [`Probe`], or [`Watcher`] and [`drain`] | pins and clock together: polled in a loop, or fed by interrupts |
 //!
 //! ```text
-//! polled:      pins ──► Fingers ──► Effector ──► touch or fault        (Probe::poll, at least once a millisecond)
+//! polled:      pins ──► Fingers ──► Effector ──► touch or fault        (Probe::poll, at least once per millisecond)
 //!
 //! interrupts:  pins ──► Watcher ──► heapless queue ──► drain ──► Effector ──► touch or fault
 //!              └── in the interrupt ──┘             └──────── in the main loop ─────────┘

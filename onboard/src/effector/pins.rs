@@ -19,7 +19,7 @@ pub struct Fingers<A, B, C> {
     middle: B,
     last: C,
     active: Active,
-    /// Levels told so far.
+    /// Levels reported so far.
     closed: [bool; 3],
     unreadable: [bool; 3],
 }
@@ -44,7 +44,7 @@ impl<A: InputPin, B: InputPin, C: InputPin> Fingers<A, B, C> {
     /// taken is offered again next time. Each pin is read exactly once.
     ///
     /// # Errors
-    /// [`Fault::Unreadable`], the first time that a pin cannot be read; the others have been read nevertheless.
+    /// [`Fault::Unreadable`], the first time that a pin cannot be read; the others have been read all the same.
     pub fn read(&mut self, at: u32, mut tell: impl FnMut(Edge) -> bool) -> Result<(), Fault> {
         let levels = [
             self.first.is_high().map_err(drop),

@@ -19,7 +19,7 @@ impl<A: InputPin, B: InputPin, C: InputPin, T: Clock> Probe<A, B, C, T> {
     }
 
     /// Reads the pins once. Contact times are right to the interval between two calls, so call it at least once a
-    /// millisecond: on a probe at 10 units a second that is a hundredth of a unit.
+    /// millisecond: on a probe at 10 units per second that is a hundredth of a unit.
     ///
     /// # Errors
     /// A [`Fault`]; go on polling.

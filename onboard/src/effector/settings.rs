@@ -6,23 +6,23 @@ const LONGEST: u32 = 1 << 30;
 /// How long the driver waits for what, in microseconds. Anything above 2³⁰ (18 minutes) counts as 2³⁰.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// A switch has settled when its level has held for so long: longer than the longest pause in its bouncing.
+    /// How long a level must hold before the switch has settled: longer than the longest pause in its bouncing.
     pub debounce: u32,
-    /// A switch that has not settled after so long is bouncing. More than `debounce`.
+    /// How long a switch may take to settle before it counts as bouncing. More than `debounce`.
     pub settle: u32,
     /// After the first contact, fingers that have not touched within this time are missing.
     pub timeout: u32,
-    /// After a touch all fingers have to be open for so long before the next touch can begin.
+    /// How long all fingers must be open after a touch before the next one can begin.
     pub rest: u32,
-    /// A finger that stays closed for so long is stuck. More than `timeout` and the time that a touch is held.
+    /// How long a finger may stay closed before it counts as stuck. More than `timeout` and the time a touch is held.
     pub stuck: u32,
-    /// A finger that is missing in so many touches in a row does not report. 0 never says so.
+    /// After this many touches in a row without a finger, that finger is reported as silent. 0 disables the report.
     pub silent_after: u16,
 }
 
 impl Default for Settings {
     /// For micro-switches (which bounce for 1 to 5 ms) and the paper's probe: 5 ms to debounce, 25 ms to settle, 400 ms
-    /// for the other fingers (4 units of length at 10 units a second), 10 ms rest, 5 s until stuck, silent after 100
+    /// for the other fingers (4 units of length at 10 units per second), 10 ms rest, 5 s until stuck, silent after 100
     /// touches.
     fn default() -> Self {
         Self { debounce: 5_000, settle: 25_000, timeout: 400_000, rest: 10_000, stuck: 5_000_000, silent_after: 100 }

@@ -263,7 +263,7 @@ fn fault_unreadable_names_the_pin_once_until_it_can_be_read_again() {
 
 #[test]
 fn each_poll_reads_each_pin_once_and_active_low_switches_close_to_low() {
-    // A touch of the fingers at 20, 21 and 23 ms, polled once a millisecond.
+    // A touch of the fingers at 20, 21 and 23 ms, polled once per millisecond.
     let levels = |contact: usize| {
         let level = move |i| if i >= contact { Level::Low } else { Level::High };
         (0..30).map(|i| Transaction::get(level(i))).collect::<Vec<_>>()
@@ -304,6 +304,18 @@ fn settings_out_of_range_are_brought_into_it() {
         let closed = at % 3 == 0;
         assert_eq!(effector.edge(Edge::new(First, closed, at * 1_000)), Ok(None));
     }
+    // 2^30 µs each: rest at power-up, the debouncing of a touch, and one more until a finger counts as stuck.
+    let longest = 1 << 30;
+    let mut effector = Effector::new(settings);
+    assert_eq!((effector.poll(0), effector.poll(longest)), (Ok(None), Ok(None)));
+    assert_eq!(effector.state(), State::Waiting);
+    for finger in Finger::ALL {
+        assert_eq!(effector.edge(Edge::new(finger, true, longest)), Ok(None));
+    }
+    assert_eq!(effector.poll(2 * longest - 1), Ok(None));
+    assert_eq!(effector.poll(2 * longest), Ok(Some(Touch::from_micros([0; 3]))));
+    assert_eq!(effector.poll(2 * longest + 1), Ok(None));
+    assert_eq!(effector.poll(2 * longest + 2), Err(Fault::Stuck(First)));
 }
 
 /// A clock that stands where the test puts it.
@@ -376,7 +388,7 @@ proptest! {
         let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
         let seldom = play(start, &edges, &[], end);
         let often = play(start, &edges, &[polls, dense].concat(), end);
-        // Faults that fall due together with a touch may be told before or after it.
+        // Faults due at the same time as a touch may be reported before or after it.
         let touches = |outcomes: &Outcomes| outcomes.iter().flatten().copied().collect::<Vec<_>>();
         prop_assert_eq!(touches(&seldom.0), touches(&often.0));
         let faults = |outcomes: &Outcomes| {

@@ -7,13 +7,13 @@
 //! ```
 //!
 //! [`serve`] is the whole program of a chip that recognizes touches from a host. A chip with fingers of its own pushes
-//! their touches into a [`Station`] and tells the host of them.
+//! their touches into a [`Station`] and reports them to the host.
 //!
 //! # Power cuts
 //!
 //! After every command the [`Station`] writes a record (evidence, progress of the link, which model is in use) into the
 //! older one of two places, with a counter and a checksum. Whenever the power goes, one of the two is whole, and the chip
-//! goes on from it: the host repeats what is not in it, and the link sees to it that nothing is counted twice. That
+//! continues from it: the host repeats what is not in it, and the link ensures that nothing is counted twice. That
 //! needs memory that keeps its content: battery-backed or FRAM, or RAM where resets but no power cuts are to be survived.
 
 mod memory;

@@ -77,7 +77,7 @@ impl<'a> Records<'a> {
         let [l0, l1] = length.to_le_bytes();
         *header = [l0, l1, c0, c1, c2, c3];
         self.counter = counter;
-        // The power may go at any moment from here on: what was written must not be put off.
+        // The power may go at any moment from here on: the writes must not be delayed.
         compiler_fence(Ordering::SeqCst);
     }
 }

@@ -9,7 +9,7 @@ use palpate_shared::link::{DeviceEnd, Event, Progress};
 
 /// Serves a host at the other end of `transport`, with room for models of `N` objects, until the transport fails.
 ///
-/// Goes on from the newest record in `memory`; a model that was loaded is used again if it is still whole.
+/// Continues from the newest record in `memory`; a loaded model is used again if it is still intact.
 ///
 /// Stack: about 3 KB more than [`Recognizer::push`](crate::Recognizer::push).
 ///

@@ -45,7 +45,7 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
         station
     }
 
-    /// Goes on from the newest record, if it is of this model.
+    /// Continues from the newest record if it is of this model.
     fn resume(&mut self) {
         let Some(record) = self.records.as_ref().and_then(|records| records.newest()) else { return };
         if record.source == self.source {
@@ -57,14 +57,14 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
         }
     }
 
-    /// The model to go on with, once a command has put another one into use.
+    /// The model to continue with, once a command has switched to another one.
     pub(super) fn switched(&self) -> Option<Source> {
         self.switched.then_some(self.source)
     }
 
     /// Takes a touch into account; `None` without a usable model.
     ///
-    /// Cost: [`Recognizer::push`], and with a detail a posterior and 400 instructions an object.
+    /// Cost: [`Recognizer::push`], and with a detail a posterior and 400 instructions per object.
     pub fn push(&mut self, touch: &Touch, detail: bool) -> Option<VerdictMessage> {
         let recognizer = self.recognizer.as_mut()?;
         let decision = match recognizer.push(touch) {

@@ -1,5 +1,7 @@
 //! The codes of what a model may be made of.
 
+use crate::pattern::Patterns;
+
 /// The header's descriptor code for a model over rows of features instead of touches.
 pub const RAW_FEATURES: u8 = 255;
 
@@ -58,7 +60,7 @@ codes! {
 }
 
 impl LeafType {
-    /// Bytes a value.
+    /// Bytes per value.
     pub const fn size(self) -> usize {
         // 1, 2, 4: a shift, and not a table.
         1 << self.code()
@@ -75,6 +77,39 @@ codes! {
     }
 }
 
+codes! {
+    /// Which approaches count as evidence.
+    Counted {
+        /// Full touches: all three fingers.
+        Full = 0, "full";
+        /// Touches with at least one contact.
+        Contacts = 1, "contacts";
+        /// Every approach, also one that touched nothing.
+        All = 2, "all";
+    }
+}
+
+impl Counted {
+    /// The contact patterns that can count.
+    pub const fn patterns(self) -> Patterns {
+        match self {
+            Self::Full => Patterns::FULL,
+            Self::Contacts => Patterns::CONTACTS,
+            Self::All => Patterns::ALL,
+        }
+    }
+}
+
+codes! {
+    /// What a probe's lengths are measured in.
+    Length {
+        /// A tenth of the object's longest side, as objects are scaled in the paper.
+        Tenth = 0, "unit";
+        /// Millimeters, with objects at their true size.
+        Millimeter = 1, "mm";
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -84,6 +119,8 @@ mod tests {
         assert!(Layout::ALL.iter().all(|&x| Layout::from_code(x.code()) == Some(x)));
         assert!(LeafType::ALL.iter().all(|&x| LeafType::from_code(x.code()) == Some(x)));
         assert!(Key::ALL.iter().all(|&x| Key::from_code(x.code()) == Some(x)));
+        assert!(Counted::ALL.iter().all(|&x| Counted::from_code(x.code()) == Some(x)));
+        assert!(Length::ALL.iter().all(|&x| Length::from_code(x.code()) == Some(x)));
         assert_eq!(Layout::from_code(4), None);
     }
 }

@@ -4,17 +4,19 @@
 pub const HEADER_LENGTH: usize = 96;
 /// The first four bytes of every model.
 pub const MAGIC: [u8; 4] = *b"PLPT";
-/// The version of the format that this crate reads and writes.
-pub const VERSION: u16 = 1;
+/// The newest version of the format, with optional sections; this crate reads all versions up to it.
+pub const VERSION: u16 = 2;
+/// The version without optional sections, which is what a model without any is still written as.
+pub const VERSION_WITHOUT_SECTIONS: u16 = 1;
 
 /// The header's bytes, wherever they stand; every field is read from its place when asked for.
 ///
-/// Cost: one load a field. Cannot fail: every bit pattern has a meaning, and whether it is a sensible one is for the
-/// model's validation to say.
+/// Cost: one load per field. Cannot fail: every bit pattern has a value; whether it makes sense is checked
+/// when a model is opened.
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a>(&'a [u8; HEADER_LENGTH]);
 
-/// A header under construction.
+/// A header under construction, of version 1 until it has [sections](HeaderBuilder::with_sections).
 #[derive(Clone, Debug)]
 pub struct HeaderBuilder([u8; HEADER_LENGTH]);
 
@@ -81,7 +83,7 @@ fields! {
     max_touches, with_max_touches: u32 = 56;
     /// The distance between fingers that the model was trained for, in lengths of the scene (object = 10).
     spacing, with_spacing: f32 = 60;
-    /// The probe's speed that the model was trained for, in lengths of the scene a second.
+    /// The probe's speed that the model was trained for, in lengths of the scene per second.
     speed, with_speed: f32 = 64;
     /// Bytes of the text section.
     text_length, with_text_length: u32 = 68;
@@ -93,13 +95,22 @@ fields! {
     nodes_length, with_nodes_length: u32 = 84;
     /// Bytes of the leaves.
     leaves_length, with_leaves_length: u32 = 88;
+    /// Bytes of the optional sections, in version 2: see [`Header::optional_length`].
+    sections_length, with_sections_length: u32 = 92;
+}
+
+impl Header<'_> {
+    /// Bytes of the optional sections; 0 in version 1, which has none.
+    pub fn optional_length(&self) -> u32 {
+        if self.version() == VERSION_WITHOUT_SECTIONS { 0 } else { self.sections_length() }
+    }
 }
 
 impl<'a> Header<'a> {
     /// A header of zeros.
     pub const EMPTY: Header<'static> = Header(&[0; HEADER_LENGTH]);
 
-    /// The header at the start of a model and the bytes after it, or `None` when there are too few bytes.
+    /// The header at the start of a model and the bytes after it, or `None` if there are too few bytes.
     pub fn split(bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         bytes.split_first_chunk().map(|(header, rest)| (Self(header), rest))
     }
@@ -107,11 +118,17 @@ impl<'a> Header<'a> {
 
 impl Default for HeaderBuilder {
     fn default() -> Self {
-        Self([0; HEADER_LENGTH]).with_magic(u32::from_le_bytes(MAGIC)).with_version(VERSION)
+        Self([0; HEADER_LENGTH]).with_magic(u32::from_le_bytes(MAGIC)).with_version(VERSION_WITHOUT_SECTIONS)
     }
 }
 
 impl HeaderBuilder {
+    /// A model with optional sections of `length` bytes together; without any it stays one of version 1.
+    pub fn with_sections(self, length: u32) -> Self {
+        let version = if length == 0 { VERSION_WITHOUT_SECTIONS } else { VERSION };
+        self.with_version(version).with_sections_length(length)
+    }
+
     /// The header's bytes.
     pub const fn bytes(&self) -> &[u8; HEADER_LENGTH] {
         &self.0
@@ -138,6 +155,18 @@ mod tests {
         let (header, rest) = Header::split(built.bytes()).unwrap();
         assert!(rest.is_empty());
         assert_eq!((header.odds(), header.last_object(), header.unit()), (u64::MAX - 1, 9, 0.25));
-        assert_eq!((header.magic().to_le_bytes(), header.version(), header.max_touches()), (MAGIC, VERSION, 0));
+        assert_eq!((header.magic().to_le_bytes(), header.version(), header.max_touches()), (MAGIC, 1, 0));
+    }
+
+    #[test]
+    fn only_a_model_with_optional_sections_is_of_version_2() {
+        for (length, version) in [(0, 1), (16, 2)] {
+            let built = HeaderBuilder::default().with_sections(length);
+            let (header, _) = Header::split(built.bytes()).unwrap();
+            assert_eq!((header.version(), header.optional_length()), (version, length));
+        }
+        // Version 1 has no meaning for these bytes.
+        let built = HeaderBuilder::default().with_sections_length(16);
+        assert_eq!(Header::split(built.bytes()).unwrap().0.optional_length(), 0);
     }
 }

@@ -1,18 +1,24 @@
-//! The bytes of a compiled model; `FORMAT.md` beside this crate's sources specifies them one by one.
+//! The bytes of a compiled model; `FORMAT.md` in this crate specifies every one of them.
 //!
 //! ```text
-//! header │ text │ base margins │ priors │ axes │ thresholds │ groups │ splits │ leaves │ CRC-32
+//! header │ text │ optional sections │ base margins │ priors │ axes │ thresholds │ groups │ splits │ leaves │ CRC-32
 //! ```
 
 mod codes;
 mod header;
 mod key;
 mod records;
+mod trained;
 
-pub use codes::{Key, Layout, LeafType, RAW_FEATURES};
-pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION};
+pub use crate::checksum::checksum;
+pub use codes::{Counted, Key, Layout, LeafType, Length, RAW_FEATURES};
+pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
 pub use records::{Axis, Columns, Group};
+pub use trained::{
+    MUST_UNDERSTAND, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe, TrainedTouches,
+    take_section, write_section,
+};
 
 /// Bytes of the checksum at the end.
 pub const CHECKSUM_LENGTH: usize = 4;
@@ -22,11 +28,3 @@ pub const MARGIN_LIMIT: i32 = 1 << 30;
 
 /// The largest depth of trees in [`Layout::Complete`].
 pub const MAX_COMPLETE_DEPTH: u8 = 8;
-
-/// The checksum of a model's bytes before the checksum: CRC-32 as in ISO-HDLC, zip and Ethernet.
-///
-/// Cost: about 50 instructions a byte, without a table in flash. Cannot fail.
-pub fn checksum(bytes: &[u8]) -> u32 {
-    const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
-    CRC.checksum(bytes)
-}

@@ -11,7 +11,7 @@ pub struct Axis {
     pub feature: u8,
     /// Which columns there are.
     pub columns: Columns,
-    /// Bytes a threshold: 1 to 4, little endian, signed.
+    /// Bytes per threshold: 1 to 4, little endian, signed.
     pub width: u8,
     /// How many thresholds.
     pub count: u8,
@@ -69,7 +69,7 @@ impl Axis {
     }
 }
 
-/// Trees that add up alike: eight bytes.
+/// Trees whose leaves are scaled in the same way: eight bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Group {
     /// Depth of the trees in [`Layout::Complete`](super::Layout::Complete), 1 to 8; 0 in other layouts.

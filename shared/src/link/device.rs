@@ -88,7 +88,7 @@ pub struct DeviceEnd {
 }
 
 impl DeviceEnd {
-    /// An end that goes on from `progress`; [`Progress::NONE`] at first.
+    /// An end that continues from `progress`; [`Progress::NONE`] at first.
     pub const fn new(progress: Progress) -> Self {
         Self {
             decoder: Decoder::new(),
@@ -98,12 +98,12 @@ impl DeviceEnd {
         }
     }
 
-    /// What has happened so far.
+    /// The counts so far.
     pub const fn statistics(&self) -> Statistics {
         self.statistics
     }
 
-    /// How far the session has come.
+    /// The state of the session.
     pub const fn progress(&self) -> &Progress {
         &self.progress
     }
@@ -125,7 +125,7 @@ impl DeviceEnd {
         }
     }
 
-    /// Tells the host of something that happened here.
+    /// Sends an event to the host.
     pub fn tell(&mut self, event: Event, mut send: impl FnMut(&[u8])) {
         let message = Message::Event { sequence: self.events, event };
         self.events = self.events.wrapping_add(1);

@@ -1,8 +1,8 @@
 //! Messages in frames: postcard, CRC-32, COBS.
 
 use super::message::Message;
+use crate::checksum::checksum;
 use cobs::{DecodeResult, DecoderState};
-use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// The version of frames and messages. A frame of another version is not read.
 pub const VERSION: u8 = 1;
@@ -15,25 +15,8 @@ const TRAILER: usize = 4;
 const MESSAGE_MAX: usize = super::CHUNK + 32;
 const DECODED_MAX: usize = HEADER + MESSAGE_MAX + TRAILER;
 
-/// The longest frame on the line: COBS adds a byte at the front, and 0x00 stands at either end.
+/// The longest frame on the line: COBS adds a byte at the front, and there is a 0x00 at each end.
 pub const FRAME_MAX: usize = DECODED_MAX + 3;
-
-/// With a table: 1 KB of flash, and a sixth of the time that a model's checksum takes a byte.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-
-/// CRC-32 (ISO-HDLC, as in zip and Ethernet): the checksum of frames, of what is loaded, and of evidence.
-///
-/// Cost: about 10 instructions a byte. Cannot fail.
-pub fn checksum(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
-}
-
-/// The [`checksum`] of parts one after another.
-pub(super) fn checksum_of<const N: usize>(parts: impl Iterator<Item = [u8; N]>) -> u32 {
-    let mut digest = CRC.digest();
-    parts.for_each(|part| digest.update(&part));
-    digest.finalize()
-}
 
 /// A message and the session it belongs to.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +44,7 @@ pub enum FrameError {
 /// Writes a frame into `out` and returns its bytes: 0x00, the frame, 0x00. The leading 0x00 ends whatever the line held
 /// before.
 ///
-/// Cost: about 60 instructions a byte, most of them for COBS. Returns nothing if the message is longer than any that [`Command`](super::Command)
+/// Cost: about 60 instructions per byte, most of them for COBS. Returns nothing if the message is longer than any that [`Command`](super::Command)
 /// and its like allow: a chunk of more than [`CHUNK`](super::CHUNK) bytes.
 pub fn encode<'o>(frame: &Frame<'_>, out: &'o mut [u8; FRAME_MAX]) -> &'o [u8] {
     let mut plain = [0; DECODED_MAX];

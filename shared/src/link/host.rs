@@ -6,7 +6,7 @@ use super::message::{Answer, Command, Event, Message, Outcome, Query};
 use core::fmt;
 use embedded_io::{Read, ReadReady, Write};
 
-/// How patient the host is.
+/// How long the host waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HostSettings {
     /// Microseconds after which an unanswered frame is sent again; doubles with each attempt, up to 16 times.
@@ -22,7 +22,7 @@ impl Default for HostSettings {
     }
 }
 
-/// What the host's end has seen.
+/// What the host's end has counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HostStatistics {
     /// Frames sent for the first time.
@@ -46,16 +46,16 @@ pub struct HostStatistics {
 pub enum Incoming<'a> {
     /// The session is open: commands may be given.
     Opened,
-    /// What came of a command; in the order of the commands, once for each.
+    /// The result of a command; in the order of the commands, once for each.
     Outcome {
         /// The command's number.
         sequence: u32,
-        /// What came of it.
+        /// What the result was.
         outcome: Outcome,
     },
     /// The answer to the question.
     Answer(Answer<'a>),
-    /// Something happened on the chip by itself.
+    /// Something happened on the chip that was not a command.
     Event {
         /// What happened.
         event: Event,
@@ -75,7 +75,7 @@ pub enum LinkError {
         /// Commands that may have been executed or not.
         uncertain: u32,
     },
-    /// The chip has forgotten the session, and with it what it had been told: it was reset and has no stored state.
+    /// The chip has forgotten the session, and everything it was told in it: it was reset and had no stored state.
     Forgotten {
         /// Commands whose outcome is known, and whose effect is lost.
         answered: u32,
@@ -117,7 +117,7 @@ enum Phase {
     Doubting,
 }
 
-/// A frame under way.
+/// A frame in flight.
 #[derive(Clone, Copy, Debug)]
 struct Sent {
     bytes: [u8; FRAME_MAX],
@@ -200,12 +200,12 @@ impl HostEnd {
         }
     }
 
-    /// What has happened so far.
+    /// The counts so far.
     pub const fn statistics(&self) -> HostStatistics {
         self.statistics
     }
 
-    /// Begins to open a session; [`Incoming::Opened`] says when it is. Whatever was under way is given up.
+    /// Starts opening a session; [`Incoming::Opened`] says when it is. Everything in flight is dropped.
     pub fn connect(&mut self, now: u64, mut send: impl FnMut(&[u8])) {
         self.phase = Phase::Asking;
         (self.session, self.next, self.oldest) = (0, 0, 0);
@@ -214,7 +214,7 @@ impl HostEnd {
         self.put_question(Query::Hello, now, &mut send);
     }
 
-    /// Whether the session is open, and no command or question is under way.
+    /// Whether the session is open, and no command or question is in flight.
     pub fn is_idle(&self) -> bool {
         self.phase == Phase::Open && self.question.is_none() && self.oldest == self.next
     }
@@ -277,7 +277,7 @@ impl HostEnd {
         mut send: impl FnMut(&[u8]),
         mut incoming: impl FnMut(Incoming<'_>),
     ) {
-        // The decoder hands out what lies in it, so it stands aside from the rest meanwhile.
+        // The decoder hands out what lies in it, so it is moved out while that is borrowed.
         let mut decoder = core::mem::take(&mut self.decoder);
         for &byte in bytes {
             match decoder.feed(byte) {
@@ -359,7 +359,7 @@ impl HostEnd {
                 self.phase = Phase::Open;
                 incoming(Incoming::Opened);
             }
-            // Another host opened one meanwhile.
+            // Another host opened one in the meantime.
             (Phase::Opening, Answer::Session { .. }) => {
                 self.session = next_session(session);
                 self.put_question(Query::Open { previous: session }, now, send);

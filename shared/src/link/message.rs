@@ -1,6 +1,7 @@
-//! What is said over the link. The order of variants and fields is the format: add at the end, or raise
+//! The messages. The order of variants and fields is the format: add at the end, or raise
 //! [`VERSION`](super::VERSION).
 
+use crate::checksum::checksum_of;
 use crate::{ContactTime, Descriptor, Pose, Touch};
 use serde::{Deserialize, Serialize};
 
@@ -31,11 +32,11 @@ pub enum Message<'a> {
         #[serde(borrow)]
         command: Command<'a>,
     },
-    /// Chip: what came of a command.
+    /// Chip: the result of a command.
     Outcome {
         /// The command's number.
         sequence: u32,
-        /// What came of it.
+        /// What the result was.
         outcome: Outcome,
     },
     /// Chip: a command came that is not the next one, or not of the session that this frame is of.
@@ -43,7 +44,7 @@ pub enum Message<'a> {
         /// The number of the next command.
         sequence: u32,
     },
-    /// Chip: something happened by itself.
+    /// Chip: something happened without a command.
     Event {
         /// Counts events from 0 since power-up.
         sequence: u32,
@@ -155,7 +156,7 @@ pub enum Payload {
     Snapshot,
 }
 
-/// What came of a [`Command`].
+/// The result of a [`Command`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Outcome {
@@ -167,7 +168,7 @@ pub enum Outcome {
     Refused(Refusal),
 }
 
-/// Why the chip does not do what it was told to.
+/// Why the chip refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -201,7 +202,7 @@ impl core::fmt::Display for Refusal {
     }
 }
 
-/// Something that happened on the chip by itself.
+/// Something that happened on the chip without a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Event {
@@ -216,11 +217,39 @@ pub enum Event {
     },
     /// One of the chip's own fingers is faulty.
     Fault {
-        /// 0: stuck closed, 1: bouncing, 2: silent, 3: unreadable, 4: edges lost.
-        kind: u8,
-        /// 0, 1 or 2 along the row; 255 when no one finger is at fault.
+        /// What is wrong.
+        kind: FaultKind,
+        /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
     },
+}
+
+/// What can go wrong with a chip's own fingers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum FaultKind {
+    /// A finger stays closed.
+    Stuck,
+    /// A finger does not settle.
+    Bouncing,
+    /// A finger has been missing in many touches in a row.
+    Silent,
+    /// A finger's pin cannot be read.
+    Unreadable,
+    /// Edges came faster than the main loop took them, and some were lost.
+    Overrun,
+}
+
+impl core::fmt::Display for FaultKind {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Stuck => "stuck closed",
+            Self::Bouncing => "bouncing",
+            Self::Silent => "silent",
+            Self::Unreadable => "unreadable",
+            Self::Overrun => "edges lost",
+        })
+    }
 }
 
 /// A [`Touch`] as it travels: missing contacts are `u32::MAX`, the pose is direction and alignment in Q15.
@@ -265,7 +294,7 @@ pub struct VerdictMessage {
     pub best: u8,
     /// Touches since the last reset.
     pub touches: u32,
-    /// What to hold against another recognizer, where it was asked for.
+    /// What to compare with another recognizer, if it was asked for.
     pub detail: Option<Detail>,
 }
 
@@ -291,9 +320,9 @@ pub struct Detail {
 }
 
 impl Detail {
-    /// From the posterior of the best object in Q56 and the evidence of all. Cost: about 100 instructions an object.
+    /// From the posterior of the best object in Q56 and the evidence of all. Cost: about 100 instructions per object.
     pub fn new(posterior: u64, evidence: &[i64]) -> Self {
-        let evidence = super::frame::checksum_of(evidence.iter().map(|evidence| evidence.to_le_bytes()));
+        let evidence = checksum_of(evidence.iter().map(|evidence| evidence.to_le_bytes()));
         Self { posterior: posterior.to_le_bytes(), evidence: evidence.to_le_bytes() }
     }
 
@@ -328,14 +357,14 @@ impl ModelInfo {
     }
 }
 
-/// What the chip's end of the link has seen since power-up.
+/// What the chip's end of the link has counted since power-up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Whole frames.
     pub frames: u32,
     /// Frames that were garbled or too long, or no message of this version.
     pub garbled: u32,
-    /// Commands that had been executed before: repetitions and doubled frames.
+    /// Commands that had been executed before: repetitions and duplicate frames.
     pub repeated: u32,
     /// Commands that came before the one that was expected: something was lost in between.
     pub early: u32,

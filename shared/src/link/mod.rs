@@ -7,9 +7,9 @@
 //! ```
 //!
 //! At most [`FRAME_MAX`] bytes on the line. A frame that does not decode, is too long or fails its checksum is counted
-//! and dropped; the next 0x00 begins afresh. [`Decoder`] takes bytes in any portions.
+//! and dropped; the next 0x00 starts a new frame. [`Decoder`] takes bytes in any portions.
 //!
-//! # Who says what
+//! # Messages
 //!
 //! | from | message | delivery |
 //! |---|---|---|
@@ -17,12 +17,12 @@
 //! | chip | [`Outcome`]: verdict, done, refused | repeated on demand for the last [`WINDOW`] commands |
 //! | host | [`Query`]: model, names, posteriors, statistics, snapshot | changes nothing, repeated until answered |
 //! | chip | [`Answer`] | |
-//! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host can tell how many it missed |
+//! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host knows how many it missed |
 //!
-//! A host opens a session, whose number stands in every frame. Within it, commands are numbered from 0. The chip executes
+//! A host opens a session, whose number is in every frame. Within it, commands are numbered from 0. The chip executes
 //! the command that it expects next and no other: one from before is a repetition (its outcome is sent again), one from
-//! after says that something was lost (the chip tells which it expects). The host keeps up to [`WINDOW`] commands under
-//! way and repeats those that stay without an outcome. So a command is executed once, whatever the line loses, doubles,
+//! after says that something was lost (the chip says which one it expects). The host keeps up to [`WINDOW`] commands under
+//! way and repeats those that stay without an outcome. So a command is executed once, whatever the line loses, duplicates,
 //! garbles or delays; and as the chip's [`Progress`] can be stored with its evidence, that holds through a power cut.
 //!
 //! Opening names the session that the host believes to be current, so that a late copy of an opening cannot open again.
@@ -35,12 +35,13 @@ mod frame;
 mod host;
 mod message;
 
+pub use crate::checksum::checksum;
 pub use device::{Device, DeviceEnd, Progress};
-pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, checksum, encode};
+pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
 pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
 pub use message::{
-    Answer, Command, Decision, Detail, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,
-    TouchMessage, VerdictMessage,
+    Answer, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Payload, Query, Refusal,
+    Statistics, TouchMessage, VerdictMessage,
 };
 
 /// Commands that may be under way at a time, and outcomes that the chip keeps.

@@ -18,7 +18,7 @@ fn touch(number: u32) -> Touch {
     }
 }
 
-/// A chip that writes down what it was told, and says in its verdict how many touches that were.
+/// A chip that records every command and puts its number of touches into the verdict.
 #[derive(Default)]
 struct Notebook {
     touches: Vec<Touch>,
@@ -96,7 +96,7 @@ struct Faults {
     byte_changed: f64,
     frame_lost: f64,
     frame_doubled: f64,
-    /// Up to so many microseconds; frames may overtake each other.
+    /// At most this many microseconds; frames may overtake each other.
     delay: u64,
 }
 
@@ -384,7 +384,7 @@ fn a_second_host_opens_a_session_of_its_own_and_late_copies_open_none() {
 #[test]
 fn events_say_how_many_before_them_were_lost() {
     let mut rig = Rig::new(CLEAN, 1);
-    let fault = Event::Fault { kind: 1, finger: 2 };
+    let fault = Event::Fault { kind: FaultKind::Bouncing, finger: 2 };
     for (number, event) in [Event::Started, fault, fault, fault, fault].into_iter().enumerate() {
         let (up, now) = (&mut rig.up, rig.now);
         rig.chip.tell(event, |frame| {
@@ -406,7 +406,7 @@ fn frames_of_another_version_are_not_read() {
     let mut out = [0; FRAME_MAX];
     let bytes = encode(&Frame { session: 7, message: Message::Expected { sequence: 1 } }, &mut out).to_vec();
     assert!(decode(&bytes)[0].is_ok());
-    // Version 2 with a checksum of its own.
+    // Version 2 with a valid checksum.
     let mut plain = vec![2, 7, 0, 4, 1];
     let checksum = crate::format::checksum(&plain);
     plain.extend(checksum.to_le_bytes());
@@ -492,6 +492,17 @@ proptest! {
             None => touch,
         };
         prop_assert_eq!(Touch::from(&TouchMessage::from(&touch)), touch);
+        let command = Command::Touch { touch: (&touch).into(), detail: true };
+        let frame = Frame { session: 7, message: Message::Command { sequence: 9, command } };
+        let mut out = [0; FRAME_MAX];
+        let mut decoder = Decoder::new();
+        let mut arrived = Vec::new();
+        for &byte in encode(&frame, &mut out) {
+            if let Some(Ok(Frame { message: Message::Command { command: Command::Touch { touch, .. }, .. }, .. })) = decoder.feed(byte) {
+                arrived.push(Touch::from(&touch));
+            }
+        }
+        prop_assert_eq!(arrived, [touch]);
     }
 
     #[test]
@@ -509,6 +520,7 @@ proptest! {
         let mut host = HostEnd::new(HostSettings::default());
         host.connect(0, |_| ());
         let mut notebook = Notebook::default();
+        let count = messages.len();
         for message in messages {
             let mut plain = vec![VERSION, 0, 0];
             plain.extend(message);
@@ -520,6 +532,9 @@ proptest! {
             host.receive(&encoded[..=length], 1, |_| (), |_| ());
         }
         prop_assert_eq!(chip.statistics().garbled + chip.statistics().frames > 0, true);
+        // Each was counted once by either end, as a message or as none.
+        prop_assert_eq!((chip.statistics().garbled + chip.statistics().frames) as usize, count);
+        prop_assert_eq!((host.statistics().garbled + host.statistics().received) as usize, count);
     }
 
     #[test]

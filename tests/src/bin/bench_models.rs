@@ -63,7 +63,7 @@ fn main() -> Result<()> {
     for (name, ensemble, leaf, layout) in models {
         let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() })?;
         println!(
-            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes a split, {} instructions a touch by the stated model",
+            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes per split, {} instructions per touch by the stated model",
             compiled.bytes.len(),
             compiled.splits,
             compiled.bytes.len() as f64 / compiled.splits as f64,
@@ -165,7 +165,7 @@ fn by_object(ensemble: &Ensemble) -> Vec<&palpate::ensemble::Tree> {
     trees
 }
 
-/// The same trees in irithyll-core's format, an ensemble an object, each after its length as u32. It goes right where a
+/// The same trees in irithyll-core's format, an ensemble per object, each after its length as u32. It goes right where a
 /// feature is greater than the threshold, so thresholds are the next smaller f32.
 fn irithyll(ensemble: &Ensemble) -> Vec<u8> {
     let mut bytes = Vec::new();

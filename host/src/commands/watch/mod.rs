@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 Examples:
   palpate watch /dev/ttyACM0              a chip with its own fingers
   palpate watch emulator touches/ --load model.palpate
-                                          an emulated chip and a data set's touches
+                                          an emulated chip and a data set
   palpate watch journal.jsonl             what palpate link --journal writes
 
 q, Esc or Ctrl-C quit. When the output is not a terminal, plain lines are printed instead.")]

@@ -1,25 +1,44 @@
 //! How a chart becomes lines, shapes and text.
+//!
+//! Everything is drawn four times as large as it is shown, since the plotting library rounds to whole pixels.
 
-use super::place::{apart, dashes};
-use super::{Chart, Mark, Shape, Side, Stroke};
-use crate::page::color::{GRAY, GRID, INK};
-use crate::page::scale::Scale;
+use super::labels::apart;
+use super::parts::{Chart, Mark, Shape, Side, Stroke, Svg};
+use crate::error::{PageProblem, Result};
+use crate::page::axis::Axis;
+use crate::page::color::{self, GRAY, GRID, INK};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
-use plotters::element::{Circle, PathElement, Polygon, Rectangle, Text, TriangleMarker};
-use plotters::prelude::{DrawingArea, IntoFont, SVGBackend};
+use plotters::element::{Circle, DashedPathElement, PathElement, Polygon, Rectangle, Text, TriangleMarker};
+use plotters::prelude::{DrawingArea, IntoDrawingArea, IntoFont, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontTransform, RGBColor, ShapeStyle, TextStyle};
 
 /// Pixels drawn for each pixel shown.
-pub(super) const FINE: i32 = 4;
+const FINE: i32 = 4;
 /// The height of text, in shown pixels.
 const TEXT: i32 = 13;
 /// The mean width of a character, in shown pixels.
 const CHARACTER: f64 = 6.9;
 
 impl Chart {
-    pub(super) fn draw(&self, root: &Root) -> Result<(), String> {
+    /// Draws the chart.
+    ///
+    /// # Errors
+    /// If the plotting library refuses, which it has no reason to.
+    pub(crate) fn svg(&self) -> Result<Svg> {
+        let mut text = String::new();
+        {
+            let size = (self.width * FINE as u32, self.height * FINE as u32);
+            let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+            self.draw(&root)
+                .and_then(|()| root.present().map_err(|e| e.to_string()))
+                .map_err(|reason| PageProblem::Chart { title: self.title.clone(), reason })?;
+        }
+        Ok(Svg { text: with_natural_size(&text, self.width, self.height), width: self.width, height: self.height })
+    }
+
+    fn draw(&self, root: &Root) -> Result<(), String> {
         let label_width = self.labels.iter().map(|label| label.text.chars().count()).max().unwrap_or(0);
         let top = if self.title.is_empty() { 10 } else { 30 };
         let tick_width = (self.y.longest() as f64 * CHARACTER) as i32 + 10;
@@ -28,7 +47,7 @@ impl Chart {
         let bottom = tick_height + if self.x_name.is_empty() { 4 } else { 20 };
         let right = if label_width == 0 { 18 } else { (label_width as f64 * CHARACTER * 1.12) as i32 + 24 };
         let (width, height) = (self.width as i32, self.height as i32);
-        let spec = Cartesian2d::<Scale, Scale>::new(
+        let spec = Cartesian2d::<Axis, Axis>::new(
             self.x.clone(),
             self.y.clone(),
             (left * FINE..(width - right) * FINE, (height - bottom) * FINE..top * FINE),
@@ -84,14 +103,14 @@ impl Chart {
             if (wanted - place).abs() > 2.0 {
                 draw_line(root, &[from, to], &label.color, 1)?;
             }
-            draw_text(root, &label.text, (to.0 + 3, to.1), HPos::Left, VPos::Center, &label.color, false)?;
+            draw_text(root, &label.text, (to.0 + 3, to.1), HPos::Left, VPos::Center, &color::text(label.color), false)?;
         }
         Ok(())
     }
 }
 
 type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Plane<'a> = DrawingArea<SVGBackend<'a>, Cartesian2d<Scale, Scale>>;
+type Plane<'a> = DrawingArea<SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 
 /// The edges of the plane, in shown pixels.
 struct Frame {
@@ -110,19 +129,10 @@ fn draw_mark(root: &Root, area: &Plane, frame: &Frame, mark: &Mark) -> Result<()
             let style = ShapeStyle::from(color).stroke_width(fine(width));
             if *stroke == Stroke::Dashed {
                 let pixels: Vec<(i32, i32)> = points.iter().map(|point| area.map_coordinate(point)).collect();
-                for dash in dashes(&pixels, f64::from(6 * FINE), f64::from(4 * FINE)) {
-                    to(root.draw(&PathElement::new(dash, style)))?;
-                }
-                Ok(())
+                to(root.draw(&DashedPathElement::new(pixels, 6 * FINE, 4 * FINE, style)))
             } else {
                 to(area.draw(&PathElement::new(points.clone(), style)))
             }
-        }
-        Mark::Band { points, color } => {
-            let outline = points.iter().map(|point| (point.0, point.1));
-            let back = points.iter().rev().map(|point| (point.0, point.2));
-            let outline: Vec<(f64, f64)> = outline.chain(back).collect();
-            to(area.draw(&Polygon::new(outline, color.mix(0.18))))
         }
         Mark::Spread { points, color } => {
             let style = ShapeStyle::from(color).stroke_width(fine(1));
@@ -156,38 +166,16 @@ fn draw_mark(root: &Root, area: &Plane, frame: &Frame, mark: &Mark) -> Result<()
                 Side::Left => ((x - 6, y), HPos::Right, VPos::Center),
                 Side::Right => ((x + 6, y), HPos::Left, VPos::Center),
                 Side::Above => ((x, y - 6), HPos::Center, VPos::Bottom),
-                Side::Below => ((x, y + 6), HPos::Center, VPos::Top),
                 Side::LowerRight => ((x + 5, y + 10), HPos::Left, VPos::Center),
                 Side::UpperLeft => ((x - 5, y - 10), HPos::Right, VPos::Center),
                 Side::Center => ((x, y), HPos::Center, VPos::Center),
             };
-            draw_text(root, text, place, h, v, color, false)
+            draw_text(root, text, place, h, v, &color::text(*color), false)
         }
         Mark::Vertical(x) => {
-            let x = area.as_coord_spec().get_x_axis_pixel(*x);
+            let x = area.map_coordinate(&(*x, area.get_y_range().start)).0 / FINE;
             draw_line(root, &[(x, frame.top), (x, frame.bottom)], &GRAY, 1)
         }
-        Mark::Horizontal(y) => {
-            let y = area.as_coord_spec().get_y_axis_pixel(*y);
-            draw_line(root, &[(frame.left, y), (frame.right, y)], &GRAY, 1)
-        }
-    }
-}
-
-/// Shown pixels of a value on one axis.
-trait AxisPixel {
-    fn get_x_axis_pixel(&self, x: f64) -> i32;
-    fn get_y_axis_pixel(&self, y: f64) -> i32;
-}
-
-impl AxisPixel for Cartesian2d<Scale, Scale> {
-    fn get_x_axis_pixel(&self, x: f64) -> i32 {
-        use plotters::coord::CoordTranslate;
-        self.translate(&(x, self.get_y_range().start)).0 / FINE
-    }
-    fn get_y_axis_pixel(&self, y: f64) -> i32 {
-        use plotters::coord::CoordTranslate;
-        self.translate(&(self.get_x_range().start, y)).1 / FINE
     }
 }
 
@@ -224,4 +212,50 @@ fn draw_upright(root: &Root, text: &str, (x, y): (i32, i32), h: HPos, color: &RG
     let font = ("sans-serif", f64::from(TEXT * FINE) * 1.24).into_font().transform(FontTransform::Rotate270);
     let style = TextStyle::from(font).color(color).pos(Pos::new(h, VPos::Center));
     root.draw(&Text::new(text.to_string(), (x * FINE, y * FINE), style)).map_err(|e| e.to_string())
+}
+
+/// The same drawing shown in its natural size; the plotting library states the size that it drew in.
+fn with_natural_size(text: &str, width: u32, height: u32) -> String {
+    let drawn = format!("<svg width=\"{}\" height=\"{}\"", width * FINE as u32, height * FINE as u32);
+    text.replacen(&drawn, &format!("<svg width=\"{width}\" height=\"{height}\""), 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::page::color::BLUE;
+
+    #[test]
+    fn a_chart_has_its_axes_names_its_labels_and_its_natural_size() {
+        let mut chart = Chart::new("touches", Axis::logarithmic(1.0, 60.0), "accuracy", Axis::share());
+        chart.series("ours & theirs", BLUE, Shape::Disc, &[(1.0, 0.2), (10.0, 0.7), (60.0, f64::NAN)]);
+        let svg = chart.titled("Accuracy").svg().unwrap();
+        for part in ["touches", "accuracy", "ours &amp; theirs", "100 %", "Accuracy", "#0072B2", "</svg>"] {
+            assert!(svg.text.contains(part), "{part}\n{}", svg.text);
+        }
+        assert!(svg.text.starts_with("<svg width=\"560\" height=\"360\" viewBox=\"0 0 2240 1440\""), "{}", svg.text);
+        assert!(!svg.text.contains("NaN"));
+    }
+
+    #[test]
+    fn a_dashed_line_covers_its_path_with_gaps() {
+        let mut chart = Chart::new("", Axis::linear(0.0, 1.0, 1), "", Axis::linear(0.0, 1.0, 1)).sized(220, 100);
+        chart.line("", BLUE, Stroke::Dashed, &[(0.0, 0.5), (1.0, 0.5)]);
+        let svg = chart.svg().unwrap().text;
+        let dashes: Vec<(i32, i32)> = svg
+            .split("<polyline ")
+            .filter(|line| line.contains("#0072B2"))
+            .map(|line| {
+                let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+                let x: Vec<i32> =
+                    points.split_whitespace().map(|p| p.split(',').next().unwrap().parse().unwrap()).collect();
+                (x[0], *x.last().unwrap())
+            })
+            .collect();
+        assert!(dashes.len() > 10, "{dashes:?}");
+        for pair in dashes.windows(2) {
+            let ((from, to), (next, _)) = (pair[0], pair[1]);
+            assert_eq!((to - from, next - to), (6 * FINE, 4 * FINE), "{dashes:?}");
+        }
+    }
 }

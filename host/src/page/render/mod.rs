@@ -1,28 +1,22 @@
 //! Pictures of meshes.
 //!
-//! A small software rasteriser: a depth buffer, one soft light from above the viewer's left shoulder, normals smoothed
-//! over everything but sharp edges, and four samples a pixel each way. Orthographic, so that proportions can be judged.
+//! A small software rasterizer: a depth buffer, one soft light from above the viewer's left shoulder, normals smoothed
+//! over everything but sharp edges, and several samples per pixel. Orthographic, so that proportions can be judged.
 
 mod picture;
 mod raster;
-mod view;
-
-pub use view::View;
+mod viewpoint;
 
 use crate::mesh::{Mesh, Object};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use picture::Picture;
+use viewpoint::Viewpoint;
 
 /// A picture of `mesh`, `size` pixels wide and high, as PNG: from a three-quarter view, on a transparent ground so that
 /// it works on light and dark pages. A mesh without extent gives an empty picture.
 pub fn thumbnail(mesh: &Mesh, size: u32) -> Vec<u8> {
-    seen_from(mesh, size, View::three_quarter(mesh))
-}
-
-/// As [`thumbnail`], from a view of one's own.
-pub fn seen_from(mesh: &Mesh, size: u32, view: View) -> Vec<u8> {
     let mut picture = Picture::new(size, size);
-    picture.draw(&raster::render(mesh, size, view), 0, 0);
+    picture.draw(&raster::render(mesh, size, Viewpoint::three_quarter(mesh)), 0, 0);
     picture.png()
 }
 
@@ -36,7 +30,7 @@ pub fn sheet(objects: &[Object], width: u32) -> Vec<u8> {
     let mut picture = Picture::new(width, count.div_ceil(columns) * (cell + caption));
     for (i, object) in (0..).zip(objects) {
         let (left, top) = (i % columns * cell, i / columns * (cell + caption));
-        picture.draw(&raster::render(&object.mesh, cell, View::three_quarter(&object.mesh)), left, top);
+        picture.draw(&raster::render(&object.mesh, cell, Viewpoint::three_quarter(&object.mesh)), left, top);
         write(&mut picture, &object.name, left + cell / 2, top + cell);
     }
     picture.on_light_ground();

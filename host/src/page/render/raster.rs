@@ -1,10 +1,10 @@
 //! Triangles to shaded pixels.
 
-use super::view::View;
+use super::viewpoint::Viewpoint;
 use crate::mesh::Mesh;
 use glam::{Vec2, Vec3};
 
-/// Samples a pixel, each way.
+/// Samples per pixel, each way.
 const SAMPLES: u32 = 3;
 /// Faces that meet at less than this share a smooth normal: the cosine of 40°.
 const CREASE: f32 = 0.766;
@@ -18,7 +18,7 @@ pub(super) struct Raster {
 }
 
 /// Draws `mesh` as large as the picture holds, with a small margin.
-pub(super) fn render(mesh: &Mesh, size: u32, view: View) -> Raster {
+pub(super) fn render(mesh: &Mesh, size: u32, view: Viewpoint) -> Raster {
     let wide = size * SAMPLES;
     let placed: Vec<Vec3> = mesh.vertices.iter().map(|&v| view.turn * Vec3::from(v)).collect();
     let finite = placed.iter().copied().filter(|v| v.is_finite());

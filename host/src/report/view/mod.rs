@@ -1,22 +1,20 @@
 //! A page on which a mesh can be turned and looked at, with some approaches of the probe.
 //!
-//! The page holds all that it needs ([three.js](https://threejs.org) included) and asks the network for nothing. It
-//! shows what a user wants to know of a mesh before capturing millions of touches: is it right side out and closed, is
-//! its scale sensible beside the fingers, where do the fingers meet it.
+//! The page holds all that it needs and asks the network for nothing. It answers what a user should know about a mesh
+//! before capturing millions of touches: is it right side out and closed, does its scale suit the fingers, where do the
+//! fingers touch it.
 
-mod shown;
-
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::mesh::Object;
 use crate::mesh::facts::Facts;
+use crate::page::html;
+use crate::page::scene::{self, Line, SimplifiedMesh};
 use crate::probe::approach::{Approach, FINGERS, Probe};
 use crate::probe::scene::Scene;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use maud::{DOCTYPE, PreEscaped, html};
+use glam::DVec3;
+use maud::html;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
-use shown::Shown;
 
 /// What a page shows.
 #[derive(Clone, Copy, Debug)]
@@ -52,28 +50,22 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     settings.probe.check(settings.length)?;
     let scene = Scene::new(&object.mesh, settings.length)?;
     let facts = Facts::of(&object.mesh);
-    let shown = Shown::of(&object.mesh, settings.length);
+    let mesh = SimplifiedMesh::new(&object.mesh, settings.length);
+    let shown_triangles = mesh.triangles.len();
     let drawn = draw(&scene, settings);
-    let data = serde_json::json!({
+    let own = serde_json::json!({
         "length": settings.length,
-        "radius": settings.probe.radius,
-        "low": scene.bounds()[0].to_array(),
-        "high": scene.bounds()[1].to_array(),
-        "step": shown.step,
-        "origin": shown.origin.to_array(),
-        "wide": shown.is_wide(),
-        "positions": STANDARD.encode(shown.position_bytes()),
-        "indices": STANDARD.encode(shown.index_bytes()),
+        "full": drawn.approaches.iter().map(Drawn::is_full).collect::<Vec<_>>(),
         "approaches": drawn.approaches,
     });
-    // In a script element only `<` could end the data early.
-    let data = serde_json::to_string(&data)
-        .map_err(|e| Error::data(format!("cannot write the page's data: {e}"), "Report this as a bug."))?
-        .replace('<', "\\u003c");
-    Ok(html(object, settings, &facts, &shown, &drawn, &data))
+    let lines = drawn.approaches.iter().enumerate().flat_map(|(group, approach)| approach.lines(group));
+    let [low, high] = scene.bounds().map(|corner| corner.to_array());
+    let scene = scene::Scene { mesh, low, high, radius: settings.probe.radius, lines: lines.collect() };
+    let json = scene.json(own.as_object().cloned().unwrap_or_default())?;
+    Ok(html(object, settings, &facts, shown_triangles, &drawn, &json))
 }
 
-/// One approach, as the page's script reads it.
+/// One approach, for the page's script.
 #[derive(serde::Serialize)]
 struct Drawn {
     /// Where each finger starts.
@@ -83,6 +75,31 @@ struct Drawn {
     distances: [Option<f64>; FINGERS],
     /// When each finger touches, in seconds after the first; null if it misses.
     times: [Option<f64>; FINGERS],
+}
+
+impl Drawn {
+    fn is_full(&self) -> bool {
+        self.distances.iter().all(Option::is_some)
+    }
+
+    /// A line for each finger's way, with a ball where it touches; a finger that misses goes as far beyond the object as
+    /// it started before it.
+    fn lines(&self, group: usize) -> impl Iterator<Item = Line> {
+        const COLORS: [&str; FINGERS] = ["first", "middle", "last"];
+        let direction = DVec3::from(self.direction);
+        (0..FINGERS).map(move |finger| {
+            let start = DVec3::from(self.starts[finger]);
+            let distance = self.distances[finger].unwrap_or(-2.0 * start.dot(direction));
+            let ball = self.distances[finger].is_some();
+            Line {
+                group,
+                start: start.to_array(),
+                end: (start + distance * direction).to_array(),
+                color: if ball { COLORS[finger] } else { "missed" },
+                ball,
+            }
+        })
+    }
 }
 
 /// The approaches to show, and how many were drawn to find them.
@@ -107,7 +124,7 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
             times: times.map(|time| time.micros().map(|micros| f64::from(micros) / 1e6)),
         };
         tried += 1;
-        let is_full = distances.iter().all(Option::is_some);
+        let is_full = drawn.is_full();
         full += u64::from(is_full);
         let (kept, most) = if is_full { (&mut touches, settings.touches) } else { (&mut misses, settings.misses) };
         if kept.len() < most {
@@ -118,101 +135,88 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
     Approaches { approaches: touches, tried, full }
 }
 
-fn html(object: &Object, settings: &Settings, facts: &Facts, shown: &Shown, drawn: &Approaches, data: &str) -> String {
+fn html(
+    object: &Object,
+    settings: &Settings,
+    facts: &Facts,
+    shown_triangles: usize,
+    drawn: &Approaches,
+    json: &str,
+) -> String {
     let side = facts.high - facts.low;
     let unit = f64::from(side.max_element()) / settings.length;
     let share = 100.0 * drawn.full as f64 / drawn.tried.max(1) as f64;
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                meta http-equiv="Content-Security-Policy"
-                    content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
-                link rel="icon" href="data:,";
-                title { (object.name) " – Palpate" }
-                style { (PreEscaped(include_str!("page.css"))) }
-            }
-            body {
-                main {
-                    figure id="scene" {
-                        div id="stage" { div id="labels" aria-hidden="true" {} p id="message" role="status" {} }
-                        figcaption {
-                            "Drag to turn, scroll or pinch to come nearer, drag with two fingers or the right button to "
-                            "move. Click a finger or a row to see one approach alone; Escape shows all."
+    let body = html! {
+        main {
+            (scene::figure("Drag to turn, scroll or pinch to zoom, drag with two fingers or the right mouse button to move. \
+                            Click a contact or a row to see one approach alone; Escape shows all."))
+            aside {
+                h1 { (object.name) }
+                dl {
+                    div { dt { "Triangles" } dd {
+                        (grouped(facts.triangles))
+                        @if shown_triangles < facts.triangles {
+                            " (simplified to " (grouped(shown_triangles)) " here; the touches are those of the whole mesh)"
                         }
+                    } }
+                    div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
+                    div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
+                    div { dt { "Size in the file" } dd {
+                        (three_digits(side.x.into())) " × " (three_digits(side.y.into())) " × " (three_digits(side.z.into()))
+                    } }
+                    div { dt { "One unit here" } dd { (three_digits(unit)) " in the file" } }
+                    div { dt { "Finger radius" } dd {
+                        (settings.probe.radius) " units, " (three_digits(settings.probe.radius * unit)) " in the file"
+                    } }
+                    div { dt { "Full touches" } dd { (format!("{share:.1} % of {} approaches", grouped(drawn.tried as usize))) } }
+                }
+                fieldset {
+                    legend { "Show" }
+                    @for (id, label, on) in [
+                        ("touches", "touches", true), ("misses", "misses", false), ("box", "bounding box", true),
+                        ("edges", "edges of triangles", false), ("smooth", "smooth shading", facts.triangles > 5000),
+                    ] {
+                        label { input type="checkbox" id=(id) checked[on]; " " (label) }
                     }
-                    aside {
-                        h1 { (object.name) }
-                        dl {
-                            div { dt { "Triangles" } dd {
-                                (grouped(facts.triangles))
-                                @if shown.triangles.len() < facts.triangles {
-                                    " (simplified to " (grouped(shown.triangles.len())) " here; the touches are those of all)"
-                                }
-                            } }
-                            div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
-                            div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
-                            div { dt { "Size in the file" } dd {
-                                (short(side.x.into())) " × " (short(side.y.into())) " × " (short(side.z.into()))
-                            } }
-                            div { dt { "One unit here" } dd { (short(unit)) " in the file" } }
-                            div { dt { "Finger radius" } dd {
-                                (settings.probe.radius) " units, " (short(settings.probe.radius * unit)) " in the file"
-                            } }
-                            div { dt { "Full touches" } dd { (format!("{share:.1} % of {} approaches drawn", grouped(drawn.tried as usize))) } }
-                        }
-                        fieldset {
-                            legend { "Show" }
-                            @for (id, label, on) in [
-                                ("touches", "touches", true), ("misses", "misses", false), ("box", "box", true),
-                                ("edges", "triangles' edges", false), ("smooth", "smooth shading", facts.triangles > 5000),
-                            ] {
-                                label { input type="checkbox" id=(id) checked[on]; " " (label) }
-                            }
-                        }
-                        p.key {
-                            @for (class, label) in [
-                                ("first", "finger 1"),
-                                ("middle", "finger 2"),
-                                ("last", "finger 3"),
-                                ("missed", "misses"),
-                                ("back", "inside of the surface"),
-                            ] {
-                                span { span class={ "finger " (class) } {} (label) }
-                            }
-                        }
-                        div.scroll {
-                            table {
-                                thead { tr {
-                                    th { "approach" } th { "t1 / s" } th { "t2 / s" } th { "t3 / s" } th { "κ / ms" }
-                                } }
-                                tbody {
-                                    @for (i, approach) in drawn.approaches.iter().enumerate() {
-                                        tr tabindex="0" data-approach=(i) {
-                                            td { (i + 1) }
-                                            @for time in approach.times { td { (seconds(time)) } }
-                                            td { (curvature(approach.times)) }
-                                        }
+                }
+                p.key {
+                    @for (class, label) in [
+                        ("first", "finger 1"),
+                        ("middle", "finger 2"),
+                        ("last", "finger 3"),
+                        ("missed", "misses"),
+                        ("back", "inside of the surface"),
+                    ] {
+                        span { span class={ "finger " (class) } {} (label) }
+                    }
+                }
+                div.scroll role="region" aria-label="Approaches" tabindex="0" {
+                    table {
+                        thead { tr {
+                            @for name in ["approach", "t1 / s", "t2 / s", "t3 / s", "κ / ms"] { th scope="col" { (name) } }
+                        } }
+                        tbody {
+                            @for (i, approach) in drawn.approaches.iter().enumerate() {
+                                tr data-approach=(i) {
+                                    td {
+                                        button type="button" aria-pressed="false" aria-label={ "Show approach " (i + 1) } { (i + 1) }
                                     }
+                                    @for time in approach.times { td { (seconds(time)) } }
+                                    td { (curvature(approach.times)) }
                                 }
                             }
-                        }
-                        p.note {
-                            "Times count from the first contact; – is a finger that never touched. "
-                            "κ = t1 − 2·t2 + t3, the curvature under the probe."
                         }
                     }
                 }
-                script id="data" type="application/json" { (PreEscaped(data)) }
-                script { (PreEscaped(include_str!("../../../assets/three/three.min.js"))) }
-                script { (PreEscaped(include_str!("page.js"))) }
+                p.note {
+                    "Times are counted from the first contact; – is a finger that did not touch. "
+                    "κ = t1 − 2·t2 + t3, the curvature under the probe."
+                }
             }
         }
-    }
-    .into_string()
+        (scene::scripts(json, include_str!("page.js")))
+    };
+    html::file(&format!("{} – Palpate", object.name), &[include_str!("page.css"), scene::STYLE], &body)
 }
 
 fn seconds(time: Option<f64>) -> String {
@@ -227,7 +231,7 @@ fn curvature(times: [Option<f64>; FINGERS]) -> String {
 }
 
 /// A number with three significant digits.
-fn short(value: f64) -> String {
+fn three_digits(value: f64) -> String {
     if value == 0.0 || !(1e-3..1e6).contains(&value.abs()) {
         return format!("{value:.2e}");
     }
@@ -235,7 +239,7 @@ fn short(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// A count with its thousands apart.
+/// A count with its thousands separated by commas.
 fn grouped(count: usize) -> String {
     let digits = count.to_string();
     let groups: Vec<&[u8]> = digits.as_bytes().rchunks(3).rev().collect();

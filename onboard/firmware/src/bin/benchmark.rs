@@ -1,6 +1,6 @@
 //! What a touch costs on this chip from the switches to the host: instructions, stack, flash and RAM.
 //!
-//! The evaluator alone, layout by layout and beside its peers, is the `evaluator` image.
+//! The `evaluator` image measures the evaluator alone, layout by layout, next to other evaluators.
 #![no_std]
 #![no_main]
 
@@ -86,9 +86,9 @@ fn link(meter: &mut Meter, touch: &Touch) {
     let bytes = touch_frame(touch, 1_000, true, &mut out);
     let bare = Touch::new(touch.times());
     for (name, touch) in [("with a pose", touch), ("without", &bare)] {
-        // Ten bits a byte; the outcome's frame, 18 bytes without detail, travels meanwhile.
+        // Ten bits per byte; the outcome's frame, 18 bytes without detail, travels at the same time.
         let length = touch_frame(touch, 1_000, true, &mut [0; FRAME_MAX]).len();
-        println!("a touch's frame {}: {} bytes, {} touches a second at 115,200 baud", name, length, 11_520 / length);
+        println!("a touch's frame {}: {} bytes, {} touches per second at 115,200 baud", name, length, 11_520 / length);
     }
     let mut decoder = Decoder::new();
     cost!(meter, "link: decode a touch's frame", || {

@@ -1,6 +1,6 @@
 //! What the evaluator costs on this chip, layout by layout: instructions and stack a touch, margins alone, as the
-//! exporter states them (on a Cortex-M4F it must be right to 15 %), and with evidence and stopping; and beside the first
-//! model the same trees in irithyll-core and as a plain array of eight-byte nodes with f32 compares.
+//! exporter states them (on a Cortex-M4F within 15 %), and with evidence and stopping; and, next to the first
+//! model, the same trees in irithyll-core and as a plain array of eight-byte nodes with f32 compares.
 #![no_std]
 #![no_main]
 
@@ -13,7 +13,7 @@ use palpate_shared::Touch;
 /// Touches that are averaged over.
 const TOUCHES: usize = 50;
 
-/// What the exporter states (for a Cortex-M4F) may be off by so many percent.
+/// What the exporter states (for a Cortex-M4F) may be off by this many percent.
 const STATED_WITHIN: u64 = 15;
 
 macro_rules! models {
@@ -112,7 +112,7 @@ fn peers(meter: &mut Meter, touches: &[Touch]) {
     println!("irithyll-core    {:7} {:8}", IRITHYLL.0.len(), cost);
 }
 
-/// Walks trees of eight-byte nodes, a hundred an object.
+/// Walks trees of eight-byte nodes, a hundred per object.
 fn eight_byte_nodes(mut bytes: &[u8], row: &[f32; 3], margins: &mut [f32; 10]) {
     for margin in margins {
         *margin = 0.5;

@@ -1,4 +1,4 @@
-//! Recognizes from three switches on three pins, and tells a host of every touch and fault over the UART
+//! Recognizes from three switches on three pins, and reports every touch and fault to a host over the UART
 //! (`palpate watch`). A verdict ends an object; the next touch begins another.
 //!
 //! The model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`.
@@ -95,7 +95,7 @@ fn pin_changed() {
     });
 }
 
-/// Every interrupt comes here, so that the image needs no table of its own for each chip.
+/// Every interrupt is handled here, so that the image needs no interrupt table per chip.
 #[allow(unsafe_code)] // cortex-m-rt wants the word; nothing in it needs it.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {

@@ -1,7 +1,7 @@
 //! Recognizes touches that a host sends over the UART: `palpate link` at the other end.
 //!
 //! A model comes from the host (`palpate link PORT --load model.palpate`) and lies in RAM that keeps its content through
-//! resets, as do the records that let it go on after one.
+//! resets, as do the records from which it continues after one.
 #![no_std]
 #![no_main]
 
@@ -29,7 +29,7 @@ fn main() -> ! {
     }
 }
 
-/// Every interrupt comes here, so that the image needs no table of its own for each chip.
+/// Every interrupt is handled here, so that the image needs no interrupt table per chip.
 #[allow(unsafe_code)] // cortex-m-rt wants the word; nothing in it needs it.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {

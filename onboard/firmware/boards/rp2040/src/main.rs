@@ -42,7 +42,7 @@ const MODEL_PROBE: Geometry = Geometry { spacing: 15_000, speed: 100_000 };
 const PROBE: Geometry = MODEL_PROBE;
 
 /// The second-stage boot loader, which the chip's ROM looks for at the start of the flash.
-#[allow(unsafe_code)] // A section of its own is how it gets there.
+#[allow(unsafe_code)] // A linker section is how it gets there.
 #[unsafe(link_section = ".boot2")]
 #[used]
 static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;

@@ -1,0 +1,30 @@
+//! What every HTML file here has: its head, and a policy under which the browser refuses to ask the network for anything.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// A whole HTML file. It holds everything itself: the `styles` are put into its head one after the other.
+pub(crate) fn file(title: &str, styles: &[&str], body: &Markup) -> String {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta http-equiv="Content-Security-Policy"
+                    content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+                // No icon, so that a browser does not ask for one.
+                link rel="icon" href="data:,";
+                title { (title) }
+                @for style in styles { style { (PreEscaped(style)) } }
+            }
+            body { (body) }
+        }
+    }
+    .into_string()
+}
+
+/// A script, inside the file.
+pub(crate) fn script(text: &str) -> Markup {
+    html! { script { (PreEscaped(text)) } }
+}

@@ -1,0 +1,187 @@
+//! What the touches so far say about each object.
+
+use super::exponential::exp2_negative;
+
+/// A posterior probability, in Q56: fine enough to distinguish 1 − 1e-16 from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Posterior(u64);
+
+const ONE: u64 = 1 << 56;
+
+impl Posterior {
+    /// The probability in Q56: 2^56 is 1.
+    pub const fn q56(self) -> u64 {
+        self.0
+    }
+
+    /// The probability, rounded to f32. Cost: a conversion; in software on a chip without an FPU.
+    pub const fn to_f32(self) -> f32 {
+        self.0 as f32 / ONE as f32
+    }
+
+    /// The probability as f64.
+    pub const fn to_f64(self) -> f64 {
+        self.0 as f64 / ONE as f64
+    }
+
+    /// 1 − the probability as f64, exact where the probability itself is close to 1.
+    pub const fn complement(self) -> f64 {
+        ONE.saturating_sub(self.0) as f64 / ONE as f64
+    }
+}
+
+/// How units of evidence turn into bits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unit {
+    pub(crate) bits: u32,
+    pub(crate) shift: u8,
+}
+
+impl Unit {
+    /// e^-(`ahead` units) in Q56.
+    fn weight(self, ahead: u64) -> u64 {
+        let ahead = u64::from(u32::try_from(ahead).unwrap_or(u32::MAX));
+        exp2_negative((ahead * u64::from(self.bits)) >> (self.shift & 63))
+    }
+}
+
+/// The object with the most evidence; the first of several.
+///
+/// Cost: six instructions per object.
+pub(crate) fn best(evidence: &[i64]) -> (usize, i64) {
+    let mut best = (0, i64::MIN);
+    for (object, &evidence) in evidence.iter().enumerate() {
+        if evidence > best.1 {
+            best = (object, evidence);
+        }
+    }
+    best
+}
+
+/// Whether the weights of all objects but the best come to at most `odds` (Q56), the best one's being 1: whether its
+/// posterior passes the threshold.
+///
+/// Cost: an exponential for each object, until it is clear that the answer is no; usually after the first rival.
+pub(crate) fn is_decided(evidence: &[i64], (winner, most): (usize, i64), odds: u64, unit: Unit) -> bool {
+    let mut left = odds;
+    for (object, &evidence) in evidence.iter().enumerate() {
+        if object == winner {
+            continue;
+        }
+        match left.checked_sub(unit.weight(most.abs_diff(evidence))) {
+            Some(rest) => left = rest,
+            None => return false,
+        }
+    }
+    true
+}
+
+/// The posterior of one object.
+///
+/// Cost: an exponential for each object, and a division of about 800 instructions. Error: at most 2e-8 of the smaller
+/// one of the posterior and its complement, and 2^-55.
+pub(crate) fn posterior(evidence: &[i64], object: usize, unit: Unit) -> Posterior {
+    let (winner, most) = best(evidence);
+    let Some(&own) = evidence.get(object) else { return Posterior(0) };
+    // In Q55, so that 256 objects level with each other do not overflow.
+    let own = unit.weight(most.abs_diff(own)) >> 1;
+    let mut others = 0;
+    for (other, &evidence) in evidence.iter().enumerate() {
+        if other != winner {
+            others += unit.weight(most.abs_diff(evidence)) >> 1;
+        }
+    }
+    let sum = (ONE >> 1) + others;
+    Posterior(if object == winner { ONE - ratio(others, sum) } else { ratio(own, sum) })
+}
+
+/// `part` / `whole` in Q56, rounded down, for a part that is at most the whole: long division.
+fn ratio(part: u64, whole: u64) -> u64 {
+    let (mut rest, mut quotient) = (part, 0_u64);
+    if rest >= whole {
+        return ONE;
+    }
+    for _ in 0..56 {
+        quotient <<= 1;
+        // 2 · rest may not fit 64 bits, but 2 · rest − whole is below whole.
+        let half = whole - rest;
+        if rest >= half {
+            rest -= half;
+            quotient |= 1;
+        } else {
+            rest <<= 1;
+        }
+    }
+    quotient
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A unit of a thousandth of a nat.
+    fn unit() -> Unit {
+        let bits = core::f64::consts::LOG2_E / 1000.0 * 4_294_967_296.0;
+        Unit { bits: (bits * 256.0).round() as u32, shift: 8 }
+    }
+
+    #[test]
+    fn posteriors_are_those_of_a_softmax() {
+        let evidence = [1000, 400, -2500, 999];
+        let weights = evidence.map(|e| (e as f64 / 1000.0).exp());
+        let sum: f64 = weights.iter().sum();
+        for (object, weight) in weights.iter().enumerate() {
+            let posterior = posterior(&evidence, object, unit()).to_f64();
+            assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {}", weight / sum);
+        }
+        assert_eq!(posterior(&evidence, 4, unit()), Posterior(0));
+    }
+
+    #[test]
+    fn posteriors_beyond_nine_nines_are_told_apart() {
+        for nats in [20, 21, 25, 30, 34] {
+            let posterior = posterior(&[nats * 1000, 0], 0, unit());
+            let exact = 1.0 / (1.0 + (nats as f64).exp());
+            assert!((posterior.complement() / exact - 1.0).abs() < 1e-6 + 6e-17 / exact, "{nats}: {posterior:?}");
+            let loser = super::posterior(&[nats * 1000, 0], 1, unit()).to_f64();
+            assert!((loser / exact - 1.0).abs() < 1e-6 + 6e-17 / exact);
+        }
+        assert_eq!(posterior(&[i64::MAX, i64::MIN], 0, unit()).q56(), ONE);
+        assert_eq!(posterior(&[i64::MAX, i64::MIN], 1, unit()).q56(), 0);
+    }
+
+    #[test]
+    fn a_tie_is_never_decided_and_splits_the_posterior() {
+        for objects in [2, 3, 10, 256] {
+            let evidence = std::vec![77; objects];
+            assert!(!is_decided(&evidence, best(&evidence), ONE - 1, unit()));
+            for object in [0, objects - 1] {
+                let posterior = posterior(&evidence, object, unit()).to_f64();
+                assert!((posterior - 1.0 / objects as f64).abs() < 1e-9);
+            }
+        }
+        assert_eq!(best(&[1, 5, 5]), (1, 5));
+    }
+
+    #[test]
+    fn the_only_object_is_decided() {
+        assert!(is_decided(&[0], best(&[0]), 0, unit()));
+        assert_eq!(posterior(&[-5], 0, unit()).q56(), ONE);
+    }
+
+    #[test]
+    fn a_decision_is_where_the_posterior_passes() {
+        for rate in [0.3, 0.1, 0.01, 1e-4, 1e-9] {
+            let odds = rate / (1.0 - rate);
+            let q56 = (odds * ONE as f64) as u64;
+            let passes = |ahead: i64| is_decided(&[0, ahead, -400], (1, ahead), q56, unit());
+            let exact = |ahead: i64| {
+                let nats = |e: i64| (e as f64 / 1000.0).exp();
+                (nats(0) + nats(-400)) / nats(ahead) <= odds
+            };
+            for ahead in 0..30_000 {
+                assert_eq!(passes(ahead), exact(ahead), "{ahead} at {rate}");
+            }
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Margins to a verdict: evidence, its exponential, when to stop, and the state as bytes.
+
+mod evidence;
+mod exponential;
+mod recognizer;
+mod snapshot;
+mod stopping;
+
+pub use evidence::Posterior;
+pub use exponential::exp2_negative;
+pub use recognizer::{CapacityError, Recognizer, Verdict};
+pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
+pub use stopping::Stopping;

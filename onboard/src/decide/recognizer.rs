@@ -1,0 +1,166 @@
+//! Touch by touch to a verdict.
+
+use super::evidence::{self, Posterior, Unit};
+use super::stopping::Stopping;
+use crate::model::Model;
+use core::fmt;
+use palpate_shared::Touch;
+
+/// What is known after a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// No object is sure enough yet.
+    Undecided,
+    /// An object was recognized. Further touches change nothing until [`Recognizer::reset`].
+    Recognized {
+        /// The object's index in the model.
+        object: u8,
+        /// How many touches it took.
+        touches: u32,
+    },
+    /// The limit of touches was reached without a decision: undecided for good, until [`Recognizer::reset`]. Most
+    /// likely an object that the model does not know.
+    Unknown,
+}
+
+/// A model with more objects than a recognizer has room for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CapacityError {
+    /// The model's objects.
+    pub objects: usize,
+    /// The recognizer's room.
+    pub capacity: usize,
+}
+
+impl fmt::Display for CapacityError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the model has {} objects, and the recognizer has room for {}", self.objects, self.capacity)
+    }
+}
+
+impl core::error::Error for CapacityError {}
+
+/// Recognizes an object by touch; has room for up to `N` objects.
+///
+/// State: 8 bytes per object, and 40.
+#[derive(Clone, Debug)]
+pub struct Recognizer<'m, const N: usize> {
+    model: &'m Model<'m>,
+    stopping: Stopping,
+    /// Margins summed over touches, and the prior, in units of a margin.
+    evidence: [i64; N],
+    touches: u32,
+    verdict: Verdict,
+}
+
+impl<'m, const N: usize> Recognizer<'m, N> {
+    /// A recognizer that has touched nothing yet.
+    ///
+    /// # Errors
+    /// [`CapacityError`] when the model has more than `N` objects.
+    pub fn new(model: &'m Model<'m>, stopping: Stopping) -> Result<Self, CapacityError> {
+        let objects = model.object_count();
+        if objects > N {
+            return Err(CapacityError { objects, capacity: N });
+        }
+        let mut priors = model.priors().iter();
+        let evidence = core::array::from_fn(|_| priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into()));
+        Ok(Self { model, stopping, evidence, touches: 0, verdict: Verdict::Undecided })
+    }
+
+    /// Takes in a touch.
+    ///
+    /// Cost: the margins, then about 15 instructions per object and one exponential, rarely more. Cannot fail: evidence
+    /// that reaches the limits of 64 bits (after 2^33 touches at the earliest) stays there, which brings objects closer
+    /// together and never makes one recognized.
+    pub fn push(&mut self, touch: &Touch) -> Verdict {
+        let mut margins = [0; N];
+        self.model.margins(touch, &mut margins);
+        self.add(&margins)
+    }
+
+    /// Takes in a row of features, as [`Model::margins_of`].
+    pub fn push_features(&mut self, features: &[i32]) -> Verdict {
+        let mut margins = [0; N];
+        self.model.margins_of(features, &mut margins);
+        self.add(&margins)
+    }
+
+    /// Takes in a touch by its margins, computed beforehand with [`Model::margins`]; missing ones count as 0. For
+    /// replaying the same touches in many orders.
+    pub fn push_margins(&mut self, margins: &[i32]) -> Verdict {
+        self.add(margins)
+    }
+
+    /// The verdict after the last touch.
+    pub const fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
+    /// How many touches were taken in since the last [`reset`](Self::reset).
+    pub const fn touches(&self) -> u32 {
+        self.touches
+    }
+
+    /// The object with the most evidence; the first of several.
+    pub fn best(&self) -> usize {
+        evidence::best(self.evidence()).0
+    }
+
+    /// The posterior of an object; 0 for one that the model does not know.
+    ///
+    /// Cost: an exponential for each object, and about 800 instructions.
+    pub fn posterior(&self, object: usize) -> Posterior {
+        evidence::posterior(self.evidence(), object, self.unit())
+    }
+
+    /// The evidence for each object: margins summed over touches, and the prior, in [units](Model::unit).
+    pub fn evidence(&self) -> &[i64] {
+        self.evidence.get(..self.model.object_count()).unwrap_or_default()
+    }
+
+    /// Forgets all touches, for the next object.
+    pub fn reset(&mut self) {
+        let mut priors = self.model.priors().iter();
+        for evidence in &mut self.evidence {
+            *evidence = priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into());
+        }
+        self.touches = 0;
+        self.verdict = Verdict::Undecided;
+    }
+
+    /// The model.
+    pub const fn model(&self) -> &'m Model<'m> {
+        self.model
+    }
+
+    /// Takes over the state of a snapshot.
+    pub(crate) const fn set_state(&mut self, evidence: [i64; N], touches: u32, verdict: Verdict) {
+        self.evidence = evidence;
+        self.touches = touches;
+        self.verdict = verdict;
+    }
+
+    fn add(&mut self, margins: &[i32]) -> Verdict {
+        if self.verdict != Verdict::Undecided {
+            return self.verdict;
+        }
+        for (evidence, &margin) in self.evidence.iter_mut().zip(margins) {
+            *evidence = evidence.saturating_add(i64::from(margin));
+        }
+        self.touches = self.touches.saturating_add(1);
+        let best = evidence::best(self.evidence());
+        if evidence::is_decided(self.evidence(), best, self.stopping.odds, self.unit()) {
+            let object = u8::try_from(best.0).unwrap_or(u8::MAX);
+            self.verdict = Verdict::Recognized { object, touches: self.touches };
+        } else if self.touches >= self.stopping.max_touches {
+            self.verdict = Verdict::Unknown;
+        }
+        self.verdict
+    }
+
+    fn unit(&self) -> Unit {
+        let header = self.model.header();
+        Unit { bits: header.unit_bits(), shift: header.unit_shift() }
+    }
+}

@@ -1,0 +1,97 @@
+//! A recognizer's state as bytes, so that a power cut loses no touch.
+//!
+//! The bytes are postcard's: the model's checksum, the number of touches, the verdict (0 undecided, 1 recognized,
+//! 2 unknown) and its object, then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
+
+use super::recognizer::{Recognizer, Verdict};
+use core::fmt;
+use palpate_shared::format::checksum;
+
+/// Why a snapshot was not written or taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SnapshotError {
+    /// The buffer is too short; [`SNAPSHOT_LENGTH`] bytes and ten for each object are always enough.
+    Short,
+    /// The bytes are not a whole, unchanged snapshot.
+    Damaged,
+    /// The snapshot is from another model.
+    OtherModel,
+}
+
+/// Bytes of a snapshot without its evidence, at most.
+pub const SNAPSHOT_LENGTH: usize = 16;
+
+impl fmt::Display for SnapshotError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Short => "the buffer is too short for a snapshot",
+            Self::Damaged => "the snapshot is incomplete or was changed",
+            Self::OtherModel => "the snapshot is from another model",
+        })
+    }
+}
+
+impl core::error::Error for SnapshotError {}
+
+/// Model, touches, verdict, object.
+type State = (u32, u32, u8, u8);
+
+impl<const N: usize> Recognizer<'_, N> {
+    /// Writes the state to the start of `buffer`, and gives the bytes that it took.
+    ///
+    /// Cost: about 60 instructions per byte. Cannot panic.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Short`].
+    pub fn snapshot<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], SnapshotError> {
+        let (verdict, object) = match self.verdict() {
+            Verdict::Undecided => (0, 0),
+            Verdict::Recognized { object, .. } => (1, object),
+            Verdict::Unknown => (2, 0),
+        };
+        let state: State = (self.model().checksum(), self.touches(), verdict, object);
+        let mut length = postcard::to_slice(&state, buffer).map_err(|_| SnapshotError::Short)?.len();
+        for evidence in self.evidence() {
+            let rest = buffer.get_mut(length..).ok_or(SnapshotError::Short)?;
+            length += postcard::to_slice(evidence, rest).map_err(|_| SnapshotError::Short)?.len();
+        }
+        let sum = checksum(buffer.get(..length).ok_or(SnapshotError::Short)?);
+        let end = buffer.get_mut(length..).and_then(<[u8]>::first_chunk_mut).ok_or(SnapshotError::Short)?;
+        *end = sum.to_le_bytes();
+        buffer.get(..length + 4).ok_or(SnapshotError::Short)
+    }
+
+    /// Takes over the state of a snapshot; what was touched before is forgotten. On an error nothing changes.
+    ///
+    /// Cost: about 60 instructions per byte. Cannot panic.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Damaged`] or [`SnapshotError::OtherModel`].
+    pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
+        let (body, sum) = snapshot.split_last_chunk().ok_or(SnapshotError::Damaged)?;
+        if checksum(body) != u32::from_le_bytes(*sum) {
+            return Err(SnapshotError::Damaged);
+        }
+        let (state, mut rest): (State, _) = postcard::take_from_bytes(body).map_err(|_| SnapshotError::Damaged)?;
+        let (model, touches, verdict, object) = state;
+        if model != self.model().checksum() {
+            return Err(SnapshotError::OtherModel);
+        }
+        let verdict = match verdict {
+            0 => Verdict::Undecided,
+            1 if usize::from(object) < self.model().object_count() => Verdict::Recognized { object, touches },
+            2 => Verdict::Unknown,
+            _ => return Err(SnapshotError::Damaged),
+        };
+        let mut evidence = [0; N];
+        for evidence in evidence.iter_mut().take(self.model().object_count()) {
+            (*evidence, rest) = postcard::take_from_bytes(rest).map_err(|_| SnapshotError::Damaged)?;
+        }
+        if !rest.is_empty() {
+            return Err(SnapshotError::Damaged);
+        }
+        self.set_state(evidence, touches, verdict);
+        Ok(())
+    }
+}

@@ -1,0 +1,22 @@
+//! What this build reads: layouts and types of leaves are features of the crate, so that only what is used is linked.
+
+use palpate_shared::format::{Layout, LeafType};
+
+/// Whether models of a layout are read.
+pub(crate) const fn layout(layout: Layout) -> bool {
+    match layout {
+        Layout::Compact => cfg!(feature = "compact"),
+        Layout::Complete => cfg!(feature = "complete"),
+        Layout::Grid => cfg!(feature = "grid"),
+        Layout::Wide => cfg!(feature = "wide"),
+    }
+}
+
+/// Whether models with a type of leaf are read.
+pub(crate) const fn leaf(leaf: LeafType) -> bool {
+    match leaf {
+        LeafType::I8 => cfg!(feature = "i8-leaves"),
+        LeafType::I16 => cfg!(feature = "i16-leaves"),
+        LeafType::F32 => cfg!(feature = "f32-leaves"),
+    }
+}

@@ -1,0 +1,90 @@
+//! What is checked when a model is opened, so that no later step can fail.
+
+use super::optional;
+use crate::bytes::{ModelError, take};
+use crate::layouts::{Sections, built_in, complete, grid, preorder, ranks};
+use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
+
+/// The largest shift of a group.
+const MAX_SHIFT: u8 = 24;
+
+/// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves.
+#[inline(never)]
+pub(super) fn check(model: &Sections<'_>, header: &Header<'_>) -> Result<(), ModelError> {
+    if Key::from_code(header.key()).is_none() {
+        return Err(ModelError::Field { offset: 13 });
+    }
+    let positive = |bits: u32| bits.wrapping_sub(1) < f32::INFINITY.to_bits() - 1;
+    if !positive(header.unit().to_bits()) {
+        return Err(ModelError::Field { offset: 32 });
+    }
+    if header.unit_shift() > 63 {
+        return Err(ModelError::Field { offset: 40 });
+    }
+    let built_in = built_in::layout(model.layout);
+    if !built_in || !built_in::leaf(model.leaf) {
+        return Err(ModelError::NotBuiltIn { offset: if built_in { 7 } else { 6 } });
+    }
+    optional::check(model)?;
+    ranks::check(model, header.last_feature())?;
+    let section =
+        |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };
+    let values = usize::from(model.objects);
+    let mut nodes = model.nodes;
+    let mut leaves = model.leaves;
+    if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
+        let cells = grid::cells(model).ok_or(ModelError::Section { offset: model.offset(model.axes) })?;
+        section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
+        section(model.groups.is_empty(), model.groups)?;
+    }
+    // The largest leaf, as a power of two.
+    let leaf_bits = match model.leaf {
+        LeafType::I8 => 7,
+        LeafType::I16 => 15,
+        LeafType::F32 => 0,
+    };
+    let limit = MARGIN_LIMIT.unsigned_abs();
+    let (mut range, mut largest_base) = (1_u32 << 20, 0);
+    let mut shift = MAX_SHIFT;
+    for (index, &bytes) in model.groups.as_chunks().0.iter().enumerate() {
+        let wrong = ModelError::Field { offset: model.offset(model.groups) + Group::LENGTH * index };
+        let group = Group::from_bytes(bytes).ok_or(wrong)?;
+        let known = group.object.is_none_or(|object| u16::from(object) < model.objects);
+        let integer = model.leaf != LeafType::F32 || group.shift == 0;
+        if group.shift > shift || !known || !integer {
+            return Err(wrong);
+        }
+        shift = group.shift;
+        if model.leaf != LeafType::F32 {
+            // Shifted at most by 15 + MAX_SHIFT; a right shift of the limit cannot overflow as one of the trees could.
+            if group.trees > (limit >> leaf_bits) >> shift {
+                return Err(ModelError::MarginRange);
+            }
+            range = range.saturating_add(group.trees << ((leaf_bits + shift) & 31));
+        }
+        let leaf = model.leaf.size() * if group.object.is_none() { values } else { 1 };
+        let fits = match model.layout {
+            Layout::Complete
+                if built_in::layout(Layout::Complete) && (1..=MAX_COMPLETE_DEPTH).contains(&group.depth) =>
+            {
+                complete::check(&group, &mut nodes, &mut leaves, leaf)
+            }
+            Layout::Compact if built_in::layout(Layout::Compact) && group.depth == 0 => {
+                preorder::check(&group, &mut nodes, &mut leaves, leaf, 3)
+            }
+            Layout::Wide if built_in::layout(Layout::Wide) && group.depth == 0 => {
+                preorder::check(&group, &mut nodes, &mut leaves, leaf, 6)
+            }
+            _ => return Err(wrong),
+        };
+        section(fits.is_some(), model.nodes)?;
+    }
+    section(nodes.is_empty(), nodes)?;
+    section(leaves.is_empty(), leaves)?;
+    if model.leaf != LeafType::F32 {
+        for &base in model.base.as_chunks().0 {
+            largest_base = largest_base.max(i32::from_le_bytes(base).unsigned_abs());
+        }
+    }
+    if range.saturating_add(largest_base) > limit { Err(ModelError::MarginRange) } else { Ok(()) }
+}

@@ -1,0 +1,119 @@
+//! A touch to margins: the evaluator.
+
+use super::{Model, fixed};
+use crate::layouts::leaves::{BLOCK, Sum};
+use crate::layouts::{built_in, complete, grid, preorder, ranks};
+use palpate_shared::format::{Group, Layout};
+use palpate_shared::{Features, Touch};
+
+impl Model<'_> {
+    /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
+    /// objects are left alone; if it is shorter, nothing is written and the answer is `false`.
+    ///
+    /// Cost: the ensemble's; see the layouts. Cannot fail otherwise; a model over rows of features takes every feature
+    /// of a touch as missing.
+    pub fn margins(&self, touch: &Touch, margins: &mut [i32]) -> bool {
+        let features = self.descriptor.map(|descriptor| descriptor.features(touch));
+        self.margins_of(features.as_ref().map_or(&[], Features::as_slice), margins)
+    }
+
+    /// The margins of a row of features (see [`Model::margins`]): whole numbers or
+    /// [`f32_key`](palpate_shared::format::f32_key)s as [`Model::key`] says,
+    /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where one is missing, as it is for all features beyond the end of a short row.
+    pub fn margins_of(&self, features: &[i32], margins: &mut [i32]) -> bool {
+        let Some(margins) = self.sum(features, margins) else { return false };
+        if self.is_float() {
+            for margin in margins {
+                *margin = fixed::q16_from_f32_bits(margin.cast_unsigned());
+            }
+        }
+        true
+    }
+
+    /// The margins of a row of features as the trainer's own f32 values, bit for bit; `false`, and nothing written,
+    /// unless the model has f32 leaves and `margins` is as long as there are objects.
+    #[cfg(feature = "f32-leaves")]
+    pub fn f32_margins_of(&self, features: &[i32], margins: &mut [f32]) -> bool {
+        let mut bits = [0; 256];
+        if !self.is_float() || margins.len() != self.object_count() {
+            return false;
+        }
+        let Some(bits) = self.sum(features, &mut bits) else { return false };
+        for (margin, bits) in margins.iter_mut().zip(bits) {
+            *margin = f32::from_bits(bits.cast_unsigned());
+        }
+        true
+    }
+
+    /// Adds up all trees: in units, or in f32 values' bits.
+    fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
+        let margins = margins.get_mut(..self.object_count())?;
+        if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
+            grid::look_up(&self.sections, features, margins);
+            return Some(margins);
+        }
+        // Without a shift (the first is the largest), and always in f32, margins start from their base.
+        let shifted = self.sections.groups.get(1).is_some_and(|&shift| shift > 0);
+        if shifted {
+            margins.fill(0);
+        } else {
+            self.start(margins);
+        }
+        let mut sum = Sum { margins, leaf: self.sections.leaf, object: None };
+        let bias = self.add_trees(features, &mut sum);
+        if shifted {
+            for (margin, &base) in margins.iter_mut().zip(self.sections.base.as_chunks().0) {
+                *margin = margin.wrapping_add(i32::from_le_bytes(base)).wrapping_sub(bias);
+            }
+        } else if bias != 0 {
+            margins.iter_mut().for_each(|margin| *margin = margin.wrapping_sub(bias));
+        }
+        Some(margins)
+    }
+
+    /// Sets margins to their base.
+    fn start(&self, margins: &mut [i32]) {
+        match bytemuck::try_cast_slice(self.sections.base) {
+            Ok(bases) => grid::put(margins, bases, |[base]: [i32; 1]| i32::from_le(base)),
+            Err(_) => grid::put(margins, self.sections.base, i32::from_le_bytes),
+        }
+    }
+
+    /// Adds the leaves of all groups, and says how far every margin is too large. Groups come with the largest shift
+    /// first, so that all that was added before is shifted on the way.
+    fn add_trees(&self, features: &[i32], sum: &mut Sum<'_>) -> i32 {
+        let mut ranks = [0; 256];
+        ranks::rank(&self.sections, features, &mut ranks);
+        let mut reached = [0; BLOCK];
+        let (mut nodes, mut leaves) = (self.sections.nodes, self.sections.leaves);
+        let (mut shift, mut bias) = (0, 0_i32);
+        let shift_all = |margins: &mut [i32], bias: &mut i32, shift: u8| {
+            if shift > 0 {
+                *bias = bias.wrapping_shl(shift.into());
+                margins.iter_mut().for_each(|margin| *margin = margin.wrapping_shl(shift.into()));
+            }
+        };
+        for &bytes in self.sections.groups.as_chunks().0 {
+            let Some(group) = Group::from_bytes(bytes) else { continue };
+            shift_all(sum.margins, &mut bias, u8::saturating_sub(shift, group.shift));
+            shift = group.shift;
+            sum.object = group.object;
+            match self.sections.layout {
+                Layout::Complete if built_in::layout(Layout::Complete) => {
+                    complete::add(&group, &ranks, &mut reached, &mut nodes, &mut leaves, sum);
+                }
+                Layout::Wide if built_in::layout(Layout::Wide) => {
+                    preorder::add_wide(self.sections.cuts, &group, features, &mut nodes, &mut leaves, sum);
+                }
+                Layout::Compact if built_in::layout(Layout::Compact) => {
+                    preorder::add_compact(&group, &ranks, &mut nodes, &mut leaves, sum);
+                }
+                // Refused when the model was opened.
+                _ => {}
+            }
+            bias = bias.wrapping_add(sum.settle(group.trees));
+        }
+        shift_all(sum.margins, &mut bias, shift);
+        bias
+    }
+}

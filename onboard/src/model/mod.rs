@@ -1,0 +1,170 @@
+//! Bytes to a model to the margins of a touch.
+
+mod check;
+mod fixed;
+mod header;
+mod margins;
+mod optional;
+
+use crate::bytes::{ModelError, at, take};
+use crate::layouts::{Sections, built_in};
+use palpate_shared::Descriptor;
+use palpate_shared::format::{
+    HEADER_LENGTH, Header, Key, Layout, LeafType, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
+    take_section,
+};
+
+/// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
+///
+/// `FORMAT.md` of `palpate-shared` describes the bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Model<'a> {
+    sections: Sections<'a>,
+    descriptor: Option<Descriptor>,
+}
+
+impl<'a> Model<'a> {
+    /// Opens a model, checking everything that reading it later relies on: after this nothing can fail.
+    ///
+    /// Cost: about 50 instructions per byte, nearly all of them for the checksum; call it once and keep the result.
+    ///
+    /// # Errors
+    /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
+    #[inline(never)]
+    pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
+        let mut model = header::read(bytes).map(|(sections, descriptor)| Self { sections, descriptor });
+        if let Ok(opened) = &model
+            && let Err(error) = check::check(&opened.sections, &opened.header())
+        {
+            model = Err(error);
+        }
+        model
+    }
+
+    /// The header.
+    pub fn header(&self) -> Header<'a> {
+        // A model is only made from bytes that have a header.
+        Header::split(self.sections.bytes).map_or(Header::EMPTY, |(header, _)| header)
+    }
+
+    /// All of the model's bytes.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.sections.bytes
+    }
+
+    /// How many objects the model knows: 1 to 256.
+    pub fn object_count(&self) -> usize {
+        usize::from(self.sections.objects)
+    }
+
+    /// How many features a row has: 1 to 256.
+    pub fn feature_count(&self) -> usize {
+        usize::from(self.header().last_feature()) + 1
+    }
+
+    /// Which features a touch is turned into; `None` for a model over rows of features.
+    pub const fn descriptor(&self) -> Option<Descriptor> {
+        self.descriptor
+    }
+
+    /// How the trees are laid out.
+    pub const fn layout(&self) -> Layout {
+        self.sections.layout
+    }
+
+    /// What leaves are stored as.
+    pub const fn leaf_type(&self) -> LeafType {
+        self.sections.leaf
+    }
+
+    /// Whether margins are added in f32; never without the feature `f32-leaves`, so that no code for it is linked.
+    pub(crate) const fn is_float(&self) -> bool {
+        built_in::leaf(LeafType::F32) && matches!(self.sections.leaf, LeafType::F32)
+    }
+
+    /// What features are compared as.
+    pub fn key(&self) -> Key {
+        Key::from_code(self.header().key()).unwrap_or(Key::Whole)
+    }
+
+    /// Nats in one unit of a margin.
+    pub fn unit(&self) -> f32 {
+        self.header().unit()
+    }
+
+    /// The farthest that a margin can be from the full model's, in nats.
+    pub fn margin_error(&self) -> f32 {
+        self.header().margin_error()
+    }
+
+    /// The checksum, which names the model: two models with the same are the same.
+    pub fn checksum(&self) -> u32 {
+        self.sections.bytes.last_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes))
+    }
+
+    /// The version of the program that exported the model.
+    pub fn tool_version(&self) -> &'a str {
+        self.text(0)
+    }
+
+    /// The name of an object; empty for one that the model does not know.
+    pub fn object_name(&self, object: usize) -> &'a str {
+        self.text(object.saturating_add(1))
+    }
+
+    /// The evidence for an object before any touch, in units of a margin.
+    pub fn prior(&self, object: usize) -> i32 {
+        self.priors().get(object).map_or(0, |prior| i32::from_le_bytes(*prior))
+    }
+
+    /// The probe that the model was trained for, if it states one.
+    pub fn probe(&self) -> Option<TrainedProbe> {
+        TrainedProbe::from_bytes(optional::find(self.sections.optional, Tag::Probe))
+    }
+
+    /// The touches that the model was trained on, and so the only ones that count as evidence: full touches, with a pose
+    /// if the descriptor needs one, unless the model states others.
+    ///
+    /// Cost: about 100 instructions.
+    pub fn trained_touches(&self) -> TrainedTouches {
+        TrainedTouches::from_bytes(optional::find(self.sections.optional, Tag::Touches))
+            .unwrap_or_else(|| TrainedTouches::full(self.descriptor.is_some_and(Descriptor::needs_pose)))
+    }
+
+    /// The noise in the training, if the model states it.
+    pub fn noise(&self) -> Option<TrainedNoise> {
+        TrainedNoise::from_bytes(optional::find(self.sections.optional, Tag::Noise))
+    }
+
+    /// The optional sections, in the order of their tags; also those that this crate does not know.
+    pub fn optional_sections(&self) -> impl Iterator<Item = Section<'a>> {
+        let mut rest = self.sections.optional;
+        core::iter::from_fn(move || take_section(&mut rest))
+    }
+
+    /// The evidence for each object before any touch.
+    pub(crate) fn priors(&self) -> &'a [[u8; 4]] {
+        // They follow the base margins, which are as long.
+        let start = self.sections.offset(self.sections.base) + self.sections.base.len();
+        self.sections.bytes.get(start..start + self.sections.base.len()).unwrap_or_default().as_chunks().0
+    }
+
+    fn text_length(&self) -> usize {
+        usize::try_from(self.header().text_length()).unwrap_or_default()
+    }
+
+    fn text(&self, index: usize) -> &'a str {
+        let mut text = self.sections.bytes.get(HEADER_LENGTH..).unwrap_or_default();
+        text = text.get(..self.text_length()).unwrap_or_default();
+        for _ in 0..index {
+            next_text(&mut text);
+        }
+        core::str::from_utf8(next_text(&mut text)).unwrap_or_default()
+    }
+}
+
+/// The next string: a byte for its length, then its UTF-8.
+fn next_text<'a>(text: &mut &'a [u8]) -> &'a [u8] {
+    let length = usize::from(at(text, 0));
+    take(text, 1).and_then(|_| take(text, length)).unwrap_or_default()
+}

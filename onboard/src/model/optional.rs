@@ -1,0 +1,40 @@
+//! The optional sections: checked once, then found by their tags.
+
+use crate::bytes::ModelError;
+use crate::layouts::Sections;
+use palpate_shared::format::{Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
+
+/// The content of the section with this tag; empty if there is none, which no section that is read is.
+pub(super) fn find<'a>(mut sections: &'a [u8], tag: Tag) -> &'a [u8] {
+    while let Some(Section { tag: found, content, .. }) = take_section(&mut sections) {
+        if found == tag.code() {
+            return content;
+        }
+    }
+    &[]
+}
+
+/// Checks that sections fill their part of the model, in the order of their tags, and make sense, and that none is there
+/// that has to be understood and is not.
+pub(super) fn check(model: &Sections<'_>) -> Result<(), ModelError> {
+    let mut rest = model.optional;
+    let mut last = 0;
+    while !rest.is_empty() {
+        let offset = model.offset(rest);
+        let Section { tag, must_understand, content } =
+            take_section(&mut rest).ok_or(ModelError::Section { offset })?;
+        let valid = match tag {
+            _ if tag <= last => false,
+            _ if tag == Tag::Probe.code() => TrainedProbe::from_bytes(content).is_some(),
+            _ if tag == Tag::Touches.code() => TrainedTouches::from_bytes(content).is_some(),
+            _ if tag == Tag::Noise.code() => TrainedNoise::from_bytes(content).is_some(),
+            _ if must_understand => return Err(ModelError::NotUnderstood { tag, offset }),
+            _ => true,
+        };
+        if !valid {
+            return Err(ModelError::Field { offset });
+        }
+        last = tag;
+    }
+    Ok(())
+}

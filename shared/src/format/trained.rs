@@ -1,0 +1,317 @@
+//! What a model states about its training, and the optional sections that hold it.
+
+use super::codes::{Counted, Length};
+use crate::pattern::Patterns;
+
+/// An optional section's tag. The tag in the model also has [`MUST_UNDERSTAND`] set if a reader that does not know the
+/// section has to refuse the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Tag {
+    /// [`TrainedProbe`].
+    Probe,
+    /// [`TrainedTouches`].
+    Touches,
+    /// [`TrainedNoise`].
+    Noise,
+    /// Reserved: stopping thresholds by the number of touches.
+    ThresholdsByTouches,
+    /// Reserved: stopping thresholds by object.
+    ThresholdsByObject,
+    /// Reserved: a test for objects that the model does not know.
+    FitTest,
+    /// Reserved: a plan of approaches.
+    Plan,
+    /// Reserved: the features' names, for models over rows of features.
+    FeatureNames,
+}
+
+impl Tag {
+    /// The tag's number.
+    pub const fn code(self) -> u16 {
+        match self {
+            Self::Probe => 1,
+            Self::Touches => 2,
+            Self::Noise => 3,
+            Self::ThresholdsByTouches => 4,
+            Self::ThresholdsByObject => 5,
+            Self::FitTest => 6,
+            Self::Plan => 7,
+            Self::FeatureNames => 8,
+        }
+    }
+}
+
+/// Set in the tag of a section that a reader has to understand.
+pub const MUST_UNDERSTAND: u16 = 1 << 15;
+
+/// Bytes before a section's content: tag, two zeros, length.
+pub const SECTION_HEADER_LENGTH: usize = 8;
+
+/// The probe that a model was trained for: 16 bytes.
+///
+/// The header's `spacing` and `speed` are those of the simulated training; here they are as the user stated them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainedProbe {
+    /// Radius of a finger, in lengths.
+    pub radius: f32,
+    /// Between neighboring fingers, in lengths.
+    pub spacing: f32,
+    /// Nominal speed, in lengths per second.
+    pub speed: f32,
+    /// What a length is.
+    pub length: Length,
+}
+
+impl TrainedProbe {
+    /// Bytes of the section.
+    pub const LENGTH: usize = 16;
+
+    /// The section's content.
+    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
+        let numbers = [self.radius, self.spacing, self.speed].map(f32::to_le_bytes);
+        let mut bytes = [0; Self::LENGTH];
+        bytes.iter_mut().zip(numbers.into_iter().flatten()).for_each(|(to, from)| *to = from);
+        let [.., length, _, _, _] = &mut bytes;
+        *length = self.length.code();
+        bytes
+    }
+
+    /// Reads a section; `None` if a number is not positive and finite, or the unit of length does not exist. Bytes after
+    /// those that are known are ignored.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let ([radius, spacing, speed, [length, ..]], _) = bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
+        let number = |bytes: &[u8; 4]| {
+            let bits = u32::from_le_bytes(*bytes);
+            // Positive and finite, without floating point.
+            (bits.wrapping_sub(1) < f32::INFINITY.to_bits() - 1).then(|| f32::from_bits(bits))
+        };
+        Some(Self {
+            radius: number(radius)?,
+            spacing: number(spacing)?,
+            speed: number(speed)?,
+            length: Length::from_code(*length)?,
+        })
+    }
+}
+
+/// The touches that a model was trained on, and so the only ones that it can take as evidence: 8 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrainedTouches {
+    /// The contact patterns that occurred.
+    pub patterns: Patterns,
+    /// Which approaches count as evidence.
+    pub counted: Counted,
+    /// Whether a touch has to have a pose.
+    pub needs_pose: bool,
+    /// The largest time between the first and the last contact of a touch, in microseconds; `u32::MAX` if it is not
+    /// known. An effector that waits for less turns full touches into partial ones.
+    pub largest_spread: u32,
+}
+
+impl TrainedTouches {
+    /// Bytes of the section.
+    pub const LENGTH: usize = 8;
+
+    /// Full touches only, without a limit of their spread: what a model without this section was trained on.
+    pub const fn full(needs_pose: bool) -> Self {
+        Self { patterns: Patterns::FULL, counted: Counted::Full, needs_pose, largest_spread: u32::MAX }
+    }
+
+    /// The section's content.
+    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
+        let [a, b, c, d] = self.largest_spread.to_le_bytes();
+        [self.patterns.bits(), self.counted.code(), self.needs_pose.into(), 0, a, b, c, d]
+    }
+
+    /// Reads a section; `None` if there is no pattern, one that does not exist or one that does not count, or if a code
+    /// does not exist. Bytes after those that are known are ignored.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (&[patterns, counted, pose, _, a, b, c, d], _) = bytes.split_first_chunk()?;
+        let (patterns, counted) = (Patterns::from_bits(patterns)?, Counted::from_code(counted)?);
+        if patterns.is_empty() || patterns.and(counted.patterns()) != patterns || pose > 1 {
+            return None;
+        }
+        Some(Self { patterns, counted, needs_pose: pose == 1, largest_spread: u32::from_le_bytes([a, b, c, d]) })
+    }
+}
+
+/// The noise that was added to touches in training: 16 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TrainedNoise {
+    /// The least standard deviation of the Gaussian noise of contact times, in microseconds.
+    pub least: u32,
+    /// The largest one.
+    pub largest: u32,
+    /// The timer's resolution in microseconds; 0 for none.
+    pub timer: u32,
+    /// The standard deviation of the pose in thousandths of a degree; 0 for none.
+    pub pose: u32,
+}
+
+impl TrainedNoise {
+    /// Bytes of the section.
+    pub const LENGTH: usize = 16;
+
+    /// The section's content.
+    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
+        let numbers = [self.least, self.largest, self.timer, self.pose].map(u32::to_le_bytes);
+        let mut bytes = [0; Self::LENGTH];
+        bytes.iter_mut().zip(numbers.into_iter().flatten()).for_each(|(to, from)| *to = from);
+        bytes
+    }
+
+    /// Reads a section; `None` if it is too short or its largest noise is less than its least. Bytes after those that
+    /// are known are ignored.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (numbers, _) = bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
+        let [least, largest, timer, pose] = numbers.map(u32::from_le_bytes);
+        (least <= largest).then_some(Self { least, largest, timer, pose })
+    }
+}
+
+/// Everything that a model states about its training, to be written into it.
+///
+/// ```
+/// use palpate_shared::Patterns;
+/// use palpate_shared::format::{Counted, HeaderBuilder, Trained, TrainedTouches};
+///
+/// let touches = TrainedTouches {
+///     patterns: Patterns::CONTACTS,
+///     counted: Counted::Contacts,
+///     needs_pose: false,
+///     largest_spread: 1_050_000,
+/// };
+/// let trained = Trained { touches: Some(touches), ..Trained::default() };
+/// let mut sections = Vec::new();
+/// trained.write(|bytes| sections.extend_from_slice(bytes));
+/// let header = HeaderBuilder::default().with_sections(sections.len() as u32);
+/// // Header, text, these sections, base margins, and so on.
+/// # assert_eq!(sections.len(), 16);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trained {
+    /// The probe.
+    pub probe: Option<TrainedProbe>,
+    /// The touches.
+    pub touches: Option<TrainedTouches>,
+    /// The noise.
+    pub noise: Option<TrainedNoise>,
+}
+
+impl Trained {
+    /// Hands the bytes of all sections to `put`, in order. Sections with higher tags can follow with
+    /// [`write_section`].
+    pub fn write(&self, mut put: impl FnMut(&[u8])) {
+        if let Some(probe) = self.probe {
+            write_section(Tag::Probe, false, &probe.to_bytes(), &mut put);
+        }
+        if let Some(touches) = self.touches {
+            // Whoever does not know it would take as evidence what is none.
+            write_section(Tag::Touches, true, &touches.to_bytes(), &mut put);
+        }
+        if let Some(noise) = self.noise {
+            write_section(Tag::Noise, false, &noise.to_bytes(), &mut put);
+        }
+    }
+}
+
+/// Hands the bytes of one section to `put`: its header, its content, and zeros up to a multiple of four. Sections have to
+/// be written in the order of their tags, each once.
+///
+/// A content of 4 GB or more is cut there.
+pub fn write_section(tag: Tag, must_understand: bool, content: &[u8], put: &mut impl FnMut(&[u8])) {
+    let tag = tag.code() | if must_understand { MUST_UNDERSTAND } else { 0 };
+    let length = u32::try_from(content.len()).unwrap_or(u32::MAX);
+    let content = content.get(..usize::try_from(length).unwrap_or(usize::MAX)).unwrap_or(content);
+    put(&tag.to_le_bytes());
+    put(&[0; 2]);
+    put(&length.to_le_bytes());
+    put(content);
+    let zeros = content.len().wrapping_neg() % 4;
+    put([0; 3].get(..zeros).unwrap_or_default());
+}
+
+/// A section as it is found in a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Section<'a> {
+    /// The tag without [`MUST_UNDERSTAND`].
+    pub tag: u16,
+    /// Whether a reader that does not know the tag has to refuse the model.
+    pub must_understand: bool,
+    /// The content, without the zeros after it.
+    pub content: &'a [u8],
+}
+
+/// Splits the first section off `bytes`; `None` if it is not whole. What is left is in `bytes`.
+///
+/// Cost: about 30 instructions. Cannot fail.
+pub fn take_section<'a>(bytes: &mut &'a [u8]) -> Option<Section<'a>> {
+    let (&[low, high, _, _, a, b, c, d], rest) = bytes.split_first_chunk::<SECTION_HEADER_LENGTH>()?;
+    let tag = u16::from_le_bytes([low, high]);
+    let length = usize::try_from(u32::from_le_bytes([a, b, c, d])).ok()?;
+    let (content, rest) = rest.split_at_checked(length)?;
+    *bytes = rest.get(length.wrapping_neg() % 4..)?;
+    Some(Section { tag: tag & !MUST_UNDERSTAND, must_understand: tag & MUST_UNDERSTAND != 0, content })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    const TOUCHES: TrainedTouches = TrainedTouches {
+        patterns: Patterns::CONTACTS,
+        counted: Counted::Contacts,
+        needs_pose: true,
+        largest_spread: 1_050_000,
+    };
+    const PROBE: TrainedProbe = TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth };
+    const NOISE: TrainedNoise = TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 5_000 };
+
+    #[test]
+    fn sections_are_read_back_as_written() {
+        let trained = Trained { probe: Some(PROBE), touches: Some(TOUCHES), noise: Some(NOISE) };
+        let mut bytes = Vec::new();
+        trained.write(|part| bytes.extend_from_slice(part));
+        write_section(Tag::FeatureNames, false, b"seven b", &mut |part| bytes.extend_from_slice(part));
+        let mut rest = bytes.as_slice();
+        let sections: Vec<Section> = core::iter::from_fn(|| take_section(&mut rest)).collect();
+        assert!(rest.is_empty());
+        let heads: Vec<_> = sections.iter().map(|s| (s.tag, s.must_understand, s.content.len())).collect();
+        assert_eq!(heads, [(1, false, 16), (2, true, 8), (3, false, 16), (8, false, 7)]);
+        assert_eq!(TrainedProbe::from_bytes(sections[0].content), Some(PROBE));
+        assert_eq!(TrainedTouches::from_bytes(sections[1].content), Some(TOUCHES));
+        assert_eq!(TrainedNoise::from_bytes(sections[2].content), Some(NOISE));
+        assert_eq!(sections[3].content, b"seven b");
+        for length in 0..16 {
+            assert_eq!(take_section(&mut &bytes[..length]), None, "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn contents_that_make_no_sense_are_refused() {
+        for (position, wrong) in [(0, 0), (0, 1), (0, 64), (1, 3), (2, 2)] {
+            let mut bytes = TOUCHES.to_bytes();
+            bytes[position] = wrong;
+            assert_eq!(TrainedTouches::from_bytes(&bytes), None, "byte {position}: {wrong}");
+        }
+        for (radius, length) in [(0.0, 0), (-1.0, 0), (f32::NAN, 0), (f32::INFINITY, 0), (0.15, 2)] {
+            let mut bytes = TrainedProbe { radius, ..PROBE }.to_bytes();
+            bytes[12] = length;
+            assert_eq!(TrainedProbe::from_bytes(&bytes), None, "{radius} {length}");
+        }
+        assert_eq!(TrainedNoise::from_bytes(&TrainedNoise { least: 20_000, ..NOISE }.to_bytes()), None);
+        assert_eq!(TrainedTouches::from_bytes(&TOUCHES.to_bytes()[..7]), None);
+        assert_eq!(TrainedProbe::from_bytes(&PROBE.to_bytes()[..15]), None);
+        assert_eq!(TrainedNoise::from_bytes(&NOISE.to_bytes()[..15]), None);
+    }
+
+    #[test]
+    fn a_section_that_has_grown_is_read_as_far_as_it_is_known() {
+        let grown = |bytes: &[u8]| [bytes, &[1, 2, 3, 4]].concat();
+        assert_eq!(TrainedProbe::from_bytes(&grown(&PROBE.to_bytes())), Some(PROBE));
+        assert_eq!(TrainedTouches::from_bytes(&grown(&TOUCHES.to_bytes())), Some(TOUCHES));
+        assert_eq!(TrainedNoise::from_bytes(&grown(&NOISE.to_bytes())), Some(NOISE));
+    }
+}

@@ -1,0 +1,30 @@
+//! Models with optional sections.
+
+use palpate_shared::format::{HEADER_LENGTH, Header, Trained, VERSION, checksum};
+
+/// The model with these optional sections instead of those that it has.
+///
+/// # Panics
+/// If the bytes are no model.
+pub fn with_sections(model: &[u8], sections: &[u8]) -> Vec<u8> {
+    let (header, _) = Header::split(model).expect("a model has a header");
+    let start = HEADER_LENGTH + header.text_length() as usize;
+    let rest = &model[start + header.optional_length() as usize..model.len() - 4];
+    let mut bytes = [&model[..start], sections, rest].concat();
+    bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
+    let length = u32::try_from(bytes.len() + 4).expect("a small model");
+    bytes[8..12].copy_from_slice(&length.to_le_bytes());
+    bytes[92..96].copy_from_slice(&(sections.len() as u32).to_le_bytes());
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes
+}
+
+/// The model, with what it was trained for.
+///
+/// # Panics
+/// As [`with_sections`].
+pub fn trained(model: &[u8], trained: &Trained) -> Vec<u8> {
+    let mut sections = Vec::new();
+    trained.write(|bytes| sections.extend_from_slice(bytes));
+    with_sections(model, &sections)
+}
