@@ -1,35 +1,13 @@
 //! Any bytes offered as an OBJ file give an error that names it, or a mesh whose indices are in range, and take memory in
 //! proportion to their length; a mesh can be touched.
 #![no_main]
-#![allow(
-    dead_code,
-    unexpected_cfgs,
-    unreachable_pub,
-    reason = "parts of the host crate, without all that it depends on"
-)]
 
-#[path = "../../host/src/error/mod.rs"]
-mod error;
-#[path = "../../host/src/mesh"]
-mod mesh {
-    pub mod facts;
-    pub mod obj;
-    mod triangles;
-
-    pub use triangles::Mesh;
-}
-#[path = "../../host/src/probe"]
-mod probe {
-    pub mod scene;
-    pub mod sweep;
-}
-
-use glam::DVec3;
 use libfuzzer_sys::fuzz_target;
-use mesh::facts::Facts;
-use mesh::obj;
+use palpate::glam::DVec3;
+use palpate::mesh::facts::Facts;
+use palpate::mesh::obj;
+use palpate::probe::Scene;
 use peak_alloc::PeakAlloc;
-use probe::scene::Scene;
 use std::path::Path;
 
 #[global_allocator]

@@ -482,7 +482,7 @@ mod tests {
     fn settings(touches: u64) -> Settings {
         Settings {
             sources: vec!["meshes".into()],
-            capture: Origin { touches, ..Origin::default() }.into(),
+            capture: crate::touches::Origin { touches, ..Default::default() }.into(),
             groups: 50,
             command: "palpate run 'my meshes'".into(),
             ..Settings::default()
