@@ -189,6 +189,7 @@ mod tests {
         assert_eq!(names(&[one, two]), ["a cup", "fork", "spoon"]);
     }
 
+    #[cfg(feature = "objects")]
     #[test]
     fn a_built_in_object_is_found_by_its_name_unless_a_file_has_it() {
         assert_eq!(names(&["mouse".into(), "bowl".into()]), ["bowl", "mouse"]);
@@ -225,6 +226,7 @@ mod tests {
         assert!(matches!(error.problem(), Some(Problem::Mesh(MeshProblem::NoSuchSource { .. }))), "{error:?}");
     }
 
+    #[cfg(feature = "objects")]
     #[test]
     fn a_misspelled_built_in_object_is_refused_with_the_names_of_all() {
         for error in
@@ -236,6 +238,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "objects")]
     #[test]
     fn several_objects_where_one_is_needed_are_refused_with_their_number() {
         let error = object("builtin").unwrap_err().to_string();
