@@ -25,5 +25,5 @@ pub use emulator::Emulator;
 pub use journal::{Entry, Journal};
 pub use port::Port;
 pub use steps::{Step, Steps};
-pub use stream::{Summary, Update, stream};
+pub use stream::{Summary, Update, probability, stream};
 pub use transport::Transport;

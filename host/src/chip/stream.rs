@@ -173,8 +173,8 @@ fn sent(step: Step, mirror: Option<&mut Station<'_, '_, 256>>, chip: &ChipModel)
     }
 }
 
-/// A probability from Q56.
-pub(super) fn probability(q56: u64) -> f64 {
+/// A probability from Q56, as the chip sends it.
+pub fn probability(q56: u64) -> f64 {
     q56 as f64 / (1_u64 << 56) as f64
 }
 

@@ -1,11 +1,12 @@
 use super::progress::Bar;
 use palpate::Error;
 use palpate::Result;
-use palpate::chip::{ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, stream};
+use palpate::chip::{ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
+};
+use palpate::compile::CompiledModel;
 use palpate::output::{print, print_json};
 use palpate::progress::Progress;
 use palpate::touches::Dataset;
-use palpate_onboard::Model;
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;
 use std::ops::ControlFlow;
@@ -40,8 +41,8 @@ pub(crate) struct Reach {
 
 impl Reach {
     /// Opens a session, and loads the model if there is one to load.
-    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<Vec<u8>>)> {
-        let model = self.load.as_deref().map(read_model).transpose()?;
+    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledModel>)> {
+        let model = self.load.as_deref().map(CompiledModel::read).transpose()?;
         let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
         let mut transport = port.open(self.baud, &emulator)?;
         let mut settings = HostSettings::default();
@@ -51,7 +52,8 @@ impl Reach {
             settings = HostSettings { retry: 50_000, attempts: 200 };
         }
         let mut connection = Connection::open(transport, settings)?;
-        if let Some(bytes) = &model {
+        if let Some(model) = &model {
+            let bytes = model.bytes();
             let progress = Bar::new();
             progress.begin("loading", Some(bytes.len() as u64));
             connection.load(bytes, |done| progress.current().set_position(done as u64))?;
@@ -72,13 +74,6 @@ impl Reach {
         let file = std::fs::File::open(source).map_err(|e| Error::io(source, "read the touches", e))?;
         Ok(Steps::lines(Box::new(BufReader::new(file)), source))
     }
-}
-
-/// Reads a compiled model, and says what is wrong with it before the chip has to.
-pub(crate) fn read_model(path: &Path) -> Result<Vec<u8>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read the model", e))?;
-    Model::new(&bytes).map_err(|e| Error::file(path, e.to_string(), "Make one with: palpate export."))?;
-    Ok(bytes)
 }
 
 /// What is on the chip, or an error that says how to change that.
@@ -123,7 +118,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let named = arguments.model.as_deref().map(read_model).transpose()?;
+    let named = arguments.model.as_deref().map(CompiledModel::read).transpose()?;
     if arguments.parity.is_some() && named.is_none() && arguments.reach.load.is_none() {
         let fix = "Give it with --model, or load it with --load.";
         return Err(Error::argument("parity needs the model that the chip has", fix));
@@ -137,13 +132,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let mut printer = Printer::new(&chip, arguments.json, arguments.journal.as_deref())?;
     let Some(steps) = steps else { return printer.model(&arguments.port) };
 
-    let bytes = named.or(loaded);
-    let model = match &bytes {
-        Some(bytes) => {
-            Some(Model::new(bytes).map_err(|e| Error::data(e.to_string(), "Make one with: palpate export."))?)
-        }
-        None => None,
-    };
+    let compiled = named.or(loaded);
+    let model = compiled.as_ref().map(CompiledModel::model);
     let progress = Bar::new();
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
@@ -219,8 +209,7 @@ impl<'c> Printer<'c> {
         match update {
             Update::Object(name) => self.object.clone_from(name),
             Update::Touch { verdict, decided, .. } if !self.json && (*decided || every_touch) => {
-                let posterior = verdict.detail.map_or(0, |detail| detail.posterior());
-                let posterior = posterior as f64 / (1_u64 << 56) as f64;
+                let posterior = probability(verdict.detail.map_or(0, |detail| detail.posterior()));
                 let said = match verdict.decision {
                     Decision::Recognized(object) => format!("recognized {}", self.name(object)),
                     Decision::Unknown => "unknown".into(),

@@ -2,9 +2,10 @@ use super::link::{Reach, chip_model};
 use palpate::Error;
 use palpate::Result;
 use palpate::chip::watch::{Follow, Screen, View, line};
-use palpate::chip::{ChipModel, Connection, Entry, Owned, Port, Update, stream};
+use palpate::chip::{ChipModel, Connection, Entry, Owned, Port, Update, probability, stream};
+use palpate::compile::CompiledModel;
 use palpate::output::print;
-use palpate_onboard::Model;
+
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -56,12 +57,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     match steps {
         Some(steps) => {
-            let model = match &loaded {
-                Some(bytes) => {
-                    Some(Model::new(bytes).map_err(|e| Error::data(e.to_string(), "Make one with: palpate export."))?)
-                }
-                None => None,
-            };
+            let model = loaded.as_ref().map(CompiledModel::model);
             stream(&mut connection, steps, &chip, model.as_ref(), &mut each)?;
         }
         None => loop {
@@ -133,7 +129,7 @@ impl Show {
         let entry = Entry::Link { resent: here.resent, garbled, missed: here.missed_events };
         if posteriors {
             let q56 = connection.posteriors(chip.names.len())?;
-            self.view.posteriors = q56.into_iter().map(|p| p as f64 / (1_u64 << 56) as f64).collect();
+            self.view.posteriors = q56.into_iter().map(probability).collect();
         }
         match self.screen {
             Some(_) => self.view.take(&entry),

@@ -1,13 +1,13 @@
 //! Speed against error: a family of compiled models, what each costs, and how good it is.
 
-use super::context::{Context, opened};
+use super::context::Context;
 use super::limit::Large;
 use super::work::Work;
 use crate::compile::{self, Leaf};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
-use crate::error::Result;
-use crate::evaluate::{Candidate, Margins};
+use crate::error::{CompileProblem, Error, Problem, Result};
+use crate::evaluate::{Candidate, Margins, parity};
 use crate::page::chart::{Chart, Mark, Shape, Side, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
@@ -15,7 +15,6 @@ use crate::page::scale::{Scale, short_number};
 use crate::page::table::{Cell, Data, Table};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -65,8 +64,11 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
                 for &leaf in leaves {
                     let compiled =
                         compile::compile(ensemble, &compile::Settings { leaf, layout, ..Default::default() });
-                    // Not every ensemble fits every layout.
-                    let Ok(compiled) = compiled else { continue };
+                    let compiled = match compiled {
+                        // Not every ensemble fits every layout.
+                        Err(error) if is_unfit(&error) => continue,
+                        compiled => compiled?,
+                    };
                     members.push(member(context, large, &touches, name, ensemble, leaf, &compiled)?);
                 }
             }
@@ -97,6 +99,10 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
     Ok(members)
 }
 
+fn is_unfit(error: &Error) -> bool {
+    matches!(error.problem(), Some(Problem::Compile(CompileProblem::DoesNotFit { .. })))
+}
+
 fn member(
     context: &Context,
     large: &Large,
@@ -107,9 +113,10 @@ fn member(
     compiled: &compile::Compiled,
 ) -> Result<Member> {
     let settings = context.settings;
-    let model = opened(&compiled.bytes)?;
+    let model = compile::open(&compiled.bytes)?;
     let margins = Margins::new(Candidate::Compiled(&model), &large.test)?;
     let groups = if settings.quick { 500 } else { 1_500 };
+    let all: Vec<&Touch> = touches.iter().collect();
     let curve = margins.curve(100.min(margins.fewest_touches()), groups, settings.seed)?;
     Ok(Member {
         name: name.into(),
@@ -119,7 +126,7 @@ fn member(
         bytes: compiled.bytes.len(),
         nanoseconds: nanoseconds(&model, touches),
         work: Work::of(compiled, touches)?,
-        margin_error: margin_error(&model, ensemble, touches),
+        margin_error: parity::difference(ensemble, &model, &all, &())?.max_margin_error,
         stated_error: f64::from(compiled.margin_error),
         at_10: curve.accuracy(10).value,
         at_30: curve.accuracy(30).value,
@@ -139,19 +146,6 @@ fn nanoseconds(model: &Model<'_>, touches: &[Touch]) -> f64 {
         best = best.min(began.elapsed().as_secs_f64() * 1e9 / touches.len().max(1) as f64);
     }
     best
-}
-
-/// The largest difference between compiled and full margins, in nats.
-fn margin_error(model: &Model<'_>, ensemble: &Ensemble, touches: &[Touch]) -> f64 {
-    let unit = f64::from(model.unit());
-    let worst = |touch: &Touch| {
-        let mut margins = vec![0; model.object_count()];
-        model.margins(touch, &mut margins);
-        let full = ensemble.margins(touch);
-        let error = |(compiled, full): (&i32, &f32)| (f64::from(*compiled) * unit - f64::from(*full)).abs();
-        margins.iter().zip(&full).map(error).fold(0.0, f64::max)
-    };
-    touches.par_iter().map(worst).reduce(|| 0.0, f64::max)
 }
 
 /// The members that no other beats in both bytes and accuracy, by rising size.
@@ -279,7 +273,7 @@ fn table(context: &Context, members: &[Member]) -> Table {
             Cell::count(member.bytes),
             Cell::Number(member.nanoseconds, 0),
             Cell::count(member.work.m4f),
-            Cell::count(member.work.m0_plus),
+            member.work.m0_plus.map_or(Cell::Missing, Cell::count),
             Cell::Number(member.margin_error, 5),
             Cell::Number(member.stated_error, 5),
             Cell::Percent(member.at_10, 1),
@@ -312,7 +306,7 @@ mod tests {
             layout: String::new(),
             bytes,
             nanoseconds: 1.0,
-            work: Work { m4f: 1, m0_plus: 1, measured: true },
+            work: Work { m4f: 1, m0_plus: Some(1), measured: true },
             margin_error: 0.0,
             stated_error: 0.0,
             at_10,

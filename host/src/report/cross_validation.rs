@@ -1,6 +1,7 @@
 //! Cross-validation: accuracy against the number of touches, and who is taken for whom (the paper's figures 8 and 9).
 
-use super::context::{Context, compiled, compiled_f32, opened};
+use super::context::{Context, compiled, compiled_f32};
+use crate::compile;
 use super::short::method_style;
 use super::statistics::mean_deviation;
 use crate::ensemble::train;
@@ -60,7 +61,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
         if fold == 0 { (context.models()?.paper.clone(), 0.0) } else { timed(&context.paper())? };
     let (ours, ours_seconds) = if fold == 0 { (context.models()?.ours.clone(), 0.0) } else { timed(&context.ours())? };
     let bytes = [compiled_f32(&paper)?.bytes, compiled(&ours)?.bytes];
-    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
+    let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
     let settings = context.settings;
     let most = MOST.min(split.test.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0));
     let tested = |candidate, seconds| -> Result<MethodFold> {

@@ -7,7 +7,7 @@
 //!
 //! The result is written as an [`Ensemble`] of a single tree, a leaf a cell, so that it is evaluated like any other model.
 
-use crate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
+use crate::ensemble::{Ensemble, Node, Origin, Output, Tree, feature_row};
 use crate::error::{Error, Result};
 use crate::touches::Dataset;
 use palpate_shared::Descriptor;
@@ -43,7 +43,7 @@ pub(super) fn density_model(descriptor: Descriptor, train: &Dataset, held_out: &
     let objects = train.names();
     let tree = tree(&edges, &logs);
     let base_margins = vec![0.0; objects.len()];
-    Ok((Ensemble { descriptor, objects, base_margins, trees: vec![tree] }, best))
+    Ok((Ensemble { descriptor, objects, base_margins, trees: vec![tree], origin: Origin::default() }, best))
 }
 
 /// The features of every touch, an object a list.

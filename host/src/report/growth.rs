@@ -1,6 +1,7 @@
 //! Growth: what more objects, and finer meshes, cost.
 
-use super::context::{Context, compiled, opened, touch};
+use super::context::{Context, compiled, touch};
+use crate::compile;
 use super::work::Work;
 use crate::capture;
 use crate::ensemble::train;
@@ -92,7 +93,7 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let ensemble = train::train(&split.train, &context.ours(), &())?;
     let train = began.elapsed().as_secs_f64();
     let compiled = compiled(&ensemble)?;
-    let model = opened(&compiled.bytes)?;
+    let model = compile::open(&compiled.bytes)?;
     let touches: Vec<Touch> =
         split.test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
     let curve = Margins::new(Candidate::Compiled(&model), &split.test)?.curve(60, 100, settings.seed)?;

@@ -1,7 +1,7 @@
 //! How many instructions a touch takes on the chips.
 
 use crate::chip::emulated::Chip;
-use crate::compile::Compiled;
+use crate::compile::{Compiled, Instructions};
 use crate::error::Result;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
@@ -11,14 +11,11 @@ use serde::{Deserialize, Serialize};
 pub(super) struct Work {
     /// On a Cortex-M4F.
     pub(super) m4f: u64,
-    /// On a Cortex-M0+.
-    pub(super) m0_plus: u64,
+    /// On a Cortex-M0+, if it is known.
+    pub(super) m0_plus: Option<u64>,
     /// Whether emulated chips counted them; else they are the compiler's estimate.
     pub(super) measured: bool,
 }
-
-/// Instructions on a Cortex-M0+ for each on a Cortex-M4F, for the estimate.
-const M0_RATIO: f64 = 1.48;
 
 impl Work {
     /// Measured on these touches where the emulator and the firmware's `cost` images are there, else estimated.
@@ -28,10 +25,10 @@ impl Work {
     pub(super) fn of(compiled: &Compiled, touches: &[Touch]) -> Result<Self> {
         if Chip::M4F.is_there() && Chip::M0Plus.is_there() {
             let margins = |chip: Chip| chip.measure(&compiled.bytes, touches).map(|cost| cost.margins);
-            return Ok(Self { m4f: margins(Chip::M4F)?, m0_plus: margins(Chip::M0Plus)?, measured: true });
+            return Ok(Self { m4f: margins(Chip::M4F)?, m0_plus: Some(margins(Chip::M0Plus)?), measured: true });
         }
-        let m4f = compiled.instructions;
-        Ok(Self { m4f, m0_plus: (m4f as f64 * M0_RATIO).round() as u64, measured: false })
+        let Instructions { m4f, m0_plus } = compiled.instructions;
+        Ok(Self { m4f, m0_plus, measured: false })
     }
 
     /// How the figures came about, for a column's title.

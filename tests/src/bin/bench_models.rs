@@ -63,14 +63,14 @@ fn main() -> Result<()> {
     for (name, ensemble, leaf, layout) in models {
         let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() })?;
         println!(
-            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes a split, {} instructions a touch by the stated model",
+            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes per split, {} instructions per touch by the stated model",
             compiled.bytes.len(),
             compiled.splits,
             compiled.bytes.len() as f64 / compiled.splits as f64,
-            compiled.instructions
+            compiled.instructions.m4f
         );
         write(&out.join(format!("{name}.palpate")), &compiled.bytes)?;
-        estimates.extend((compiled.instructions as u32).to_le_bytes());
+        estimates.extend((compiled.instructions.m4f as u32).to_le_bytes());
         if name == "identity" {
             write(&out.join("identity.bin"), &expected(&compiled.bytes, &touches)?)?;
         }
