@@ -194,7 +194,12 @@ fn table(evaluation: &Evaluation) -> String {
     );
     _ = write!(text, "{:width$}", "±");
     cells(&mut text, &mut evaluation.accuracy_standard_error.values().map(percent));
-    _ = writeln!(text, " {:>9.1} {:>9}", sequential.mean_touches_standard_error, percent(&sequential.error_standard_error));
+    _ = writeln!(
+        text,
+        " {:>9.1} {:>9}",
+        sequential.mean_touches_standard_error,
+        percent(&sequential.error_standard_error)
+    );
     _ = write!(
         text,
         "\nStopping at an error rate of {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \

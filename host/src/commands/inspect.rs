@@ -209,7 +209,10 @@ fn text(inspected: &Inspected<'_>) -> String {
         "stopping",
         format!("error rate {}, at most {} touches", inspected.stopping.error_rate, inspected.stopping.max_touches),
     );
-    line("probe", format!("spacing {} units, speed {} units per second", inspected.probe.spacing, inspected.probe.speed));
+    line(
+        "probe",
+        format!("spacing {} units, speed {} units per second", inspected.probe.spacing, inspected.probe.speed),
+    );
     line("instructions", format!("{} (per touch, estimated)", instructions(inspected.instructions)));
     line("bytes", inspected.bytes.to_string());
     for (part, bytes) in &inspected.bytes_by_part {
@@ -222,7 +225,10 @@ fn text(inspected: &Inspected<'_>) -> String {
         let Memory { model_flash, code_flash, ram, stack, .. } = chip.memory;
         line("", String::new());
         line("on a", chip.core.name().into());
-        line("flash", format!("{model_flash} bytes of model, about {code_flash} bytes of code (1300 of them start-up)"));
+        line(
+            "flash",
+            format!("{model_flash} bytes of model, about {code_flash} bytes of code (1300 of them start-up)"),
+        );
         line("RAM", format!("{ram} bytes, estimated (the opened model, and a recognizer of just its objects)"));
         line("stack", format!("{stack} bytes, estimated"));
         line(

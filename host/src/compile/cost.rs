@@ -70,8 +70,7 @@ impl Instructions {
         let groups_end = groups_start + Group::LENGTH * usize::from(header.groups());
         let bytes = model.bytes();
         let records = bytes.get(groups_start..groups_end).unwrap_or_default();
-        let groups: Vec<Group> =
-            records.as_chunks().0.iter().filter_map(|record| Group::from_bytes(*record)).collect();
+        let groups: Vec<Group> = records.as_chunks().0.iter().filter_map(|record| Group::from_bytes(*record)).collect();
         let nodes = bytes.get(groups_end..groups_end + length(header.nodes_length())).unwrap_or_default();
         Self::new(&Shape { layout: model.layout(), leaf: model.leaf_type(), objects, axes, groups: &groups, nodes })
     }
@@ -277,7 +276,13 @@ mod tests {
     fn estimates_are_within_a_tenth_of_what_emulation_counts_on_both_processors() {
         for (trees, depth, object, leaf, axes, counted) in COUNTED {
             // One-output trees are in a group for each object, those with i8 leaves in one for each of three scales.
-            let parts = if object.is_some() { 10 } else if leaf == LeafType::I8 { 3 } else { 1 };
+            let parts = if object.is_some() {
+                10
+            } else if leaf == LeafType::I8 {
+                3
+            } else {
+                1
+            };
             let group = |part: u32| {
                 let trees = (trees + part) / parts;
                 Group { depth, shift: 0, object, trees }
@@ -286,18 +291,19 @@ mod tests {
             let shape = Shape { layout: Layout::Complete, leaf, objects: 10, axes, groups: &groups, nodes: &[] };
             let estimate = Instructions::new(&shape);
             for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
-                assert!(estimate.abs_diff(counted) * 10 <= counted, "{estimate} for {counted}, {trees} trees, {leaf:?}");
+                assert!(
+                    estimate.abs_diff(counted) * 10 <= counted,
+                    "{estimate} for {counted}, {trees} trees, {leaf:?}"
+                );
             }
         }
-        let grid =
-            Shape { layout: Layout::Grid, leaf: LeafType::I8, objects: 10, axes: 2, groups: &[], nodes: &[] };
+        let grid = Shape { layout: Layout::Grid, leaf: LeafType::I8, objects: 10, axes: 2, groups: &[], nodes: &[] };
         assert_eq!(Instructions::new(&grid), Instructions { m4f: 400, m0_plus: Some(518) });
     }
 
     #[test]
     fn with_f32_leaves_nothing_is_said_about_a_processor_without_float_unit() {
-        let shape =
-            Shape { layout: Layout::Grid, leaf: LeafType::F32, objects: 10, axes: 2, groups: &[], nodes: &[] };
+        let shape = Shape { layout: Layout::Grid, leaf: LeafType::F32, objects: 10, axes: 2, groups: &[], nodes: &[] };
         assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
         assert!(Instructions::new(&shape).on(Core::M4F).is_some());
     }

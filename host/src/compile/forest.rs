@@ -195,14 +195,8 @@ impl<'a> Reader<'a> {
                 }
                 let (left, left_splits, left_depth) = self.branch(left, depth + 1)?;
                 let (right, right_splits, right_depth) = self.branch(right, depth + 1)?;
-                let split = Split {
-                    feature: number,
-                    cut: cut(threshold, self.key),
-                    missing_left,
-                    left,
-                    right,
-                    left_splits,
-                };
+                let split =
+                    Split { feature: number, cut: cut(threshold, self.key), missing_left, left, right, left_splits };
                 let depth = 1 + left_depth.max(right_depth);
                 Ok((Branch::Split(Box::new(split)), 1 + left_splits + right_splits, depth))
             }

@@ -80,14 +80,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            leaf: Leaf::I16,
-            layout: None,
-            error_rate: 0.01,
-            max_touches: 200,
-            priors: None,
-            raw_features: None,
-        }
+        Self { leaf: Leaf::I16, layout: None, error_rate: 0.01, max_touches: 200, priors: None, raw_features: None }
     }
 }
 

@@ -79,12 +79,7 @@ pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale) -> Vec<Ru
 }
 
 /// Every tree filled up to its group's depth; `None` if some are too deep or have too many thresholds.
-pub(super) fn complete(
-    forest: &Forest<'_>,
-    axes: &Axes,
-    runs: &[Run],
-    leaves: &mut Leaves<'_>,
-) -> Option<Sections> {
+pub(super) fn complete(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<'_>) -> Option<Sections> {
     if axes.columns > 256 || forest.trees.iter().any(|tree| tree.depth > usize::from(MAX_COMPLETE_DEPTH)) {
         return None;
     }
@@ -140,12 +135,7 @@ pub(super) fn fits_narrow(forest: &Forest<'_>, axes: &Axes) -> bool {
 }
 
 /// Splits in preorder, three bytes each; `None` if they do not fit.
-pub(super) fn compact(
-    forest: &Forest<'_>,
-    axes: &Axes,
-    runs: &[Run],
-    leaves: &mut Leaves<'_>,
-) -> Option<Sections> {
+pub(super) fn compact(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<'_>) -> Option<Sections> {
     if !fits_narrow(forest, axes) {
         return None;
     }

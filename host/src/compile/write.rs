@@ -4,8 +4,8 @@ use super::Settings;
 use super::forest::Forest;
 use super::layout::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
-use crate::probe::approach::Probe;
 use crate::error::{CompileProblem, Error, Result};
+use crate::probe::approach::Probe;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, checksum};
 

@@ -142,7 +142,8 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         };
-        let split = |left, right, feature, threshold| Node::Split { feature, threshold, missing_left: true, left, right };
+        let split =
+            |left, right, feature, threshold| Node::Split { feature, threshold, missing_left: true, left, right };
         let tree = |problem| EnsembleProblem::Tree { tree: 0, problem };
         let root = |node: Node| move |e: &mut Ensemble| e.trees[0].nodes[0] = node.clone();
         assert_eq!(
@@ -159,10 +160,7 @@ mod tests {
             refused(&root(split(1, 2, 0, f32::NAN))),
             EnsembleProblem::Tree { problem: TreeProblem::Threshold { .. }, .. }
         ));
-        assert_eq!(
-            refused(&root(Node::Leaf(vec![]))),
-            tree(TreeProblem::LeafValues { node: 0, found: 0, wanted: 2 })
-        );
+        assert_eq!(refused(&root(Node::Leaf(vec![]))), tree(TreeProblem::LeafValues { node: 0, found: 0, wanted: 2 }));
         assert_eq!(
             refused(&|e| e.trees[0].nodes[2] = Node::Leaf(vec![0.0, f32::INFINITY])),
             tree(TreeProblem::LeafValue { node: 2, value: f32::INFINITY })

@@ -94,9 +94,7 @@ impl CompileProblem {
             }
             Self::Model(_) => "Export the model again with `palpate export`.",
             Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",
-            Self::Tree { .. } | Self::MarginRange { .. } => {
-                "Train it again, or check the program that wrote it."
-            }
+            Self::Tree { .. } | Self::MarginRange { .. } => "Train it again, or check the program that wrote it.",
             Self::Thresholds { .. } => {
                 "Train on features in whole units: times in microseconds, direction cosines times 32767."
             }

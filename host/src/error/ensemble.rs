@@ -318,9 +318,7 @@ impl EnsembleProblem {
                 "Use 2 to 256 different names of at most 255 bytes, without tabs and line ends.".into()
             }
             Self::Classes { .. } => "Name every class once, in the order of the labels.".into(),
-            Self::Features { .. } => {
-                "Train it on that descriptor's features, or name the right descriptor.".into()
-            }
+            Self::Features { .. } => "Train it on that descriptor's features, or name the right descriptor.".into(),
             Self::Tree { problem: TreeProblem::Categorical, .. } => {
                 "Train on numbers: every feature of a touch is one.".into()
             }
@@ -333,9 +331,7 @@ impl EnsembleProblem {
             Self::OneObject => "Capture at least two.".into(),
             Self::TooManyObjects { .. } => "Leave some objects out of the data set.".into(),
             Self::NoTouches { .. } => "Capture it again.".into(),
-            Self::NoPose { .. } => {
-                "Capture the touches with their pose, or use the descriptor curvature.".into()
-            }
+            Self::NoPose { .. } => "Capture the touches with their pose, or use the descriptor curvature.".into(),
             Self::Trainer { .. } => "Report this as a bug, with the data.".into(),
         }
     }

@@ -1,8 +1,8 @@
 use super::*;
-use crate::error::Problem;
 use crate::compile::{self, Leaf, compile};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
+use crate::error::Problem;
 use crate::touches::Dataset;
 use crate::touches::synthetic;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -156,6 +156,31 @@ fn the_json_has_the_keys_that_programs_rely_on() {
             assert!(json.pointer(pointer).is_some_and(serde_json::Value::is_number), "{pointer} in {json}");
         }
         assert!(json["sequential"]["error"].is_number());
+    });
+}
+
+#[test]
+fn how_many_groups_differ_is_counted() {
+    let ensemble = ensemble();
+    let touches = synthetic::dataset(&[30, 40, 30], 2);
+    let margins = Margins::new(Candidate::Full(&ensemble), &touches).unwrap();
+    let expected = [(0, 1), (1, 30), (2, 435), (15, 155_117_520), (28, 435), (29, 30), (30, 1), (31, 0)];
+    for (at, groups) in expected {
+        assert_eq!(margins.distinct_groups(at), groups, "{at}");
+    }
+    let margins = Margins::new(Candidate::Full(&ensemble), &test_touches()).unwrap();
+    assert_eq!(margins.distinct_groups(150), u64::MAX);
+}
+
+#[test]
+fn errors_and_undecided_sequences_of_objects_average_to_those_of_all() {
+    full_and_compiled(|margins| {
+        let settings = SequentialSettings { error_rate: 0.2, max_touches: Some(4), sequences: 300, seed: 3 };
+        let sequential = margins.sequential(&settings).unwrap();
+        let mean = |shares: &BTreeMap<String, f64>| shares.values().sum::<f64>() / 3.0;
+        assert!((mean(&sequential.error_per_object) - sequential.error).abs() < 1e-12);
+        assert!((mean(&sequential.undecided_per_object) - sequential.undecided).abs() < 1e-12);
+        assert!(sequential.error > 0.0 && sequential.undecided > 0.0);
     });
 }
 

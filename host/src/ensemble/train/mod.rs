@@ -176,7 +176,11 @@ fn with_hessboost(
 #[cfg(feature = "xgboost")]
 fn with_xgboost(rows: &Rows, settings: &Settings, objects: Vec<String>, progress: &dyn Progress) -> Result<Ensemble> {
     if settings.multi_output {
-        return Err(Error::setting("leaves", "each", "one: XGBoost 1.6.2 has no leaves that hold a value for each object"));
+        return Err(Error::setting(
+            "leaves",
+            "each",
+            "one: XGBoost 1.6.2 has no leaves that hold a value for each object",
+        ));
     }
     xgboost::train(rows, settings, objects, progress)
 }

@@ -78,7 +78,8 @@ fn settings_out_of_range_are_refused_by_name() {
     ] {
         let error = train(&dataset, &settings, &()).unwrap_err();
         assert!(
-            matches!(error.problem(), Some(Problem::Setting { name, .. }) if *name == expected) && error.exit_code() == 2,
+            matches!(error.problem(), Some(Problem::Setting { name, .. }) if *name == expected)
+                && error.exit_code() == 2,
             "{error}"
         );
         assert!(!error.to_string().contains("--"), "the library names an option: {error}");

@@ -38,8 +38,7 @@ impl Document {
             return Err(EnsembleProblem::TreeInfo { found: tree_info.len(), trees: trees.len() });
         }
         let read = |((number, columns), group): ((usize, &TreeColumns), u64)| {
-            tree(columns, group, features, classes)
-                .map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
+            tree(columns, group, features, classes).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
         };
         let trees = trees.iter().enumerate().zip(tree_info).map(read).collect::<Result<_, _>>()?;
         Ok(Ensemble { descriptor, objects, base_margins, trees, origin: origin(&attributes)? })
@@ -90,8 +89,7 @@ fn parsed<'t, T: serde::Deserialize<'t>>(
     expected: &'static str,
     text: &'t str,
 ) -> Result<T, EnsembleProblem> {
-    serde_json::from_str(text)
-        .map_err(|error| EnsembleProblem::Attribute { name, expected, detail: error.to_string() })
+    serde_json::from_str(text).map_err(|error| EnsembleProblem::Attribute { name, expected, detail: error.to_string() })
 }
 
 fn count(name: &'static str, text: &str) -> Result<usize, EnsembleProblem> {
@@ -165,10 +163,11 @@ fn node(
         return Err(TreeProblem::Threshold { node: position, threshold });
     }
     Ok(Node::Split {
-        feature: usize::try_from(feature)
-            .ok()
-            .filter(|&index| index < features)
-            .ok_or(TreeProblem::Feature { node: position, feature, features })?,
+        feature: usize::try_from(feature).ok().filter(|&index| index < features).ok_or(TreeProblem::Feature {
+            node: position,
+            feature,
+            features,
+        })?,
         threshold,
         missing_left: columns.default_left[position].is_set(),
         left: child("left", left)?,

@@ -1,4 +1,5 @@
 use super::*;
+use palpate_shared::Descriptor;
 use crate::ensemble::train::{Settings, train};
 use crate::touches::synthetic;
 use serde_json::{Value, json};
