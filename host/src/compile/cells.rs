@@ -1,9 +1,8 @@
 //! Every case that an ensemble distinguishes, where they can be counted.
 //!
-//! Between its thresholds an ensemble is constant. Over two features that leaves at most some ten thousand cells, so
-//! that its margins can be had exactly for every possible touch: the grid layout stores them, and the worst error of a
-//! margin is the largest that there is. The three times of a touch are no more than two dimensions, since the earliest
-//! is always 0.
+//! Between its thresholds an ensemble is constant. Over two features that leaves some ten thousand cells at most, few
+//! enough to compute its margins for every possible touch: the grid layout stores them, and the worst error of a margin
+//! is the largest in any cell. The three times of a touch are no more than two dimensions, since the earliest is always 0.
 
 use super::axes::visit;
 use super::forest::{Branch, Forest};

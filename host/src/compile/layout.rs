@@ -48,7 +48,7 @@ pub(super) fn candidates(
         layouts.iter_mut().filter(|layout| **layout == Layout::Compact).for_each(|layout| *layout = Layout::Wide);
     }
     let mut candidates = Vec::new();
-    let scale = Scale::of_trees(forest, leaf);
+    let scale = Scale::for_trees(forest, leaf);
     // The same for every layout that walks trees, and slow to find.
     let error = OnceCell::new();
     let scale = scale

@@ -23,7 +23,7 @@ pub(super) fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option
     }
     let sums: Vec<Vec<f32>> =
         (0..objects).map(|object| cells.sums(forest, object, forest.base[object], |_, value| value)).collect();
-    let scale = Scale::of_cells(&sums, leaf)?;
+    let scale = Scale::for_table(&sums, leaf)?;
     let mut leaves = Leaves::new(leaf, &scale);
     let mut worst = if leaf == LeafType::F32 { f64::from(scale.unit) / 2.0 } else { 0.0 };
     for cell in 0..sides.iter().product() {
