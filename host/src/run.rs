@@ -232,10 +232,7 @@ impl Trial {
         let train_seconds = began.elapsed().as_secs_f64();
         progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
-        let compile = compile::Settings {
-            error_rate: settings.error_rate,
-            ..compile::Settings::default()
-        };
+        let compile = compile::Settings { error_rate: settings.error_rate, ..compile::Settings::default() };
         let compiled = compile::compile(&ensemble, &compile)?;
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;

@@ -1,6 +1,6 @@
-use super::numbers::share;
 use super::export::features;
 use super::inspect::core;
+use super::numbers::share;
 use super::progress::Bar;
 use palpate::Result;
 use palpate::compile::Core;
