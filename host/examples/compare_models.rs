@@ -13,7 +13,7 @@ use palpate::evaluate::parity::parity;
 use palpate::evaluate::{Candidate, Margins, Settings, evaluate};
 use palpate::mesh::{Mesh, Object};
 use palpate::onboard::Model;
-use palpate::touches::{Dataset, folds};
+use palpate::touches::{Dataset, Origin, folds};
 use std::error::Error;
 use std::path::Path;
 

@@ -4,7 +4,7 @@ use palpate::ensemble::StatedProbe;
 use palpate::ensemble::train::{self, Engine, Settings};
 use palpate::output;
 use palpate_shared::Descriptor;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
