@@ -2,7 +2,7 @@
 
 use crate::capture;
 use crate::compile::{self, Compiled};
-use crate::ensemble::train;
+use crate::ensemble::{StatedProbe, train};
 use crate::error::{ReportProblem, Result};
 use crate::evaluate::parity::{self, Parity};
 use crate::evaluate::{self, Candidate, Curve, Evaluation, Margins};
@@ -165,10 +165,11 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
     let seed = settings.capture.origin.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
+    let probe = Some(StatedProbe { probe: settings.capture.origin.probe, length: settings.capture.origin.length });
     let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);
-    let paper = method("paper", "paper", train::Settings { seed, ..train::Settings::paper() })?;
-    let ours = method("ours", "ensemble", train::Settings { seed, ..train::Settings::compact() })?;
-    let model = open(&ours.compiled)?;
+    let paper = method("paper", "paper", train::Settings { seed, probe, ..train::Settings::paper() })?;
+    let ours = method("ours", "ensemble", train::Settings { seed, probe, ..train::Settings::compact() })?;
+    let model = compile::open(&ours.compiled.bytes)?;
     let summary = Summary {
         made_from,
         tool_version: env!("CARGO_PKG_VERSION"),
@@ -231,16 +232,11 @@ impl Trial {
         let train_seconds = began.elapsed().as_secs_f64();
         progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
-        let compile = compile::Settings {
-            error_rate: settings.error_rate,
-            spacing: settings.capture.origin.probe.spacing as f32,
-            speed: settings.capture.origin.probe.speed as f32,
-            ..compile::Settings::default()
-        };
+        let compile = compile::Settings { error_rate: settings.error_rate, ..compile::Settings::default() };
         let compiled = compile::compile(&ensemble, &compile)?;
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
-        let model = open(&compiled)?;
+        let model = compile::open(&compiled.bytes)?;
         let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
@@ -273,10 +269,6 @@ impl Trial {
 
 fn model_path(out: &Path, stem: &str) -> PathBuf {
     out.join(if stem == "ensemble" { "model" } else { stem }).with_extension("palpate")
-}
-
-fn open(compiled: &Compiled) -> Result<Model<'_>> {
-    Model::new(&compiled.bytes).map_err(|error| ReportProblem::Compiled { reason: error.to_string() }.into())
 }
 
 /// Pushes one object's test touches until the recognizer has its verdict.

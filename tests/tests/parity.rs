@@ -1,6 +1,6 @@
 //! The compiled model against the full one, over a million touches and ten thousand sequences.
 
-use palpate::capture::{self, capture};
+use palpate::capture::capture;
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node};

@@ -545,13 +545,10 @@ mod tests {
 
     #[test]
     fn a_mesh_that_makes_no_scene_is_named_once_with_one_remedy() {
-        let point = Object { name: "point".into(), mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0; 3]] } };
+        let dot = Object { name: "dot".into(), mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0; 3]] } };
         let directory = tempfile::tempdir().unwrap();
-        let error = capture(&[point], &settings(), directory.path(), &()).unwrap_err().to_string();
-        assert!(
-            error.starts_with("point: ") && !error.contains("..") && error.matches("point").count() == 1,
-            "{error}"
-        );
+        let error = capture(&[dot], &settings(), directory.path(), &()).unwrap_err().to_string();
+        assert!(error.starts_with("dot: ") && !error.contains("..") && error.matches("dot").count() == 1, "{error}");
     }
 
     #[test]

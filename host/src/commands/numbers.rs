@@ -19,12 +19,14 @@ fn whole(text: &str) -> Option<u64> {
     (number.fract() == 0.0 && (0.0..1e15).contains(&number)).then_some(number as u64)
 }
 
-/// A number, such as an error rate. A percentage is refused with how to write it.
+/// A share, such as an error rate: `0.05` or `5%`.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
-    text.parse().map_err(|_| match text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok()) {
-        Some(percent) => format!("write it as a share: {}", percent / 100.0),
-        None => "give a number, such as 0.01".to_owned(),
-    })
+    let (number, percent) = match text.trim().strip_suffix('%') {
+        Some(number) => (number.trim_end(), 100.0),
+        None => (text, 1.0),
+    };
+    let share: f64 = number.parse().map_err(|_| "give a share such as 0.05, or percent such as 5%".to_owned())?;
+    Ok(share / percent)
 }
 
 #[cfg(test)]
@@ -43,11 +45,12 @@ mod tests {
     }
 
     #[test]
-    fn percentages_are_refused_with_a_hint() {
-        assert_eq!(share("0.05"), Ok(0.05));
-        for text in ["5%", "5 %"] {
-            assert_eq!(share(text), Err("write it as a share: 0.05".into()));
+    fn shares_may_be_percentages() {
+        for text in ["0.05", "5%", "5 %"] {
+            assert_eq!(share(text), Ok(0.05), "{text}");
         }
-        assert_eq!(share("few"), Err("give a number, such as 0.01".into()));
+        for text in ["few", "%", "5%%"] {
+            assert_eq!(share(text), Err("give a share such as 0.05, or percent such as 5%".into()), "{text}");
+        }
     }
 }

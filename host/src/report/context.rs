@@ -6,14 +6,13 @@ use crate::capture::Sampler;
 use crate::compile;
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
-use crate::error::{ReportProblem, Result};
+use crate::error::Result;
 use crate::mesh::Object;
 use crate::mesh::builtin;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::folds::{self, Split};
 use crate::touches::{Dataset, ObjectTouches, Origin};
-use palpate_onboard::Model;
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::cell::OnceCell;
@@ -224,9 +223,4 @@ pub(super) fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>
 /// than any difference that decides, and several times faster to compute than by the trainer's own trees.
 pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
     compile::compile(ensemble, &compile::Settings { leaf: compile::Leaf::F32, ..compile::Settings::default() })
-}
-
-/// A compiled model, checked.
-pub(super) fn opened(bytes: &[u8]) -> Result<Model<'_>> {
-    Model::new(bytes).map_err(|error| ReportProblem::Compiled { reason: error.to_string() }.into())
 }

@@ -1,7 +1,8 @@
 //! Generalization: recognizing a fork that was never touched by the touches of other forks.
 
-use super::context::{Context, compiled, opened, touch};
+use super::context::{Context, compiled, touch};
 use super::statistics::mean_deviation;
+use crate::compile;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::Object;
@@ -54,7 +55,7 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
         let training = gathered(&|_| (0, count / instances));
         let ensemble = context.train(&training, &context.ours())?;
         let bytes = compiled(&ensemble)?.bytes;
-        let model = opened(&bytes)?;
+        let model = compile::open(&bytes)?;
         let accuracies = |data: &Dataset| -> Result<Vec<f64>> {
             let curve =
                 Margins::new(Candidate::Compiled(&model), data)?.curve(30, settings.many_groups, settings.seed)?;

@@ -1,7 +1,8 @@
 //! Growth: what more objects and finer meshes cost.
 
-use super::context::{Context, compiled, opened, touch};
+use super::context::{Context, compiled, touch};
 use super::instructions::Instructions;
+use crate::compile;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::{Mesh, Object};
@@ -90,7 +91,7 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let ensemble = context.train(&split.train, &context.ours())?;
     let train = began.elapsed().as_secs_f64();
     let compiled = compiled(&ensemble)?;
-    let model = opened(&compiled.bytes)?;
+    let model = compile::open(&compiled.bytes)?;
     let touches: Vec<Touch> =
         split.test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
     let curve = Margins::new(Candidate::Compiled(&model), &split.test)?.curve(60, 100, settings.seed)?;

@@ -1,8 +1,9 @@
 //! The limit: the best that any classifier could do with the curvature descriptor, and how far each model is from it.
 
-use super::context::{Context, compiled, compiled_f32, opened};
+use super::context::{Context, compiled, compiled_f32};
 use super::density::density_model;
 use super::statistics::z95;
+use crate::compile;
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
 use crate::error::Result;
@@ -107,7 +108,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let ensemble_half = context.train(&halved, &large_ensemble)?;
     let models = context.models()?;
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
-    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
+    let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
 
     let groups = if settings.quick { 1_000 } else { 3_000 };
     let measured = |name: &str, candidate: Candidate| -> Result<Measured> {

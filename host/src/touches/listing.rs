@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn what_is_no_listing_is_refused_with_its_line() {
-        for (text, line) in [("", 0), ("{", 1), ("[]", 1), (&OLD.replace("seed", "sed"), 6)] {
+        for (text, line) in [("", 1), ("{", 1), ("[]", 1), (&OLD.replace("seed", "sed"), 6)] {
             let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
             assert!(error.starts_with(&format!("dataset.json:{line}: not the listing of a data set")), "{error}");
         }
