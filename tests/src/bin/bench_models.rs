@@ -19,6 +19,7 @@ use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node, Output};
 use palpate::touches::Dataset;
 use palpate::touches::folds::{self, Split};
+use palpate::error::ReportProblem;
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::identity;
