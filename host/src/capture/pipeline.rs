@@ -41,17 +41,27 @@ pub(super) fn run(
     let threads = settings.threads().min(chunks(&jobs).count()).max(1);
     std::thread::scope(|scope| {
         let mut channels = Vec::with_capacity(threads);
+        let (go, started) = bounded(threads);
         for producer in 0..threads {
             let (sender, receiver) = bounded(AHEAD);
             let chunks = chunks(&jobs).skip(producer).step_by(threads);
-            let work = move || produce(chunks, samplers, settings, &sender, progress);
-            // A system that is out of threads must not end in a panic. The threads that did start find their channels
-            // closed and end.
+            let started = started.clone();
+            let work = move || {
+                if started.recv().is_ok() {
+                    produce(chunks, samplers, settings, &sender, progress);
+                }
+            };
+            // A system that is out of threads must not end in a panic. The threads that did start end without having
+            // worked: nobody tells them to go.
             std::thread::Builder::new().spawn_scoped(scope, work).map_err(|error| {
                 let message = error.to_string();
                 CaptureProblem::Threads { asked: threads, started: producer, message }
             })?;
             channels.push(receiver);
+        }
+        for _ in 0..threads {
+            // There is room for all, and a receiver here.
+            _ = go.send(());
         }
         let mut turns = (0..threads).cycle();
         let mut summaries = Vec::with_capacity(samplers.len());
@@ -91,7 +101,7 @@ fn chunks(jobs: &[(usize, Range<u64>)]) -> impl Iterator<Item = (usize, Range<u6
     jobs.iter().flat_map(|(object, samples)| split(samples).map(|part| (*object, part)))
 }
 
-/// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is gone.
+/// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is started.
 fn produce(
     chunks: impl Iterator<Item = (usize, Range<u64>)>,
     samplers: &[Sampler<'_>],
