@@ -24,7 +24,7 @@ fn a_built_in_object_is_shown_by_its_name() {
     let page = directory.path().join("bowl.html");
     stdout(command(["view", "bowl", "-o"]).arg(&page).output().unwrap());
     let text = std::fs::read_to_string(&page).unwrap();
-    assert!(text.contains("<title>bowl") && text.contains("<dt>Right side out</dt><dd>yes</dd>"));
+    assert!(text.contains("<title>bowl") && text.contains("<dt>Right side out</dt><dd class=\"\">yes</dd>"));
 }
 
 #[test]
