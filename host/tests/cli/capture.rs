@@ -349,12 +349,12 @@ fn a_capture_to_standard_output_is_refused() {
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_the_system_refuses_are_an_error_and_no_panic() {
-    // Four gigabytes of addresses do not hold the stacks of 100,000 threads.
+    // Six gigabytes of addresses hold few stacks of one each. The builder of scenes gets one thread.
     let directory = meshes();
-    let script =
-        "ulimit -v 4000000; exec \"$1\" capture \"$2/meshes\" -o \"$2/out\" --touches 100000000 --threads 100000";
+    let script = "ulimit -v 6000000; export RUST_MIN_STACK=1073741824 RAYON_NUM_THREADS=1
+        exec \"$1\" capture \"$2/meshes\" -o \"$2/out\" --touches 1000000 --threads 100000";
     let error = stderr(shell(script, directory.path()), 1);
-    assert!(error.contains("threads (") && error.contains("Use fewer threads."), "{error}");
+    assert!(error.contains("of 256 threads (") && error.contains("Use fewer threads."), "{error}");
 }
 
 #[test]
