@@ -54,7 +54,7 @@ pub struct Settings {
     pub add: bool,
     /// Replace the data set in the directory, whatever it holds. Takes precedence over `resume` and `add`.
     pub force: bool,
-    /// How many threads to use; all that the machine has by default.
+    /// How many threads to use, at most 256; by default as many as the machine has.
     pub threads: Option<usize>,
 }
 

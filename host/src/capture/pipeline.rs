@@ -19,6 +19,9 @@ const CHUNK: u64 = 256;
 /// How many chunks a producer may be ahead.
 const AHEAD: usize = 8;
 
+/// The most producers, however many are asked for: what they may be ahead together stays a few megabytes.
+const MOST_THREADS: usize = 256;
+
 /// What a producer hands to the writer.
 struct Chunk {
     text: String,
@@ -38,7 +41,7 @@ pub(super) fn run(
     let jobs: Vec<(usize, Range<u64>)> = (0..samplers.len()).map(|object| (object, rest(object))).collect();
     progress.begin("touching", Some(total * samplers.len() as u64));
     // More threads than chunks would have nothing to do.
-    let threads = settings.threads().min(chunks(&jobs).count()).max(1);
+    let threads = settings.threads().min(MOST_THREADS).min(chunks(&jobs).take(MOST_THREADS).count()).max(1);
     std::thread::scope(|scope| {
         let mut channels = Vec::with_capacity(threads);
         let (go, started) = bounded(threads);
