@@ -258,7 +258,7 @@ impl Trial {
             model_bytes: compiled.bytes.len(),
             layout: compiled.layout.name().into(),
             leaf: compile.leaf.name().into(),
-            fixed_touches: if curve.most() == 0 { None } else { curve.touches_to_error(settings.error_rate) },
+            fixed_touches: curve.touches_to_error(settings.error_rate),
             followed_to: curve.most(),
             evaluation,
             parity,
