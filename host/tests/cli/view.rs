@@ -12,7 +12,7 @@ fn a_page_shows_a_mesh_of_ones_own_with_the_touches_that_were_asked_for() {
     };
     let text = view();
     assert!(text.contains("<title>my globe"));
-    assert_eq!(text.matches("<tr tabindex").count(), 7);
+    assert_eq!(text.matches("<tr data-approach=").count(), 7);
     assert_eq!(listing(page.parent().unwrap()), ["globe.html"]);
     // The same seed gives the same page.
     assert_eq!(view(), text);
