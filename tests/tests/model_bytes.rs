@@ -49,8 +49,10 @@ fn models() -> Vec<Vec<u8>> {
 fn walk(model: &Model<'_>) {
     let Ok(mut recognizer) = Recognizer::<256>::new(model, Stopping::from_model(model)) else { return };
     for touch in random::touches(40, 3) {
-        recognizer.push(&touch);
-        recognizer.push_features(&[i32::MIN, i32::MAX]);
+        let _ = recognizer.push(&touch);
+        let mut margins = [0; 256];
+        model.margins_of(&[i32::MIN, i32::MAX], &mut margins);
+        recognizer.push_margins(&margins);
         recognizer.posterior(0);
     }
     for object in 0..model.object_count() {

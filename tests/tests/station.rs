@@ -4,18 +4,32 @@
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate_onboard::station::{Memory, serve};
-use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
+use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::link::{
     CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, Message, Outcome, Payload, Query,
     Refusal, checksum,
 };
-use palpate_shared::{Descriptor, Touch};
+use palpate_shared::{ContactTime, Descriptor, Patterns, Pose, Touch};
 use palpate_tests::random::{self, Shape};
+use palpate_tests::sections::trained;
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
 use std::collections::VecDeque;
 
 const OBJECTS: usize = 16;
+
+/// Most touches count; those without any contact, and those that spread too far, do not.
+const CONTACTS: Trained = Trained {
+    probe: None,
+    touches: Some(TrainedTouches {
+        patterns: Patterns::CONTACTS,
+        counted: Counted::Contacts,
+        needs_pose: false,
+        largest_spread: 1_000_000,
+    }),
+    noise: None,
+};
 
 fn model(seed: u64) -> Vec<u8> {
     let shape = Shape {
@@ -28,7 +42,7 @@ fn model(seed: u64) -> Vec<u8> {
         leaf: 0.05,
     };
     let settings = Settings { leaf: Leaf::I16, ..Settings::default() };
-    compile(&random::ensemble(shape, seed), &settings).unwrap().bytes
+    trained(&compile(&random::ensemble(shape, seed), &settings).unwrap().bytes, &CONTACTS)
 }
 
 /// A chip's memory, which outlasts its program.
@@ -216,9 +230,12 @@ fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
     let mut recognizer = Recognizer::<OBJECTS>::new(&model, Stopping::from_model(&model)).unwrap();
     let verdict = |touch| {
         let decision = match recognizer.push(touch) {
-            Verdict::Undecided => Decision::Undecided,
-            Verdict::Recognized { object, .. } => Decision::Recognized(object),
-            Verdict::Unknown => Decision::Unknown,
+            Ok(Verdict::Undecided) => Decision::Undecided,
+            Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
+            Ok(Verdict::Unknown) => Decision::Unknown,
+            Err(Refused::Pattern(_)) => return Outcome::Refused(Refusal::Pattern),
+            Err(Refused::Spread) => return Outcome::Refused(Refusal::Spread),
+            Err(refused) => panic!("{refused}"),
         };
         let best = recognizer.best();
         let detail = Some(Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
@@ -226,6 +243,35 @@ fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
         Outcome::Verdict(palpate_shared::link::VerdictMessage { decision, best: best as u8, touches, detail })
     };
     touches.iter().map(verdict).collect()
+}
+
+/// Outcomes of touches, counted or not.
+fn answers_to_touches(desk: &Desk) -> Vec<Outcome> {
+    let is_answer = |outcome: &&Outcome| match outcome {
+        Outcome::Verdict(_) => true,
+        Outcome::Refused(refusal) => refusal.is_of_a_touch(),
+        _ => false,
+    };
+    desk.outcomes.iter().filter(is_answer).copied().collect()
+}
+
+#[test]
+fn touches_that_the_model_was_not_trained_for_are_refused_counted_and_reported_over_the_link() {
+    let bytes = model(1);
+    let pose = Pose { direction: [0, 0, -32_767], alignment: [32_767, 0, 0] };
+    let missing = ContactTime::MISSING;
+    let touches = [
+        Touch::from_micros([0, 5, 9]),
+        Touch::new([missing; 3]).with_pose(pose),
+        Touch::from_micros([0, 1_000_001, 9]),
+        Touch::new([ContactTime::FIRST, missing, missing]),
+    ];
+    let mut desk = Desk::new(touches.iter().map(push).chain([Step::Ask(Query::Statistics)]), 0);
+    Chip::new(bytes.clone()).run(&mut desk).unwrap();
+    assert_eq!(desk.outcomes, expected(&bytes, &touches));
+    let refusals = [Outcome::Refused(Refusal::Pattern), Outcome::Refused(Refusal::Spread)];
+    assert_eq!(desk.outcomes[1..3], refusals);
+    assert!(desk.answers[0].contains("refused: 2"), "{}", desk.answers[0]);
 }
 
 #[test]
@@ -257,8 +303,7 @@ fn a_loaded_model_is_used_from_its_commit_on_and_after_a_restart() {
     let mut chip = Chip::new(Vec::new());
     let mut desk = Desk::new(script, 0);
     chip.run(&mut desk).unwrap();
-    let verdicts: Vec<Outcome> = desk.outcomes.iter().filter(|o| matches!(o, Outcome::Verdict(_))).copied().collect();
-    assert_eq!(verdicts, [expected(first, before), expected(second, after)].concat());
+    assert_eq!(answers_to_touches(&desk), [expected(first, before), expected(second, after)].concat());
     let mut desk = Desk::new([Step::Ask(Query::Model), Step::Do(Command::Reset), push(&after[0])], 0);
     chip.run(&mut desk).unwrap();
     assert!(desk.answers[0].contains(&format!("length: {}", second.len())), "{}", desk.answers[0]);
@@ -344,9 +389,9 @@ fn through_power_cuts_and_torn_records_no_touch_is_lost_or_doubled() {
         }
     }
     assert!(cuts > 100 && torn > 30, "{cuts} {torn}");
-    let told: Vec<Outcome> = desk.outcomes.iter().filter(|o| matches!(o, Outcome::Verdict(_))).copied().collect();
-    assert_eq!(told, verdicts);
-    assert!(!desk.outcomes.iter().any(|o| matches!(o, Outcome::Refused(_))), "loading continues after a power cut");
+    assert_eq!(answers_to_touches(&desk), verdicts);
+    let is_refused = |outcome: &Outcome| matches!(outcome, Outcome::Refused(refusal) if !refusal.is_of_a_touch());
+    assert!(!desk.outcomes.iter().any(is_refused), "loading continues after a power cut");
 }
 
 /// The place of the newest record, by its counter: postcard's first number.

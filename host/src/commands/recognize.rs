@@ -3,7 +3,7 @@ use palpate::Result;
 use palpate::compile::CompiledFile;
 use palpate::output;
 use palpate::touches::parse_touch;
-use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -42,6 +42,9 @@ struct Line<'a> {
     verdict: &'static str,
     object: &'a str,
     posterior: f64,
+    /// Why the touch was not counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<String>,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
@@ -96,29 +99,39 @@ fn stream(
         let touch = parse_touch(line).map_err(wrong)?;
         let verdict = recognizer.push(&touch);
         print(recognizer, model, verdict, json)?;
-        if verdict != Verdict::Undecided {
+        if recognizer.verdict() != Verdict::Undecided {
             recognizer.reset();
         }
     }
     Ok(())
 }
 
-fn print(recognizer: &Recognizer<'_, 256>, model: &Model<'_>, verdict: Verdict, json: bool) -> Result<()> {
+fn print(
+    recognizer: &Recognizer<'_, 256>,
+    model: &Model<'_>,
+    verdict: std::result::Result<Verdict, Refused>,
+    json: bool,
+) -> Result<()> {
     let best = recognizer.best();
     let line = Line {
         touch: recognizer.touches(),
-        verdict: match verdict {
+        verdict: match recognizer.verdict() {
             Verdict::Undecided => "undecided",
             Verdict::Recognized { .. } => "recognized",
             Verdict::Unknown => "unknown",
         },
-        object: model.object_name(best),
+        // Before the first touch that counts, no object is more likely than another for a reason to be named.
+        object: if recognizer.touches() == 0 { "" } else { model.object_name(best) },
         posterior: recognizer.posterior(best).to_f64(),
+        refused: verdict.err().map(|refused| refused.to_string()),
     };
     if json {
         let text = serde_json::to_string(&line)
             .map_err(|e| Error::data(format!("cannot write the verdict as JSON: {e}"), "Report this as a bug."))?;
         return output::print(&format!("{text}\n"));
+    }
+    if let Some(refused) = line.refused {
+        return output::print(&format!("{:4}  not counted: {refused}\n", line.touch));
     }
     output::print(&format!("{:4}  {:10}  {} {:.4}\n", line.touch, line.verdict, line.object, line.posterior))
 }

@@ -103,8 +103,10 @@ fn differ(ensemble: &Ensemble, model: &Model<'_>, mut draw: impl Iterator<Item =
     while let Some(touch) = draw.next()
         && (compiled.verdict() == Verdict::Undecided || full.verdict == Verdict::Undecided)
     {
-        compiled.push(&touch);
-        full.push(&touch);
+        // What the model was not trained for is not counted by either.
+        if compiled.push(&touch).is_ok() {
+            full.push(&touch);
+        }
     }
     match (compiled.verdict(), full.verdict) {
         (a, b) if a == b => (0, 0),

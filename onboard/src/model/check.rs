@@ -3,14 +3,14 @@
 use super::optional;
 use crate::bytes::{ModelError, take};
 use crate::layouts::{Sections, built_in, complete, grid, preorder, ranks};
-use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
+use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, TrainedTouches};
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
 
 /// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves.
 #[inline(never)]
-pub(super) fn check(model: &Sections<'_>, header: &Header<'_>) -> Result<(), ModelError> {
+pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
     if Key::from_code(header.key()).is_none() {
         return Err(ModelError::Field { offset: 13 });
     }
@@ -25,7 +25,7 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>) -> Result<(), Mod
     if !built_in || !built_in::leaf(model.leaf) {
         return Err(ModelError::NotBuiltIn { offset: if built_in { 7 } else { 6 } });
     }
-    optional::check(model)?;
+    optional::check(model, touches)?;
     ranks::check(model, header.last_feature())?;
     let section =
         |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };

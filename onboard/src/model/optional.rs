@@ -15,8 +15,8 @@ pub(super) fn find<'a>(mut sections: &'a [u8], tag: Tag) -> &'a [u8] {
 }
 
 /// Checks that sections fill their part of the model, in the order of their tags, and make sense, and that none is there
-/// that has to be understood and is not.
-pub(super) fn check(model: &Sections<'_>) -> Result<(), ModelError> {
+/// that has to be understood and is not. Sets `touches` if the model states them.
+pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
     let mut rest = model.optional;
     let mut last = 0;
     while !rest.is_empty() {
@@ -26,7 +26,9 @@ pub(super) fn check(model: &Sections<'_>) -> Result<(), ModelError> {
         let valid = match tag {
             _ if tag <= last => false,
             _ if tag == Tag::Probe.code() => TrainedProbe::from_bytes(content).is_some(),
-            _ if tag == Tag::Touches.code() => TrainedTouches::from_bytes(content).is_some(),
+            _ if tag == Tag::Touches.code() => {
+                TrainedTouches::from_bytes(content).map(|stated| *touches = stated).is_some()
+            }
             _ if tag == Tag::Noise.code() => TrainedNoise::from_bytes(content).is_some(),
             _ if must_understand => return Err(ModelError::NotUnderstood { tag, offset }),
             _ => true,

@@ -1,7 +1,7 @@
 //! A model in use, and the commands it can be given.
 
 use super::record::{Records, Source, Staged};
-use crate::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
+use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::link::{
     Decision, Detail, Device, ModelInfo, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
@@ -23,6 +23,8 @@ pub struct Station<'m, 'r, const N: usize> {
     /// What the model that is arriving will be.
     next_source: Source,
     switched: bool,
+    /// Touches that were not counted.
+    refused: u32,
     records: Option<&'m mut Records<'r>>,
 }
 
@@ -39,8 +41,17 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
         records: Option<&'m mut Records<'r>>,
     ) -> Self {
         let recognizer = model.and_then(|model| Recognizer::new(model, Stopping::from_model(model)).ok());
-        let mut station =
-            Self { model, recognizer, staging, staged: None, source, next_source, switched: false, records };
+        let mut station = Self {
+            model,
+            recognizer,
+            staging,
+            staged: None,
+            source,
+            next_source,
+            switched: false,
+            refused: 0,
+            records,
+        };
         station.resume();
         station
     }
@@ -62,20 +73,34 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
         self.switched.then_some(self.source)
     }
 
-    /// Takes a touch into account; `None` without a usable model.
+    /// Takes a touch into account.
     ///
     /// Cost: [`Recognizer::push`], and with a detail a posterior and 400 instructions per object.
-    pub fn push(&mut self, touch: &Touch, detail: bool) -> Option<VerdictMessage> {
-        let recognizer = self.recognizer.as_mut()?;
+    ///
+    /// # Errors
+    /// [`Refusal::NoModel`] without a usable model; [`Refusal::Pattern`], [`Refusal::Spread`], [`Refusal::NoPose`] or
+    /// [`Refusal::Features`] for a touch that the model was not trained for: [`Station::refused`] counts those.
+    pub fn push(&mut self, touch: &Touch, detail: bool) -> Result<VerdictMessage, Refusal> {
+        let recognizer = self.recognizer.as_mut().ok_or(Refusal::NoModel)?;
         let decision = match recognizer.push(touch) {
-            Verdict::Undecided => Decision::Undecided,
-            Verdict::Recognized { object, .. } => Decision::Recognized(object),
-            Verdict::Unknown => Decision::Unknown,
+            Ok(Verdict::Undecided) => Decision::Undecided,
+            Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
+            Ok(Verdict::Unknown) => Decision::Unknown,
+            Err(refused) => {
+                self.refused = self.refused.saturating_add(1);
+                return Err(refusal(refused));
+            }
         };
         let best = recognizer.best();
         let detail = detail.then(|| Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
         let best = u8::try_from(best).unwrap_or(u8::MAX);
-        Some(VerdictMessage { decision, best, touches: recognizer.touches(), detail })
+        Ok(VerdictMessage { decision, best, touches: recognizer.touches(), detail })
+    }
+
+    /// How many touches were not counted because the model was not trained for them, since power-up or the last change
+    /// of the model.
+    pub const fn refused(&self) -> u32 {
+        self.refused
     }
 
     /// Puts what has arrived into use.
@@ -104,13 +129,23 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
     }
 }
 
+/// As the link reports it.
+const fn refusal(refused: Refused) -> Refusal {
+    match refused {
+        Refused::Pattern(_) => Refusal::Pattern,
+        Refused::Spread => Refusal::Spread,
+        Refused::NoPose => Refusal::NoPose,
+        Refused::NeedsFeatures | Refused::NeedsTouches => Refusal::Features,
+    }
+}
+
 fn outcome(result: Result<(), Refusal>) -> Outcome {
     result.map_or_else(Outcome::Refused, |()| Outcome::Done)
 }
 
 impl<const N: usize> Device for Station<'_, '_, N> {
     fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome {
-        self.push(touch, detail).map_or(Outcome::Refused(Refusal::NoModel), Outcome::Verdict)
+        self.push(touch, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
     }
 
     fn reset(&mut self) -> Outcome {
@@ -176,6 +211,10 @@ impl<const N: usize> Device for Station<'_, '_, N> {
         let count = rest.len().min(buffer.len());
         buffer.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
         Ok((u32::try_from(whole.len()).unwrap_or(u32::MAX), count))
+    }
+
+    fn refused(&self) -> u32 {
+        self.refused
     }
 
     fn store(&mut self, progress: &Progress) {

@@ -39,6 +39,11 @@ pub trait Device {
     /// A [`Refusal`] to send instead.
     fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal>;
 
+    /// How many touches were not counted because the model was not trained for them, since power-up.
+    fn refused(&self) -> u32 {
+        0
+    }
+
     /// Called after a command was executed and before its outcome is sent: a device that is to survive power cuts
     /// stores its evidence and this, at once or not at all.
     fn store(&mut self, progress: &Progress) {
@@ -93,7 +98,7 @@ impl DeviceEnd {
         Self {
             decoder: Decoder::new(),
             progress,
-            statistics: Statistics { frames: 0, garbled: 0, repeated: 0, early: 0, foreign: 0 },
+            statistics: Statistics { frames: 0, garbled: 0, repeated: 0, early: 0, foreign: 0, refused: 0 },
             events: 0,
         }
     }
@@ -234,7 +239,7 @@ fn answer<'b>(
             Some(name) => Answer::Name(name.get(..name.floor_char_boundary(CHUNK)).unwrap_or_default()),
             None => Answer::Refused(Refusal::NoObject),
         },
-        Query::Statistics => Answer::Statistics(*statistics),
+        Query::Statistics => Answer::Statistics(Statistics { refused: device.refused(), ..*statistics }),
         Query::Posteriors { first } => {
             let objects = (first..=u8::MAX).take(POSTERIORS);
             let posteriors = objects.map_while(|object| device.posterior(object));
