@@ -1,14 +1,9 @@
 //! Any bytes offered as touches give errors that name their line, or touches that are written and read back the same;
 //! memory grows with the longest line only.
 #![no_main]
-#![allow(dead_code, unreachable_pub, reason = "parts of the host crate, without all that it depends on")]
-
-#[path = "../../host/src/error.rs"]
-mod error;
-#[path = "../../host/src/dataset/text.rs"]
-mod text;
 
 use libfuzzer_sys::fuzz_target;
+use palpate::touches::text;
 use peak_alloc::PeakAlloc;
 use std::path::Path;
 

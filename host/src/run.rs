@@ -2,7 +2,7 @@
 
 use crate::capture;
 use crate::compile::{self, Compiled};
-use crate::ensemble::train;
+use crate::ensemble::{StatedProbe, train};
 use crate::error::{ReportProblem, Result};
 use crate::evaluate::parity::{self, Parity};
 use crate::evaluate::{self, Candidate, Curve, Evaluation, Margins};
@@ -15,10 +15,11 @@ use crate::progress::{self, Progress};
 use crate::report::results;
 use crate::report::run_page::{RunMethod, RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
-use crate::touches::Dataset;
 use crate::touches::folds::{self, Split};
+use crate::touches::{Dataset, Listing};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -156,13 +157,19 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         results::refuse_others(out, &made_from, &FILES, "data/dataset.json")?;
     }
     let data = out.join("data");
-    let captured = capture::capture(objects, &settings.capture, &data, progress)?;
-    let seed = settings.capture.seed;
+    // A run replaces what an earlier run on the same objects left, finished or not, and no other touches.
+    let names: BTreeSet<&str> = objects.iter().map(|object| object.name.as_str()).collect();
+    let is_same = |listing: &Listing| listing.objects.iter().map(|entry| entry.name.as_str()).eq(names.iter().copied());
+    let force = settings.capture.force || settings.replace || Listing::read(&data)?.as_ref().is_some_and(is_same);
+    let captured =
+        capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
+    let seed = settings.capture.origin.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
+    let probe = Some(StatedProbe { probe: settings.capture.origin.probe, length: settings.capture.origin.length });
     let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);
-    let paper = method("paper", "paper", train::Settings { seed, ..train::Settings::paper() })?;
-    let ours = method("ours", "ensemble", train::Settings { seed, ..train::Settings::compact() })?;
-    let model = open(&ours.compiled)?;
+    let paper = method("paper", "paper", train::Settings { seed, probe, ..train::Settings::paper() })?;
+    let ours = method("ours", "ensemble", train::Settings { seed, probe, ..train::Settings::compact() })?;
+    let model = compile::open(&ours.compiled.bytes)?;
     let summary = Summary {
         made_from,
         tool_version: env!("CARGO_PKG_VERSION"),
@@ -194,7 +201,7 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
         "job": "run",
         "sources": settings.sources,
         "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
-        "capture": results::json("capture's settings", &settings.capture)?,
+        "capture": results::json("capture's settings", &settings.capture.origin)?,
         "test_share": settings.test_share,
         "groups": settings.groups,
         "error_rate": settings.error_rate,
@@ -227,17 +234,15 @@ impl Trial {
         progress.begin(&format!("compiling and testing {name}"), None);
         let compile = compile::Settings {
             error_rate: settings.error_rate,
-            spacing: settings.capture.probe.spacing as f32,
-            speed: settings.capture.probe.speed as f32,
             ..compile::Settings::default()
         };
         let compiled = compile::compile(&ensemble, &compile)?;
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
-        let model = open(&compiled)?;
+        let model = compile::open(&compiled.bytes)?;
         let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
         let fewest = margins.fewest_touches();
-        let seed = settings.capture.seed;
+        let seed = settings.capture.origin.seed;
         let evaluation = evaluate::evaluate(
             &margins,
             &evaluate::Settings {
@@ -267,10 +272,6 @@ impl Trial {
 
 fn model_path(out: &Path, stem: &str) -> PathBuf {
     out.join(if stem == "ensemble" { "model" } else { stem }).with_extension("palpate")
-}
-
-fn open(compiled: &Compiled) -> Result<Model<'_>> {
-    Model::new(&compiled.bytes).map_err(|error| ReportProblem::Compiled { reason: error.to_string() }.into())
 }
 
 /// Pushes one object's test touches until the recognizer has its verdict.
@@ -476,7 +477,7 @@ mod tests {
     fn settings(touches: u64) -> Settings {
         Settings {
             sources: vec!["meshes".into()],
-            capture: capture::Settings { touches, ..capture::Settings::default() },
+            capture: crate::touches::Origin { touches, ..Default::default() }.into(),
             groups: 50,
             command: "palpate run 'my meshes'".into(),
             ..Settings::default()

@@ -1,7 +1,7 @@
 //! Hard cases of evidence and stopping.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Node, Output, Tree};
+use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
 use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
 use palpate_shared::format::checksum;
 use palpate_shared::{Descriptor, Touch};
@@ -27,6 +27,7 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
         objects: (0..objects).map(|object| object.to_string()).collect(),
         base_margins: vec![0.0; objects],
         trees: vec![Tree { nodes, output: Output::Each }],
+        origin: Origin::default(),
     }
 }
 

@@ -59,7 +59,7 @@ fn model(descriptor: Descriptor, seed: u64) -> Vec<u8> {
 fn dataset(count: usize) -> Dataset {
     let object =
         |index: usize| ObjectTouches { name: format!("object {index}"), touches: random::touches(count, index as u64) };
-    Dataset { objects: (0..OBJECTS).map(object).collect() }
+    Dataset::new((0..OBJECTS).map(object).collect())
 }
 
 /// On a good line nothing has to be sent again, however busy the machine that emulates the chip.

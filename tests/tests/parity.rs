@@ -1,11 +1,11 @@
 //! The compiled model against the full one, over a million touches and ten thousand sequences.
 
-use palpate::capture::{self, capture};
+use palpate::capture::capture;
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node};
 use palpate::evaluate::parity::{Parity, parity};
-use palpate::touches::{Dataset, ObjectTouches};
+use palpate::touches::{Dataset, ObjectTouches, Origin};
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use palpate_tests::random;
@@ -21,7 +21,7 @@ fn size(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> usize {
 /// Touches of the built-in objects.
 fn captured(pose: bool) -> Dataset {
     let directory = tempfile::tempdir().unwrap();
-    let settings = capture::Settings { touches: 1_500, pose, ..capture::Settings::default() };
+    let settings = Origin { touches: 1_500, pose, ..Origin::default() }.into();
     capture(&palpate::mesh::builtin::all().unwrap(), &settings, directory.path(), &()).unwrap();
     Dataset::read(directory.path()).unwrap()
 }
@@ -32,7 +32,7 @@ fn million(dataset: &Dataset) -> Dataset {
     let share = TOUCHES / dataset.objects.len();
     let objects = dataset.objects.iter().zip(touches.chunks(share));
     let objects = objects.map(|(object, part)| ObjectTouches { name: object.name.clone(), touches: part.to_vec() });
-    Dataset { objects: objects.collect() }
+    Dataset::new(objects.collect())
 }
 
 fn hold(ensemble: &Ensemble, dataset: &Dataset) -> (Parity, Parity) {

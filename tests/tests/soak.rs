@@ -106,7 +106,7 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
     let described = connection.model().unwrap();
     let object =
         |index: usize| ObjectTouches { name: format!("object {index}"), touches: random::touches(997, index as u64) };
-    let dataset = Dataset { objects: (0..OBJECTS).map(object).collect() };
+    let dataset = Dataset::new((0..OBJECTS).map(object).collect());
     let (mut early, mut done, mut events) = ([None; 2], 0_u64, 0);
     let processes = ["self".to_owned(), chip.id().to_string()];
     let summary =

@@ -1,20 +1,40 @@
 //! Virtual touches of objects, as many as wanted.
 //!
-//! Sample i of an object is a pure function of (seed, object's name, i) (`sample`), so neither the number of threads
+//! Sample i of an object is a pure function of (seed, object's name, i) ([`Sampler`]), so neither the number of threads
 //! nor shards nor an interruption changes a data set. Producers compute chunks of samples, one writer puts them on the
 //! disk in order, and bounded channels between them keep the memory flat (`pipeline`). What is on the disk is
-//! accounted for every half second, so that an interrupted capture can be resumed (`store`).
+//! checkpointed every half second, so that an interrupted capture can be resumed (`store`). A capture never replaces
+//! touches that it would not write itself, unless it is told to (`admission`).
+//!
+//! ```
+//! use palpate::capture::{self, capture};
+//! use palpate::mesh::builtin;
+//! use palpate::touches::{Dataset, Origin};
+//!
+//! # fn main() -> palpate::Result<()> {
+//! let directory = tempfile::tempdir().expect("a directory for temporary files");
+//! let objects = [builtin::one("bowl")?, builtin::one("mouse")?];
+//! let settings: capture::Settings = Origin { touches: 100, pose: true, ..Origin::default() }.into();
+//! let summary = capture(&objects, &settings, directory.path(), &())?;
+//! assert!(summary.approaches() > summary.touches());
+//!
+//! let dataset = Dataset::read(directory.path())?;
+//! assert_eq!(dataset.names(), ["bowl", "mouse"]);
+//! assert_eq!(dataset.probe().map(|probe| probe.spacing), Some(1.5));
+//! # Ok(())
+//! # }
+//! ```
 
+mod admission;
 mod pipeline;
 mod sample;
 mod store;
 
-use crate::error::{Error, Result};
+use crate::error::{CaptureProblem, Error, Result};
 use crate::mesh::Object;
-use crate::probe::approach::Probe;
 use crate::probe::scene::Scene;
-use crate::progress::Progress;
-use crate::touches::Format;
+use crate::progress::{self, Progress};
+use crate::touches::Origin;
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,48 +43,24 @@ use std::time::Instant;
 
 pub use sample::{MOST_ATTEMPTS, Sampler};
 
-/// How objects are touched. The default is the published method: 21,000 full touches an object, longest side 10 units.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+/// What to capture, and what to do with what is there.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Settings {
-    /// How many touches of each object; with `approaches`, how many approaches.
-    pub touches: u64,
-    /// The seed of all that is random.
-    pub seed: u64,
-    /// The longest side of an object's bounding box, in units.
-    pub length: f64,
-    /// The probe's measures.
-    pub probe: Probe,
-    /// Whether the probe's direction and alignment are written too.
-    pub pose: bool,
-    /// Whether every approach is kept, not only full touches: sample i is then approach i.
-    pub approaches: bool,
-    /// How the touches are kept; Parquet keeps the pose in any case.
-    pub format: Format,
-    /// Which part of the samples to compute.
-    pub shard: Shard,
-    /// Whether to go on where an interrupted capture into the same directory stopped.
-    #[serde(skip)]
+    /// How objects are touched.
+    pub origin: Origin,
+    /// Go on where an interrupted capture into the same directory stopped.
     pub resume: bool,
+    /// Add objects to the data set in the directory, which must have been made in the same way.
+    pub add: bool,
+    /// Replace the data set in the directory, whatever it holds. Takes precedence over `resume` and `add`.
+    pub force: bool,
     /// How many threads to use; all that the machine has by default.
-    #[serde(skip)]
     pub threads: Option<usize>,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            touches: 21_000,
-            seed: 1,
-            length: 10.0,
-            probe: Probe::default(),
-            pose: false,
-            approaches: false,
-            format: Format::Text,
-            shard: Shard::WHOLE,
-            resume: false,
-            threads: None,
-        }
+impl From<Origin> for Settings {
+    fn from(origin: Origin) -> Self {
+        Self { origin, ..Self::default() }
     }
 }
 
@@ -72,82 +68,16 @@ impl Settings {
     /// Refuses settings that make no capture.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming the setting.
+    /// [`Problem::Setting`](crate::error::Problem::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
-        if self.touches == 0 {
-            return Err(Error::argument("0 touches were asked for", "Ask for at least 1."));
-        }
         if self.threads == Some(0) {
-            return Err(Error::argument("0 threads were asked for", "Ask for at least 1, or leave the option out."));
+            return Err(Error::setting("threads", 0, "1 or more, or none for all that the machine has"));
         }
-        self.format.check()?;
-        self.probe.check(self.length)
-    }
-
-    /// Whether the pose is written.
-    fn writes_pose(&self) -> bool {
-        self.pose || self.format == Format::Parquet
-    }
-
-    /// The samples that are to be computed: the shard's part of all.
-    pub fn samples(&self) -> Range<u64> {
-        self.shard.part(self.touches)
+        self.origin.check()
     }
 
     fn threads(&self) -> usize {
         self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
-    }
-}
-
-/// One of several equal parts of the samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(into = "String", try_from = "String")]
-pub struct Shard {
-    number: u64,
-    of: u64,
-}
-
-impl Shard {
-    /// All samples.
-    pub const WHOLE: Self = Self { number: 1, of: 1 };
-
-    fn part(self, samples: u64) -> Range<u64> {
-        let before = |number: u64| u64::try_from(u128::from(samples) * u128::from(number) / u128::from(self.of));
-        // At most `samples`, so the conversion cannot fail.
-        before(self.number - 1).unwrap_or(samples)..before(self.number).unwrap_or(samples)
-    }
-}
-
-impl std::fmt::Display for Shard {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(formatter, "{}/{}", self.number, self.of)
-    }
-}
-
-impl std::str::FromStr for Shard {
-    type Err = String;
-
-    /// Reads `K/N`: the K-th of N parts, counted from 1.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
-        match parts {
-            Some((number, of)) if 1 <= number && number <= of => Ok(Self { number, of }),
-            _ => Err(format!("{text:?} is no shard: give K/N with K from 1 to N, like 2/5")),
-        }
-    }
-}
-
-impl From<Shard> for String {
-    fn from(shard: Shard) -> Self {
-        shard.to_string()
-    }
-}
-
-impl TryFrom<String> for Shard {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
     }
 }
 
@@ -190,25 +120,37 @@ impl Summary {
 /// Touches the objects and writes `DIR/<object>.txt` (or `.parquet`) for each, and `DIR/dataset.json`.
 ///
 /// # Errors
-/// When a setting is wrong, a mesh cannot be touched, the directory cannot be written to or another capture is writing
-/// to it. Whatever was written at the last of the half-second accounts can be resumed.
+/// When a setting is wrong, a mesh cannot be touched, the directory cannot be written to, another capture is writing to
+/// it, or it holds what this capture would not write; [`Error::Cancelled`] if `progress` cancels it. Whatever was
+/// written at the last of the half-second checkpoints can be resumed.
 pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progress: &dyn Progress) -> Result<Summary> {
     settings.check()?;
     let start = Instant::now();
-    let scenes = scenes(objects, settings)?;
-    let samplers: Vec<Sampler<'_>> =
-        objects.iter().zip(&scenes).map(|(object, scene)| Sampler::new(scene, &object.name, settings)).collect();
-    let mut store = store::Store::open(directory, settings, objects.iter().map(|object| object.name.clone()))?;
+    let mut objects: Vec<&Object> = objects.iter().collect();
+    objects.sort_by(|a, b| a.name.cmp(&b.name));
+    let scenes = scenes(&objects, settings.origin.length, progress)?;
+    let samplers: Vec<Sampler<'_>> = objects
+        .iter()
+        .zip(&scenes)
+        .map(|(object, scene)| Sampler::new(scene, &object.name, &settings.origin))
+        .collect();
+    let names: Vec<String> = objects.iter().map(|object| object.name.clone()).collect();
+    let mut store = store::Store::open(directory, settings, &names)?;
     let objects = pipeline::run(&samplers, settings, &mut store, progress)?;
     store.finish()?;
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
 }
 
 /// The objects' scenes, built side by side.
-fn scenes(objects: &[Object], settings: &Settings) -> Result<Vec<Scene>> {
-    let scene = |object: &Object| {
-        Scene::new(&object.mesh, settings.length)
-            .map_err(|error| Error::data(format!("{}: {error}", object.name), "Leave the object out."))
+fn scenes(objects: &[&Object], length: f64, progress: &dyn Progress) -> Result<Vec<Scene>> {
+    let scene = |object: &&Object| {
+        progress::check(progress)?;
+        Scene::new(&object.mesh, length).map_err(|error| match error {
+            Error::At { problem, .. } => {
+                CaptureProblem::Object { name: object.name.clone(), problem: Box::new(problem) }.into()
+            }
+            other => other.in_file(&object.name),
+        })
     };
     objects.par_iter().map(scene).collect()
 }
@@ -217,17 +159,19 @@ fn scenes(objects: &[Object], settings: &Settings) -> Result<Vec<Scene>> {
 ///
 /// # Errors
 /// When a setting is wrong, or the object cannot be touched with all three fingers.
-pub fn touches(scene: &Scene, name: &str, settings: &Settings, samples: Range<u64>) -> Result<Vec<Touch>> {
-    settings.check()?;
-    let sampler = Sampler::new(scene, name, settings);
+pub fn touches(scene: &Scene, name: &str, origin: &Origin, samples: Range<u64>) -> Result<Vec<Touch>> {
+    origin.check()?;
+    let sampler = Sampler::new(scene, name, origin);
     samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Problem;
     use crate::mesh::Mesh;
-    use crate::touches::{Dataset, manifest::Manifest};
+    use crate::probe::approach::Probe;
+    use crate::touches::{Dataset, Entry, Format, Listing, Shard};
     use std::collections::BTreeMap;
 
     fn objects() -> Vec<Object> {
@@ -237,8 +181,17 @@ mod tests {
         [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh }).into()
     }
 
+    fn origin(touches: u64) -> Origin {
+        Origin { touches, ..Origin::default() }
+    }
+
+    /// The settings of `settings()` with another origin.
+    fn with(origin: Origin) -> Settings {
+        Settings { origin, ..settings() }
+    }
+
     fn settings() -> Settings {
-        Settings { touches: 1500, threads: Some(2), ..Settings::default() }
+        Settings { threads: Some(2), ..origin(1500).into() }
     }
 
     /// The files of a captured data set.
@@ -269,21 +222,21 @@ mod tests {
     #[test]
     fn another_seed_or_name_gives_other_touches() {
         let one = files(&settings());
-        let other = files(&Settings { seed: 2, ..settings() });
+        let other = files(&with(Origin { seed: 2, ..origin(1500) }));
         assert_ne!(one["disc.txt"], other["disc.txt"]);
         let scene = Scene::new(&objects()[0].mesh, 10.0).unwrap();
-        let disc = touches(&scene, "disc", &settings(), 0..9).unwrap();
-        assert_ne!(disc, touches(&scene, "disk", &settings(), 0..9).unwrap());
+        let disc = touches(&scene, "disc", &origin(1500), 0..9).unwrap();
+        assert_ne!(disc, touches(&scene, "disk", &origin(1500), 0..9).unwrap());
     }
 
     #[test]
     fn shards_put_together_are_the_whole() {
         for approaches in [false, true] {
-            let settings = Settings { touches: 1000, approaches, ..settings() };
-            let whole = files(&settings);
+            let origin = Origin { approaches, ..origin(1000) };
+            let whole = files(&with(origin.clone()));
             let mut joined = BTreeMap::new();
             for number in 1..=7 {
-                for (name, text) in files(&Settings { shard: Shard { number, of: 7 }, ..settings.clone() }) {
+                for (name, text) in files(&with(Origin { shard: shard(number), ..origin.clone() })) {
                     *joined.entry(name).or_insert_with(String::new) += &text;
                 }
             }
@@ -292,29 +245,25 @@ mod tests {
         }
     }
 
-    #[test]
-    fn shards_are_read_as_they_are_written_and_wrong_ones_refused() {
-        assert_eq!("2/5".parse::<Shard>().unwrap().to_string(), "2/5");
-        assert_eq!("5/5".parse::<Shard>().unwrap().part(u64::MAX).end, u64::MAX);
-        for wrong in ["", "0/5", "6/5", "1", "1/0", "-1/2", "a/b", "1/2/3"] {
-            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
-        }
+    fn shard(number: u64) -> Shard {
+        format!("{number}/7").parse().unwrap()
     }
 
     #[test]
     fn touches_in_memory_are_those_on_the_disk() {
         let directory = tempfile::tempdir().unwrap();
-        let settings = Settings { pose: true, ..settings() };
+        let origin = Origin { pose: true, ..origin(1500) };
+        let settings = with(origin.clone());
         let summary = capture(&objects(), &settings, directory.path(), &()).unwrap();
         let dataset = Dataset::read(directory.path()).unwrap();
         for (object, read) in objects().iter().zip(&dataset.objects) {
-            let scene = Scene::new(&object.mesh, settings.length).unwrap();
-            assert_eq!(read.touches, touches(&scene, &object.name, &settings, 0..1500).unwrap());
+            let scene = Scene::new(&object.mesh, origin.length).unwrap();
+            assert_eq!(read.touches, touches(&scene, &object.name, &origin, 0..1500).unwrap());
             assert!(read.touches.iter().all(|touch| touch.is_full() && touch.pose().is_some()));
         }
-        let manifest = Manifest::read(directory.path()).unwrap().unwrap();
-        assert!(manifest.complete);
-        assert_eq!(manifest.objects[0].approaches, summary.objects[0].approaches);
+        let listing = Listing::read(directory.path()).unwrap().unwrap();
+        assert!(listing.complete);
+        assert_eq!(listing.objects[0].approaches, summary.objects[0].approaches);
         assert!(summary.objects[0].approaches > 2 * summary.objects[0].touches, "a disc is often missed");
     }
 
@@ -342,16 +291,18 @@ mod tests {
     #[test]
     fn what_an_interruption_left_behind_is_cut_off_and_the_rest_is_the_same() {
         let whole = files(&settings());
-        let mut manifest: Manifest = serde_json::from_str(&whole["dataset.json"]).unwrap();
-        let scenes = scenes(&objects(), &settings()).unwrap();
+        let mut listing: Listing = serde_json::from_str(&whole["dataset.json"]).unwrap();
+        let objects = objects();
+        let scenes = scenes(&objects.iter().collect::<Vec<_>>(), 10.0, &()).unwrap();
         for (object, kept) in [(0, 0), (0, 1), (0, 777), (0, 1500), (1, 0), (1, 1499), (1, 1500)] {
-            // As if it had been killed after an account of so many touches of this object.
+            // As if it had been killed after a checkpoint at N touches of this object.
             let directory = tempfile::tempdir().unwrap();
-            manifest.complete = false;
-            for (index, entry) in manifest.objects.iter_mut().enumerate() {
+            listing.complete = false;
+            for (index, entry) in listing.objects.iter_mut().enumerate() {
                 let kept = [kept, if index < object { 1500 } else { 0 }][usize::from(index != object)];
                 let text = &whole[&format!("{}.txt", entry.name)];
-                let sampler = Sampler::new(&scenes[index], &entry.name, &manifest.settings);
+                let sampler = Sampler::new(&scenes[index], &entry.name, &listing.origin);
+                entry.crc32 = None;
                 entry.touches = kept;
                 entry.approaches = (0..kept).map(|sample| sampler.sample(sample).unwrap().1).sum();
                 entry.bytes = text.lines().take(kept as usize).map(|line| line.len() as u64 + 1).sum();
@@ -362,19 +313,18 @@ mod tests {
                     std::fs::write(directory.path().join(format!("{}.{end}", entry.name)), left).unwrap();
                 }
             }
-            manifest.write(directory.path()).unwrap();
-            capture(&objects(), &Settings { resume: true, ..settings() }, directory.path(), &()).unwrap();
+            listing.write(directory.path()).unwrap();
+            capture(&objects, &Settings { resume: true, ..settings() }, directory.path(), &()).unwrap();
             assert!(read_files(directory.path()) == whole, "object {object}, {kept} touches");
         }
     }
 
     #[test]
-    fn a_part_that_lost_what_was_accounted_for_is_not_gone_on_with() {
+    fn a_part_that_lost_what_was_checkpointed_is_not_resumed() {
         let directory = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::new(&settings(), ["disc".into(), "globe".into()]);
-        manifest.objects[0] =
-            crate::touches::manifest::Entry { name: "disc".into(), touches: 9, approaches: 99, bytes: 252 };
-        manifest.write(directory.path()).unwrap();
+        let mut listing = Listing::new(&origin(1500), ["disc".into(), "globe".into()]);
+        listing.objects[0] = Entry { name: "disc".into(), touches: 9, approaches: 99, bytes: 252, crc32: None };
+        listing.write(directory.path()).unwrap();
         let error = capture(&objects(), &Settings { resume: true, ..settings() }, directory.path(), &()).unwrap_err();
         assert!(error.to_string().contains("disc.part: shorter than the 252 bytes"), "{error}");
     }
@@ -383,7 +333,7 @@ mod tests {
     fn an_object_that_three_fingers_cannot_touch_is_named() {
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let speck = Object { name: "speck".into(), mesh: Mesh { vertices, triangles: vec![[0, 1, 2]] } };
-        let settings = Settings { length: 0.5, touches: 1, ..settings() };
+        let settings = with(Origin { length: 0.5, ..origin(1) });
         let directory = tempfile::tempdir().unwrap();
         let error = capture(&[speck], &settings, directory.path(), &()).unwrap_err().to_string();
         assert!(error.contains("speck: none of 4194304 approaches"), "{error}");
@@ -394,15 +344,15 @@ mod tests {
     fn wrong_settings_are_wrong_arguments() {
         let probe = Probe::default();
         for wrong in [
-            Settings { touches: 0, ..settings() },
+            with(origin(0)),
             Settings { threads: Some(0), ..settings() },
-            Settings { length: 0.0, ..settings() },
-            Settings { length: f64::INFINITY, ..settings() },
-            Settings { probe: Probe { radius: -0.15, ..probe }, ..settings() },
-            Settings { probe: Probe { spacing: f64::NAN, ..probe }, ..settings() },
-            Settings { probe: Probe { speed: 0.0, ..probe }, ..settings() },
-            Settings { probe: Probe { speed: 1e-3, ..probe }, ..settings() },
-            Settings { probe: Probe { tilt: 90.0, ..probe }, ..settings() },
+            with(Origin { length: 0.0, ..origin(9) }),
+            with(Origin { length: f64::INFINITY, ..origin(9) }),
+            with(Origin { probe: Probe { radius: -0.15, ..probe }, ..origin(9) }),
+            with(Origin { probe: Probe { spacing: f64::NAN, ..probe }, ..origin(9) }),
+            with(Origin { probe: Probe { speed: 0.0, ..probe }, ..origin(9) }),
+            with(Origin { probe: Probe { speed: 1e-3, ..probe }, ..origin(9) }),
+            with(Origin { probe: Probe { tilt: 90.0, ..probe }, ..origin(9) }),
         ] {
             let directory = tempfile::tempdir().unwrap();
             assert_eq!(capture(&objects(), &wrong, directory.path(), &()).unwrap_err().exit_code(), 2, "{wrong:?}");
@@ -410,15 +360,219 @@ mod tests {
         }
     }
 
+    /// What a capture of these objects into the directory is refused for.
+    fn refusal(objects: &[Object], settings: &Settings, directory: &Path) -> CaptureProblem {
+        let before = read_files(directory);
+        let error = capture(objects, settings, directory, &()).unwrap_err();
+        assert_eq!(error.exit_code(), 1);
+        assert_eq!(read_files(directory), before, "what is there must stay");
+        match error {
+            Error::At { problem: Problem::Capture(problem), .. } => problem,
+            other => panic!("{other}"),
+        }
+    }
+
+    fn globe_called(name: &str) -> Object {
+        Object { name: name.into(), mesh: Mesh::globe(6) }
+    }
+
     #[test]
-    fn touches_of_an_earlier_capture_are_replaced() {
+    fn a_capture_into_a_directory_with_other_objects_is_refused() {
         let directory = tempfile::tempdir().unwrap();
-        capture(&objects(), &settings(), directory.path(), &()).unwrap();
-        let mut others = objects();
-        others[0].name = "plate".into();
-        capture(&others, &Settings { touches: 10, ..settings() }, directory.path(), &()).unwrap();
-        let files = read_files(directory.path());
-        assert_eq!(files.keys().collect::<Vec<_>>(), ["dataset.json", "globe.txt", "plate.txt"]);
-        assert_eq!(files["globe.txt"].lines().count(), 10);
+        let settings = with(origin(20));
+        capture(&[globe_called("mug")], &settings, directory.path(), &()).unwrap();
+        let boxed = [globe_called("box")];
+        let holds = CaptureProblem::HoldsOtherObjects { objects: vec!["mug".into()], touches: 20 };
+        assert_eq!(refusal(&boxed, &settings, directory.path()), holds);
+        capture(&boxed, &Settings { force: true, ..settings }, directory.path(), &()).unwrap();
+        assert_eq!(read_files(directory.path()).keys().collect::<Vec<_>>(), ["box.txt", "dataset.json"]);
+    }
+
+    #[test]
+    fn a_capture_over_touches_of_other_settings_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
+        match refusal(&objects(), &with(Origin { seed: 2, ..origin(10) }), directory.path()) {
+            CaptureProblem::HoldsOtherSettings { objects, differences } => {
+                assert_eq!(objects, ["disc", "globe"]);
+                assert_eq!(differences, "seed is 1 there and 2 here, touches is 20 there and 10 here");
+            }
+            other => panic!("{other}"),
+        }
+        let replaced = Settings { force: true, ..with(origin(10)) };
+        capture(&objects(), &replaced, directory.path(), &()).unwrap();
+        assert_eq!(read_files(directory.path())["globe.txt"].lines().count(), 10);
+    }
+
+    #[test]
+    fn the_same_capture_may_be_repeated_and_gives_the_same_bytes() {
+        let directory = tempfile::tempdir().unwrap();
+        capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
+        let before = read_files(directory.path());
+        std::fs::write(directory.path().join("globe.txt"), "0 0 0\n").unwrap();
+        capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
+        assert_eq!(read_files(directory.path()), before);
+    }
+
+    #[test]
+    fn a_capture_into_a_directory_with_touches_from_elsewhere_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["fork.txt", "globe.txt"] {
+            std::fs::write(directory.path().join(name), "0 0 0\n").unwrap();
+        }
+        let holds = CaptureProblem::HoldsFiles { files: vec!["fork.txt".into(), "globe.txt".into()] };
+        assert_eq!(refusal(&objects(), &with(origin(20)), directory.path()), holds);
+    }
+
+    #[test]
+    fn a_listing_that_cannot_be_read_is_not_written_over() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("dataset.json"), "{").unwrap();
+        let error = capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap_err().to_string();
+        assert!(error.contains("dataset.json:1: not the listing of a data set"), "{error}");
+        capture(&objects(), &Settings { force: true, ..with(origin(20)) }, directory.path(), &()).unwrap();
+        assert_eq!(Dataset::read(directory.path()).unwrap().len(), 40);
+    }
+
+    #[test]
+    fn an_unfinished_capture_repeated_without_resuming_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        cancelled(&settings(), directory.path());
+        match refusal(&objects(), &settings(), directory.path()) {
+            CaptureProblem::HoldsUnfinished { objects, .. } => assert_eq!(objects, ["disc", "globe"]),
+            other => panic!("{other}"),
+        }
+        capture(&objects(), &Settings { force: true, ..settings() }, directory.path(), &()).unwrap();
+        assert!(read_files(directory.path()) == files(&settings()));
+    }
+
+    #[test]
+    fn a_kill_while_old_touches_are_deleted_leaves_no_complete_listing() {
+        // The first file that is to be deleted cannot be: it stands for the moment of the kill.
+        let directory = tempfile::tempdir().unwrap();
+        capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
+        let obstacle = directory.path().join("globe.txt");
+        std::fs::remove_file(&obstacle).unwrap();
+        std::fs::create_dir(&obstacle).unwrap();
+        let forced = Settings { force: true, ..with(origin(30)) };
+        let error = capture(&objects(), &forced, directory.path(), &()).unwrap_err().to_string();
+        assert!(error.contains("globe.txt: cannot remove the old touches"), "{error}");
+        assert!(!directory.path().join("disc.txt").exists(), "deleted before the obstacle");
+        assert!(Dataset::read(directory.path()).unwrap_err().to_string().contains("not complete"));
+        std::fs::remove_dir(&obstacle).unwrap();
+        capture(&objects(), &forced, directory.path(), &()).unwrap();
+        assert_eq!(Dataset::read(directory.path()).unwrap().len(), 60);
+    }
+
+    /// Cancels once this many touches are reported.
+    struct CancelAfter(std::sync::atomic::AtomicI64);
+
+    impl Progress for CancelAfter {
+        fn advance(&self, steps: u64) {
+            self.0.fetch_sub(steps as i64, std::sync::atomic::Ordering::Relaxed);
+        }
+
+        fn is_cancelled(&self) -> bool {
+            self.0.load(std::sync::atomic::Ordering::Relaxed) <= 0
+        }
+    }
+
+    /// Captures until the first chunk is written.
+    fn cancelled(settings: &Settings, directory: &Path) {
+        let error = capture(&objects(), settings, directory, &CancelAfter(1.into())).unwrap_err();
+        assert!(matches!(error, Error::Cancelled), "{error}");
+    }
+
+    #[test]
+    fn a_cancelled_capture_stops_and_can_be_resumed() {
+        let directory = tempfile::tempdir().unwrap();
+        cancelled(&settings(), directory.path());
+        let listing = Listing::read(directory.path()).unwrap().unwrap();
+        assert!(!listing.complete);
+        assert!(Dataset::read(directory.path()).unwrap_err().to_string().contains("not complete"));
+        assert!(!directory.path().join("globe.txt").exists(), "the second object was never begun");
+        capture(&objects(), &Settings { resume: true, ..settings() }, directory.path(), &()).unwrap();
+        assert!(read_files(directory.path()) == files(&settings()));
+    }
+
+    #[test]
+    fn objects_added_later_are_as_if_captured_together() {
+        let together = files(&settings());
+        let directory = tempfile::tempdir().unwrap();
+        let [disc, globe] = objects().try_into().unwrap();
+        let add = Settings { add: true, ..settings() };
+        for object in [globe.clone(), disc.clone()] {
+            capture(&[object], &add, directory.path(), &()).unwrap();
+        }
+        assert!(read_files(directory.path()) == together);
+        // What cannot be added.
+        let there = CaptureProblem::AlreadyThere { objects: vec!["disc".into()] };
+        assert_eq!(refusal(&[disc.clone(), globe_called("cup")], &add, directory.path()), there);
+        let other = Settings { add: true, ..with(origin(9)) };
+        let problem = refusal(&[globe_called("cup")], &other, directory.path());
+        assert!(matches!(problem, CaptureProblem::AddsOtherSettings { .. }), "{problem}");
+        // An interrupted addition can be resumed, and nothing else be added before it is.
+        let error = capture(&[globe_called("cup")], &add, directory.path(), &CancelAfter(1.into())).unwrap_err();
+        assert!(matches!(error, Error::Cancelled), "{error}");
+        let problem = refusal(&[globe_called("jug")], &add, directory.path());
+        assert!(matches!(problem, CaptureProblem::HoldsUnfinished { .. }), "{problem}");
+        let resume = Settings { resume: true, ..add };
+        let problem = refusal(&[globe_called("jug")], &resume, directory.path());
+        assert!(matches!(problem, CaptureProblem::ResumesOtherObjects { .. }), "{problem}");
+        capture(&[globe_called("cup")], &resume, directory.path(), &()).unwrap();
+        let dataset = Dataset::read(directory.path()).unwrap();
+        assert_eq!((dataset.names(), dataset.len()), (["cup", "disc", "globe"].map(String::from).into(), 4500));
+    }
+
+    #[test]
+    fn a_hundred_thousand_threads_are_as_many_as_there_is_work_for() {
+        assert!(files(&Settings { threads: Some(100_000), ..settings() }) == files(&settings()));
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn the_listing_states_the_true_size_and_checksum_of_parquet_files() {
+        let directory = tempfile::tempdir().unwrap();
+        let settings = with(Origin { format: Format::Parquet, ..origin(200) });
+        capture(&objects(), &settings, directory.path(), &()).unwrap();
+        for entry in Listing::read(directory.path()).unwrap().unwrap().objects {
+            let path = directory.path().join(format!("{}.parquet", entry.name));
+            assert_eq!(entry.bytes, std::fs::metadata(&path).unwrap().len());
+            assert_eq!(entry.crc32, Some(crate::touches::checksum(&path).unwrap()));
+            assert!(!directory.path().join(format!("{}.part", entry.name)).exists());
+        }
+    }
+
+    #[test]
+    fn a_mesh_that_makes_no_scene_is_named_once_with_one_remedy() {
+        let dot = Object { name: "dot".into(), mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0; 3]] } };
+        let directory = tempfile::tempdir().unwrap();
+        let error = capture(&[dot], &settings(), directory.path(), &()).unwrap_err().to_string();
+        assert!(error.starts_with("dot: ") && !error.contains("..") && error.matches("dot").count() == 1, "{error}");
+    }
+
+    #[test]
+    fn the_samples_are_those_of_version_0_1_0() {
+        // Written by `palpate capture` of that version: data sets are resumed, added to and compared across versions.
+        let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mesh = Mesh { vertices, triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] };
+        let scene = Scene::new(&mesh, 10.0).unwrap();
+        let text = |origin: &Origin, samples| {
+            let mut text = String::new();
+            for touch in touches(&scene, "tetrahedron", origin, samples).unwrap() {
+                crate::touches::write_touch(&mut text, &touch, origin.pose);
+            }
+            text
+        };
+        assert_eq!(
+            text(&Origin { pose: true, ..Origin::default() }, 0..3),
+            "0.210317 0.105158 0.000000 0.787042 -0.398328 0.471084 0.551744 0.809778 -0.199530\n\
+             0.000000 0.156403 0.312806 0.657857 0.255989 -0.708304 -0.685934 0.613666 -0.391034\n\
+             0.000000 0.141773 0.366983 0.253578 -0.123203 -0.959441 -0.380718 0.893521 -0.238075\n"
+        );
+        assert_eq!(
+            text(&Origin { approaches: true, seed: 7, ..Origin::default() }, 0..4),
+            "0.110923 0.000000 -\n- - -\n- - 0.000000\n0.000000 0.028569 0.057137\n"
+        );
     }
 }

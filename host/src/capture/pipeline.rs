@@ -6,7 +6,7 @@
 
 use super::store::Store;
 use super::{ObjectSummary, Sampler, Settings};
-use crate::error::Result;
+use crate::error::{CaptureProblem, Result};
 use crate::progress::{self, Progress};
 use crate::touches::write_touch;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -32,18 +32,25 @@ pub(super) fn run(
     store: &mut Store,
     progress: &dyn Progress,
 ) -> Result<Vec<ObjectSummary>> {
-    let samples = settings.samples();
+    let samples = settings.origin.samples();
     let total = samples.end - samples.start;
     let rest = |object: usize| samples.start + store.entry(object).touches..samples.end;
     let jobs: Vec<(usize, Range<u64>)> = (0..samplers.len()).map(|object| (object, rest(object))).collect();
     progress.begin("touching", Some(total * samplers.len() as u64));
-    let threads = settings.threads().max(1);
+    // More threads than chunks would have nothing to do.
+    let threads = settings.threads().min(chunks(&jobs).count()).max(1);
     std::thread::scope(|scope| {
         let mut channels = Vec::with_capacity(threads);
         for producer in 0..threads {
             let (sender, receiver) = bounded(AHEAD);
             let chunks = chunks(&jobs).skip(producer).step_by(threads);
-            scope.spawn(move || produce(chunks, samplers, settings, &sender));
+            let work = move || produce(chunks, samplers, settings, &sender, progress);
+            // A system that is out of threads must not end in a panic. The threads that did start find their channels
+            // closed and end.
+            std::thread::Builder::new().spawn_scoped(scope, work).map_err(|error| {
+                let message = error.to_string();
+                CaptureProblem::Threads { asked: threads, started: producer, message }
+            })?;
             channels.push(receiver);
         }
         let mut turns = (0..threads).cycle();
@@ -84,15 +91,16 @@ fn chunks(jobs: &[(usize, Range<u64>)]) -> impl Iterator<Item = (usize, Range<u6
     jobs.iter().flat_map(|(object, samples)| split(samples).map(|part| (*object, part)))
 }
 
-/// Computes chunks until they are all done, one fails, or the writer is gone.
+/// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is gone.
 fn produce(
     chunks: impl Iterator<Item = (usize, Range<u64>)>,
     samplers: &[Sampler<'_>],
     settings: &Settings,
     sender: &Sender<Result<Chunk>>,
+    progress: &dyn Progress,
 ) {
     for (object, samples) in chunks {
-        let chunk = compute(&samplers[object], settings, samples);
+        let chunk = compute(&samplers[object], settings, samples, progress);
         let failed = chunk.is_err();
         if sender.send(chunk).is_err() || failed {
             return;
@@ -100,11 +108,12 @@ fn produce(
     }
 }
 
-fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>) -> Result<Chunk> {
+fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>, progress: &dyn Progress) -> Result<Chunk> {
     let mut chunk = Chunk { text: String::new(), approaches: 0 };
     for sample in samples {
+        progress::check(progress)?;
         let (touch, approaches) = sampler.sample(sample)?;
-        write_touch(&mut chunk.text, &touch, settings.writes_pose());
+        write_touch(&mut chunk.text, &touch, settings.origin.writes_pose());
         chunk.approaches += approaches;
     }
     Ok(chunk)
@@ -112,5 +121,5 @@ fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>) -> R
 
 fn receive(channel: &Receiver<Result<Chunk>>) -> Result<Chunk> {
     // A producer only goes away early by a panic, which the scope passes on.
-    channel.recv().unwrap_or_else(|_| Err(crate::Error::data("a worker stopped", "Report this as a bug.")))
+    channel.recv().unwrap_or_else(|_| Err(CaptureProblem::WorkerStopped.into()))
 }

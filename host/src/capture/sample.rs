@@ -1,9 +1,12 @@
 //! Sample i of an object: a pure function of (seed, object's name, i).
+//!
+//! The stream of random numbers is that of version 0.1.0 and must stay it, byte for byte: data sets are resumed, added
+//! to and compared across versions. It is therefore not one of the streams of `random`.
 
-use super::Settings;
-use crate::error::{Error, Result};
+use crate::error::{CaptureProblem, Result};
 use crate::probe::approach::Approach;
 use crate::probe::scene::Scene;
+use crate::touches::Origin;
 use palpate_shared::Touch;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -17,15 +20,15 @@ pub const MOST_ATTEMPTS: u64 = 1 << 22;
 pub struct Sampler<'a> {
     scene: &'a Scene,
     name: &'a str,
-    settings: &'a Settings,
+    origin: &'a Origin,
     stream: u64,
 }
 
 impl<'a> Sampler<'a> {
-    /// The samples of the object with this scene and name.
-    pub fn new(scene: &'a Scene, name: &'a str, settings: &'a Settings) -> Self {
-        let stream = name.bytes().fold(mix(settings.seed), |hash, byte| mix(hash ^ u64::from(byte)));
-        Self { scene, name, settings, stream }
+    /// The samples of the object with this scene and name, made as `origin` says.
+    pub fn new(scene: &'a Scene, name: &'a str, origin: &'a Origin) -> Self {
+        let stream = name.bytes().fold(mix(origin.seed), |hash, byte| mix(hash ^ u64::from(byte)));
+        Self { scene, name, origin, stream }
     }
 
     /// The object's name.
@@ -37,21 +40,20 @@ impl<'a> Sampler<'a> {
     /// approaches are drawn until one is a full touch; when every approach is kept, the first one is the sample.
     ///
     /// # Errors
-    /// When [`MOST_ATTEMPTS`] approaches give no full touch.
+    /// [`CaptureProblem::Untouchable`] when [`MOST_ATTEMPTS`] approaches give no full touch.
     pub fn sample(&self, index: u64) -> Result<(Touch, u64)> {
         let mut rng = self.rng(index);
-        let probe = &self.settings.probe;
+        let probe = &self.origin.probe;
         for attempts in 1..=MOST_ATTEMPTS {
             let approach = Approach::draw(&mut rng, self.scene.bounds(), probe.tilt);
-            if self.settings.approaches {
+            if self.origin.approaches {
                 return Ok((approach.touch(approach.distances(self.scene, probe), probe), attempts));
             }
             if let Some(distances) = approach.full_distances(self.scene, probe) {
                 return Ok((approach.touch(distances.map(Some), probe), attempts));
             }
         }
-        let what = format!("{}: none of {MOST_ATTEMPTS} approaches touched with all three fingers", self.name);
-        Err(Error::data(what, "Leave the object out, or give a larger radius, a smaller spacing or a greater length."))
+        Err(CaptureProblem::Untouchable { name: self.name.into(), approaches: MOST_ATTEMPTS }.into())
     }
 
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {
@@ -59,7 +61,7 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// The finaliser of SplitMix64: every bit of the input changes about half of the output's.
+/// The finalizer of SplitMix64: every bit of the input changes about half of the output's.
 fn mix(value: u64) -> u64 {
     let value = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

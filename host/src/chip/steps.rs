@@ -1,6 +1,6 @@
 //! What is streamed to a chip: touches, and where one object ends and the next begins.
 
-use crate::error::{ChipProblem, Error, Place, Result};
+use crate::error::{Error, Place, Result};
 use crate::touches::{Dataset, parse_touch};
 use palpate_shared::Touch;
 use std::io::BufRead;
@@ -92,8 +92,8 @@ impl Steps {
                 if text.is_empty() {
                     return Ok(Some(Step::Object(None)));
                 }
-                let wrong = |what: String| Error::at(Place::line(&*path, *line), ChipProblem::NotATouch { what });
-                Ok(Some(Step::Touch(parse_touch(text).map_err(wrong)?)))
+                let touch = parse_touch(text).map_err(|problem| Error::at(Place::line(&path, *line), problem))?;
+                Ok(Some(Step::Touch(touch)))
             }
         }
     }
@@ -110,7 +110,7 @@ mod tests {
             name: name.into(),
             touches: (first..first + 3).map(|t| Touch::from_micros([0, t, t])).collect(),
         };
-        let dataset = Dataset { objects: vec![object("a", 10), object("b", 20)] };
+        let dataset = Dataset::new(vec![object("a", 10), object("b", 20)]);
         let mut steps = Steps::sequences(dataset, 2, 7);
         let mut seen = Vec::new();
         while let Some(step) = steps.next_step().unwrap() {

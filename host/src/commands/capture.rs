@@ -1,22 +1,26 @@
+use super::numbers::count;
 use super::progress::Bar;
-use palpate::Result;
-use palpate::capture::{self, Settings, Shard, Summary};
+use palpate::capture::{self, Settings, Summary};
+use palpate::error::{CaptureProblem, Problem, TouchesProblem};
 use palpate::mesh::facts::Facts;
 use palpate::mesh::source;
 use palpate::output;
 use palpate::probe::approach::Probe;
-use palpate::touches::Format;
+use palpate::touches::{Format, Listing, Origin, Shard};
+use palpate::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-The touches go to DIR/<object>.txt: a line a touch, three contact times in seconds after the first contact, `-` for a
-finger that never touched. DIR/dataset.json says how they were made.
+The touches go to DIR/<object>.txt, one line per touch: three contact times in seconds after the first contact, `-` for \
+a finger that never touched. DIR/dataset.json says how they were made. Touches that are there already are kept: a \
+capture that would replace others is refused.
 
 Examples:
   palpate capture builtin -o data                 21,000 touches per object
   palpate capture cup.obj bowls/ builtin -o data  your own meshes beside them
+  palpate capture jug.obj -o data --add           one more object, touched alike
   palpate capture meshes/ -o data --pose          with the probe's direction
   palpate capture meshes/ -o data --approaches    every approach, also misses
   palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts
@@ -28,42 +32,48 @@ pub(crate) struct Arguments {
     /// The directory for the touches
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// How many touches of each object (with --approaches: how many approaches)
-    #[arg(long, value_name = "N", default_value_t = Settings::default().touches)]
-    touches: u64,
-    /// The seed of all that is random
-    #[arg(long, value_name = "N", default_value_t = Settings::default().seed)]
-    seed: u64,
-    /// The longest side of each object's bounding box, in units
-    #[arg(long, value_name = "UNITS", default_value_t = Settings::default().length)]
-    length: f64,
-    /// The fingers' radius, in units
-    #[arg(long, value_name = "UNITS", default_value_t = Probe::default().radius)]
-    radius: f64,
-    /// The distance between neighboring fingers, in units
-    #[arg(long, value_name = "UNITS", default_value_t = Probe::default().spacing)]
-    spacing: f64,
-    /// How fast the probe moves, in units a second
-    #[arg(long, value_name = "UNITS", default_value_t = Probe::default().speed)]
-    speed: f64,
-    /// How far the row of fingers may be tilted to either side, in degrees
-    #[arg(long, value_name = "DEGREES", default_value_t = Probe::default().tilt)]
-    tilt: f64,
+    /// How many touches of each object (with --approaches: how many approaches) [default: 21000]
+    #[arg(long, value_name = "N", value_parser = count)]
+    touches: Option<u64>,
+    /// The seed of all that is random [default: 1]
+    #[arg(long, value_name = "N", value_parser = count)]
+    seed: Option<u64>,
+    /// The longest side of each object's bounding box, in units [default: 10]
+    #[arg(long, value_name = "UNITS")]
+    length: Option<f64>,
+    /// The fingers' radius, in units [default: 0.15]
+    #[arg(long, value_name = "UNITS")]
+    radius: Option<f64>,
+    /// The distance between neighboring fingers, in units [default: 1.5]
+    #[arg(long, value_name = "UNITS")]
+    spacing: Option<f64>,
+    /// How fast the probe moves, in units per second [default: 10]
+    #[arg(long, value_name = "UNITS")]
+    speed: Option<f64>,
+    /// How far the row of fingers may be tilted to either side, in degrees [default: 10]
+    #[arg(long, value_name = "DEGREES")]
+    tilt: Option<f64>,
     /// Append the probe's direction and alignment to each line (six numbers)
     #[arg(long)]
     pose: bool,
     /// Keep every approach, also those that not all fingers touch
     #[arg(long)]
     approaches: bool,
-    /// How to keep the touches: text, or parquet (columns t1, t2, t3, direction, alignment, object)
-    #[arg(long, value_enum, default_value = "text")]
-    format: TouchFormat,
-    /// Capture only the K-th of N parts; the parts, one after the other, are the whole
-    #[arg(long, value_name = "K/N", default_value_t = Shard::WHOLE)]
-    shard: Shard,
-    /// Go on with an interrupted capture
-    #[arg(long)]
+    /// How to keep the touches: text, or parquet (columns t1, t2, t3, direction, alignment, object) [default: text]
+    #[arg(long, value_name = "text|parquet", value_parser = parsed::<Format>)]
+    format: Option<Format>,
+    /// Capture only the K-th of N parts; the parts, one after the other, are the whole [default: 1/1]
+    #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
+    shard: Option<Shard>,
+    /// Resume an interrupted capture
+    #[arg(long, conflicts_with = "force")]
     resume: bool,
+    /// Add the objects to the data set in the directory, touched as the others were
+    #[arg(long, conflicts_with = "force")]
+    add: bool,
+    /// Replace the data set in the directory, whatever it holds
+    #[arg(long)]
+    force: bool,
     /// How many threads to use [default: all]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -72,27 +82,13 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum TouchFormat {
-    Text,
-    Parquet,
-}
-
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { radius, spacing, speed, tilt, .. } = arguments;
+    output::refuse_stdout(&arguments.output)?;
     let settings = Settings {
-        touches: arguments.touches,
-        seed: arguments.seed,
-        length: arguments.length,
-        probe: Probe { radius, spacing, speed, tilt },
-        pose: arguments.pose,
-        approaches: arguments.approaches,
-        format: match arguments.format {
-            TouchFormat::Text => Format::Text,
-            TouchFormat::Parquet => Format::Parquet,
-        },
-        shard: arguments.shard,
+        origin: arguments.origin()?,
         resume: arguments.resume,
+        add: arguments.add,
+        force: arguments.force,
         threads: arguments.threads,
     };
     settings.check()?;
@@ -105,6 +101,50 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     if arguments.json { output::print_json(&summary) } else { output::print(&table(&summary)) }
 }
 
+impl Arguments {
+    /// What the options say, and where they say nothing the defaults or, for objects to add, the data set.
+    fn origin(&self) -> Result<Origin> {
+        let there = if self.add { Listing::read(&self.output)? } else { None };
+        let base = there.map_or_else(Origin::default, |listing| listing.origin);
+        Ok(Origin {
+            touches: self.touches.unwrap_or(base.touches),
+            seed: self.seed.unwrap_or(base.seed),
+            length: self.length.unwrap_or(base.length),
+            probe: Probe {
+                radius: self.radius.unwrap_or(base.probe.radius),
+                spacing: self.spacing.unwrap_or(base.probe.spacing),
+                speed: self.speed.unwrap_or(base.probe.speed),
+                tilt: self.tilt.unwrap_or(base.probe.tilt),
+            },
+            pose: self.pose || base.pose,
+            approaches: self.approaches || base.approaches,
+            format: self.format.unwrap_or(base.format),
+            shard: self.shard.unwrap_or(base.shard),
+        })
+    }
+}
+
+/// An option's value; what is wrong with it, with what to do.
+fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|problem: TouchesProblem| format!("{problem}. {}", problem.fix()))
+}
+
+/// Which options help, where the library refuses what is in the directory.
+pub(super) fn hint(error: &Error) -> Option<&'static str> {
+    let Some(Problem::Capture(problem)) = error.problem() else { return None };
+    match problem {
+        CaptureProblem::HoldsOtherObjects { .. } => Some("--add adds to what is there, --force replaces it."),
+        CaptureProblem::HoldsOtherSettings { .. } | CaptureProblem::Shorter { .. } => {
+            Some("--force replaces what is there.")
+        }
+        CaptureProblem::HoldsUnfinished { .. } => Some("--resume resumes it, --force replaces it."),
+        CaptureProblem::NotWritten { .. } => Some("To resume, repeat the command with --resume."),
+        CaptureProblem::Untouchable { .. } => Some("See --radius, --spacing and --length."),
+        CaptureProblem::Threads { .. } => Some("See --threads."),
+        _ => None,
+    }
+}
+
 fn table(summary: &Summary) -> String {
     let width = summary.objects.iter().map(|object| object.name.len()).max().unwrap_or(0).max(6);
     let mut text = format!(
@@ -115,7 +155,7 @@ fn table(summary: &Summary) -> String {
         let share = 100.0 * touches as f64 / approaches.max(1) as f64;
         let rate = now as f64 / seconds;
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{name:width$}  {touches:>10}  {approaches:>12}  {share:>6.1}%  {rate:>14.0}");
+        _ = writeln!(text, "{name:width$}  {touches:>10}  {approaches:>12}  {share:>6.1}%  {rate:>14.0}");
     };
     for object in &summary.objects {
         row(&object.name, object.touches, object.approaches, object.approaches_now, object.seconds);

@@ -53,9 +53,14 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let times = cast::times(&scene, &lines, f64::from(arguments.radius));
     let text = cast::annotate(&lines, &times);
     let Some(path) = arguments.output else { return output::print(&text) };
+    output::refuse_input(&path, [&arguments.mesh, &arguments.casts])?;
     output::write_bytes(&path, text.as_bytes())?;
     let agreement = cast::agreement(&lines, &times);
-    if arguments.json { output::print_json(&agreement) } else { output::print(&table(&agreement)) }
+    if arguments.json {
+        output::print_json_about(&path, &agreement)
+    } else {
+        output::print_about(&path, &table(&agreement))
+    }
 }
 
 fn table(sets: &[Agreement]) -> String {

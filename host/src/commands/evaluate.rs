@@ -1,27 +1,29 @@
+use super::numbers::share;
 use super::progress::Bar;
-use palpate::Result;
 use palpate::evaluate::model_file::ModelFile;
-use palpate::evaluate::{self, Evaluation, Margins, Settings};
+use palpate::evaluate::{self, Evaluation, LEAST_GROUPS, Margins, Settings};
 use palpate::output;
 use palpate::progress::Progress;
-use palpate::touches::Dataset;
 use palpate::touches::noise;
+use palpate::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 /// Measure how often a model is right, and after how many touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The model is a compiled one (model.palpate), evaluated by the code that runs on the chip, or an ensemble
-(ensemble.json), evaluated in f32. The same seed draws the same groups of touches for both.
+The model is a compiled one (model.palpate), evaluated by the code that runs on the chip, or an ensemble (ensemble.json), evaluated in f32. The same seed draws the same groups of touches for both.
 
-Evaluate on touches that the model was not trained on: capture them with another seed.
+Evaluate on touches that the model was not trained on: capture them with another seed. An ensemble knows its training touches again; a compiled model does not.
+
+No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 
 Examples:
   palpate capture builtin -o unseen --touches 2000 --seed 2
   palpate evaluate model.palpate unseen
   palpate evaluate ensemble.json unseen --at 10,30 --json
-  palpate evaluate model.palpate unseen --noise 5ms")]
+  palpate evaluate model.palpate unseen --noise 5ms
+  palpate evaluate model.palpate unseen --confusion 20")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
@@ -33,15 +35,18 @@ pub(crate) struct Arguments {
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]
     groups: usize,
-    /// Stop touching when the posterior passes one less this
-    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
     error_rate: f64,
-    /// Give up after so many touches [default: the model's own limit; 200 for an ensemble]
+    /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
     max_touches: Option<u32>,
     /// Add Gaussian noise to the contact times first: standard deviation, such as 5ms [default: none]
     #[arg(long, value_parser = super::train::microseconds, value_name = "DURATION")]
     noise: Option<f64>,
+    /// Say as well how often each object was taken for each, after this many touches
+    #[arg(long, value_name = "TOUCHES")]
+    confusion: Option<usize>,
     /// Seed of the drawing, and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -50,9 +55,36 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+/// An evaluation, and what was asked for beside it.
+#[derive(serde::Serialize)]
+struct Evaluated {
+    #[serde(flatten)]
+    evaluation: Evaluation,
+    /// Objects whose touches are those that the model was trained on.
+    trained_on: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    confusion: Option<Confusion>,
+}
+
+/// How often each object was taken for each.
+#[derive(serde::Serialize)]
+struct Confusion {
+    touches: usize,
+    /// Rows.
+    touched: Vec<String>,
+    /// Columns.
+    recognized: Vec<String>,
+    /// Groups.
+    counts: Vec<Vec<usize>>,
+}
+
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
-    let mut dataset = Dataset::read(&arguments.directory)?;
+    let mut dataset = super::dataset(&arguments.directory)?;
+    let trained_on: Vec<String> = match &file {
+        ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
+        ModelFile::Compiled(_) => Vec::new(),
+    };
     if let Some(deviation) = arguments.noise {
         for object in &mut dataset.objects {
             object.touches = noise::noisy(&object.name, &object.touches, deviation, arguments.seed);
@@ -60,26 +92,76 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     }
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let evaluation = file.with(|candidate| {
+    let (evaluation, confusion) = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?;
-        let defaults = Settings::default();
-        let feasible = || defaults.at.iter().copied().filter(|&at| at <= margins.fewest_touches()).collect();
+        let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
-            at: arguments.at.clone().unwrap_or_else(feasible),
+            at,
             groups: arguments.groups,
             error_rate: arguments.error_rate,
             max_touches: arguments.max_touches,
             seed: arguments.seed,
         };
-        evaluate::evaluate(&margins, &settings)
+        let confusion = arguments.confusion.map(|touches| -> Result<_> {
+            Ok(Confusion {
+                touches,
+                touched: margins.tested_names().to_vec(),
+                recognized: margins.objects().to_vec(),
+                counts: margins.confusion(touches, arguments.groups, arguments.seed)?,
+            })
+        });
+        Ok((evaluate::evaluate(&margins, &settings)?, confusion.transpose()?))
     })?;
     drop(progress);
-    if arguments.json { output::print_json(&evaluation) } else { output::print(&table(&evaluation)) }
+    let evaluated = Evaluated { evaluation, trained_on, confusion };
+    if arguments.json {
+        return output::print_json(&evaluated);
+    }
+    output::print(&text(&evaluated))
 }
 
-/// Accuracies in percent: a row an object, a column a number of touches; then the sequential figures.
+/// The numbers of touches to give the accuracy after: those asked for, or the usual ones that enough groups can be drawn
+/// of.
+fn numbers_of_touches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Result<Vec<usize>> {
+    let few = |at: usize| margins.distinct_groups(at) < LEAST_GROUPS;
+    let Some(wanted) = wanted else {
+        return Ok(Settings::default().at.into_iter().filter(|&at| !few(at)).collect());
+    };
+    // None at all is said by the evaluation, with the object that has too few touches.
+    match wanted.iter().find(|&&at| at > 0 && at <= margins.fewest_touches() && few(at)) {
+        Some(&at) => {
+            let (groups, touches) = (margins.distinct_groups(at), margins.fewest_touches());
+            let allowed = format!(
+                "another number, or capture more: of {touches} touches only {groups} different groups of {at} can be drawn, \
+                 too few for an accuracy"
+            );
+            Err(Error::setting("at", at, allowed))
+        }
+        None => Ok(wanted.to_vec()),
+    }
+}
+
+fn text(evaluated: &Evaluated) -> String {
+    let mut text = table(&evaluated.evaluation);
+    if let Some(confusion) = &evaluated.confusion {
+        text += &confusion_table(confusion);
+    }
+    if !evaluated.trained_on.is_empty() {
+        let objects = evaluated.trained_on.join(", ");
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "\nThe model was trained on these touches of {objects}: on others it is right less often. Capture them with \
+             another seed."
+        );
+    }
+    text
+}
+
+/// Accuracies in percent: one row per object, one column per number of touches; then the sequential figures.
 fn table(evaluation: &Evaluation) -> String {
     let width = evaluation.per_object.keys().map(|name| name.chars().count()).max().unwrap_or(0).max("touches".len());
+    let sequential = &evaluation.sequential;
     let mut text = format!("{:width$}", "touches");
     // Writing to a string cannot fail.
     let cells = |text: &mut String, numbers: &mut dyn Iterator<Item = String>| {
@@ -87,23 +169,40 @@ fn table(evaluation: &Evaluation) -> String {
     };
     let percent = |share: &f64| format!("{:.1} %", 100.0 * share);
     cells(&mut text, &mut evaluation.accuracy.keys().map(ToString::to_string));
-    _ = writeln!(text, " {:>9}", "to stop");
+    _ = writeln!(text, " {:>9} {:>9} {:>9}", "to stop", "wrong", "undecided");
     for (name, accuracy) in &evaluation.per_object {
         _ = write!(text, "{name:width$}");
         cells(&mut text, &mut accuracy.values().map(percent));
-        _ = writeln!(text, " {:>9.1}", evaluation.sequential.per_object.get(name).copied().unwrap_or(f64::NAN));
+        let of = |shares: &std::collections::BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        _ = writeln!(
+            text,
+            " {:>9.1} {:>9} {:>9}",
+            of(&sequential.per_object),
+            percent(&of(&sequential.error_per_object)),
+            percent(&of(&sequential.undecided_per_object))
+        );
     }
-    let sequential = &evaluation.sequential;
     _ = write!(text, "{:width$}", "all");
     cells(&mut text, &mut evaluation.accuracy.values().map(percent));
-    _ = writeln!(text, " {:>9.1}", sequential.mean_touches);
+    _ = writeln!(
+        text,
+        " {:>9.1} {:>9} {:>9}",
+        sequential.mean_touches,
+        percent(&sequential.error),
+        percent(&sequential.undecided)
+    );
     _ = write!(text, "{:width$}", "±");
     cells(&mut text, &mut evaluation.accuracy_standard_error.values().map(percent));
-    _ = writeln!(text, " {:>9.1}", sequential.mean_touches_standard_error);
+    _ = writeln!(
+        text,
+        " {:>9.1} {:>9}",
+        sequential.mean_touches_standard_error,
+        percent(&sequential.error_standard_error)
+    );
     _ = write!(
         text,
         "\nStopping at an error rate of {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
-         {}.\n{} groups an object of {} touches in all; ± is a standard error.\n",
+         {}.\n{} groups per object of {} touches in all; ± is a standard error.\n",
         sequential.error_rate,
         sequential.mean_touches,
         100.0 * sequential.error,
@@ -113,5 +212,25 @@ fn table(evaluation: &Evaluation) -> String {
         evaluation.groups,
         evaluation.touches,
     );
+    text
+}
+
+/// Shares in percent: one row per touched object, one column per object that it was taken for.
+fn confusion_table(confusion: &Confusion) -> String {
+    let names = confusion.touched.iter().chain(&confusion.recognized);
+    let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("7.1 %".len() + 2);
+    let mut text = format!("\nTaken for, after {} touches\n{:width$}", confusion.touches, "");
+    // Writing to a string cannot fail.
+    confusion.recognized.iter().for_each(|name| _ = write!(text, " {name:>width$}"));
+    text.push('\n');
+    for (name, counts) in confusion.touched.iter().zip(&confusion.counts) {
+        let groups = counts.iter().sum::<usize>().max(1) as f64;
+        _ = write!(text, "{name:width$}");
+        for &count in counts {
+            let share = if count == 0 { "–".into() } else { format!("{:.1} %", 100.0 * count as f64 / groups) };
+            _ = write!(text, " {share:>width$}");
+        }
+        text.push('\n');
+    }
     text
 }

@@ -1,5 +1,6 @@
+use super::numbers::share;
 use palpate::Result;
-use palpate::compile::{self, Layout, Leaf, Settings};
+use palpate::compile::{self, Instructions, Layout, Leaf, Settings};
 use palpate::ensemble::Ensemble;
 use palpate::output;
 use std::path::PathBuf;
@@ -8,14 +9,16 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Leaves:
-  i16   two bytes a value: verdicts as the full model's (the default)
-  i8    one byte a value: half the size, margins within a few hundredths of a nat
-  f32   four bytes a value, added as the trainer adds them: margins bit for bit
+  i16   two bytes per value: verdicts as the full model's (the default)
+  i8    one byte per value: half the size, margins within a few hundredths of a nat
+  f32   four bytes per value, added as the trainer adds them: margins bit for bit
+
+Instructions per touch are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
 
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
-  palpate export ensemble.json -o strict.palpate --error-rate 0.001")]
+  palpate export ensemble.json -o strict.palpate --error-rate 0.1%")]
 pub(crate) struct Arguments {
     /// Ensemble that `palpate train` saved
     ensemble: PathBuf,
@@ -28,8 +31,8 @@ pub(crate) struct Arguments {
     /// How trees are laid out; auto weighs size and speed
     #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid")]
     layout: LayoutChoice,
-    /// The error rate at which recognizers stop unless told otherwise
-    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    /// The error rate, such as 0.05 or 5%, at which recognizers stop unless told otherwise
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
     error_rate: f64,
     /// The touches after which they give up
     #[arg(long, default_value_t = 200, value_name = "N")]
@@ -51,9 +54,11 @@ struct Exported {
     splits: usize,
     leaves: usize,
     margin_error: f32,
+    instructions: Instructions,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_input(&arguments.output, [&arguments.ensemble])?;
     let ensemble = Ensemble::load(&arguments.ensemble)?;
     let settings = Settings {
         leaf: arguments.leaf,
@@ -62,7 +67,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         max_touches: arguments.max_touches,
         ..Settings::default()
     };
-    let compiled = compile::compile(&ensemble, &settings).map_err(|error| error.in_file(&arguments.ensemble))?;
+    let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
+        1 => error.in_file(&arguments.ensemble),
+        _ => error,
+    })?;
     output::write_bytes(&arguments.output, &compiled.bytes)?;
     let exported = Exported {
         bytes: compiled.bytes.len(),
@@ -72,13 +80,14 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         splits: compiled.splits,
         leaves: compiled.leaves,
         margin_error: compiled.margin_error,
+        instructions: compiled.instructions,
     };
     if arguments.json {
-        return output::print_json(&exported);
+        return output::print_json_about(&arguments.output, &exported);
     }
-    output::print(&format!(
+    let text = format!(
         "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}), margins within {:.2e} nats\n\
-         A chip that reads no other models needs these features of palpate-onboard: {}, {}-leaves\n",
+         Instructions per touch, estimated: {}\n{}",
         arguments.output.display(),
         exported.bytes,
         exported.trees,
@@ -87,9 +96,22 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         exported.layout,
         exported.leaf,
         exported.margin_error,
-        exported.layout,
-        exported.leaf,
-    ))
+        instructions(exported.instructions),
+        features(exported.layout, exported.leaf),
+    );
+    output::print_about(&arguments.output, &text)
+}
+
+/// The estimates as a text.
+pub(super) fn instructions(instructions: Instructions) -> String {
+    let m0_plus =
+        instructions.m0_plus.map_or_else(|| "unknown (f32 leaves)".into(), |instructions| instructions.to_string());
+    format!("{} on a Cortex-M4F, {m0_plus} on a Cortex-M0+", instructions.m4f)
+}
+
+/// The line that names the cargo features that a chip needs.
+pub(super) fn features(layout: &str, leaf: &str) -> String {
+    format!("A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves\n")
 }
 
 fn leaf(name: &str) -> Result<Leaf, String> {

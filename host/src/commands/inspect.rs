@@ -1,21 +1,33 @@
+use super::export::instructions;
 use palpate::Result;
-use palpate::compile::CompiledFile;
+use palpate::chip::emulated::Chip;
+use palpate::compile::{self, CompiledModel, Core, Instructions, Memory};
 use palpate::output;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
+use palpate_shared::{Pose, Q15_ONE, Touch};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Say what is in a compiled model.
+/// Say what is in a compiled model, and what it costs on a chip.
 #[derive(clap::Args)]
 #[command(after_help = "\
+With --chip, instructions per touch are measured where QEMU is installed and the firmware's `cost` image is built (onboard/firmware, seen from the current directory); otherwise they are estimated, right to 15 %. The time is that of one instruction per cycle: memory that makes the processor wait adds to it.
+
 Examples:
   palpate inspect model.palpate
+  palpate inspect model.palpate --chip m0+ --mhz 48
   palpate inspect model.palpate --json")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
+    /// Say what it costs on this processor
+    #[arg(long, value_parser = core, value_name = "m0+|m4f")]
+    chip: Option<Core>,
+    /// The processor's clock in MHz, to give the time per touch
+    #[arg(long, requires = "chip", value_parser = megahertz)]
+    mhz: Option<f64>,
     /// Print it as JSON
     #[arg(long)]
     json: bool,
@@ -41,6 +53,10 @@ struct Inspected<'a> {
     margin_error: f32,
     stopping: Defaults,
     probe: Probe,
+    /// Per touch, estimated.
+    instructions: Instructions,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    chip: Option<OnChip>,
 }
 
 #[derive(serde::Serialize)]
@@ -55,10 +71,31 @@ struct Probe {
     speed: f32,
 }
 
+/// What the model costs on a chip.
+#[derive(serde::Serialize)]
+struct OnChip {
+    core: Core,
+    #[serde(flatten)]
+    memory: Memory,
+    /// "measured" or "estimated".
+    how: &'static str,
+    /// From contact times to margins.
+    margin_instructions: Option<u64>,
+    /// From contact times to the verdict.
+    verdict_instructions: Option<u64>,
+    mhz: Option<f64>,
+    /// From contact times to the verdict, at one instruction per cycle.
+    microseconds: Option<f64>,
+}
+
+/// Instructions of a verdict beyond the margins, where nothing is measured: between 500 and 1,400.
+const VERDICT: u64 = 1_000;
+
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let file = CompiledFile::read(&arguments.model)?;
-    let model = file.model()?;
-    let inspected = inspect(&model);
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let model = compiled.model();
+    let mut inspected = inspect(&model);
+    inspected.chip = arguments.chip.map(|core| on_chip(&model, core, arguments.mhz)).transpose()?;
     if arguments.json { output::print_json(&inspected) } else { output::print(&text(&inspected)) }
 }
 
@@ -84,6 +121,8 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         margin_error: model.margin_error(),
         stopping: Defaults { error_rate: significant(stopping.error_rate()), max_touches: stopping.max_touches() },
         probe: Probe { spacing: header.spacing(), speed: header.speed() },
+        instructions: Instructions::of_model(model),
+        chip: None,
     }
 }
 
@@ -110,6 +149,47 @@ fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
     ])
 }
 
+fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip> {
+    let emulated = match core {
+        Core::M4F => Chip::M4F,
+        Core::M0Plus => Chip::M0Plus,
+    };
+    // The image makes touches of what it is given; a model over rows of features cannot be measured with it.
+    let measured = match model.descriptor() {
+        Some(_) if emulated.is_there() => Some(emulated.measure(model.bytes(), &touches(model))?),
+        _ => None,
+    };
+    let (how, margins, verdict) = match measured {
+        Some(cost) => ("measured", Some(cost.margins), Some(cost.push)),
+        None => {
+            let margins = Instructions::of_model(model).on(core);
+            ("estimated", margins, margins.map(|margins| margins + VERDICT))
+        }
+    };
+    Ok(OnChip {
+        core,
+        memory: Memory::of_model(model, core),
+        how,
+        margin_instructions: margins,
+        verdict_instructions: verdict,
+        mhz,
+        microseconds: mhz.zip(verdict).map(|(mhz, verdict)| verdict as f64 / mhz),
+    })
+}
+
+/// Touches that spread evenly over what the model's probe can give, the same every time.
+fn touches(model: &Model<'_>) -> Vec<Touch> {
+    // Most contacts come within a twentieth of the longest time.
+    let range = compile::longest_time(model) * 1e6 / 20.0;
+    let spread = |index: u32, step: f64| ((f64::from(index) * step).fract() * range) as u32;
+    let touch = |index| {
+        let pose = Pose { direction: [0, 0, -Q15_ONE], alignment: [Q15_ONE, 0, 0] };
+        let times = [spread(index, 0.618_034), spread(index, 0.754_878), spread(index, 0.569_840)];
+        Touch::from_micros(times).with_pose(pose)
+    };
+    (0..64).map(touch).collect()
+}
+
 fn text(inspected: &Inspected<'_>) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
@@ -129,12 +209,56 @@ fn text(inspected: &Inspected<'_>) -> String {
         "stopping",
         format!("error rate {}, at most {} touches", inspected.stopping.error_rate, inspected.stopping.max_touches),
     );
-    line("probe", format!("spacing {}, speed {} a second", inspected.probe.spacing, inspected.probe.speed));
+    line(
+        "probe",
+        format!("spacing {} units, speed {} units per second", inspected.probe.spacing, inspected.probe.speed),
+    );
+    line("instructions", format!("{} (per touch, estimated)", instructions(inspected.instructions)));
     line("bytes", inspected.bytes.to_string());
     for (part, bytes) in &inspected.bytes_by_part {
         line("", format!("{bytes:>9} {}", part.replace('_', " ")));
     }
     line("checksum", inspected.checksum.clone());
     line("ensemble", inspected.ensemble.clone());
-    text
+    if let Some(chip) = &inspected.chip {
+        let known = |number: Option<u64>| number.map_or("unknown (f32 leaves)".into(), |number| number.to_string());
+        let Memory { model_flash, code_flash, ram, stack, .. } = chip.memory;
+        line("", String::new());
+        line("on a", chip.core.name().into());
+        line(
+            "flash",
+            format!("{model_flash} bytes of model, about {code_flash} bytes of code (1300 of them start-up)"),
+        );
+        line("RAM", format!("{ram} bytes, estimated (the opened model, and a recognizer of just its objects)"));
+        line("stack", format!("{stack} bytes, estimated"));
+        line(
+            "instructions",
+            format!(
+                "{} to the margins, {} to the verdict (per touch, {})",
+                known(chip.margin_instructions),
+                known(chip.verdict_instructions),
+                chip.how
+            ),
+        );
+        if let (Some(mhz), Some(microseconds)) = (chip.mhz, chip.microseconds) {
+            line("time", format!("{microseconds:.0} µs per touch at {mhz} MHz, one instruction per cycle"));
+        }
+    }
+    // Empty lines end without blanks.
+    text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+}
+
+pub(super) fn core(name: &str) -> Result<Core, String> {
+    match name.to_lowercase().as_str() {
+        "m0+" | "m0plus" | "cortex-m0+" => Ok(Core::M0Plus),
+        "m4f" | "cortex-m4f" => Ok(Core::M4F),
+        _ => Err("use m0+ or m4f".into()),
+    }
+}
+
+fn megahertz(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(mhz) if mhz > 0.0 && mhz.is_finite() => Ok(mhz),
+        _ => Err("give a number above 0, such as 48".into()),
+    }
 }

@@ -3,7 +3,7 @@ use clap::ArgGroup;
 use palpate::chip::{
     ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
 };
-use palpate::compile::CompiledFile;
+use palpate::compile::CompiledModel;
 use palpate::error::ChipProblem;
 use palpate::output::{print, print_json};
 use palpate::progress::Progress;
@@ -44,8 +44,8 @@ pub(crate) struct ChipOptions {
 
 impl ChipOptions {
     /// Opens a session, and loads the model if there is one to load.
-    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledFile>)> {
-        let model = self.load.as_deref().map(CompiledFile::read).transpose()?;
+    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledModel>)> {
+        let model = self.load.as_deref().map(CompiledModel::read).transpose()?;
         let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
         let mut transport = port.open(self.baud, &emulator)?;
         let mut settings = HostSettings::default();
@@ -67,7 +67,7 @@ impl ChipOptions {
             return Ok(Steps::lines(Box::new(BufReader::new(std::io::stdin())), Path::new("standard input")));
         }
         if source.is_dir() {
-            let dataset = Dataset::read(source)?;
+            let dataset = super::dataset(source)?;
             let count = self.touches.unwrap_or(dataset.len() as u64);
             return Ok(Steps::sequences(dataset, self.sequence, count));
         }
@@ -113,7 +113,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let named = arguments.model.as_deref().map(CompiledFile::read).transpose()?;
+    let named = arguments.model.as_deref().map(CompiledModel::read).transpose()?;
     let steps = match arguments.parity.as_ref().or(arguments.source.as_ref()) {
         Some(source) => Some(arguments.chip.steps(source)?),
         None => None,
@@ -123,8 +123,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let mut printer = Printer::new(&chip, arguments.json, arguments.journal.as_deref())?;
     let Some(steps) = steps else { return printer.model(&arguments.port) };
 
-    let file = named.or(loaded);
-    let model = file.as_ref().map(|file| file.model()).transpose()?;
+    let compiled = named.or(loaded);
+    let model = compiled.as_ref().map(CompiledModel::model);
     let progress = Bar::new();
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();

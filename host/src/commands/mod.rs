@@ -7,6 +7,7 @@ mod evaluate;
 mod export;
 mod inspect;
 mod link;
+mod numbers;
 mod objects;
 mod parity;
 mod progress;
@@ -20,8 +21,10 @@ mod view;
 mod watch;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::Problem;
+use palpate::error::{Problem, TouchesProblem};
+use palpate::touches::{Dataset, Format, Listing};
 use palpate::{Error, Result};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Declares the enum that clap parses and the dispatch, from one list.
@@ -97,6 +100,21 @@ pub(crate) struct Cli {
     command: Command,
 }
 
+impl Command {
+    /// What to add to an error with which the command ends: which of its options help.
+    fn hint(&self) -> fn(&Error) -> Option<&'static str> {
+        match self {
+            Self::Capture(_) => capture::hint,
+            _ => |error| match error.problem() {
+                Some(Problem::Touches(TouchesProblem::Incomplete)) => {
+                    Some("Repeat the command of the capture with --resume.")
+                }
+                _ => None,
+            },
+        }
+    }
+}
+
 /// The program's commands and arguments.
 fn cli() -> clap::Command {
     Cli::command().mut_subcommands(|command| match command.get_after_help().map(|text| unwrapped(&text.to_string())) {
@@ -124,11 +142,15 @@ fn unwrapped(text: &str) -> String {
 pub(crate) fn run() -> ExitCode {
     let matches = cli().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let hint = cli.command.hint();
     match cli.command.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if !matches!(error, Error::Closed) {
                 eprintln!("palpate: {}", message(&error, matches.subcommand_name().unwrap_or_default()));
+                if let Some(hint) = hint(&error) {
+                    eprintln!("{hint}");
+                }
             }
             ExitCode::from(error.exit_code())
         }
@@ -147,6 +169,26 @@ fn message(error: &Error, command: &str) -> String {
         return format!("{place}--{option} is {value}. {}", problem.fix());
     }
     error.to_string()
+}
+
+/// Reads a data set; its warnings go to stderr.
+fn dataset(directory: &Path) -> Result<Dataset> {
+    let dataset = Dataset::read(directory)?;
+    for warning in &dataset.warnings {
+        eprintln!("palpate: warning: {warning}");
+    }
+    Ok(dataset)
+}
+
+/// The files that a data set consists of, as far as they can be found: what a command that reads it must not write.
+fn files_of(directory: &Path) -> Vec<PathBuf> {
+    let is_touches = |path: &PathBuf| {
+        let extension = path.extension().unwrap_or_default();
+        path.file_name().is_some_and(|name| name == Listing::FILE)
+            || Format::ALL.iter().any(|format| extension == format.extension())
+    };
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    entries.map(|entry| entry.path()).filter(is_touches).collect()
 }
 
 #[cfg(test)]

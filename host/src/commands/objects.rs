@@ -47,6 +47,7 @@ struct Written {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_stdout(&arguments.output)?;
     let chosen = |name: &&str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
     let names: Vec<&str> = builtin::names().into_iter().filter(chosen).collect();
     let made = builtin::make(&names, arguments.varied)?;

@@ -1,17 +1,15 @@
 use super::progress::Bar;
 use palpate::Result;
-use palpate::compile::CompiledFile;
+use palpate::compile::CompiledModel;
 use palpate::ensemble::Ensemble;
 use palpate::evaluate::parity;
 use palpate::output;
-use palpate::touches::Dataset;
 use std::path::PathBuf;
 
-/// Hold a compiled model against its ensemble.
+/// Compare a compiled model with its ensemble.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Every touch of the data set goes through both: margins, and the best object. Then random sequences of touches, each of
-one object, go through both until there is a verdict.
+Every touch of the data set goes through both: margins, and the best object. Then random sequences of touches, each of one object, go through both until there is a verdict.
 
 Examples:
   palpate parity ensemble.json model.palpate data
@@ -36,10 +34,10 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let ensemble = Ensemble::load(&arguments.ensemble)?;
-    let file = CompiledFile::read(&arguments.model)?;
-    let dataset = Dataset::read(&arguments.directory)?;
-    let model = file.model()?;
-    let parity = parity::parity(&ensemble, &model, &dataset, arguments.sequences, arguments.seed, &Bar::new())
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let dataset = super::dataset(&arguments.directory)?;
+    let Arguments { sequences, seed, .. } = arguments;
+    let parity = parity::parity(&ensemble, &compiled.model(), &dataset, sequences, seed, &Bar::new())
         .map_err(|error| error.in_file(&arguments.model))?;
     if arguments.json {
         return output::print_json(&parity);

@@ -1,9 +1,11 @@
-use palpate::Error;
+use super::numbers::share;
 use palpate::Result;
-use palpate::compile::CompiledFile;
+use palpate::compile::{self, CompiledModel};
+use palpate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
 use palpate::output;
 use palpate::touches::parse_touch;
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
+use palpate_shared::Touch;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -11,27 +13,26 @@ use std::path::{Path, PathBuf};
 /// Recognize objects from a stream of touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-One touch a line in (three contact times in seconds, and the pose if the model needs it), one verdict a line out as it
-arrives: undecided, recognized, or unknown once the limit of touches is reached. After a verdict the next touch is the
-first of another object.
+Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided, recognized, or unknown once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
 
 Examples:
   palpate recognize model.palpate data/fork.txt
   probe | palpate recognize model.palpate
-  palpate recognize model.palpate - --json < data/fork.txt")]
+  palpate recognize model.palpate - --json < data/fork.txt
+  palpate recognize model.palpate data/fork.txt --error-rate 5% --max-touches 30")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
     /// File with touches; - is standard input
     #[arg(default_value = "-")]
     file: PathBuf,
-    /// Stop at this error rate instead of the model's
-    #[arg(long, value_name = "RATE")]
+    /// Stop at this error rate, such as 0.05 or 5%, instead of the model's
+    #[arg(long, value_name = "RATE", value_parser = share)]
     error_rate: Option<f64>,
     /// Give up after this many touches instead of the model's limit
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
-    /// Print a JSON object a line
+    /// Print one JSON object per line
     #[arg(long)]
     json: bool,
 }
@@ -48,90 +49,96 @@ struct Line<'a> {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let file = CompiledFile::read(&arguments.model)?;
-    let model = file.model()?;
-    let stopping = stopping(&arguments, &model)?;
-    let mut recognizer = Recognizer::<256>::new(&model, stopping)
-        .map_err(|error| Error::file(&arguments.model, error.to_string(), "Use a model of at most 256 objects."))?;
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let model = compiled.model();
+    let own = Stopping::from_model(&model);
+    let max_touches = arguments.max_touches.unwrap_or(own.max_touches());
+    let stopping = compile::stopping(arguments.error_rate.unwrap_or(own.error_rate()), max_touches)?;
+    // The model's own threshold stays as it is, to the last bit.
+    let stopping = if arguments.error_rate.is_none() { own.with_max_touches(max_touches) } else { stopping };
+    let too_many = |error: palpate_onboard::CapacityError| {
+        let problem = EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity };
+        Error::at(Place::file(&arguments.model), problem)
+    };
+    let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
+    let stream = Stream { recognizer, model: &model, longest: compile::longest_time(&model), json: arguments.json };
     let path = &arguments.file;
     if path.as_os_str() == "-" {
-        return stream(&mut recognizer, &model, std::io::stdin().lock(), Path::new("standard input"), arguments.json);
+        return stream.run(std::io::stdin().lock(), Path::new("standard input"));
     }
     let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-    stream(&mut recognizer, &model, touches, path, arguments.json)
+    stream.run(touches, path)
 }
 
-fn stopping(arguments: &Arguments, model: &Model<'_>) -> Result<Stopping> {
-    let own = Stopping::from_model(model);
-    let max_touches = arguments.max_touches.unwrap_or(own.max_touches());
-    let Some(rate) = arguments.error_rate else {
-        return Ok(own.with_max_touches(max_touches));
-    };
-    Stopping::new(rate, max_touches).ok_or_else(|| {
-        Error::argument(
-            format!("an error rate of {rate} after at most {max_touches} touches"),
-            "Give an error rate between 1e-15 and 0.5, and at least one touch.",
-        )
-    })
-}
-
-/// A verdict for each line, printed before the next line is waited for.
-fn stream(
-    recognizer: &mut Recognizer<'_, 256>,
-    model: &Model<'_>,
-    touches: impl Read,
-    path: &Path,
+/// A stream of touches and what recognizes them.
+struct Stream<'m> {
+    recognizer: Recognizer<'m, 256>,
+    model: &'m Model<'m>,
+    /// The longest time between contacts that makes sense, in seconds.
+    longest: f64,
     json: bool,
-) -> Result<()> {
-    let mut reader = BufReader::new(touches);
-    let mut bytes = Vec::new();
-    for number in 1.. {
-        bytes.clear();
-        let read = reader.read_until(b'\n', &mut bytes);
-        if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
-            break;
-        }
-        let wrong = |what: String| Error::line(path, number, what, "Correct the line.");
-        let line = std::str::from_utf8(&bytes).map_err(|_| wrong("not text (no UTF-8)".to_owned()))?.trim();
-        if line.is_empty() {
-            continue;
-        }
-        let touch = parse_touch(line).map_err(wrong)?;
-        let verdict = recognizer.push(&touch);
-        print(recognizer, model, verdict, json)?;
-        if recognizer.verdict() != Verdict::Undecided {
-            recognizer.reset();
-        }
-    }
-    Ok(())
 }
 
-fn print(
-    recognizer: &Recognizer<'_, 256>,
-    model: &Model<'_>,
-    verdict: std::result::Result<Verdict, Refused>,
-    json: bool,
-) -> Result<()> {
-    let best = recognizer.best();
-    let line = Line {
-        touch: recognizer.touches(),
-        verdict: match recognizer.verdict() {
-            Verdict::Undecided => "undecided",
-            Verdict::Recognized { .. } => "recognized",
-            Verdict::Unknown => "unknown",
-        },
-        // Before the first touch that counts, no object is more likely than another for a reason to be named.
-        object: if recognizer.touches() == 0 { "" } else { model.object_name(best) },
-        posterior: recognizer.posterior(best).to_f64(),
-        refused: verdict.err().map(|refused| refused.to_string()),
-    };
-    if json {
-        let text = serde_json::to_string(&line)
-            .map_err(|e| Error::data(format!("cannot write the verdict as JSON: {e}"), "Report this as a bug."))?;
-        return output::print(&format!("{text}\n"));
+impl Stream<'_> {
+    /// Prints a verdict for each line before the next line is waited for.
+    fn run(mut self, touches: impl Read, path: &Path) -> Result<()> {
+        let mut reader = BufReader::new(touches);
+        let mut bytes = Vec::new();
+        for number in 1.. {
+            bytes.clear();
+            let read = reader.read_until(b'\n', &mut bytes);
+            if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
+                break;
+            }
+            let wrong = |problem: Problem| Error::at(Place::line(path, number), problem);
+            let line = std::str::from_utf8(&bytes).map_err(|_| wrong(TouchesProblem::NotText.into()))?.trim();
+            if line.is_empty() {
+                self.recognizer.reset();
+                continue;
+            }
+            let touch = parse_touch(line).map_err(|problem| wrong(problem.into()))?;
+            self.check(&touch).map_err(|problem| wrong(problem.into()))?;
+            let verdict = self.recognizer.push(&touch);
+            self.print(verdict.err())?;
+            if self.recognizer.verdict() != Verdict::Undecided {
+                self.recognizer.reset();
+            }
+        }
+        Ok(())
     }
-    if let Some(refused) = line.refused {
-        return output::print(&format!("{:4}  not counted: {refused}\n", line.touch));
+
+    /// Refuses times that no object can give, such as times in milliseconds.
+    fn check(&self, touch: &Touch) -> Result<(), EvaluateProblem> {
+        let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
+        let seconds = f64::from(last) * 1e-6;
+        if seconds <= self.longest {
+            return Ok(());
+        }
+        Err(EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed: self.model.header().speed() })
     }
-    output::print(&format!("{:4}  {:10}  {} {:.4}\n", line.touch, line.verdict, line.object, line.posterior))
+
+    fn print(&self, refused: Option<Refused>) -> Result<()> {
+        let best = self.recognizer.best();
+        let line = Line {
+            touch: self.recognizer.touches(),
+            verdict: match self.recognizer.verdict() {
+                Verdict::Undecided => "undecided",
+                Verdict::Recognized { .. } => "recognized",
+                Verdict::Unknown => "unknown",
+            },
+            // Before the first counted touch no object is more likely than the others.
+            object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
+            posterior: self.recognizer.posterior(best).to_f64(),
+            refused: refused.map(|refused| refused.to_string()),
+        };
+        if self.json {
+            // Numbers and strings are always JSON.
+            let text = serde_json::to_string(&line).unwrap_or_default();
+            return output::print(&format!("{text}\n"));
+        }
+        if let Some(refused) = line.refused {
+            return output::print(&format!("{:4}  not counted: {refused}\n", line.touch));
+        }
+        output::print(&format!("{:4}  {:10}  {} {:.4}\n", line.touch, line.verdict, line.object, line.posterior))
+    }
 }

@@ -1,7 +1,7 @@
 use super::progress::Bar;
 use super::shell;
 use palpate::Result;
-use palpate::output::{print, print_json};
+use palpate::output::{print, print_json, refuse_stdout};
 use palpate::report::{self, Existing, Settings};
 use std::path::PathBuf;
 
@@ -41,6 +41,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let Arguments { sources, output, seed, quick, growth, resume, force, json } = arguments;
+    refuse_stdout(&output)?;
     let command = command(&sources, seed, quick, growth);
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
     let settings = Settings { command, growth: settings.growth || growth, ..settings };

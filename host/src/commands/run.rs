@@ -1,10 +1,10 @@
 use super::progress::Bar;
 use super::shell;
 use palpate::Result;
-use palpate::capture;
 use palpate::mesh::source;
 use palpate::output;
 use palpate::run;
+use palpate::touches::Origin;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     #[arg(short, long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Touches of each object, a tenth of them to test on
-    #[arg(long, value_name = "N", default_value_t = 21_000, value_parser = clap::value_parser!(u64).range(100..))]
+    #[arg(long, value_name = "N", default_value_t = 21_000, value_parser = touches)]
     touches: u64,
     /// Seed of all that is random
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -39,6 +39,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_stdout(&arguments.out)?;
     let Arguments { sources, out, touches, seed, force, json } = arguments;
     let objects = source::objects(&sources)?;
     if !json {
@@ -50,7 +51,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         ))?;
     }
     let settings = run::Settings {
-        capture: capture::Settings { touches, seed, ..capture::Settings::default() },
+        capture: Origin { touches, seed, ..Origin::default() }.into(),
         replace: force,
         command: shell::command(["palpate", "run"].into_iter().chain(sources.iter().map(String::as_str)).chain([
             "-o",
@@ -65,4 +66,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     let summary = run::run(&objects, &settings, &out, &Bar::new())?;
     if json { output::print_json(&summary) } else { output::print(&run::text(&summary, &out)) }
+}
+
+/// As many touches as can be divided and trained on.
+fn touches(text: &str) -> Result<u64, String> {
+    match super::numbers::count(text)? {
+        count if count < 100 => Err("give 100 or more".to_owned()),
+        count => Ok(count),
+    }
 }

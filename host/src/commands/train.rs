@@ -1,10 +1,10 @@
 use super::progress::Bar;
 use palpate::Result;
+use palpate::ensemble::StatedProbe;
 use palpate::ensemble::train::{self, Engine, Settings};
 use palpate::output;
-use palpate::touches::Dataset;
 use palpate_shared::Descriptor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
@@ -12,7 +12,9 @@ use std::time::Instant;
 #[command(after_help = "\
 Presets:
   compact    trees whose leaves hold a value for each object, on curvature: small and accurate
-  paper      the published method: 100 rounds of one tree an object on contact times
+  paper      the published method: 100 rounds of one tree per object, on contact times
+
+The ensemble states the probe that the data set was captured with; models exported from it do as well.
 
 Examples:
   palpate train data -o ensemble.json
@@ -32,8 +34,7 @@ pub(crate) struct Arguments {
     /// Which features a touch is turned into [default: the preset's]
     #[arg(long, value_parser = descriptor, value_name = "times|curvature|gravity|oriented")]
     descriptor: Option<Descriptor>,
-    /// What a leaf holds: a value for each object, or one value (and each object has its own trees) [default: the
-    /// preset's]
+    /// What a leaf holds: a value for each object, or one value (and each object has its own trees) [default: the preset's]
     #[arg(long, value_enum)]
     leaves: Option<Leaves>,
     /// Boosting rounds [default: the preset's; compact 30, paper 100]
@@ -51,8 +52,7 @@ pub(crate) struct Arguments {
     /// The most bins of a feature's histogram, for all features or for each [default: the preset's; 256]
     #[arg(long, value_delimiter = ',', value_name = "BINS[,BINS…]")]
     bins: Vec<usize>,
-    /// Round leaves to multiples of a power of two that fit so many bits, so that a compiled model with leaves of that
-    /// width is exact; 0 leaves them as they are [default: the preset's; compact 16, paper 0]
+    /// Round leaves to multiples of a power of two that fit this many bits, so that a compiled model with leaves of that width is exact; 0 leaves them as they are [default: the preset's; compact 16, paper 0]
     #[arg(long, value_name = "BITS")]
     leaf_bits: Option<u32>,
     /// Train for noisy contact times: standard deviation, such as 5ms [default: none]
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     /// Threads; the ensemble is the same for any number [default: all]
     #[arg(long)]
     threads: Option<usize>,
-    /// Who grows the trees; xgboost (version 1.6.2, no multi-output trees) needs the cargo feature of that name
+    /// The library that trains; xgboost (version 1.6.2, only with --leaves one) needs the cargo feature of that name
     #[arg(long, value_enum, default_value = "hessboost")]
     trainer: Trainer,
     /// Print what was trained as JSON
@@ -102,10 +102,14 @@ struct Trained {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let settings = arguments.settings();
-    let dataset = Dataset::read(&arguments.directory)?;
+    output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
+    let dataset = super::dataset(&arguments.directory)?;
+    let settings = Settings { probe: StatedProbe::of(&dataset), ..arguments.settings() };
     let start = Instant::now();
-    let ensemble = train::train(&dataset, &settings, &Bar::new())?;
+    let ensemble = train::train(&dataset, &settings, &Bar::new()).map_err(|error| match error.exit_code() {
+        1 => error.in_file(&arguments.directory),
+        _ => error,
+    })?;
     let seconds = start.elapsed().as_secs_f64();
     ensemble.save(&arguments.output)?;
     let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
@@ -122,9 +126,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         seconds,
     };
     if arguments.json {
-        return output::print_json(&trained);
+        return output::print_json_about(&arguments.output, &trained);
     }
-    output::print(&format!(
+    let text = format!(
         "{}: {} trees, {} splits on {} of {} touches of {} objects, trained in {:.1} s\n",
         arguments.output.display(),
         trained.trees,
@@ -133,7 +137,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         trained.touches,
         trained.objects,
         trained.seconds
-    ))
+    );
+    output::print_about(&arguments.output, &text)
 }
 
 impl Arguments {
@@ -155,7 +160,8 @@ impl Arguments {
             noise: self.noise.unwrap_or(preset.noise),
             seed: self.seed,
             threads: self.threads,
-            engine: match self.trainer {
+            probe: None,
+            trainer: match self.trainer {
                 Trainer::Hessboost => Engine::Hessboost,
                 Trainer::Xgboost => Engine::Xgboost,
             },

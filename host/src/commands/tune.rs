@@ -1,7 +1,10 @@
+use super::numbers::share;
+use super::export::features;
+use super::inspect::core;
 use super::progress::Bar;
 use palpate::Result;
+use palpate::compile::Core;
 use palpate::output;
-use palpate::touches::Dataset;
 use palpate::tune::{self, Row, Settings, Tuned};
 use palpate_shared::Descriptor;
 use std::fmt::Write as _;
@@ -10,12 +13,12 @@ use std::path::PathBuf;
 /// Find the best model that fits a chip.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Trains a family of ensembles, compiles each in several ways, and keeps the model that needs the fewest touches within
-the limits. Chosen on touches held out from training, measured on others again.
+Trains a family of ensembles, compiles each in several ways, and keeps the model that needs the fewest touches within the limits. It is chosen on touches held out from training, and measured on others again.
 
 Examples:
   palpate tune data --max-bytes 16K -o model.palpate
   palpate tune data --max-bytes 16K --max-instructions 600 -o fast.palpate
+  palpate tune data --max-instructions 2000 --chip m0+ -o m0.palpate
   palpate tune data --json")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
@@ -29,14 +32,17 @@ pub(crate) struct Arguments {
     /// The most bytes of the model, such as 16K
     #[arg(long, value_parser = bytes, value_name = "BYTES")]
     max_bytes: Option<usize>,
-    /// The most instructions a touch on a Cortex-M4F
+    /// The most instructions per touch
     #[arg(long, value_name = "COUNT")]
     max_instructions: Option<u64>,
+    /// The processor that the limit of instructions is for
+    #[arg(long, value_parser = core, default_value = "m4f", value_name = "m0+|m4f")]
+    chip: Core,
     /// Which features a touch is turned into
     #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "NAME")]
     descriptor: Descriptor,
-    /// Stop touching when the posterior passes one less this
-    #[arg(long, default_value_t = 0.01, value_name = "RATE")]
+    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
     error_rate: f64,
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]
@@ -50,13 +56,18 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let dataset = Dataset::read(&arguments.directory)?;
+    for path in [&arguments.output, &arguments.ensemble].into_iter().flatten() {
+        output::refuse_input(path, super::files_of(&arguments.directory))?;
+    }
+    let dataset = super::dataset(&arguments.directory)?;
     let tuned = tune::tune(
         &dataset,
         &Settings {
             descriptor: arguments.descriptor,
             max_bytes: arguments.max_bytes,
             max_instructions: arguments.max_instructions,
+            core: arguments.chip,
+            probe: StatedProbe::of(&dataset),
             error_rate: arguments.error_rate,
             groups: arguments.groups,
             seed: arguments.seed,
@@ -69,14 +80,30 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     if let Some(path) = &arguments.output {
         output::write_bytes(path, &tuned.model)?;
     }
-    if arguments.json { output::print_json(&tuned) } else { output::print(&table(&tuned)) }
+    let written = arguments.output.clone().unwrap_or_default();
+    if arguments.json {
+        return output::print_json_about(&written, &tuned);
+    }
+    let mut text = table(&tuned);
+    let chosen = &tuned.rows[tuned.chosen];
+    text += &features(chosen.layout.unwrap_or_default(), chosen.leaf.unwrap_or_default());
+    for (what, path) in [("model", &arguments.output), ("ensemble", &arguments.ensemble)] {
+        if let Some(path) = path {
+            // Writing to a string cannot fail.
+            _ = writeln!(text, "Wrote the {what}: {}", path.display());
+        }
+    }
+    if arguments.output.is_none() {
+        text += "The model was not written: name a file with -o.\n";
+    }
+    output::print_about(&written, &text)
 }
 
 /// The frontier, the choice marked, and what it achieves on touches of its own.
 fn table(tuned: &Tuned) -> String {
     let mut text = format!(
-        "  {:>6} {:>6} {:>4} {:>9} {:>4} {:>8} {:>7} {:>6} {:>8} {:>8} {:>7} {:>7}\n",
-        "trees", "depth", "eta", "bins", "leaf", "layout", "bytes", "instr.", "at 10", "at 30", "touches", "wrong"
+        "  {:>6} {:>6} {:>4} {:>9} {:>4} {:>8} {:>7} {:>7} {:>7} {:>8} {:>8} {:>7} {:>7}\n",
+        "trees", "depth", "eta", "bins", "leaf", "layout", "bytes", "M4F", "M0+", "at 10", "at 30", "touches", "wrong"
     );
     let mut line = |mark: &str, row: &Row| {
         let accuracy = |at| row.accuracy.get(&at).map_or("–".into(), |share| format!("{:.1} %", 100.0 * share));
@@ -85,7 +112,7 @@ fn table(tuned: &Tuned) -> String {
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "{mark:1} {:>6} {:>6} {:>4} {:>9} {:>4} {:>8} {:>7} {:>6} {:>8} {:>8} {:>7.1} {:>5.2} %",
+            "{mark:1} {:>6} {:>6} {:>4} {:>9} {:>4} {:>8} {:>7} {:>7} {:>7} {:>8} {:>8} {:>7.1} {:>5.2} %",
             row.recipe.trees,
             row.recipe.depth,
             row.recipe.eta,
@@ -94,6 +121,7 @@ fn table(tuned: &Tuned) -> String {
             row.layout.unwrap_or("–"),
             number(row.bytes.map(|bytes| bytes as u64)),
             number(row.instructions),
+            number(row.instructions_m0_plus),
             accuracy(10),
             accuracy(30),
             row.mean_touches,
@@ -111,8 +139,7 @@ fn table(tuned: &Tuned) -> String {
     _ = write!(
         text,
         "\n* the best that fits; on touches that did not choose it: {}; stops after {:.1} touches, {:.2} % wrong.\n\
-         Instructions a touch on a Cortex-M4F, by the exporter's model of the evaluator. The last line is the full model \
-         without limits.\n",
+         M4F and M0+: instructions per touch, estimated, right to 15 %. The last line is the full model without limits.\n",
         accuracy.join(", "),
         tuned.test.sequential.mean_touches,
         100.0 * tuned.test.sequential.error,

@@ -43,10 +43,11 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_input(&arguments.output, [&arguments.object])?;
     let Arguments { touches, misses, seed, length, radius, spacing, .. } = arguments;
     let probe = Probe { radius, spacing, ..Probe::default() };
     let object = source::object(&arguments.object)?;
     let page = view::page(&object, &view::Settings { touches, misses, seed, length, probe })?;
     output::write_bytes(&arguments.output, page.as_bytes())?;
-    output::print(&format!("{}: open it in a browser\n", arguments.output.display()))
+    output::print_about(&arguments.output, &format!("{}: open it in a browser\n", arguments.output.display()))
 }

@@ -10,7 +10,7 @@ const MAX_CUTS: usize = 255;
 /// The axes of a forest: each feature's thresholds, in lists of at most 255.
 pub(super) struct Axes {
     pub(super) axes: Vec<(Axis, Vec<i32>)>,
-    /// The column and the rank above which a split goes right, by (feature, threshold, missing goes left).
+    /// The column of a split and the rank above which it goes right, by (feature, threshold, missing goes left).
     places: BTreeMap<(u8, i32, bool), (usize, u8)>,
     pub(super) columns: usize,
 }
@@ -60,7 +60,7 @@ impl Axes {
     }
 }
 
-/// Bytes a threshold: two where every threshold fits them and the next axis's are then aligned like these, else four.
+/// Bytes per threshold: two where every threshold fits them and the next axis's are then aligned like these, else four.
 /// Other widths are read, too, but byte by byte.
 pub(super) fn width(cuts: &[i32]) -> u8 {
     let narrow = cuts.len().is_multiple_of(2) && cuts.iter().all(|&cut| i16::try_from(cut).is_ok());

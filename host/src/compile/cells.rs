@@ -1,9 +1,8 @@
-//! Every case that an ensemble can tell apart, where they can be counted.
+//! Every case that an ensemble distinguishes, where they can be counted.
 //!
-//! Between its thresholds an ensemble is constant. Over two features that leaves at most some ten thousand cells, so
-//! that its margins can be had exactly for every possible touch: the grid layout stores them, and the worst error of a
-//! margin is the largest that there is. The three times of a touch are no more than two dimensions, since the earliest
-//! is always 0.
+//! Between its thresholds an ensemble is constant. Over two features that leaves some ten thousand cells at most, few
+//! enough to compute its margins for every possible touch: the grid layout stores them, and the worst error of a margin
+//! is the largest in any cell. The three times of a touch are no more than two dimensions, since the earliest is always 0.
 
 use super::axes::visit;
 use super::forest::{Branch, Forest};
@@ -11,7 +10,7 @@ use palpate_shared::Descriptor;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{AddAssign, Range};
 
-/// Cells times trees that are looked at; beyond, the worst case is bounded instead of found.
+/// Cells times trees that are visited; beyond, the worst case is bounded instead of found.
 const MAX_WORK: usize = 2_000_000_000;
 /// The most cells held in memory at once.
 const MAX_CELLS: usize = 4_000_000;

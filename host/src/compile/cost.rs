@@ -1,51 +1,318 @@
-//! A model of the evaluator's cost: instructions a touch on a Cortex-M4F, from contact times to margins.
+//! What a compiled model costs on a chip: instructions, flash, RAM and stack, estimated.
 //!
-//! The firmware's `evaluator` prints what it says beside what the emulated chip counts, for ensembles of all shapes, and
-//! fails where the two are more than 15 % apart. The figures are those of the firmware's profile (`opt-level = "s"`).
+//! Instructions are those of one touch, from contact times to margins, by a model of the evaluator. The firmware's
+//! `evaluator` prints the Cortex-M4F figure beside what the emulated chip counts, for ensembles of all shapes, and fails
+//! where the two are more than 15 % apart. The Cortex-M0+ figure is fitted to the same program's counts for thumbv6m
+//! (`onboard/README.md` lists them), within 10 % of each. Flash of the code is that of the firmware's `verdict` image,
+//! RAM and stack are those that `evaluator` prints. All figures are of the firmware's profile (`opt-level = "s"`).
 
-use palpate_shared::format::LeafType;
+use palpate_onboard::Model;
+use palpate_shared::format::{Axis, Group, HEADER_LENGTH, Layout, LeafType};
+use serde::Serialize;
 
-/// Features, clearing, and the base margins.
-const TOUCH: usize = 350;
-/// Ranking in an axis, in eight steps.
-const AXIS: usize = 140;
-/// An object's base margin.
-const OBJECT: usize = 6;
-/// A group of trees, or what it has beyond a block of 64.
-const BLOCK: usize = 130;
-/// Shifting what was added before.
-const SHIFT: usize = 60;
-
-/// What does not depend on the trees.
-pub(super) fn touch(axes: usize, objects: usize) -> usize {
-    TOUCH + AXIS * axes + OBJECT * objects
+/// A processor that costs are known for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Core {
+    /// Cortex-M4F.
+    #[serde(rename = "m4f")]
+    M4F,
+    /// Cortex-M0+.
+    #[serde(rename = "m0+")]
+    M0Plus,
 }
 
-/// A group of complete trees, whose leaves have so many values.
-pub(super) fn complete_group(trees: usize, depth: usize, leaf: LeafType, values: usize, shifted: bool) -> usize {
-    // Depths 4 to 6 are written out; others are a loop with checks.
-    let walk = if (4..=6).contains(&depth) { 12 + 6 * depth } else { 18 + 13 * depth };
-    // A few values are added together, the last ones alone.
-    let (few, together) = match leaf {
-        LeafType::I8 => (10, 29),
-        LeafType::I16 => (5, 19),
-        LeafType::F32 => (5, 30),
+/// About how many instructions a touch takes, from contact times to margins; right to 15 %.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Instructions {
+    /// On a Cortex-M4F.
+    pub m4f: u64,
+    /// On a Cortex-M0+; `None` with f32 leaves, whose additions its software does.
+    pub m0_plus: Option<u64>,
+}
+
+/// What a model takes on a chip, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Memory {
+    /// Flash of the model.
+    pub model_flash: usize,
+    /// Flash of a whole image that reads this layout and these leaves and gives verdicts; 1,300 bytes of it are start-up,
+    /// vector table and the compiler's own routines, which most programs have anyway.
+    pub code_flash: usize,
+    /// RAM of the opened model and of a recognizer with room for just the model's objects.
+    pub ram: usize,
+    /// Stack of a touch with its verdict.
+    pub stack: usize,
+}
+
+impl Core {
+    /// The processor's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::M4F => "Cortex-M4F",
+            Self::M0Plus => "Cortex-M0+",
+        }
+    }
+}
+
+impl Instructions {
+    /// What a touch costs in a compiled model.
+    pub fn of_model(model: &Model<'_>) -> Self {
+        let header = model.header();
+        let objects = model.object_count();
+        let axes = usize::from(header.axes());
+        let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
+        // The order of sections that FORMAT.md gives.
+        let groups_start = HEADER_LENGTH
+            + length(header.text_length())
+            + 8 * objects
+            + Axis::LENGTH * axes
+            + length(header.cuts_length());
+        let groups_end = groups_start + Group::LENGTH * usize::from(header.groups());
+        let bytes = model.bytes();
+        let records = bytes.get(groups_start..groups_end).unwrap_or_default();
+        let groups: Vec<Group> = records.as_chunks().0.iter().filter_map(|record| Group::from_bytes(*record)).collect();
+        let nodes = bytes.get(groups_end..groups_end + length(header.nodes_length())).unwrap_or_default();
+        Self::new(&Shape { layout: model.layout(), leaf: model.leaf_type(), objects, axes, groups: &groups, nodes })
+    }
+
+    pub(super) fn new(shape: &Shape<'_>) -> Self {
+        let m0_plus = (shape.leaf != LeafType::F32).then(|| M0_PLUS.touch(shape));
+        Self { m4f: M4F.touch(shape), m0_plus }
+    }
+
+    /// On a processor.
+    pub fn on(self, core: Core) -> Option<u64> {
+        match core {
+            Core::M4F => Some(self.m4f),
+            Core::M0Plus => self.m0_plus,
+        }
+    }
+}
+
+impl Memory {
+    /// What a compiled model takes on a processor.
+    pub fn of_model(model: &Model<'_>, core: Core) -> Self {
+        let objects = model.object_count();
+        // A recognizer: 8 bytes per object and 32; an opened model: 64.
+        let ram = 8 * objects + 32 + 64;
+        // The most that was seen for ten objects, less their margins.
+        let stack = 4 * objects + if model.layout() == Layout::Grid { 276 } else { 880 };
+        Self { model_flash: model.bytes().len(), code_flash: code_flash(core, model), ram, stack }
+    }
+}
+
+/// Bytes of the firmware's `verdict` image with one layout and one type of leaf.
+fn code_flash(core: Core, model: &Model<'_>) -> usize {
+    // By layout; i8, i16 and f32 leaves.
+    let bytes = match (core, model.layout()) {
+        (Core::M4F, Layout::Grid) => [6_052, 6_056, 6_120],
+        (Core::M4F, Layout::Compact) => [6_440, 6_452, 6_724],
+        (Core::M4F, Layout::Complete) => [7_684, 7_632, 7_568],
+        (Core::M4F, Layout::Wide) => [6_296, 6_312, 6_584],
+        (Core::M0Plus, Layout::Grid) => [5_776, 5_832, 5_876],
+        (Core::M0Plus, Layout::Compact) => [6_264, 6_288, 7_112],
+        (Core::M0Plus, Layout::Complete) => [7_296, 7_476, 7_816],
+        (Core::M0Plus, Layout::Wide) => [6_124, 6_132, 7_016],
     };
-    let leaf = together * (values / few) + 11 * (values % few);
-    trees.div_ceil(64) * BLOCK + trees * (walk + leaf) + if shifted { SHIFT } else { 0 }
+    match model.leaf_type() {
+        LeafType::I8 => bytes[0],
+        LeafType::I16 => bytes[1],
+        LeafType::F32 => bytes[2],
+    }
 }
 
-/// A tree in preorder: steps to the leaf that is reached on average, and its values.
-pub(super) fn preorder_tree(steps: f64, step: f64, values: usize) -> usize {
-    (25.0 + step * steps).round() as usize + 57 + 5 * values
+/// What the cost of a touch depends on.
+pub(super) struct Shape<'a> {
+    pub(super) layout: Layout,
+    pub(super) leaf: LeafType,
+    pub(super) objects: usize,
+    pub(super) axes: usize,
+    pub(super) groups: &'a [Group],
+    /// The splits, as the model has them.
+    pub(super) nodes: &'a [u8],
 }
 
-/// A step in a compact tree.
-pub(super) const COMPACT_STEP: f64 = 17.0;
-/// A step in a wide tree.
-pub(super) const WIDE_STEP: f64 = 28.0;
+/// The costs of the evaluator's parts on one processor, in instructions.
+struct Costs {
+    /// Features, clearing, and the base margins; then for each object.
+    touch: (usize, usize),
+    /// Ranking in an axis, in eight steps.
+    axis: usize,
+    /// A group of complete trees, or what it has beyond a block of 64.
+    block: usize,
+    /// Shifting what was added before.
+    shift: usize,
+    /// A walk through a complete tree: at the start and for each level, for the depths that are written out, 4 to 6;
+    /// then for others, which are a loop with checks.
+    walk: [(usize, usize); 2],
+    /// A leaf's values of one byte: of ten together; of two bytes or f32: of five together; one value alone.
+    leaf: Leaf,
+    /// A tree in preorder; then each value of its leaf.
+    preorder: (f64, usize, usize),
+    /// A step in a compact and in a wide tree.
+    step: (f64, f64),
+    /// A table; then for each object.
+    grid: (usize, usize),
+}
 
-/// A table.
-pub(super) fn grid(objects: usize) -> usize {
-    350 + 5 * objects
+/// Costs of a leaf's values.
+struct Leaf {
+    ten_i8: usize,
+    five_i16: usize,
+    five_f32: usize,
+    alone: usize,
+}
+
+const M4F: Costs = Costs {
+    touch: (350, 6),
+    axis: 140,
+    block: 130,
+    shift: 60,
+    walk: [(12, 6), (18, 13)],
+    leaf: Leaf { ten_i8: 29, five_i16: 19, five_f32: 30, alone: 11 },
+    preorder: (25.0, 57, 5),
+    step: (17.0, 28.0),
+    grid: (350, 5),
+};
+
+const M0_PLUS: Costs = Costs {
+    touch: (508, 9),
+    axis: 203,
+    block: 189,
+    shift: 87,
+    walk: [(18, 7), (26, 19)],
+    // No estimate is made with f32.
+    leaf: Leaf { ten_i8: 57, five_i16: 31, five_f32: 0, alone: 14 },
+    preorder: (35.0, 80, 7),
+    step: (24.0, 39.0),
+    grid: (448, 7),
+};
+
+impl Costs {
+    /// Instructions of a touch.
+    fn touch(&self, shape: &Shape<'_>) -> u64 {
+        let trees = match shape.layout {
+            Layout::Grid => return (self.grid.0 + self.grid.1 * shape.objects) as u64,
+            Layout::Complete => {
+                let groups = shape.groups.iter().enumerate();
+                groups.map(|(index, group)| self.complete_group(group, shape, index > 0)).sum()
+            }
+            Layout::Compact => self.preorder_trees(shape, 3, self.step.0, |node| usize::from(node[2])),
+            Layout::Wide => {
+                let left = |node: &[u8]| usize::from(u16::from_le_bytes([node[4], node[5]]));
+                self.preorder_trees(shape, 6, self.step.1, left)
+            }
+        };
+        let axes = if shape.layout == Layout::Wide { 0 } else { shape.axes };
+        (self.touch.0 + self.axis * axes + self.touch.1 * shape.objects + trees) as u64
+    }
+
+    fn complete_group(&self, group: &Group, shape: &Shape<'_>, shifted: bool) -> usize {
+        let depth = usize::from(group.depth);
+        let trees = usize::try_from(group.trees).unwrap_or(usize::MAX);
+        let (start, level) = self.walk[usize::from(!(4..=6).contains(&depth))];
+        // A few values are added together, the last ones alone.
+        let (few, together) = match shape.leaf {
+            LeafType::I8 => (10, self.leaf.ten_i8),
+            LeafType::I16 => (5, self.leaf.five_i16),
+            LeafType::F32 => (5, self.leaf.five_f32),
+        };
+        let values = values(group, shape);
+        let leaf = together * (values / few) + self.leaf.alone * (values % few);
+        trees.div_ceil(64) * self.block + trees * (start + level * depth + leaf) + if shifted { self.shift } else { 0 }
+    }
+
+    /// Trees in preorder, each after its number of splits: steps to the leaf that is reached on average, and its values.
+    fn preorder_trees(&self, shape: &Shape<'_>, length: usize, step: f64, left: impl Fn(&[u8]) -> usize) -> usize {
+        let (start, tree, value) = self.preorder;
+        let mut rest = shape.nodes;
+        let mut sum = 0;
+        for group in shape.groups {
+            let leaf = tree + value * values(group, shape);
+            for _ in 0..group.trees {
+                let Some((splits, after)) = rest.split_first_chunk() else { return sum };
+                let splits = length * usize::from(u16::from_le_bytes(*splits));
+                let Some((splits, after)) = after.split_at_checked(splits) else { return sum };
+                rest = after;
+                let steps = expected_steps(splits, length, &left);
+                sum += (start + step * steps).round() as usize + leaf;
+            }
+        }
+        sum
+    }
+}
+
+/// Values of a leaf.
+fn values(group: &Group, shape: &Shape<'_>) -> usize {
+    if group.object.is_some() { 1 } else { shape.objects }
+}
+
+/// Steps to a leaf of a tree in preorder, if either side of a split is as likely; `left` gives the splits in a split's
+/// left subtree.
+fn expected_steps(splits: &[u8], length: usize, left: &impl Fn(&[u8]) -> usize) -> f64 {
+    if splits.is_empty() {
+        return 0.0;
+    }
+    let (root, below) = splits.split_at(length);
+    let (left_splits, right_splits) = below.split_at((length * left(root)).min(below.len()));
+    1.0 + (expected_steps(left_splits, length, left) + expected_steps(right_splits, length, left)) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What `onboard/README.md` states that emulation counts: trees, their depth, values of a leaf, leaf type, axes, and
+    /// instructions on each processor.
+    const COUNTED: [(u32, u8, Option<u8>, LeafType, usize, [u64; 2]); 5] = [
+        (1_000, 6, Some(0), LeafType::I16, 3, [61_898, 80_242]),
+        (100, 6, None, LeafType::I16, 2, [9_405, 13_739]),
+        (100, 6, None, LeafType::I8, 2, [8_974, 13_604]),
+        (40, 5, None, LeafType::I16, 2, [3_994, 5_837]),
+        (40, 5, None, LeafType::I8, 2, [4_276, 6_309]),
+    ];
+
+    #[test]
+    fn estimates_are_within_a_tenth_of_what_emulation_counts_on_both_processors() {
+        for (trees, depth, object, leaf, axes, counted) in COUNTED {
+            // One-output trees are in a group for each object, those with i8 leaves in one for each of three scales.
+            let parts = if object.is_some() {
+                10
+            } else if leaf == LeafType::I8 {
+                3
+            } else {
+                1
+            };
+            let group = |part: u32| {
+                let trees = (trees + part) / parts;
+                Group { depth, shift: 0, object, trees }
+            };
+            let groups: Vec<Group> = (0..parts).map(group).collect();
+            let shape = Shape { layout: Layout::Complete, leaf, objects: 10, axes, groups: &groups, nodes: &[] };
+            let estimate = Instructions::new(&shape);
+            for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
+                assert!(
+                    estimate.abs_diff(counted) * 10 <= counted,
+                    "{estimate} for {counted}, {trees} trees, {leaf:?}"
+                );
+            }
+        }
+        let grid = Shape { layout: Layout::Grid, leaf: LeafType::I8, objects: 10, axes: 2, groups: &[], nodes: &[] };
+        assert_eq!(Instructions::new(&grid), Instructions { m4f: 400, m0_plus: Some(518) });
+    }
+
+    #[test]
+    fn with_f32_leaves_nothing_is_said_about_a_processor_without_float_unit() {
+        let shape = Shape { layout: Layout::Grid, leaf: LeafType::F32, objects: 10, axes: 2, groups: &[], nodes: &[] };
+        assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
+        assert!(Instructions::new(&shape).on(Core::M4F).is_some());
+    }
+
+    #[test]
+    fn steps_are_weighted_by_the_chance_of_each_side() {
+        let left = |node: &[u8]| usize::from(node[2]);
+        // A root, one split on its left, which has one on its right.
+        assert_eq!(expected_steps(&[0, 0, 2, 0, 0, 0, 0, 0, 0], 3, &left), 1.75);
+        assert_eq!(expected_steps(&[], 3, &left), 0.0);
+    }
 }

@@ -1,8 +1,10 @@
 //! An ensemble that was checked, with thresholds as the integers that the chip compares.
 
-use crate::ensemble::{Ensemble, Node, Output, Tree};
-use crate::error::{Error, Result};
+use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Output, Tree, check_leaf};
+use crate::error::{CompileProblem, Error, Result, TreeProblem};
+use palpate_shared::Descriptor;
 use palpate_shared::format::{Key, f32_key};
+use std::collections::BTreeSet;
 
 /// Margins beyond ± this many nats are refused: e^16384 is sure enough.
 pub(super) const MARGIN_RANGE: f64 = 16384.0;
@@ -16,7 +18,7 @@ pub(super) struct Forest<'a> {
     pub(super) trees: Vec<Branches<'a>>,
     pub(super) features: usize,
     pub(super) key: Key,
-    pub(super) descriptor: Option<palpate_shared::Descriptor>,
+    pub(super) descriptor: Option<Descriptor>,
 }
 
 /// A tree of a checked ensemble.
@@ -49,20 +51,23 @@ pub(super) struct Split<'a> {
 impl<'a> Forest<'a> {
     pub(super) fn new(ensemble: &'a Ensemble, raw_features: Option<usize>) -> Result<Self> {
         let objects = ensemble.objects.len();
-        if !(1..=256).contains(&objects) || ensemble.base_margins.len() != objects {
-            return Err(wrong(format!("{objects} objects and {} base margins", ensemble.base_margins.len())));
+        let base_margins = ensemble.base_margins.len();
+        if !(1..=MAX_OBJECTS).contains(&objects) || base_margins != objects {
+            return Err(CompileProblem::Objects { objects, base_margins }.into());
         }
         let features = raw_features.unwrap_or(ensemble.descriptor.feature_count());
         if !(1..=256).contains(&features) {
-            return Err(Error::argument(format!("{features} features"), "A model has 1 to 256 features."));
+            return Err(Error::setting("raw_features", features, "1 to 256"));
         }
         let key = if raw_features.is_some() { Key::Real } else { Key::Whole };
         let mut trees = Vec::with_capacity(ensemble.trees.len());
         for (index, tree) in ensemble.trees.iter().enumerate() {
-            let place = |what: String| wrong(format!("tree {index}: {what}"));
+            let place = |problem| CompileProblem::Tree { tree: index, problem };
             let values = match tree.output {
                 Output::One(object) if object < objects => 1,
-                Output::One(object) => return Err(place(format!("object {object} of {objects}"))),
+                Output::One(object) => {
+                    return Err(place(TreeProblem::Object { object: object as u64, objects }).into());
+                }
                 Output::Each => objects,
             };
             let mut reader = Reader { tree, values, features, key, left: tree.nodes.len(), largest: 0.0 };
@@ -77,6 +82,9 @@ impl<'a> Forest<'a> {
             descriptor: raw_features.is_none().then_some(ensemble.descriptor),
         };
         forest.check_range()?;
+        if let Some(descriptor) = forest.descriptor {
+            check_thresholds(ensemble, descriptor)?;
+        }
         Ok(forest)
     }
 
@@ -122,9 +130,7 @@ impl<'a> Forest<'a> {
             let range = self.range(object);
             if range.is_nan() || range > MARGIN_RANGE {
                 let largest = self.trees.iter().map(|tree| tree.largest).fold(self.base[object].abs(), f32::max);
-                return Err(wrong(format!(
-                    "the margin of object {object} can reach {range:e} nats (the largest single value is {largest:e}), beyond the {MARGIN_RANGE} that a model can hold"
-                )));
+                return Err(CompileProblem::MarginRange { object, range, largest, most: MARGIN_RANGE }.into());
             }
         }
         Ok(())
@@ -161,39 +167,36 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// A branch, its splits and its depth.
-    fn branch(&mut self, index: usize, depth: usize) -> Result<(Branch<'a>, usize, usize), String> {
+    fn branch(&mut self, index: usize, depth: usize) -> Result<(Branch<'a>, usize, usize), TreeProblem> {
         if depth > MAX_DEPTH {
-            return Err(format!("it is deeper than {MAX_DEPTH} splits"));
+            return Err(TreeProblem::TooDeep { most: MAX_DEPTH });
         }
-        let node = self.tree.nodes.get(index).ok_or_else(|| format!("there is no node {index}"))?;
-        self.left = self.left.checked_sub(1).ok_or_else(|| format!("node {index} is reached twice"))?;
+        let nodes = self.tree.nodes.len();
+        let node = self.tree.nodes.get(index).ok_or(TreeProblem::NoNodes)?;
+        self.left = self.left.checked_sub(1).ok_or(TreeProblem::ReachedTwice { node: index })?;
         match node {
             Node::Leaf(values) => {
-                if values.len() != self.values {
-                    return Err(format!("leaf {index} has {} values instead of {}", values.len(), self.values));
-                }
-                for &value in values {
-                    if !value.is_finite() {
-                        return Err(format!("leaf {index} has the value {value}"));
-                    }
-                    self.largest = self.largest.max(value.abs());
-                }
+                check_leaf(index, values, self.values)?;
+                self.largest = values.iter().fold(self.largest, |largest, value| largest.max(value.abs()));
                 Ok((Branch::Leaf(values), 0, 0))
             }
             &Node::Split { feature, threshold, missing_left, left, right } => {
-                if feature >= self.features || threshold.is_nan() {
-                    return Err(format!("split {index} is at {threshold} of feature {feature} of {}", self.features));
+                let features = self.features;
+                let number = u8::try_from(feature).ok().filter(|_| feature < features);
+                let number = number.ok_or(TreeProblem::Feature { node: index, feature: feature as u64, features })?;
+                if threshold.is_nan() {
+                    return Err(TreeProblem::Threshold { node: index, threshold });
+                }
+                for (side, child) in [("left", left), ("right", right)] {
+                    if child >= nodes {
+                        let child = i64::try_from(child).unwrap_or(i64::MAX);
+                        return Err(TreeProblem::Child { node: index, side, child, nodes });
+                    }
                 }
                 let (left, left_splits, left_depth) = self.branch(left, depth + 1)?;
                 let (right, right_splits, right_depth) = self.branch(right, depth + 1)?;
-                let split = Split {
-                    feature: u8::try_from(feature).map_err(|e| e.to_string())?,
-                    cut: cut(threshold, self.key),
-                    missing_left,
-                    left,
-                    right,
-                    left_splits,
-                };
+                let split =
+                    Split { feature: number, cut: cut(threshold, self.key), missing_left, left, right, left_splits };
                 let depth = 1 + left_depth.max(right_depth);
                 Ok((Branch::Split(Box::new(split)), 1 + left_splits + right_splits, depth))
             }
@@ -210,6 +213,43 @@ fn cut(threshold: f32, key: Key) -> i32 {
     }
 }
 
-fn wrong(what: String) -> Error {
-    Error::data(format!("cannot compile the ensemble: {what}"), "Train it again, or check the program that wrote it.")
+/// Calls `see` on the values of every leaf, from left to right.
+pub(super) fn each_leaf<'f>(branch: &'f Branch<'f>, see: &mut impl FnMut(&'f [f32])) {
+    match branch {
+        Branch::Leaf(values) => see(values),
+        Branch::Split(split) => {
+            each_leaf(&split.left, see);
+            each_leaf(&split.right, see);
+        }
+    }
+}
+
+/// Refuses an ensemble that was trained on fractions, such as times in seconds: its thresholds fall together when they
+/// become whole numbers. Trainers put thresholds at values of the data, which are whole, or halfway between two, so only
+/// thresholds elsewhere count; a few that fall together harm nothing.
+fn check_thresholds(ensemble: &Ensemble, descriptor: Descriptor) -> Result<()> {
+    for (feature, &name) in descriptor.feature_names().iter().enumerate() {
+        let splits = ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| match *node {
+            Node::Split { feature: own, threshold, .. } if own == feature => Some(threshold),
+            _ => None,
+        });
+        let mut thresholds: Vec<f32> = splits.collect();
+        thresholds.sort_unstable_by(f32::total_cmp);
+        thresholds.dedup();
+        let rounded = thresholds.iter().map(|&threshold| cut(threshold, Key::Whole)).collect::<BTreeSet<_>>().len();
+        let fell_together = |pair: &&[f32]| {
+            cut(pair[0], Key::Whole) == cut(pair[1], Key::Whole) && pair.iter().any(|&threshold| is_fraction(threshold))
+        };
+        let lost = thresholds.windows(2).filter(fell_together).count();
+        if 20 * lost > thresholds.len() {
+            return Err(CompileProblem::Thresholds { feature: name, thresholds: thresholds.len(), rounded }.into());
+        }
+    }
+    Ok(())
+}
+
+/// Whether a threshold is neither a whole number nor halfway between two, but for rounding in f32.
+fn is_fraction(threshold: f32) -> bool {
+    let twice = 2.0 * f64::from(threshold);
+    (twice - twice.round()).abs() > 1e-6 * twice.abs().max(1.0)
 }

@@ -4,21 +4,57 @@
 //! Ensemble ──► Forest (checked, whole thresholds) ──► Axes (ranks) ──► units ──► layout ──► bytes
 //!                                        └──────────► cells: the worst error of a margin
 //! ```
+//!
+//! [`compile`] does all of it; [`CompiledModel`] is a compiled model read from a file.
+//!
+//! ```
+//! use palpate::compile::{self, compile};
+//! use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
+//! use palpate_shared::{Descriptor, Touch};
+//!
+//! # fn main() -> palpate::Result<()> {
+//! // One split at a curvature of 50 ms: flatter is a bowl, more curved a fork.
+//! let nodes = vec![
+//!     Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 },
+//!     Node::Leaf(vec![0.5, -0.5]),
+//!     Node::Leaf(vec![-0.5, 0.5]),
+//! ];
+//! let ensemble = Ensemble {
+//!     descriptor: Descriptor::Curvature,
+//!     objects: vec!["bowl".into(), "fork".into()],
+//!     base_margins: vec![0.0; 2],
+//!     trees: vec![Tree { nodes, output: Output::Each }],
+//!     origin: Origin::default(),
+//! };
+//! let compiled = compile(&ensemble, &compile::Settings::default())?;
+//! let model = compile::open(&compiled.bytes)?;
+//! let mut margins = [0; 2];
+//! model.margins(&Touch::from_micros([0, 0, 80_000]), &mut margins);
+//! assert!(margins[1] > margins[0]);
+//! # Ok(())
+//! # }
+//! ```
 
 mod axes;
 mod cells;
 mod cost;
-mod file;
 mod forest;
 mod layout;
+mod model;
 mod quantize;
+mod rounding;
+mod table;
+#[cfg(test)]
+mod tests;
+mod trees;
 mod write;
 
-pub use file::CompiledFile;
+pub use cost::{Core, Instructions, Memory};
+pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 
 use crate::ensemble::Ensemble;
-use crate::error::{Error, Result};
+use crate::error::{CompileProblem, Error, Result};
 use axes::Axes;
 use cells::Cells;
 use forest::Forest;
@@ -38,31 +74,17 @@ pub struct Settings {
     pub max_touches: u32,
     /// How likely each object is before any touch, in any common unit; `None` makes all equal.
     pub priors: Option<Vec<f64>>,
-    /// The distance between fingers that the model was trained for, in lengths of the scene.
-    pub spacing: f32,
-    /// The probe's speed that the model was trained for, in lengths of the scene a second.
-    pub speed: f32,
-    /// Compiles an ensemble over rows of f32 features instead of touches: so many features, whatever the ensemble's
-    /// descriptor.
+    /// Compiles an ensemble over rows of this many f32 features instead of touches, whatever the ensemble's descriptor.
     pub raw_features: Option<usize>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            leaf: Leaf::I16,
-            layout: None,
-            error_rate: 0.01,
-            max_touches: 200,
-            priors: None,
-            spacing: 1.5,
-            speed: 10.0,
-            raw_features: None,
-        }
+        Self { leaf: Leaf::I16, layout: None, error_rate: 0.01, max_touches: 200, priors: None, raw_features: None }
     }
 }
 
-/// A compiled model.
+/// What [`compile`] made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compiled {
     /// What the chip reads.
@@ -75,23 +97,30 @@ pub struct Compiled {
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
-    /// About how many instructions a touch takes on a Cortex-M4F, by a model of the evaluator that the firmware's
-    /// `evaluator` holds against what it counts: right to 15 %.
-    pub instructions: u64,
+    /// About how many instructions a touch takes.
+    pub instructions: Instructions,
 }
 
-/// Compiles an ensemble.
+/// When recognizers stop.
 ///
 /// # Errors
-/// [`Error::Data`] for an ensemble that contradicts itself, has leaves that are not finite or too large, or more of
-/// something than the format can count; [`Error::Argument`] for settings that do not fit it.
+/// [`Problem::Setting`](crate::error::Problem::Setting) `error_rate` or `max_touches`, whichever is out of its range.
+pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
+    if max_touches == 0 {
+        return Err(Error::setting("max_touches", 0, "at least 1"));
+    }
+    Stopping::new(error_rate, max_touches)
+        .ok_or_else(|| Error::setting("error_rate", error_rate, "a number of at least 1e-15 and below 0.5"))
+}
+
+/// Compiles an ensemble. The model states the ensemble's own probe, or the published one where the ensemble states none.
+///
+/// # Errors
+/// [`CompileProblem`] for an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
+/// that fall together when rounded to whole numbers, more of something than the format can count, or that does not fit
+/// the layout asked for; [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
-    let stopping = Stopping::new(settings.error_rate, settings.max_touches).ok_or_else(|| {
-        Error::argument(
-            format!("an error rate of {} after at most {} touches", settings.error_rate, settings.max_touches),
-            "Give an error rate between 1e-15 and 0.5, and at least one touch.",
-        )
-    })?;
+    let stopping = stopping(settings.error_rate, settings.max_touches)?;
     let forest = Forest::new(ensemble, settings.raw_features)?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
@@ -103,16 +132,13 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let mut best: Option<(u128, Layout, layout::Parts)> = None;
     for (layout, parts) in candidates {
         let bytes = parts.bytes() as u128;
-        let cost = bytes * bytes * u128::from(parts.instructions);
+        let cost = bytes * bytes * u128::from(parts.instructions.m4f);
         if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
             best = Some((cost, layout, parts));
         }
     }
     let Some((_, layout, parts)) = best else {
-        return Err(Error::data(
-            "the ensemble fits no layout of the model format",
-            "Train fewer trees, or trees with fewer splits.",
-        ));
+        return Err(CompileProblem::FitsNoLayout.into());
     };
     let (margin_error, instructions) = (parts.margin_error, parts.instructions);
     let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts)?;

@@ -26,7 +26,7 @@ pub(super) struct Scale {
 
 impl Scale {
     /// The finest scale for a forest's trees.
-    pub(super) fn of_trees(forest: &Forest<'_>, leaf: LeafType) -> Option<Self> {
+    pub(super) fn for_trees(forest: &Forest<'_>, leaf: LeafType) -> Option<Self> {
         let Some(most) = most(leaf) else {
             return Some(Self { unit: F32_UNIT, shifts: vec![0; forest.trees.len()] });
         };
@@ -60,7 +60,7 @@ impl Scale {
     }
 
     /// The scale for a table of margins: one without rounding if there is one, else the finest.
-    pub(super) fn of_cells(sums: &[Vec<f32>], leaf: LeafType) -> Option<Self> {
+    pub(super) fn for_table(sums: &[Vec<f32>], leaf: LeafType) -> Option<Self> {
         let values = || sums.iter().flatten().copied();
         let largest = values().fold(0.0_f64, |most, sum| most.max(f64::from(sum.abs())));
         let unit = match most(leaf) {

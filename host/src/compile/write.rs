@@ -4,7 +4,8 @@ use super::Settings;
 use super::forest::Forest;
 use super::layout::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
-use crate::error::{Error, Result};
+use crate::error::{CompileProblem, Error, Result};
+use crate::probe::approach::Probe;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, checksum};
 
@@ -20,6 +21,8 @@ pub(super) fn write(
     let mut text = text(ensemble)?;
     let priors = priors(settings, forest.objects(), parts.unit)?;
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
+    // Where nothing is known, the published probe.
+    let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);
@@ -49,8 +52,8 @@ pub(super) fn write(
         .with_margin_error(parts.margin_error)
         .with_odds(stopping.odds())
         .with_max_touches(stopping.max_touches())
-        .with_spacing(settings.spacing)
-        .with_speed(settings.speed)
+        .with_spacing(probe.spacing as f32)
+        .with_speed(probe.speed as f32)
         .with_text_length(count(text.len())?)
         .with_ensemble(hash(ensemble))
         .with_cuts_length(count(parts.cuts.len())?)
@@ -72,12 +75,7 @@ pub(super) fn write(
 fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
     let mut text = Vec::new();
     for string in std::iter::once(env!("CARGO_PKG_VERSION")).chain(ensemble.objects.iter().map(String::as_str)) {
-        let length = u8::try_from(string.len()).map_err(|_| {
-            Error::data(
-                format!("the object's name {string:?} is too long for a model"),
-                "Use names of at most 255 bytes.",
-            )
-        })?;
+        let length = u8::try_from(string.len()).map_err(|_| CompileProblem::NameTooLong { name: string.into() })?;
         text.push(length);
         text.extend(string.bytes());
     }
@@ -88,10 +86,8 @@ fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
 fn priors(settings: &Settings, objects: usize, unit: f32) -> Result<Vec<i32>> {
     let Some(priors) = &settings.priors else { return Ok(vec![0; objects]) };
     if priors.len() != objects || !priors.iter().all(|prior| prior.is_finite() && *prior > 0.0) {
-        return Err(Error::argument(
-            format!("{} priors for {objects} objects", priors.len()),
-            "Give one positive number for each object.",
-        ));
+        let priors = priors.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        return Err(Error::setting("priors", priors, format!("{objects} positive numbers, one for each object")));
     }
     let largest = priors.iter().copied().fold(0.0, f64::max);
     Ok(priors.iter().map(|prior| ((prior / largest).ln() / f64::from(unit)).round() as i32).collect())
@@ -145,5 +141,5 @@ fn count(number: usize) -> Result<u32> {
 }
 
 fn too_large() -> Error {
-    Error::data("the ensemble is too large for the model format", "Train fewer trees, or trees with fewer splits.")
+    CompileProblem::TooLarge.into()
 }

@@ -1,8 +1,17 @@
 //! The full model: boosted trees in f32 as the trainer left them.
+//!
+//! [`train::train`] makes an [`Ensemble`] from a [`Dataset`](crate::touches::Dataset); [`Ensemble::save`] and
+//! [`Ensemble::load`] write and read it as XGBoost's JSON; [`compile`](crate::compile::compile) turns it into the bytes
+//! that the chip reads.
 
+mod check;
+mod origin;
 #[cfg(feature = "train")]
 pub mod train;
-mod xgboost_json;
+mod xgboost;
+
+pub(crate) use check::{MAX_OBJECTS, check_leaf};
+pub use origin::{Origin, StatedProbe};
 
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
 
@@ -17,6 +26,8 @@ pub struct Ensemble {
     pub base_margins: Vec<f32>,
     /// The trees, in the order in which their leaves are added.
     pub trees: Vec<Tree>,
+    /// What is known about the touches that it was trained on; changes no margin.
+    pub origin: Origin,
 }
 
 /// One tree; its root is node 0.
@@ -31,9 +42,9 @@ pub struct Tree {
 /// Which margins a tree adds to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
-    /// One value a leaf, for the object with this index.
+    /// A leaf has one value, for the object with this index.
     One(usize),
-    /// One value for each object a leaf.
+    /// A leaf has one value for each object.
     Each,
 }
 
@@ -71,7 +82,7 @@ impl Tree {
     /// The leaf that `features` (NaN where missing) reach.
     ///
     /// # Panics
-    /// If a child's or a feature's index is out of range, which reading an ensemble rules out.
+    /// If a child's or a feature's index is out of range, which [`Ensemble::check`] rules out.
     pub fn leaf(&self, features: &[f32]) -> &[f32] {
         let mut index = 0;
         loop {
@@ -90,6 +101,9 @@ impl Tree {
 impl Ensemble {
     /// The margins of one row of features, in f32, leaves added in tree order to the base margins: the trainer's own
     /// prediction, bit for bit.
+    ///
+    /// # Panics
+    /// If there are fewer features than the ensemble splits on, or it is one that [`Ensemble::check`] refuses.
     pub fn margins_of_features(&self, features: &[f32]) -> Vec<f32> {
         let mut margins = self.base_margins.clone();
         for tree in &self.trees {
@@ -103,6 +117,9 @@ impl Ensemble {
     }
 
     /// The margins of a touch.
+    ///
+    /// # Panics
+    /// If the ensemble is one that [`Ensemble::check`] refuses.
     pub fn margins(&self, touch: &Touch) -> Vec<f32> {
         self.margins_of_features(&feature_row(self.descriptor, touch))
     }

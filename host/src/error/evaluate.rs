@@ -1,13 +1,75 @@
 //! What can be wrong with evaluating.
 
+use palpate_shared::Descriptor;
+
 /// What can be wrong with evaluating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum EvaluateProblem {}
+pub enum EvaluateProblem {
+    /// The model does not know an object of the data set.
+    #[error("the model does not know the object {object}, only {}", known.join(", "))]
+    UnknownObject {
+        /// The object.
+        object: String,
+        /// The objects that it knows.
+        known: Vec<String>,
+    },
+    /// The model works on other rows than touches.
+    #[error("the model works on rows of features, not on touches")]
+    RawFeatures,
+    /// The descriptor needs the probe's pose.
+    #[error("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())]
+    NoPose {
+        /// The descriptor.
+        descriptor: Descriptor,
+    },
+    /// A compiled model and an ensemble are not of the same objects and descriptor.
+    #[error("the model was not compiled from this ensemble: its objects or its descriptor are others")]
+    OtherModel,
+    /// There is nothing to compare models on.
+    #[error("there are no touches to compare the models on")]
+    NoTouches,
+    /// The model has more objects than a recognizer has room for.
+    #[error("the model has {objects} objects, and the recognizer has room for {capacity}")]
+    TooManyObjects {
+        /// Objects of the model.
+        objects: usize,
+        /// Room of the recognizer.
+        capacity: usize,
+    },
+    /// A line is not a touch.
+    #[error("{detail}")]
+    Touch {
+        /// What is wrong with it.
+        detail: String,
+    },
+    /// A contact time is longer than an object can make it.
+    #[error(
+        "a finger touched {seconds} s after the first, but no object of the model's scale takes longer than {longest:.2} s at its speed of {speed} units per second"
+    )]
+    TimeTooLong {
+        /// Seconds after the first contact.
+        seconds: f64,
+        /// The most seconds that make sense.
+        longest: f64,
+        /// The speed that the model states, in units per second.
+        speed: f32,
+    },
+}
 
 impl EvaluateProblem {
     /// What to do about it, as a sentence.
     pub fn fix(&self) -> String {
-        match *self {}
+        match self {
+            Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
+            Self::RawFeatures => "Give a model that was exported from a Palpate ensemble.",
+            Self::NoPose { .. } => "Capture the touches with their pose.",
+            Self::OtherModel => "Give the ensemble that the model was exported from.",
+            Self::NoTouches => "Give at least one touch of each object.",
+            Self::TooManyObjects { .. } => "Use a model of fewer objects.",
+            Self::Touch { .. } => "Correct the line.",
+            Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
+        }
+        .into()
     }
 }

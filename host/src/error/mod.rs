@@ -15,7 +15,7 @@ mod tune;
 pub use capture::CaptureProblem;
 pub use chip::ChipProblem;
 pub use compile::CompileProblem;
-pub use ensemble::EnsembleProblem;
+pub use ensemble::{EnsembleProblem, NameProblem, TreeProblem};
 pub use evaluate::EvaluateProblem;
 pub use mesh::MeshProblem;
 pub use page::PageProblem;

@@ -1,13 +1,224 @@
 //! What can be wrong with data sets and files of touches.
 
+use std::path::PathBuf;
+
 /// What can be wrong with data sets and files of touches.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum TouchesProblem {}
+pub enum TouchesProblem {
+    /// A line has neither three nor nine fields.
+    #[error("{count} fields where a touch has three times, or three times and six direction cosines")]
+    Fields {
+        /// How many there are.
+        count: usize,
+    },
+    /// A field is not a number.
+    #[error("{text:?} is not a number")]
+    NotANumber {
+        /// The field.
+        text: String,
+    },
+    /// A field is infinite or not a number.
+    #[error("{text} is not finite")]
+    NotFinite {
+        /// The field.
+        text: String,
+    },
+    /// A contact time is before the clock's start.
+    #[error("the time {seconds} is negative")]
+    NegativeTime {
+        /// The time.
+        seconds: f64,
+    },
+    /// A contact time is beyond what a touch can hold.
+    #[error("the time {seconds} is longer than the 4294 s that a touch can hold")]
+    LongTime {
+        /// The time.
+        seconds: f64,
+    },
+    /// A direction or alignment is not a unit vector.
+    #[error("the {vector} has length {length:.3} where a unit vector has 1")]
+    NotUnit {
+        /// Which vector: "direction" or "alignment".
+        vector: &'static str,
+        /// Its length.
+        length: f64,
+    },
+    /// A row has one half of a pose.
+    #[error("{} without {}", with_article(there), with_article(missing))]
+    HalfPose {
+        /// The vector that is there.
+        there: &'static str,
+        /// The vector that is missing.
+        missing: &'static str,
+    },
+    /// A line is not UTF-8.
+    #[error("not text (no UTF-8)")]
+    NotText,
+    /// A row of a Parquet file is wrong.
+    #[error("row {row}: {problem}")]
+    Row {
+        /// The row, counted from 1.
+        row: u64,
+        /// What is wrong with it.
+        problem: Box<Self>,
+    },
+    /// A file is not Parquet, or its structure is damaged.
+    #[error("not a usable Parquet file ({message})")]
+    NotParquet {
+        /// What the reader said.
+        message: String,
+    },
+    /// A Parquet file lacks a column.
+    #[error("no column {name}")]
+    NoColumn {
+        /// The column.
+        name: &'static str,
+    },
+    /// A column of a Parquet file does not hold what it should.
+    #[error("column {name}: {message}")]
+    Column {
+        /// The column.
+        name: &'static str,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Touches could not be written as Parquet.
+    #[error("cannot write the touches ({message})")]
+    ParquetNotWritten {
+        /// What the writer said.
+        message: String,
+    },
+    /// A Parquet file, read by a build without Parquet.
+    #[error("this program was built without Parquet")]
+    NoParquet,
+    /// A file holds no touch.
+    #[error("no touches in it")]
+    NoTouches,
+    /// A directory holds no file of touches.
+    #[error("no touches here (no .txt or .parquet file)")]
+    NoObjects,
+    /// A directory holds one object.
+    #[error("only one object here, {name}, and nothing to distinguish it from")]
+    OneObject {
+        /// The object.
+        name: String,
+    },
+    /// An object has files in two formats, and no listing says which counts.
+    #[error("two files of the object {name}: {} and {}", file.display(), other.display())]
+    TwoFiles {
+        /// The object.
+        name: String,
+        /// One file.
+        file: PathBuf,
+        /// The other.
+        other: PathBuf,
+    },
+    /// The capture of a data set was interrupted.
+    #[error("the capture of these touches is not complete")]
+    Incomplete,
+    /// `dataset.json` is no listing.
+    #[error("not the listing of a data set ({message})")]
+    BadListing {
+        /// What the parser said.
+        message: String,
+    },
+    /// `dataset.json` names an object that no file of the directory can be called after.
+    #[error("no file can be called after the object {name:?}")]
+    BadName {
+        /// The name.
+        name: String,
+    },
+    /// `dataset.json` names an object twice.
+    #[error("the object {name} is listed twice")]
+    ListedTwice {
+        /// The object.
+        name: String,
+    },
+    /// A listed object's file is not there.
+    #[error("missing, although dataset.json lists the object {name}")]
+    Missing {
+        /// The object.
+        name: String,
+    },
+    /// A file has another number of touches than listed.
+    #[error("{found} touches where dataset.json states {stated}")]
+    OtherCount {
+        /// How many are listed.
+        stated: u64,
+        /// How many there are.
+        found: u64,
+    },
+    /// A Parquet file is not the one that was captured.
+    #[error("damaged or changed: its checksum is not the one in dataset.json")]
+    OtherChecksum,
+    /// A text names no shard.
+    #[error("{text:?} is no shard")]
+    BadShard {
+        /// The text.
+        text: String,
+    },
+    /// A text names no format of touches.
+    #[error("{name:?} is no format of touches")]
+    UnknownFormat {
+        /// The text.
+        name: String,
+    },
+    /// An object has too few touches to be divided.
+    #[error("{name} has only {touches} touches, too few to split")]
+    TooFew {
+        /// The object.
+        name: String,
+        /// How many touches it has.
+        touches: usize,
+        /// How many it needs.
+        least: usize,
+    },
+}
 
 impl TouchesProblem {
     /// What to do about it, as a sentence.
     pub fn fix(&self) -> String {
-        match *self {}
+        match self {
+            Self::Fields { .. }
+            | Self::NotANumber { .. }
+            | Self::NotFinite { .. }
+            | Self::NegativeTime { .. }
+            | Self::LongTime { .. }
+            | Self::NotUnit { .. }
+            | Self::NotText => {
+                "Correct the line: three times in seconds, - for a missing contact, and optionally direction and \
+                 alignment."
+            }
+            Self::HalfPose { .. } => "Give both or neither.",
+            Self::Row { problem, .. } => match **problem {
+                Self::HalfPose { .. } => "Give both or neither.",
+                _ => "Correct the row, or capture the object again.",
+            },
+            Self::NotParquet { .. } | Self::NoColumn { .. } | Self::Column { .. } | Self::NoTouches => {
+                "Capture the object again, or remove the file."
+            }
+            Self::ParquetNotWritten { .. } => "Check the disk and the space on it, then resume the capture.",
+            Self::NoParquet => "Build it with the feature parquet, which is on by default.",
+            Self::NoObjects => "Fill it with: palpate capture builtin -o DIR.",
+            Self::OneObject { .. } => "Capture at least two objects into the directory.",
+            Self::TwoFiles { .. } => "Remove one of them.",
+            Self::Incomplete => "Resume the capture.",
+            Self::BadListing { .. } | Self::BadName { .. } | Self::ListedTwice { .. } => {
+                "Remove the file if the touches are from elsewhere, else capture them again."
+            }
+            Self::Missing { .. } | Self::OtherCount { .. } => {
+                "Capture the objects again, or remove dataset.json if this is meant."
+            }
+            Self::OtherChecksum => "Capture the objects again.",
+            Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
+            Self::UnknownFormat { .. } => "Use text or parquet.",
+            Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
+        }
+        .into()
     }
+}
+
+fn with_article(noun: &str) -> String {
+    format!("{} {noun}", if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" })
 }

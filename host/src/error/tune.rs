@@ -3,11 +3,29 @@
 /// What can be wrong with searching for a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum TuneProblem {}
+pub enum TuneProblem {
+    /// No model of the family is within the limits.
+    #[error(
+        "no model fits; the smallest has {bytes} bytes, and the fastest takes {instructions} instructions per touch"
+    )]
+    NothingFits {
+        /// Bytes of the smallest model.
+        bytes: usize,
+        /// Instructions per touch of the fastest model, on the chip that the limit is for.
+        instructions: u64,
+    },
+    /// No model of the family fits any layout.
+    #[error("no ensemble of the family could be compiled")]
+    NothingCompiles,
+}
 
 impl TuneProblem {
     /// What to do about it, as a sentence.
     pub fn fix(&self) -> String {
-        match *self {}
+        match self {
+            Self::NothingFits { .. } => "Allow more bytes or more instructions.",
+            Self::NothingCompiles => "Report this as a bug, with the data.",
+        }
+        .into()
     }
 }

@@ -13,7 +13,7 @@ pub struct Curve {
     correct: Vec<Vec<usize>>,
 }
 
-/// How sure a model was of the object it thought best, and whether that was the right one.
+/// How sure a model was of the object with the most evidence, and whether that was the right one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Confidence {
     /// The posterior of the best object.
@@ -26,7 +26,8 @@ impl Margins<'_> {
     /// Accuracy after 1 to `most` touches, over `groups` groups drawn for each object.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there are no groups, or an object has fewer than `most` touches.
+    /// [`Problem::Setting`](crate::error::Problem::Setting): `groups` if there are none, `at` if `most` is 0 or an object
+    /// has fewer touches.
     pub fn curve(&self, most: usize, groups: usize, seed: u64) -> Result<Curve> {
         self.check(most, groups)?;
         let correct = (0..self.tested.len()).map(|position| {
@@ -64,25 +65,28 @@ impl Margins<'_> {
     pub fn confidences(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Confidence>> {
         self.check(touches, groups)?;
         let unit = self.unit();
-        let of = |position: usize| {
+        let confidences = |position: usize| {
             let right = self.tested[position].object;
             self.ends(position, touches, groups, seed, move |evidence| {
                 let best = best(evidence);
                 Confidence { posterior: 1.0 / (1.0 + rivals(evidence, best, unit)), correct: best == right }
             })
         };
-        Ok((0..self.tested.len()).flat_map(of).collect())
+        Ok((0..self.tested.len()).flat_map(confidences).collect())
     }
 
     fn check(&self, most: usize, groups: usize) -> Result<()> {
         if groups == 0 {
-            return Err(Error::argument("there are no groups to evaluate", "Use --groups 1 or more."));
+            return Err(Error::setting("groups", 0, "at least 1"));
+        }
+        if most == 0 {
+            return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
         }
         match self.tested.iter().zip(self.tested_names()).find(|(tested, _)| tested.touches < most) {
-            Some((tested, name)) => Err(Error::argument(
-                format!("groups of {most} touches were asked for, but {name} has only {}", tested.touches),
-                "Ask for fewer touches with --at, or capture more.",
-            )),
+            Some((tested, name)) => {
+                let allowed = format!("fewer touches, or capture more: {name} has only {}", tested.touches);
+                Err(Error::setting("at", most, allowed))
+            }
             None => Ok(()),
         }
     }
@@ -122,7 +126,7 @@ impl Curve {
         self.correct.first().map_or(0, Vec::len)
     }
 
-    /// Accuracy after `touches` touches (1 to [`Curve::most`]), each object counting alike.
+    /// Accuracy after `touches` touches (1 to [`Curve::most`]), each object weighted equally.
     ///
     /// # Panics
     /// If `touches` is out of range.

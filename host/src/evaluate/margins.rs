@@ -1,8 +1,9 @@
 //! A model's margins for every test touch, computed once.
 
+use crate::compile;
 use crate::ensemble::{Ensemble, feature_row};
-use crate::error::{Error, Result};
-use crate::random;
+use crate::error::{EvaluateProblem, Result};
+use crate::random::{self, Purpose};
 use crate::touches::Dataset;
 use palpate_onboard::Model;
 use palpate_shared::{Descriptor, Touch};
@@ -21,27 +22,27 @@ pub enum Candidate<'m> {
 /// A model's margins for every touch of a data set.
 pub struct Margins<'m> {
     pub(super) candidate: Candidate<'m>,
-    descriptor: Option<Descriptor>,
+    descriptor: Descriptor,
     /// The objects that the model knows.
     objects: Vec<String>,
     /// The data set's objects.
-    pub(super) tested: Vec<Tested>,
+    pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
 }
 
 /// The margins of one object's test touches.
-pub(super) struct Tested {
+pub(super) struct Tested<'m> {
     /// The object's index in the model.
     pub(super) object: usize,
     pub(super) touches: usize,
-    pub(super) values: Values,
+    pub(super) values: Values<'m>,
 }
 
 /// Margins of touch after touch, one for each object that the model knows.
-pub(super) enum Values {
+pub(super) enum Values<'m> {
     Full(Vec<f32>),
     /// In the model's units.
-    Compiled(Vec<i32>),
+    Compiled(&'m Model<'m>, Vec<i32>),
 }
 
 impl Candidate<'_> {
@@ -55,7 +56,7 @@ impl Candidate<'_> {
     fn objects(&self) -> Vec<String> {
         match self {
             Self::Full(ensemble) => ensemble.objects.clone(),
-            Self::Compiled(model) => (0..model.object_count()).map(|object| model.object_name(object).into()).collect(),
+            Self::Compiled(model) => compile::names(model),
         }
     }
 }
@@ -65,33 +66,27 @@ impl<'m> Margins<'m> {
     /// model may know more.
     ///
     /// # Errors
-    /// [`Error::Data`] if the model does not know an object, works on rows of features instead of touches, or needs a
+    /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let objects = candidate.objects();
-        let Some(descriptor) = candidate.descriptor() else {
-            let what = "the model works on rows of features, not on touches";
-            return Err(Error::data(what, "Give a model that was exported from a Palpate ensemble."));
-        };
+        let descriptor = candidate.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
         let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
-            let what = format!("the descriptor {} needs the probe's pose, which no touch has", descriptor.name());
-            return Err(Error::data(what, "Capture with --pose."));
+            return Err(EvaluateProblem::NoPose { descriptor }.into());
         }
         let tested = dataset.objects.iter().map(|touched| {
-            let object = objects.iter().position(|name| *name == touched.name).ok_or_else(|| {
-                let what = format!("the model does not know the object {}, only {}", touched.name, objects.join(", "));
-                Error::data(what, "Train it on this object too, or take the object out of the data.")
-            })?;
+            let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: objects.clone() };
+            let object = objects.iter().position(|name| *name == touched.name).ok_or_else(unknown)?;
             let values = values(candidate, descriptor, &touched.touches, objects.len());
             Ok(Tested { object, touches: touched.touches.len(), values })
         });
         let tested = tested.collect::<Result<_>>()?;
-        Ok(Self { candidate, descriptor: Some(descriptor), objects, tested, tested_names: dataset.names() })
+        Ok(Self { candidate, descriptor, objects, tested, tested_names: dataset.names() })
     }
 
     /// The model's descriptor.
-    pub fn descriptor(&self) -> Option<Descriptor> {
+    pub fn descriptor(&self) -> Descriptor {
         self.descriptor
     }
 
@@ -115,7 +110,23 @@ impl<'m> Margins<'m> {
         self.tested.iter().map(|tested| tested.touches).min().unwrap_or(0)
     }
 
-    /// Natural logarithms a unit of evidence.
+    /// How many different groups of `touches` touches can be drawn from the object with the fewest, where that is below
+    /// 2⁶⁴.
+    pub fn distinct_groups(&self, touches: usize) -> u64 {
+        let all = self.fewest_touches();
+        if touches > all {
+            return 0;
+        }
+        // Each step is a whole number: the ways to choose one touch more.
+        let one_more = |groups: u128, chosen: usize| {
+            let next = groups.checked_mul((all - chosen) as u128)? / (chosen as u128 + 1);
+            (next <= u128::from(u64::MAX)).then_some(next)
+        };
+        let groups = (0..touches.min(all - touches)).try_fold(1, one_more);
+        groups.and_then(|groups| u64::try_from(groups).ok()).unwrap_or(u64::MAX)
+    }
+
+    /// Nats in one unit of evidence.
     pub(super) fn unit(&self) -> f64 {
         match self.candidate {
             Candidate::Full(_) => 1.0,
@@ -135,12 +146,12 @@ impl<'m> Margins<'m> {
     /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
     pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> rand::seq::index::IndexVec {
         let group = u64::try_from(group).unwrap_or(u64::MAX);
-        let mut random = random::generator(seed, &self.tested_names[position], group);
+        let mut random = random::generator(seed, Purpose::Groups, &self.tested_names[position], group);
         rand::seq::index::sample(&mut random, self.tested[position].touches, count)
     }
 }
 
-impl Tested {
+impl Tested<'_> {
     /// Adds the margins of touch `touch` to `evidence`. Whole numbers stay exact: their sums are far below 2⁵³.
     pub(super) fn add(&self, touch: usize, evidence: &mut [f64]) {
         let row = row(touch, evidence.len());
@@ -148,7 +159,7 @@ impl Tested {
             Values::Full(values) => {
                 evidence.iter_mut().zip(&values[row]).for_each(|(e, &margin)| *e += f64::from(margin))
             }
-            Values::Compiled(values) => {
+            Values::Compiled(_, values) => {
                 evidence.iter_mut().zip(&values[row]).for_each(|(e, &margin)| *e += f64::from(margin));
             }
         }
@@ -160,7 +171,7 @@ pub(super) fn row(touch: usize, objects: usize) -> Range<usize> {
     touch * objects..(touch + 1) * objects
 }
 
-fn values(candidate: Candidate<'_>, descriptor: Descriptor, touches: &[Touch], objects: usize) -> Values {
+fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[Touch], objects: usize) -> Values<'m> {
     match candidate {
         Candidate::Full(ensemble) => {
             let margins = |touch| ensemble.margins_of_features(&feature_row(descriptor, touch));
@@ -172,20 +183,14 @@ fn values(candidate: Candidate<'_>, descriptor: Descriptor, touches: &[Touch], o
                 model.margins(touch, &mut margins);
                 margins
             };
-            Values::Compiled(touches.par_iter().flat_map_iter(margins).collect())
+            Values::Compiled(model, touches.par_iter().flat_map_iter(margins).collect())
         }
     }
 }
 
 /// The object with the most evidence; the first of several, as on the chip.
-pub(super) fn best(evidence: &[f64]) -> usize {
-    let mut best = 0;
-    for (object, value) in evidence.iter().enumerate() {
-        if *value > evidence[best] {
-            best = object;
-        }
-    }
-    best
+pub(super) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
+    (0..evidence.len()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best })
 }
 
 /// What the other objects' weights come to, the best one's being 1: its posterior is 1 / (1 + this).

@@ -9,10 +9,29 @@
 //! A compiled model is evaluated by the onboard crate, the lines of code that run on the chip; an ensemble in f32 margins
 //! and f64 evidence, with the same stopping rule. The same seed draws the same groups for every model.
 //!
-//! Standard errors are those of the drawing of groups from the test touches at hand.
+//! Standard errors are those of the drawing of groups from the test touches.
+//!
+//! ```no_run
+//! use palpate::evaluate::model_file::ModelFile;
+//! use palpate::evaluate::{self, Margins};
+//! use palpate::touches::Dataset;
+//!
+//! # fn main() -> palpate::Result<()> {
+//! let model = ModelFile::load("model.palpate")?;
+//! let unseen = Dataset::read("unseen".as_ref())?;
+//! let evaluation = model.with(|candidate| {
+//!     let margins = Margins::new(candidate, &unseen)?;
+//!     evaluate::evaluate(&margins, &evaluate::Settings::default())
+//! })?;
+//! println!("right after 10 touches: {:.1} %", 100.0 * evaluation.accuracy[&10]);
+//! println!("sure after {:.1} touches", evaluation.sequential.mean_touches);
+//! # Ok(())
+//! # }
+//! ```
 
 mod curve;
 mod estimate;
+mod full;
 mod margins;
 pub mod model_file;
 pub mod parity;
@@ -31,6 +50,9 @@ use std::collections::BTreeMap;
 
 /// Touches after which a recognizer gives up, unless its model says otherwise.
 pub const MAX_TOUCHES: u32 = 200;
+
+/// Accuracies that rest on fewer different groups than this say little.
+pub const LEAST_GROUPS: u64 = 200;
 
 /// What is evaluated.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,12 +80,12 @@ impl Default for Settings {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
     /// The model's descriptor.
-    pub descriptor: Option<&'static str>,
+    pub descriptor: &'static str,
     /// Test touches, of all objects together.
     pub touches: usize,
     /// Groups drawn for each object.
     pub groups: usize,
-    /// Accuracy after a number of touches, each object counting alike.
+    /// Accuracy after a number of touches, each object weighted equally.
     pub accuracy: BTreeMap<usize, f64>,
     /// Standard error of [`Evaluation::accuracy`].
     pub accuracy_standard_error: BTreeMap<usize, f64>,
@@ -76,13 +98,13 @@ pub struct Evaluation {
 /// Evaluates a model on test touches.
 ///
 /// # Errors
-/// [`Error::Argument`] if a number of touches is 0 or more than an object has, if there are no groups, or the error rate
-/// is not between 1e-15 and 0.5.
+/// [`Problem::Setting`](crate::error::Problem::Setting): `at` if a number of touches is 0 or more than an object has,
+/// `groups` if there are none, `error_rate` and `max_touches` if they are out of their ranges.
 pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation> {
     let most = settings.at.iter().copied().max().unwrap_or(1);
     let curve = margins.curve(most, settings.groups, settings.seed)?;
     if settings.at.contains(&0) {
-        return Err(Error::argument("accuracy after 0 touches was asked for", "Use numbers of at least 1 with --at."));
+        return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
     }
     let sequential = margins.sequential(&SequentialSettings {
         error_rate: settings.error_rate,
@@ -96,7 +118,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
         (name.clone(), settings.at.iter().map(accuracy).collect())
     };
     Ok(Evaluation {
-        descriptor: margins.descriptor().map(palpate_shared::Descriptor::name),
+        descriptor: margins.descriptor().name(),
         touches: margins.touch_count(),
         groups: settings.groups,
         accuracy: settings.at.iter().map(accuracy).map(|(at, estimate)| (at, estimate.value)).collect(),

@@ -1,13 +1,15 @@
-//! A compiled model against its ensemble: margins touch by touch, verdicts sequence by sequence.
+//! A compiled model compared with its ensemble: margins touch by touch, verdicts sequence by sequence.
 
+use super::full::FullRecognizer;
+use super::margins::best;
 use crate::ensemble::Ensemble;
-use crate::error::{Error, Result};
+use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
+use crate::random::{self, Purpose};
 use crate::touches::Dataset;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use rayon::prelude::*;
 
 /// How far two models are apart.
@@ -29,11 +31,15 @@ pub struct Parity {
     pub touches_differ: usize,
 }
 
-/// Holds a compiled model against its ensemble: every touch of a data set, and `sequences` sequences, each of touches
-/// drawn at random from one object's until there is a verdict. Both models stop by the compiled model's own rule.
+/// Room for the objects of any model.
+const CAPACITY: usize = 256;
+
+/// Compares a compiled model with its ensemble: on every touch of a data set, and on `sequences` sequences, each of
+/// touches drawn at random from one object's until there is a verdict. Both models stop by the compiled model's own rule.
 ///
 /// # Errors
-/// When the two are not of the same objects and descriptor.
+/// [`EvaluateProblem`] when the two are not of the same objects and descriptor, or an object of the data set has no
+/// touches; [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn parity(
     ensemble: &Ensemble,
     model: &Model<'_>,
@@ -42,22 +48,18 @@ pub fn parity(
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Parity> {
-    check(ensemble, model)?;
+    if dataset.objects.is_empty() || dataset.objects.iter().any(|object| object.touches.is_empty()) {
+        return Err(EvaluateProblem::NoTouches.into());
+    }
     let touches: Vec<&Touch> = dataset.objects.iter().flat_map(|object| &object.touches).collect();
-    progress.begin("margins", Some(touches.len() as u64));
-    let compared = touches.par_iter().map(|touch| -> Result<_> {
-        progress::advance(progress, 1)?;
-        Ok(compare(ensemble, model, touch))
-    });
-    let (max_margin_error, best_differs) =
-        compared.try_reduce(|| (0.0, 0), |(error, differs), (e, d)| Ok((f64::max(error, e), differs + d)))?;
+    let Difference { max_margin_error, best_differs } = difference(ensemble, model, &touches, progress)?;
     progress.begin("verdicts", Some(sequences as u64));
     let runs = (0..sequences).into_par_iter().map(|index| -> Result<_> {
         progress::advance(progress, 1)?;
-        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64));
+        let mut rng = random::generator(seed, Purpose::Sequences, "", index as u64);
         let object = &dataset.objects[rng.random_range(0..dataset.objects.len())];
         let draw = std::iter::repeat_with(|| object.touches[rng.random_range(0..object.touches.len())]);
-        Ok(differ(ensemble, model, draw))
+        compare_verdicts::<CAPACITY>(ensemble, model, draw)
     });
     let (verdict_differs, touches_differ) = runs.try_reduce(|| (0, 0), |a, b| Ok((a.0 + b.0, a.1 + b.1)))?;
     Ok(Parity {
@@ -71,87 +73,136 @@ pub fn parity(
     })
 }
 
-fn check(ensemble: &Ensemble, model: &Model<'_>) -> Result<()> {
-    let names = (0..model.object_count()).map(|object| model.object_name(object));
-    if model.descriptor() != Some(ensemble.descriptor) || !names.eq(ensemble.objects.iter().map(String::as_str)) {
-        return Err(Error::data(
-            "the model was not compiled from this ensemble: its objects or its descriptor are others",
-            "Give the ensemble that the model was exported from.",
-        ));
-    }
-    Ok(())
+/// How far the margins of two models are apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// The largest difference of a margin, in nats.
+    pub max_margin_error: f64,
+    /// Touches after which another object is the best.
+    pub best_differs: usize,
 }
 
-/// The largest difference of a margin of a touch, and 1 if another object is the best.
-fn compare(ensemble: &Ensemble, model: &Model<'_>, touch: &Touch) -> (f64, usize) {
+/// Compares a compiled model's margins with its ensemble's, touch by touch, on all threads.
+///
+/// # Errors
+/// [`EvaluateProblem::OtherModel`] when the two are not of the same objects and descriptor;
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn difference(
+    ensemble: &Ensemble,
+    model: &Model<'_>,
+    touches: &[&Touch],
+    progress: &dyn Progress,
+) -> Result<Difference> {
+    let names = (0..model.object_count()).map(|object| model.object_name(object));
+    if model.descriptor() != Some(ensemble.descriptor) || !names.eq(ensemble.objects.iter().map(String::as_str)) {
+        return Err(EvaluateProblem::OtherModel.into());
+    }
+    progress.begin("margins", Some(touches.len() as u64));
+    let compared = touches.par_iter().map(|touch| -> Result<_> {
+        progress::advance(progress, 1)?;
+        Ok(compare_margins(ensemble, model, touch))
+    });
+    compared.try_reduce(Difference::default, |a, b| {
+        Ok(Difference {
+            max_margin_error: f64::max(a.max_margin_error, b.max_margin_error),
+            best_differs: a.best_differs + b.best_differs,
+        })
+    })
+}
+
+fn compare_margins(ensemble: &Ensemble, model: &Model<'_>, touch: &Touch) -> Difference {
     let full = ensemble.margins(touch);
-    let mut margins = [0; 256];
+    let mut margins = [0; CAPACITY];
     model.margins(touch, &mut margins);
     let compiled = &margins[..full.len()];
     let unit = f64::from(model.unit());
     let errors = full.iter().zip(compiled).map(|(full, &int)| (f64::from(*full) - f64::from(int) * unit).abs());
-    let differs = best(&full) != best(compiled);
-    (errors.fold(0.0, f64::max), usize::from(differs))
+    let best_differs = usize::from(best(&full) != best(compiled));
+    Difference { max_margin_error: errors.fold(0.0, f64::max), best_differs }
 }
 
 /// Whether the verdicts differ (1, 0), or only the numbers of touches (0, 1).
-fn differ(ensemble: &Ensemble, model: &Model<'_>, mut draw: impl Iterator<Item = Touch>) -> (usize, usize) {
+///
+/// # Errors
+/// [`EvaluateProblem::TooManyObjects`] if the model has more than `N` objects.
+fn compare_verdicts<const N: usize>(
+    ensemble: &Ensemble,
+    model: &Model<'_>,
+    mut draw: impl Iterator<Item = Touch>,
+) -> Result<(usize, usize)> {
     let stopping = Stopping::from_model(model);
-    let Ok(mut compiled) = Recognizer::<256>::new(model, stopping) else { return (0, 0) };
-    let mut full = FullRecognizer::new(ensemble, model, stopping);
+    let mut compiled = Recognizer::<N>::new(model, stopping)
+        .map_err(|error| EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity })?;
+    let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
+    let mut full = FullRecognizer::new((0..ensemble.objects.len()).map(prior).collect(), stopping);
     // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict.
     while let Some(touch) = draw.next()
-        && (compiled.verdict() == Verdict::Undecided || full.verdict == Verdict::Undecided)
+        && (compiled.verdict() == Verdict::Undecided || full.verdict() == Verdict::Undecided)
     {
         // What the model was not trained for is not counted by either.
-        if compiled.push(&touch).is_ok() {
-            full.push(&touch);
+        let accepted = compiled.push(&touch).is_ok();
+        if full.verdict() == Verdict::Undecided {
+            if accepted {
+                full.push(&ensemble.margins(&touch));
+            }
         }
     }
-    match (compiled.verdict(), full.verdict) {
+    Ok(match (compiled.verdict(), full.verdict()) {
         (a, b) if a == b => (0, 0),
         (Verdict::Recognized { object: a, .. }, Verdict::Recognized { object: b, .. }) if a == b => (0, 1),
         _ => (1, 0),
-    }
+    })
 }
 
-/// The full model's recognizer: f32 margins, evidence in f64, the same rule for stopping.
-struct FullRecognizer<'a> {
-    ensemble: &'a Ensemble,
-    stopping: Stopping,
-    evidence: Vec<f64>,
-    touches: u32,
-    verdict: Verdict,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compile::{self, compile};
+    use crate::ensemble::train::{self, train};
+    use crate::error::Problem;
+    use crate::touches::synthetic;
 
-impl<'a> FullRecognizer<'a> {
-    fn new(ensemble: &'a Ensemble, model: &Model<'_>, stopping: Stopping) -> Self {
-        let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
-        let evidence = (0..ensemble.objects.len()).map(prior).collect();
-        Self { ensemble, stopping, evidence, touches: 0, verdict: Verdict::Undecided }
+    fn ensemble() -> Ensemble {
+        let settings = train::Settings { rounds: 5, depth: 3, ..train::Settings::compact() };
+        train(&synthetic::dataset(&[200, 200, 200], 1), &settings, &()).unwrap()
     }
 
-    fn push(&mut self, touch: &Touch) {
-        if self.verdict != Verdict::Undecided {
-            return;
-        }
-        for (evidence, margin) in self.evidence.iter_mut().zip(self.ensemble.margins(touch)) {
-            *evidence += f64::from(margin);
-        }
-        self.touches += 1;
-        let best = best(&self.evidence);
-        let rivals = self.evidence.iter().enumerate().filter(|(object, _)| *object != best);
-        let weights: f64 = rivals.map(|(_, evidence)| (evidence - self.evidence[best]).exp()).sum();
-        let rate = self.stopping.error_rate();
-        if weights <= rate / (1.0 - rate) {
-            self.verdict = Verdict::Recognized { object: best as u8, touches: self.touches };
-        } else if self.touches >= self.stopping.max_touches() {
-            self.verdict = Verdict::Unknown;
+    fn problem<T>(result: Result<T>) -> EvaluateProblem {
+        match result.err().unwrap().problem() {
+            Some(Problem::Evaluate(problem)) => problem.clone(),
+            other => panic!("{other:?}"),
         }
     }
-}
 
-/// The first of the largest.
-fn best<T: PartialOrd + Copy>(values: &[T]) -> usize {
-    (0..values.len()).fold(0, |best, index| if values[index] > values[best] { index } else { best })
+    #[test]
+    fn verdicts_that_no_recognizer_has_room_for_are_an_error_and_not_equal() {
+        let ensemble = ensemble();
+        let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+        let model = compile::open(&bytes).unwrap();
+        let touches = || std::iter::repeat(Touch::from_micros([0, 0, 9]));
+        let error = problem(compare_verdicts::<2>(&ensemble, &model, touches()));
+        assert_eq!(error, EvaluateProblem::TooManyObjects { objects: 3, capacity: 2 });
+        assert_eq!(compare_verdicts::<3>(&ensemble, &model, touches()).unwrap(), (0, 0));
+    }
+
+    #[test]
+    fn parity_on_an_empty_data_set_is_an_error_and_no_panic() {
+        let ensemble = ensemble();
+        let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+        let model = compile::open(&bytes).unwrap();
+        for counts in [&[][..], &[0, 0], &[5, 0]] {
+            let dataset = synthetic::dataset(counts, 1);
+            assert_eq!(problem(parity(&ensemble, &model, &dataset, 10, 1, &())), EvaluateProblem::NoTouches);
+        }
+    }
+
+    #[test]
+    fn another_ensembles_model_is_refused() {
+        let ensemble = ensemble();
+        let other = Ensemble { objects: ["a", "b", "c"].map(String::from).into(), ..ensemble.clone() };
+        let bytes = compile(&other, &compile::Settings::default()).unwrap().bytes;
+        let model = compile::open(&bytes).unwrap();
+        let dataset = synthetic::dataset(&[5, 5, 5], 1);
+        assert_eq!(problem(parity(&ensemble, &model, &dataset, 10, 1, &())), EvaluateProblem::OtherModel);
+    }
 }

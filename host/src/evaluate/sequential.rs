@@ -2,7 +2,9 @@
 
 use super::MAX_TOUCHES;
 use super::estimate::Estimate;
-use super::margins::{Candidate, Margins, Values, best, rivals, row};
+use super::full::FullRecognizer;
+use super::margins::{Candidate, Margins, Values, row};
+use crate::compile;
 use crate::error::{Error, Result};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use rayon::prelude::*;
@@ -23,7 +25,7 @@ pub struct SequentialSettings {
     pub seed: u64,
 }
 
-/// What a recognizer does that stops by itself. Each object counts alike.
+/// What a recognizer does that stops by itself. Each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
     /// What it was asked to stay below.
@@ -42,6 +44,10 @@ pub struct Sequential {
     pub undecided: f64,
     /// Touches used on average, for each object.
     pub per_object: BTreeMap<String, f64>,
+    /// Share of sequences with a wrong verdict, for each object.
+    pub error_per_object: BTreeMap<String, f64>,
+    /// Share of sequences without a verdict, for each object.
+    pub undecided_per_object: BTreeMap<String, f64>,
     /// For each tested object, how it went for every sequence.
     #[serde(skip)]
     pub outcomes: Vec<Vec<Outcome>>,
@@ -60,33 +66,36 @@ impl Margins<'_> {
     /// Pushes random sequences of each object's touches into a recognizer until it stops.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there are no sequences, or the error rate is not between 1e-15 and 0.5.
+    /// [`Problem::Setting`](crate::error::Problem::Setting) if there are no sequences, or the error rate or the limit of
+    /// touches is out of its range.
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
         let SequentialSettings { error_rate, max_touches, sequences, seed } = *settings;
         if sequences == 0 {
-            return Err(Error::argument("there are no sequences to evaluate", "Use --groups 1 or more."));
+            return Err(Error::setting("groups", 0, "at least 1"));
         }
         let own = match self.candidate {
             Candidate::Full(_) => MAX_TOUCHES,
             Candidate::Compiled(model) => Stopping::from_model(model).max_touches(),
         };
-        let stopping = Stopping::new(error_rate, max_touches.unwrap_or(own)).ok_or_else(|| {
-            let what = format!("a recognizer cannot stop at an error rate of {error_rate}");
-            Error::argument(what, "Use an --error-rate between 1e-15 and 0.5, and at least one touch.")
-        })?;
+        let stopping = compile::stopping(error_rate, max_touches.unwrap_or(own))?;
         let outcomes: Vec<Vec<Outcome>> =
             (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
-        let share = |hit: &dyn Fn(usize, &Outcome) -> bool| {
-            Estimate::mean_of(outcomes.iter().enumerate().map(|(position, outcomes)| {
+        let shares = |hit: &dyn Fn(usize, &Outcome) -> bool| -> Vec<Estimate> {
+            let share = |(position, outcomes): (usize, &Vec<Outcome>)| {
                 Estimate::share(outcomes.iter().filter(|outcome| hit(position, outcome)).count(), sequences)
-            }))
+            };
+            outcomes.iter().enumerate().map(share).collect()
         };
         let right = |position: usize| self.tested[position].object;
-        let error = share(&|position, outcome| outcome.recognized.is_some_and(|object| object != right(position)));
-        let undecided = share(&|_, outcome| outcome.recognized.is_none());
-        let touches = outcomes.iter().map(|outcomes| Estimate::mean(outcomes.iter().map(|o| o.touches as f64)));
-        let mean = Estimate::mean_of(touches.clone());
-        let per_object = self.tested_names().iter().cloned().zip(touches.map(|estimate| estimate.value)).collect();
+        let errors = shares(&|position, outcome| outcome.recognized.is_some_and(|object| object != right(position)));
+        let undecideds = shares(&|_, outcome| outcome.recognized.is_none());
+        let touches: Vec<Estimate> =
+            outcomes.iter().map(|outcomes| Estimate::mean(outcomes.iter().map(|o| o.touches as f64))).collect();
+        let per_object = |estimates: &[Estimate]| {
+            self.tested_names().iter().cloned().zip(estimates.iter().map(|estimate| estimate.value)).collect()
+        };
+        let [mean, error, undecided] =
+            [&touches, &errors, &undecideds].map(|estimates| Estimate::mean_of(estimates.iter().copied()));
         Ok(Sequential {
             error_rate,
             max_touches: stopping.max_touches(),
@@ -95,7 +104,9 @@ impl Margins<'_> {
             error: error.value,
             error_standard_error: error.standard_error,
             undecided: undecided.value,
-            per_object,
+            per_object: per_object(&touches),
+            error_per_object: per_object(&errors),
+            undecided_per_object: per_object(&undecideds),
             outcomes,
         })
     }
@@ -106,8 +117,8 @@ impl Margins<'_> {
         let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(tested.touches);
         let run = |sequence| {
             let touches = self.draw(position, sequence, limit, seed).into_iter();
-            match (&tested.values, self.candidate) {
-                (Values::Compiled(values), Candidate::Compiled(model)) => {
+            match &tested.values {
+                Values::Compiled(model, values) => {
                     let rows = touches.map(|touch| &values[row(touch, objects)]);
                     match objects {
                         0..=16 => onboard::<16>(model, stopping, rows),
@@ -115,14 +126,9 @@ impl Margins<'_> {
                         _ => onboard::<256>(model, stopping, rows),
                     }
                 }
-                _ => {
-                    let mut evidence = self.prior();
-                    let odds = stopping.error_rate() / (1.0 - stopping.error_rate());
-                    until_sure(touches.map(|touch| {
-                        tested.add(touch, &mut evidence);
-                        let best = best(&evidence);
-                        (rivals(&evidence, best, 1.0) <= odds).then_some(best)
-                    }))
+                Values::Full(values) => {
+                    let mut recognizer = FullRecognizer::new(self.prior(), stopping);
+                    until_sure(touches.map(|touch| recognizer.push(&values[row(touch, objects)])))
                 }
             }
         };
@@ -140,19 +146,16 @@ fn onboard<'r, const N: usize>(
         // Room was made for at least as many objects as the model has.
         return Outcome { touches: 0, recognized: None };
     };
-    until_sure(rows.map(|margins| match recognizer.push_margins(margins) {
-        Verdict::Recognized { object, .. } => Some(usize::from(object)),
-        Verdict::Undecided | Verdict::Unknown => None,
-    }))
+    until_sure(rows.map(|margins| recognizer.push_margins(margins)))
 }
 
 /// Counts touches up to the first verdict.
-fn until_sure(verdicts: impl Iterator<Item = Option<usize>>) -> Outcome {
+fn until_sure(verdicts: impl Iterator<Item = Verdict>) -> Outcome {
     let mut touches = 0;
     for verdict in verdicts {
         touches += 1;
-        if verdict.is_some() {
-            return Outcome { touches, recognized: verdict };
+        if let Verdict::Recognized { object, .. } = verdict {
+            return Outcome { touches, recognized: Some(object.into()) };
         }
     }
     Outcome { touches, recognized: None }

@@ -2,6 +2,7 @@ use super::*;
 use crate::compile::{self, Leaf, compile};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
+use crate::error::Problem;
 use crate::touches::Dataset;
 use crate::touches::synthetic;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -24,7 +25,7 @@ fn quick() -> Settings {
     Settings { at: vec![1, 5, 20], groups: 200, ..Settings::default() }
 }
 
-fn both(check: impl Fn(&Margins<'_>)) {
+fn full_and_compiled(check: impl Fn(&Margins<'_>)) {
     let ensemble = ensemble();
     let bytes = compiled(&ensemble);
     let model = Model::new(&bytes).unwrap();
@@ -54,7 +55,7 @@ fn accuracy_after_one_touch_is_what_counting_touches_gives() {
 
 #[test]
 fn more_touches_make_fewer_errors_and_confusion_agrees_with_the_curve() {
-    both(|margins| {
+    full_and_compiled(|margins| {
         let curve = margins.curve(60, 300, 1).unwrap();
         let [one, ten, sixty] = [1, 10, 60].map(|touches| curve.accuracy(touches).value);
         assert!(one < ten && ten < sixty && sixty > 0.95, "{one} {ten} {sixty}");
@@ -72,7 +73,7 @@ fn more_touches_make_fewer_errors_and_confusion_agrees_with_the_curve() {
 
 #[test]
 fn touches_to_an_error_rate_is_where_the_curve_passes_for_good() {
-    both(|margins| {
+    full_and_compiled(|margins| {
         let curve = margins.curve(100, 300, 1).unwrap();
         let touches = curve.touches_to_error(0.05).unwrap();
         assert!(curve.accuracy(touches).value >= 0.95);
@@ -84,7 +85,7 @@ fn touches_to_an_error_rate_is_where_the_curve_passes_for_good() {
 
 #[test]
 fn the_sequential_errors_stay_below_the_error_rate() {
-    both(|margins| {
+    full_and_compiled(|margins| {
         for error_rate in [0.2, 0.05, 0.01] {
             let settings = SequentialSettings { error_rate, max_touches: None, sequences: 500, seed: 3 };
             let sequential = margins.sequential(&settings).unwrap();
@@ -128,8 +129,8 @@ fn full_and_compiled_model_are_measured_on_the_same_groups() {
     let ensemble = ensemble();
     let bytes = compiled(&ensemble);
     let model = Model::new(&bytes).unwrap();
-    let of = |candidate| evaluate(&Margins::new(candidate, &test_touches()).unwrap(), &quick()).unwrap();
-    let (full, compiled) = (of(Candidate::Full(&ensemble)), of(Candidate::Compiled(&model)));
+    let evaluated = |candidate| evaluate(&Margins::new(candidate, &test_touches()).unwrap(), &quick()).unwrap();
+    let (full, compiled) = (evaluated(Candidate::Full(&ensemble)), evaluated(Candidate::Compiled(&model)));
     // Sixteen bits change hardly a verdict; other groups would change a percent of them.
     assert!((full.accuracy[&20] - compiled.accuracy[&20]).abs() < 0.003, "{full:?} {compiled:?}");
     assert!((full.sequential.mean_touches - compiled.sequential.mean_touches).abs() < 0.05);
@@ -137,7 +138,7 @@ fn full_and_compiled_model_are_measured_on_the_same_groups() {
 
 #[test]
 fn a_recognizer_that_runs_out_of_touches_is_undecided() {
-    both(|margins| {
+    full_and_compiled(|margins| {
         let settings = SequentialSettings { error_rate: 1e-12, max_touches: Some(2), sequences: 20, seed: 1 };
         let sequential = margins.sequential(&settings).unwrap();
         assert_eq!((sequential.undecided, sequential.mean_touches, sequential.max_touches), (1.0, 2.0, 2));
@@ -149,7 +150,7 @@ fn a_recognizer_that_runs_out_of_touches_is_undecided() {
 
 #[test]
 fn the_json_has_the_keys_that_programs_rely_on() {
-    both(|margins| {
+    full_and_compiled(|margins| {
         let json = serde_json::to_value(evaluate(margins, &quick()).unwrap()).unwrap();
         for pointer in ["/accuracy/5", "/per_object/object1/20", "/sequential/error_rate", "/sequential/mean_touches"] {
             assert!(json.pointer(pointer).is_some_and(serde_json::Value::is_number), "{pointer} in {json}");
@@ -159,8 +160,33 @@ fn the_json_has_the_keys_that_programs_rely_on() {
 }
 
 #[test]
+fn how_many_groups_differ_is_counted() {
+    let ensemble = ensemble();
+    let touches = synthetic::dataset(&[30, 40, 30], 2);
+    let margins = Margins::new(Candidate::Full(&ensemble), &touches).unwrap();
+    let expected = [(0, 1), (1, 30), (2, 435), (15, 155_117_520), (28, 435), (29, 30), (30, 1), (31, 0)];
+    for (at, groups) in expected {
+        assert_eq!(margins.distinct_groups(at), groups, "{at}");
+    }
+    let margins = Margins::new(Candidate::Full(&ensemble), &test_touches()).unwrap();
+    assert_eq!(margins.distinct_groups(150), u64::MAX);
+}
+
+#[test]
+fn errors_and_undecided_sequences_of_objects_average_to_those_of_all() {
+    full_and_compiled(|margins| {
+        let settings = SequentialSettings { error_rate: 0.2, max_touches: Some(4), sequences: 300, seed: 3 };
+        let sequential = margins.sequential(&settings).unwrap();
+        let mean = |shares: &BTreeMap<String, f64>| shares.values().sum::<f64>() / 3.0;
+        assert!((mean(&sequential.error_per_object) - sequential.error).abs() < 1e-12);
+        assert!((mean(&sequential.undecided_per_object) - sequential.undecided).abs() < 1e-12);
+        assert!(sequential.error > 0.0 && sequential.undecided > 0.0);
+    });
+}
+
+#[test]
 fn the_same_seed_gives_the_same_figures_on_any_number_of_threads() {
-    both(|margins| {
+    full_and_compiled(|margins| {
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| evaluate(margins, &quick()).unwrap())
@@ -175,15 +201,17 @@ fn what_cannot_be_evaluated_says_so() {
     let ensemble = ensemble();
     let margins = Margins::new(Candidate::Full(&ensemble), &test_touches()).unwrap();
     for (settings, expected) in [
-        (Settings { at: vec![301], ..quick() }, "object1 has only 300"),
-        (Settings { at: vec![0], ..quick() }, "--at"),
-        (Settings { groups: 0, ..quick() }, "--groups"),
-        (Settings { error_rate: 0.5, ..quick() }, "--error-rate"),
-        (Settings { error_rate: f64::NAN, ..quick() }, "--error-rate"),
-        (Settings { max_touches: Some(0), ..quick() }, "at least one touch"),
+        (Settings { at: vec![301], ..quick() }, "at is 301. Use fewer touches, or capture more: object1 has only 300."),
+        (Settings { at: vec![0], ..quick() }, "at is 0. Use numbers of touches of at least 1."),
+        (Settings { at: vec![0, 5], ..quick() }, "at is 0. Use numbers of touches of at least 1."),
+        (Settings { groups: 0, ..quick() }, "groups is 0. Use at least 1."),
+        (Settings { error_rate: 0.5, ..quick() }, "error_rate is 0.5. Use a number of at least 1e-15 and below 0.5."),
+        (Settings { error_rate: f64::NAN, ..quick() }, "error_rate is NaN."),
+        (Settings { max_touches: Some(0), ..quick() }, "max_touches is 0. Use at least 1."),
     ] {
         let error = evaluate(&margins, &settings).unwrap_err();
-        assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains(expected), "{error}");
+        assert!(error.exit_code() == 2 && error.to_string().contains(expected), "{error}");
+        assert!(matches!(error.problem(), Some(Problem::Setting { .. })), "{error:?}");
     }
     let unknown = synthetic::dataset(&[9, 9, 9, 9], 1);
     let error = Margins::new(Candidate::Full(&ensemble), &unknown).err().unwrap();

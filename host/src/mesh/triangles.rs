@@ -47,8 +47,12 @@ impl Mesh {
     }
 
     /// A globe with hills, for tests and benchmarks that need a mesh of a certain size: closed, right side out, about 2
-    /// units wide, with 4 · `rings` · (`rings` − 1) triangles. `rings` is at least 2; fewer give no triangles.
+    /// units wide, with 4 · `rings` · (`rings` − 1) triangles; none for fewer than 2 rings.
+    ///
+    /// # Panics
+    /// If `rings` is more than 40,000: indices would not fit in a `u32`.
     pub fn globe(rings: u32) -> Self {
+        assert!(rings <= 40_000, "a globe of {rings} rings has too many vertices");
         let columns = 2 * rings;
         let position = |ring: u32, column: u32| {
             let latitude = std::f64::consts::PI * f64::from(ring) / f64::from(rings);

@@ -5,9 +5,8 @@
 
 use crate::error::{Error, Result};
 use crate::probe::scene::Scene;
-use crate::touches::to_q15;
 use glam::DVec3;
-use palpate_shared::{ContactTime, Pose, Touch};
+use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use rand::{Rng, RngExt};
 
 /// The number of the probe's fingers.
@@ -129,6 +128,12 @@ impl Approach {
             alignment: self.alignment.to_array().map(to_q15),
         })
     }
+}
+
+/// A direction cosine as the nearest Q15 number; what is beyond ±1 becomes ±1.
+pub fn to_q15(cosine: f64) -> i16 {
+    let one = f64::from(Q15_ONE);
+    (cosine * one).round().clamp(-one, one) as i16
 }
 
 /// Uniform in [0, 1), of 53 bits.

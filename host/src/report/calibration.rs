@@ -1,6 +1,7 @@
 //! Calibration: whether an object with a posterior of 90 % is the right one nine times in ten.
 
-use super::context::{Context, compiled, compiled_f32, opened};
+use super::context::{Context, compiled, compiled_f32};
+use crate::compile;
 use super::limit::Large;
 use super::statistics::wilson;
 use crate::error::Result;
@@ -49,7 +50,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Calibration> {
     let settings = context.settings;
     let models = context.models()?;
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
-    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
+    let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
     let groups = if settings.quick { 500 } else { 2_000 };
     let mut result = Calibration { groups, bins: Vec::new(), error: Vec::new() };
     for candidate in [Candidate::Compiled(&paper), Candidate::Compiled(&ours)] {

@@ -2,18 +2,17 @@
 
 use super::cache::Cache;
 use super::settings::Settings;
-use crate::capture::{self, Sampler};
+use crate::capture::Sampler;
 use crate::compile;
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
-use crate::error::{ReportProblem, Result};
+use crate::error::Result;
 use crate::mesh::Object;
 use crate::mesh::builtin;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::folds::{self, Split};
-use crate::touches::{Dataset, ObjectTouches};
-use palpate_onboard::Model;
+use crate::touches::{Dataset, ObjectTouches, Origin};
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::cell::OnceCell;
@@ -57,7 +56,7 @@ impl<'a> Context<'a> {
         cache: &'a Cache,
         progress: &'a dyn Progress,
     ) -> Result<Self> {
-        let length = capture::Settings::default().length;
+        let length = Origin::default().length;
         let scenes = objects.par_iter().map(|object| Scene::new(&object.mesh, length)).collect::<Result<_>>()?;
         let (captured, first, models, kinds) = Default::default();
         Ok(Self { settings, objects, cache, progress, scenes, captured, first, models, kinds })
@@ -69,7 +68,10 @@ impl<'a> Context<'a> {
             let began = Instant::now();
             let touched = self.touch(self.settings.touches, self.settings.seed)?;
             let (objects, approaches) = touched.into_iter().unzip();
-            Ok(Captured { data: Dataset { objects }, approaches, seconds: began.elapsed().as_secs_f64() })
+            let origin =
+                Origin { touches: self.settings.touches as u64, seed: self.settings.seed, ..Origin::default() };
+            let data = Dataset { origin: Some(origin), ..Dataset::new(objects) };
+            Ok(Captured { data, approaches, seconds: began.elapsed().as_secs_f64() })
         })
     }
 
@@ -189,8 +191,8 @@ pub(super) fn touch(
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<(ObjectTouches, u64)> {
-    let settings = capture::Settings { seed, ..capture::Settings::default() };
-    let sampler = Sampler::new(scene, name, &settings);
+    let origin = Origin { seed, ..Origin::default() };
+    let sampler = Sampler::new(scene, name, &origin);
     let chunk = |chunk: usize| -> Result<Vec<(Touch, u64)>> {
         let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
         progress::advance(progress, indices.len() as u64)?;
@@ -221,9 +223,4 @@ pub(super) fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>
 /// than any difference that decides, and several times faster to compute than by the trainer's own trees.
 pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
     compile::compile(ensemble, &compile::Settings { leaf: compile::Leaf::F32, ..compile::Settings::default() })
-}
-
-/// A compiled model, checked.
-pub(super) fn opened(bytes: &[u8]) -> Result<Model<'_>> {
-    Model::new(bytes).map_err(|error| ReportProblem::Compiled { reason: error.to_string() }.into())
 }

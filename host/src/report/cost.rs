@@ -1,13 +1,13 @@
 //! Speed against error: a family of compiled models, what each costs, and how good it is.
 
-use super::context::{Context, opened};
+use super::context::Context;
 use super::instructions::Instructions;
 use super::limit::Large;
 use crate::compile::{self, Leaf};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
-use crate::error::{Error, Result};
-use crate::evaluate::{Candidate, Margins};
+use crate::error::{CompileProblem, Error, Problem, Result};
+use crate::evaluate::{Candidate, Margins, parity};
 use crate::page::axis::{Axis, short_number};
 use crate::page::chart::{Chart, Mark, Shape, Side, Stroke};
 use crate::page::color;
@@ -15,7 +15,6 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -103,19 +102,13 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
 fn fitting(ensemble: &Ensemble, leaf: Leaf, layout: Option<compile::Layout>) -> Result<Option<compile::Compiled>> {
     match compile::compile(ensemble, &compile::Settings { leaf, layout, ..compile::Settings::default() }) {
         Ok(compiled) => Ok(Some(compiled)),
-        Err(error) if is_too_large(&error) => Ok(None),
+        Err(error) if is_unfit(&error) => Ok(None),
         Err(error) => Err(error),
     }
 }
 
-/// Whether an ensemble is not wrong, but fits no layout, or not the one asked for.
-fn is_too_large(error: &Error) -> bool {
-    match error {
-        Error::Data { what, .. } | Error::Argument { what, .. } => {
-            what.starts_with("the ensemble fits no layout") || what.starts_with("the ensemble does not fit the layout")
-        }
-        _ => false,
-    }
+fn is_unfit(error: &Error) -> bool {
+    matches!(error.problem(), Some(Problem::Compile(CompileProblem::DoesNotFit { .. })))
 }
 
 fn member(
@@ -128,9 +121,10 @@ fn member(
     compiled: &compile::Compiled,
 ) -> Result<Member> {
     let settings = context.settings;
-    let model = opened(&compiled.bytes)?;
+    let model = compile::open(&compiled.bytes)?;
     let margins = Margins::new(Candidate::Compiled(&model), &large.test)?;
     let groups = if settings.quick { 500 } else { 1_500 };
+    let all: Vec<&Touch> = touches.iter().collect();
     let curve = margins.curve(100.min(margins.fewest_touches()), groups, settings.seed)?;
     Ok(Member {
         name: name.into(),
@@ -140,7 +134,7 @@ fn member(
         bytes: compiled.bytes.len(),
         nanoseconds: nanoseconds(&model, touches),
         instructions: Instructions::new(compiled, touches)?,
-        margin_error: margin_error(&model, ensemble, touches),
+        margin_error: parity::difference(ensemble, &model, &all, &())?.max_margin_error,
         stated_error: f64::from(compiled.margin_error),
         at_10: curve.accuracy(10).value,
         at_30: curve.accuracy(30).value,
@@ -160,19 +154,6 @@ fn nanoseconds(model: &Model<'_>, touches: &[Touch]) -> f64 {
         best = best.min(began.elapsed().as_secs_f64() * 1e9 / touches.len().max(1) as f64);
     }
     best
-}
-
-/// The largest difference between compiled and full margins, in nats.
-fn margin_error(model: &Model<'_>, ensemble: &Ensemble, touches: &[Touch]) -> f64 {
-    let unit = f64::from(model.unit());
-    let worst = |touch: &Touch| {
-        let mut margins = vec![0; model.object_count()];
-        model.margins(touch, &mut margins);
-        let full = ensemble.margins(touch);
-        let error = |(compiled, full): (&i32, &f32)| (f64::from(*compiled) * unit - f64::from(*full)).abs();
-        margins.iter().zip(&full).map(error).fold(0.0, f64::max)
-    };
-    touches.par_iter().map(worst).reduce(|| 0.0, f64::max)
 }
 
 /// The members that no other beats in both bytes and accuracy, by rising size.
@@ -358,6 +339,7 @@ mod tests {
             objects: vec!["a".into(), "b".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
+            origin: crate::ensemble::Origin::default(),
         }
     }
 
@@ -366,7 +348,7 @@ mod tests {
         assert!(fitting(&chain(3, 0.5), Leaf::I16, None).unwrap().is_some());
         assert!(fitting(&chain(9, 0.5), Leaf::I16, Some(compile::Layout::Complete)).unwrap().is_none());
         let error = fitting(&chain(3, f32::NAN), Leaf::I16, Some(compile::Layout::Complete)).unwrap_err();
-        assert!(!is_too_large(&error), "{error}");
+        assert!(!is_unfit(&error), "{error}");
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Cross-validation: accuracy against the number of touches, and confusion (the paper's figures 8 and 9).
 
 use super::confusion::{self, normalized, recall_precision};
-use super::context::{Context, compiled, compiled_f32, opened};
+use super::context::{Context, compiled, compiled_f32};
 use super::run_page::method_style;
 use super::statistics::{LEAST_GROUPS, largest_group, mean_deviation};
+use crate::compile;
 use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
@@ -61,7 +62,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
         if fold == 0 { (context.models()?.paper.clone(), 0.0) } else { timed(&context.paper())? };
     let (ours, ours_seconds) = if fold == 0 { (context.models()?.ours.clone(), 0.0) } else { timed(&context.ours())? };
     let bytes = [compiled_f32(&paper)?.bytes, compiled(&ours)?.bytes];
-    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
+    let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
     let settings = context.settings;
     let fewest = split.test.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
     let most = MOST.min(largest_group(fewest));

@@ -7,7 +7,7 @@
 //!
 //! The result is written as an [`Ensemble`] of a single tree with one leaf per cell, so that it is evaluated like any other model.
 
-use crate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
+use crate::ensemble::{Ensemble, Node, Origin, Output, Tree, feature_row};
 use crate::error::{ReportProblem, Result};
 use crate::touches::Dataset;
 use palpate_shared::Descriptor;
@@ -42,7 +42,7 @@ pub(super) fn density_model(descriptor: Descriptor, train: &Dataset, held_out: &
     let objects = train.names();
     let tree = tree(&edges, &logs);
     let base_margins = vec![0.0; objects.len()];
-    Ok((Ensemble { descriptor, objects, base_margins, trees: vec![tree] }, best))
+    Ok((Ensemble { descriptor, objects, base_margins, trees: vec![tree], origin: Origin::default() }, best))
 }
 
 /// The features of every touch, one list per object.
@@ -210,7 +210,7 @@ mod tests {
                 })
                 .collect(),
         };
-        Dataset { objects: vec![object("a", 0), object("b", 30_000)] }
+        Dataset::new(vec![object("a", 0), object("b", 30_000)])
     }
 
     #[test]

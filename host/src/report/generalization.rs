@@ -1,8 +1,8 @@
 //! Generalization: recognizing a fork that was never touched by the touches of other forks.
 
-use super::context::{Context, compiled, opened, touch};
+use super::context::{Context, compiled, touch};
+use crate::compile;
 use super::statistics::mean_deviation;
-use crate::capture;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::Object;
@@ -12,7 +12,7 @@ use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records};
 use crate::probe::scene::Scene;
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches, Origin};
 use serde::{Deserialize, Serialize};
 
 /// Numbers of touches looked at.
@@ -45,18 +45,17 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
     let of = |&instances: &usize| -> Result<Instances> {
         // The same number of touches of a kind, however many instances share it.
         let part = |data: &Dataset, kind: usize, from: usize, to: usize| data.objects[kind].touches[from..to].to_vec();
-        let gathered = |from: &dyn Fn(usize) -> (usize, usize)| Dataset {
-            objects: (0..felt[0].objects.len())
-                .map(|kind| ObjectTouches {
-                    name: felt[0].objects[kind].name.clone(),
-                    touches: (0..instances).flat_map(|k| part(&felt[k], kind, from(k).0, from(k).1)).collect(),
-                })
-                .collect(),
+        let gathered = |from: &dyn Fn(usize) -> (usize, usize)| {
+            let objects = (0..felt[0].objects.len()).map(|kind| ObjectTouches {
+                name: felt[0].objects[kind].name.clone(),
+                touches: (0..instances).flat_map(|k| part(&felt[k], kind, from(k).0, from(k).1)).collect(),
+            });
+            Dataset::new(objects.collect())
         };
         let training = gathered(&|_| (0, count / instances));
         let ensemble = context.train(&training, &context.ours())?;
         let bytes = compiled(&ensemble)?.bytes;
-        let model = opened(&bytes)?;
+        let model = compile::open(&bytes)?;
         let accuracies = |data: &Dataset| -> Result<Vec<f64>> {
             let curve =
                 Margins::new(Candidate::Compiled(&model), data)?.curve(30, settings.many_groups, settings.seed)?;
@@ -65,17 +64,11 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
         let unseen: Vec<Vec<f64>> = tested.iter().map(&accuracies).collect::<Result<_>>()?;
         // Groups of a seen kind stay within one instance too.
         let seen = (0..instances).map(|k| {
-            let data = Dataset {
-                objects: felt[k]
-                    .objects
-                    .iter()
-                    .map(|object| ObjectTouches {
-                        name: object.name.clone(),
-                        touches: object.touches[count..].to_vec(),
-                    })
-                    .collect(),
-            };
-            accuracies(&data)
+            let objects = felt[k]
+                .objects
+                .iter()
+                .map(|object| ObjectTouches { name: object.name.clone(), touches: object.touches[count..].to_vec() });
+            accuracies(&Dataset::new(objects.collect()))
         });
         let seen: Vec<Vec<f64>> = seen.collect::<Result<_>>()?;
         let column = |rows: &[Vec<f64>], index: usize| rows.iter().map(|row| row[index]).collect::<Vec<f64>>();
@@ -89,14 +82,14 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
 }
 
 fn touched(context: &Context, objects: &[Object], count: usize) -> Result<Dataset> {
-    let length = capture::Settings::default().length;
+    let length = Origin::default().length;
     let one = |object: &Object| {
         let scene = Scene::new(&object.mesh, length)?;
         Ok(touch(&scene, &object.name, count, context.settings.seed, context.progress)?.0)
     };
     let mut objects: Vec<ObjectTouches> = objects.iter().map(one).collect::<Result<_>>()?;
     objects.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(Dataset { objects })
+    Ok(Dataset::new(objects))
 }
 
 /// The figure.

@@ -1,8 +1,8 @@
 //! Growth: what more objects and finer meshes cost.
 
-use super::context::{Context, compiled, opened, touch};
+use super::context::{Context, compiled, touch};
 use super::instructions::Instructions;
-use crate::capture;
+use crate::compile;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::{Mesh, Object};
@@ -12,8 +12,8 @@ use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use crate::probe::scene::Scene;
-use crate::touches::Dataset;
 use crate::touches::folds;
+use crate::touches::{Dataset, Origin};
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -77,13 +77,13 @@ pub(super) fn measure(context: &Context) -> Result<Growth> {
 
 fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let settings = context.settings;
-    let length = capture::Settings::default().length;
+    let length = Origin::default().length;
     let began = Instant::now();
     let touched = objects.iter().map(|object| {
         let scene = Scene::new(&object.mesh, length)?;
         Ok(touch(&scene, &object.name, settings.growth_touches, settings.seed, context.progress)?.0)
     });
-    let mut data = Dataset { objects: touched.collect::<Result<_>>()? };
+    let mut data = Dataset::new(touched.collect::<Result<_>>()?);
     let capture = began.elapsed().as_secs_f64();
     data.objects.sort_by(|a, b| a.name.cmp(&b.name));
     let split = folds::split(&data, 0.2, settings.seed)?;
@@ -91,7 +91,7 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let ensemble = context.train(&split.train, &context.ours())?;
     let train = began.elapsed().as_secs_f64();
     let compiled = compiled(&ensemble)?;
-    let model = opened(&compiled.bytes)?;
+    let model = compile::open(&compiled.bytes)?;
     let touches: Vec<Touch> =
         split.test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
     let curve = Margins::new(Candidate::Compiled(&model), &split.test)?.curve(60, 100, settings.seed)?;
@@ -109,7 +109,7 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
 fn triangles_cost(context: &Context, count: usize) -> Result<Triangles> {
     let mesh = Mesh::globe((count as f64 / 4.0).sqrt().round() as u32);
     let began = Instant::now();
-    let scene = Scene::new(&mesh, capture::Settings::default().length)?;
+    let scene = Scene::new(&mesh, Origin::default().length)?;
     let build = began.elapsed().as_secs_f64();
     let touches = if context.settings.quick { 5_000 } else { 40_000 };
     let began = Instant::now();

@@ -1,7 +1,7 @@
 //! How many instructions per touch a compiled model takes on the chips.
 
 use crate::chip::instructions::Chip;
-use crate::compile::Compiled;
+use crate::compile::{self, Compiled};
 use crate::error::Result;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
@@ -24,8 +24,8 @@ pub(super) struct Count {
     pub(super) measured: bool,
 }
 
-/// Instructions on a Cortex-M0+ for each on a Cortex-M4F, for the estimate: the largest ratio that emulation showed, from
-/// 1.30 on.
+/// Instructions on a Cortex-M0+ for each on a Cortex-M4F, where the compiler has no estimate: the largest ratio that
+/// emulation showed, from 1.30 on.
 const M0_RATIO: f64 = 1.46;
 
 impl Instructions {
@@ -41,15 +41,16 @@ impl Instructions {
         Ok(Self::from_measured(compiled.instructions, measured(Chip::M4F)?, measured(Chip::M0Plus)?))
     }
 
-    /// What was measured; where nothing was, the compiler's `estimate` for the M4F, and the M4F's number times
-    /// [`M0_RATIO`] for the M0+.
-    fn from_measured(estimate: u64, m4f: Option<u64>, m0_plus: Option<u64>) -> Self {
+    /// What was measured; where nothing was, the compiler's `estimate`, and where that has none for the M0+, the M4F's
+    /// number times [`M0_RATIO`].
+    fn from_measured(estimate: compile::Instructions, m4f: Option<u64>, m0_plus: Option<u64>) -> Self {
         let count = |measured: Option<u64>, estimate: u64| Count {
             number: measured.unwrap_or(estimate),
             measured: measured.is_some(),
         };
-        let m4f = count(m4f, estimate);
-        Self { m4f, m0_plus: count(m0_plus, (m4f.number as f64 * M0_RATIO).round() as u64) }
+        let m4f = count(m4f, estimate.m4f);
+        let by_ratio = || (m4f.number as f64 * M0_RATIO).round() as u64;
+        Self { m4f, m0_plus: count(m0_plus, estimate.m0_plus.unwrap_or_else(by_ratio)) }
     }
 
     /// Where the numbers come from, as sentences.
@@ -58,7 +59,7 @@ impl Instructions {
         let chip = if self.m4f.measured { Chip::M0Plus } else { Chip::M4F };
         let missing = chip.obstacle().map_or_else(String::new, |problem| format!("{problem}; "))
             + "onboard/firmware says how to build what is needed";
-        let m0_plus = format!("estimated as {M0_RATIO} times those on a Cortex-M4F");
+        let m0_plus = "the compiler's estimate";
         match (self.m4f.measured, self.m0_plus.measured) {
             (true, true) => format!("Instructions, from contact times to margins, were {measured}."),
             (true, false) => format!(
@@ -70,8 +71,7 @@ impl Instructions {
                  the compiler's estimate ({missing})."
             ),
             (false, false) => format!(
-                "Instructions, from contact times to margins, are estimated: on a Cortex-M4F by the compiler, on a \
-                 Cortex-M0+ {m0_plus} ({missing})."
+                "Instructions, from contact times to margins, are {m0_plus} ({missing})."
             ),
         }
     }
@@ -90,14 +90,15 @@ mod tests {
 
     #[test]
     fn instructions_on_an_m0_plus_that_were_not_measured_are_labeled_as_estimated() {
-        let both = Instructions::from_measured(100, Some(110), Some(150));
+        let estimate = compile::Instructions { m4f: 100, m0_plus: None };
+        let both = Instructions::from_measured(estimate, Some(110), Some(150));
         assert_eq!([both.m4f.number, both.m0_plus.number], [110, 150]);
         assert_eq!([both.m4f.source(), both.m0_plus.source()], ["measured", "measured"]);
-        let one = Instructions::from_measured(100, Some(110), None);
+        let one = Instructions::from_measured(estimate, Some(110), None);
         assert_eq!([one.m4f.source(), one.m0_plus.source()], ["measured", "estimated"]);
         assert_eq!(one.m0_plus.number, 161);
-        assert!(one.explanation().contains("estimated as 1.46 times"), "{}", one.explanation());
-        let none = Instructions::from_measured(100, None, None);
+        assert!(one.explanation().contains("the compiler's estimate"), "{}", one.explanation());
+        let none = Instructions::from_measured(estimate, None, None);
         assert_eq!([none.m4f.number, none.m0_plus.number], [100, 146]);
         assert_eq!([none.m4f.source(), none.m0_plus.source()], ["estimated", "estimated"]);
         assert!(!none.explanation().contains("counted"), "{}", none.explanation());

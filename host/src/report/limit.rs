@@ -1,6 +1,7 @@
 //! The limit: the best that any classifier could do with the curvature descriptor, and how far each model is from it.
 
-use super::context::{Context, compiled, compiled_f32, opened};
+use super::context::{Context, compiled, compiled_f32};
+use crate::compile;
 use super::density::density_model;
 use super::statistics::z95;
 use crate::ensemble::Ensemble;
@@ -69,15 +70,13 @@ pub(super) struct Large {
 pub(super) fn large(context: &Context) -> Result<Large> {
     let count = context.settings.limit_touches;
     let touched = context.touch(count, context.settings.seed.wrapping_add(0x11_1117))?;
-    let part = |range: std::ops::Range<usize>| Dataset {
-        objects: touched
-            .iter()
-            .map(|(object, _)| ObjectTouches {
-                name: object.name.clone(),
-                touches: object.touches[range.start.min(object.touches.len())..range.end.min(object.touches.len())]
-                    .to_vec(),
-            })
-            .collect(),
+    let part = |range: std::ops::Range<usize>| {
+        let objects = touched.iter().map(|(object, _)| ObjectTouches {
+            name: object.name.clone(),
+            touches: object.touches[range.start.min(object.touches.len())..range.end.min(object.touches.len())]
+                .to_vec(),
+        });
+        Dataset::new(objects.collect())
     };
     let (train, held) = (count * 85 / 100, count * 90 / 100);
     Ok(Large { train: part(0..train), held: part(train..held), test: part(held..count) })
@@ -89,7 +88,7 @@ fn half(data: &Dataset) -> Dataset {
         name: object.name.clone(),
         touches: object.touches[..object.touches.len() / 2].to_vec(),
     };
-    Dataset { objects: data.objects.iter().map(first).collect() }
+    data.with(data.objects.iter().map(first).collect())
 }
 
 /// Estimates the limit and tests the first fold's models on the same groups.
@@ -109,7 +108,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let ensemble_half = context.train(&halved, &large_ensemble)?;
     let models = context.models()?;
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
-    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
+    let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
 
     let groups = if settings.quick { 1_000 } else { 3_000 };
     let measured = |name: &str, candidate: Candidate| -> Result<Measured> {

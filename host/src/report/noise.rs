@@ -1,8 +1,9 @@
 //! Noise on contact times: signal-to-noise ratio, accuracy and confusion (the paper's figures 10 to 13).
 
 use super::confusion::{self, normalized, push_matrix};
-use super::context::{Context, Models, NOISE, compiled, compiled_f32, opened};
+use super::context::{Context, Models, NOISE, compiled, compiled_f32};
 use super::statistics::{mean_deviation, savitzky_golay, wilson};
+use crate::compile;
 use crate::ensemble::train;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
@@ -55,7 +56,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
 fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Result<Fold> {
     let settings = context.settings;
     let compiled = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes, compiled(&models.noise)?.bytes];
-    let models = [opened(&compiled[0])?, opened(&compiled[1])?, opened(&compiled[2])?];
+    let models = [compile::open(&compiled[0])?, compile::open(&compiled[1])?, compile::open(&compiled[2])?];
     let candidates = models.each_ref().map(Candidate::Compiled);
     let mut result = Fold { accuracy: vec![Vec::new(); METHODS.len()], confusion: vec![Vec::new(); METHODS.len()] };
     // Noise that no training saw: training uses the seed itself.
@@ -89,7 +90,7 @@ fn noisy(data: &Dataset, deviation: f64, seed: u64) -> Dataset {
         name: object.name.clone(),
         touches: noise::noisy(&object.name, &object.touches, deviation * 1e3, seed),
     };
-    Dataset { objects: data.objects.iter().map(one).collect() }
+    data.with(data.objects.iter().map(one).collect())
 }
 
 /// Accuracy of a method at the level nearest to `deviation` ms: mean and deviation over folds.

@@ -1,6 +1,7 @@
 //! Sequential recognition: how many touches it takes to be sure, and how often the verdict is wrong.
 
-use super::context::{Context, compiled, compiled_f32, opened};
+use super::context::{Context, compiled, compiled_f32};
+use crate::compile;
 use super::limit::Large;
 use super::run_page::method_style;
 use super::statistics::quantile;
@@ -64,7 +65,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
     let settings = context.settings;
     let models = context.models()?;
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
-    let [paper, ours] = [opened(&bytes[0])?, opened(&bytes[1])?];
+    let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
     let count = if settings.quick { 300 } else { 1_000 };
     let mut result = Sequences { count, methods: Vec::new(), used: Vec::new() };
     for candidate in [Candidate::Compiled(&paper), Candidate::Compiled(&ours)] {

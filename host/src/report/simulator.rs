@@ -11,7 +11,7 @@ use crate::probe::approach::{Approach, Probe};
 use crate::probe::scene::Scene;
 use crate::probe::sweep::narrow::{self, Motion, Triangle};
 use crate::probe::sweep::precision::{self, DoubleWithoutReject, Precision, SingleAfterReject};
-use crate::random;
+use crate::random::{self, Purpose};
 use glam::DVec3;
 use rand::RngExt;
 use rayon::prelude::*;
@@ -121,7 +121,7 @@ fn every_triangle(triangles: &[Triangle], cast: &Cast, radius: f64) -> Option<f6
 /// 1e-7 to 1e-2 units.
 fn casts(scene: &Scene, name: &str, count: usize, seed: u64, probe: &Probe) -> Vec<Cast> {
     let triangles: Vec<Triangle> = scene.triangles().collect();
-    let mut random = random::generator(seed, name, 1 << 40);
+    let mut random = random::generator(seed, Purpose::Casts, name, 0);
     (0..count)
         .map(|index| {
             let approach = Approach::draw(&mut random, scene.bounds(), probe.tilt);

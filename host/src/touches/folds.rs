@@ -1,7 +1,7 @@
 //! Training and test touches that share none: splits and cross-validation.
 
-use crate::error::{Error, Result};
-use crate::random;
+use crate::error::{Error, Result, TouchesProblem};
+use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;
 use rand::seq::SliceRandom;
@@ -11,11 +11,11 @@ use std::ops::Range;
 /// for each. The same data set and seed give the same split.
 ///
 /// # Errors
-/// [`Error::Argument`] unless `test_share` is between 0 and 1; [`Error::Data`] if an object has fewer than two touches.
+/// [`Setting`](crate::error::Problem::Setting) unless `test_share` is between 0 and 1; [`TouchesProblem::TooFew`] if an
+/// object has fewer than two touches.
 pub fn split(dataset: &Dataset, test_share: f64, seed: u64) -> Result<Split> {
     if !(test_share > 0.0 && test_share < 1.0) {
-        let what = format!("a test share of {test_share} leaves nothing to train or nothing to test");
-        return Err(Error::argument(what, "Use a number between 0 and 1."));
+        return Err(Error::setting("test_share", test_share, "a number between 0 and 1"));
     }
     enough(dataset, 2)?;
     Ok(divide(dataset, seed, |touches| {
@@ -29,12 +29,14 @@ pub fn split(dataset: &Dataset, test_share: f64, seed: u64) -> Result<Split> {
 /// an object, give or take one.
 ///
 /// # Errors
-/// [`Error::Argument`] unless there are at least two folds, and `fold` is one of them; [`Error::Data`] if an object has
-/// fewer touches than there are folds.
+/// [`Setting`](crate::error::Problem::Setting) unless there are at least two folds, and `fold` is one of them;
+/// [`TouchesProblem::TooFew`] if an object has fewer touches than there are folds.
 pub fn fold(dataset: &Dataset, fold: usize, folds: usize, seed: u64) -> Result<Split> {
-    if folds < 2 || fold >= folds {
-        let what = format!("fold {fold} of {folds} does not exist");
-        return Err(Error::argument(what, "Use at least two folds, counted from 0."));
+    if folds < 2 {
+        return Err(Error::setting("folds", folds, "2 or more"));
+    }
+    if fold >= folds {
+        return Err(Error::setting("fold", fold, format!("0 to {}", folds - 1)));
     }
     enough(dataset, folds)?;
     Ok(divide(dataset, seed, |touches| touches * fold / folds..touches * (fold + 1) / folds))
@@ -51,20 +53,19 @@ pub struct Split {
 
 fn enough(dataset: &Dataset, least: usize) -> Result<()> {
     match dataset.objects.iter().find(|object| object.touches.len() < least) {
-        Some(object) => Err(Error::data(
-            format!("{} has only {} touches, too few to split", object.name, object.touches.len()),
-            "Capture more touches.",
-        )),
+        Some(object) => {
+            Err(TouchesProblem::TooFew { name: object.name.clone(), touches: object.touches.len(), least }.into())
+        }
         None => Ok(()),
     }
 }
 
 /// Shuffles each object's touches and takes those at the positions that `test` chooses for testing.
 fn divide(dataset: &Dataset, seed: u64, test: impl Fn(usize) -> Range<usize>) -> Split {
-    let mut split = Split { train: Dataset { objects: Vec::new() }, test: Dataset { objects: Vec::new() } };
+    let mut split = Split { train: dataset.with(Vec::new()), test: dataset.with(Vec::new()) };
     for ObjectTouches { name, touches } in &dataset.objects {
         let mut order: Vec<usize> = (0..touches.len()).collect();
-        order.shuffle(&mut random::generator(seed, name, 0));
+        order.shuffle(&mut random::generator(seed, Purpose::Folds, name, 0));
         let chosen = test(touches.len());
         let of = |positions: &[usize]| positions.iter().map(|&position| touches[position]).collect::<Vec<Touch>>();
         let train = [of(&order[..chosen.start]), of(&order[chosen.end..])].concat();
@@ -77,14 +78,16 @@ fn divide(dataset: &Dataset, seed: u64, test: impl Fn(usize) -> Range<usize>) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Problem;
+    use crate::touches::Origin;
 
-    /// Objects of which each touch is told by its own time.
+    /// Objects of which each touch is identified by its own time.
     fn dataset(counts: &[u32]) -> Dataset {
         let object = |(index, &count): (usize, &u32)| ObjectTouches {
             name: format!("object{index}"),
             touches: (0..count).map(|i| Touch::from_micros([0, i, 9])).collect(),
         };
-        Dataset { objects: counts.iter().enumerate().map(object).collect() }
+        Dataset::new(counts.iter().enumerate().map(object).collect())
     }
 
     fn sorted(touches: impl IntoIterator<Item = Touch>) -> Vec<Option<u32>> {
@@ -129,14 +132,29 @@ mod tests {
     }
 
     #[test]
+    fn the_parts_of_a_data_set_keep_its_origin() {
+        let origin = Origin { seed: 7, ..Origin::default() };
+        let split = split(&Dataset { origin: Some(origin.clone()), ..dataset(&[9, 9]) }, 0.1, 1).unwrap();
+        assert_eq!((split.train.origin, split.test.origin), (Some(origin.clone()), Some(origin)));
+    }
+
+    #[test]
     fn what_cannot_be_split_says_so() {
         for share in [0.0, 1.0, -0.5, f64::NAN] {
-            assert!(matches!(split(&dataset(&[9, 9]), share, 1), Err(Error::Argument { .. })));
+            let error = split(&dataset(&[9, 9]), share, 1).unwrap_err();
+            assert!(matches!(error.problem(), Some(Problem::Setting { name: "test_share", .. })), "{error}");
+            assert_eq!(error.exit_code(), 2);
         }
         let error = split(&dataset(&[9, 1]), 0.1, 1).unwrap_err();
         assert!(error.to_string().contains("object1 has only 1 touches"), "{error}");
-        assert!(matches!(fold(&dataset(&[9, 9]), 10, 10, 1), Err(Error::Argument { .. })));
-        assert!(matches!(fold(&dataset(&[9, 9]), 0, 1, 1), Err(Error::Argument { .. })));
-        assert!(matches!(fold(&dataset(&[9, 9]), 0, 10, 1), Err(Error::Data { .. })));
+        let problem = |result: Result<Split>| result.unwrap_err().problem().cloned();
+        let setting = |result| match problem(result) {
+            Some(Problem::Setting { name, .. }) => name,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(setting(fold(&dataset(&[9, 9]), 10, 10, 1)), "fold");
+        assert_eq!(setting(fold(&dataset(&[9, 9]), 0, 1, 1)), "folds");
+        let few = TouchesProblem::TooFew { name: "object0".into(), touches: 9, least: 10 };
+        assert_eq!(problem(fold(&dataset(&[9, 9]), 0, 10, 1)), Some(few.into()));
     }
 }

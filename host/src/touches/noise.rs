@@ -1,6 +1,6 @@
 //! Noise on contact times, as a sensor's latency would add.
 
-use crate::random;
+use crate::random::{self, Purpose};
 use palpate_shared::{ContactTime, Touch};
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// earliest time is subtracted, so that the first contact is 0 again, and times are rounded to whole microseconds, as in
 /// the published evaluation. Missing contacts stay missing. The same name, touches and seed give the same noise.
 pub fn noisy(name: &str, touches: &[Touch], deviation: f64, seed: u64) -> Vec<Touch> {
-    let mut random = random::generator(seed, name, 0);
+    let mut random = random::generator(seed, Purpose::Noise, name, 0);
     touches.iter().map(|touch| one(touch, deviation, &mut random)).collect()
 }
 

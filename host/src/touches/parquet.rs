@@ -1,21 +1,26 @@
 //! Touches as Parquet: smaller and faster to load than text, and read by pandas, Polars, DuckDB and others.
 //!
-//! A row a touch: `object` (string), `t1`, `t2`, `t3` (seconds, null where a finger never touched), `direction` and
+//! One row per touch: `object` (string), `t1`, `t2`, `t3` (seconds, null where a finger never touched), `direction` and
 //! `alignment` (lists of three, null where unknown). Row groups of about a million rows.
 
-use super::text::{contact_time, to_q15};
-use crate::error::{Error, Result};
+use super::text::{contact_time, unit_vector};
+use crate::error::{Error, Place, Result, TouchesProblem};
+use bytes::Bytes;
 use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use std::cell::Cell;
 use std::fs::File;
+use std::io::BufReader;
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 
 /// How many rows a row group has.
 const GROUP: usize = 1 << 20;
@@ -110,57 +115,147 @@ fn column<T: DataType>(
 /// # Errors
 /// When the file cannot be read, is no Parquet, lacks a column, or a value is wrong (the row is named).
 pub fn read(path: &Path) -> Result<Vec<Touch>> {
-    let file = File::open(path).map_err(|error| Error::io(path, "read the touches", error))?;
-    let wrong = |what: String| Error::file(path, what, "Capture the object anew, or remove the file.");
-    let reader = SerializedFileReader::new(file).map_err(|error| wrong(format!("no Parquet file ({error})")))?;
-    let mut touches = Vec::new();
-    for group in 0..reader.num_row_groups() {
-        let group = reader.get_row_group(group).map_err(|error| wrong(error.to_string()))?;
-        read_group(group.as_ref(), &mut touches).map_err(wrong)?;
-    }
+    let io = |error| Error::io(path, "read the touches", error);
+    let wrong = |problem| Error::at(Place::file(path), problem);
+    let file = File::open(path).map_err(io)?;
+    let length = file.metadata().map_err(io)?.len();
+    let touches = contained(|| read_touches(Bounded { file, length })).map_err(wrong)?;
     if touches.is_empty() {
-        return Err(wrong("no touches in it".into()));
+        return Err(wrong(TouchesProblem::NoTouches));
     }
     Ok(touches)
 }
 
-fn read_group(group: &dyn RowGroupReader, touches: &mut Vec<Touch>) -> Result<(), String> {
-    let mut times = Vec::with_capacity(3);
-    for name in ["t1", "t2", "t3"] {
-        times.push(Column::open(group, name)?.ok_or_else(|| format!("no column {name}"))?);
+fn read_touches(file: Bounded) -> Result<Vec<Touch>, TouchesProblem> {
+    let length = file.length;
+    let reader = SerializedFileReader::new(file).map_err(|error| not_parquet(&error))?;
+    check_ranges(reader.metadata(), length)?;
+    let mut touches = Vec::new();
+    for group in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(group).map_err(|error| not_parquet(&error))?;
+        read_group(group.as_ref(), &mut touches)?;
     }
+    Ok(touches)
+}
+
+/// Turns a panic of the reader into an error, and keeps its message from stderr. Version 60.1 panics on several kinds of
+/// damage, such as a page that refers to a dictionary that is not there.
+fn contained<T>(read: impl FnOnce() -> Result<T, TouchesProblem>) -> Result<T, TouchesProblem> {
+    thread_local! {
+        static READING: Cell<bool> = const { Cell::new(false) };
+    }
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let earlier = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !READING.get() {
+                earlier(panic);
+            }
+        }));
+    });
+    READING.set(true);
+    // Whatever a panic leaves half done is dropped.
+    let result = std::panic::catch_unwind(AssertUnwindSafe(read));
+    READING.set(false);
+    result.unwrap_or_else(|_| Err(not_parquet(&"damaged in a way that the reader cannot name")))
+}
+
+fn not_parquet(message: &impl ToString) -> TouchesProblem {
+    TouchesProblem::NotParquet { message: message.to_string() }
+}
+
+/// Refuses columns that lie outside the file: the reader panics on those that start or end below 0.
+fn check_ranges(metadata: &ParquetMetaData, length: u64) -> Result<(), TouchesProblem> {
+    for column in metadata.row_groups().iter().flat_map(RowGroupMetaData::columns) {
+        let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
+        let end = u64::try_from(start).ok().zip(u64::try_from(column.compressed_size()).ok());
+        if end.and_then(|(start, size)| start.checked_add(size)).is_none_or(|end| end > length) {
+            return Err(not_parquet(&format!("the column {} lies outside the file", column.column_path())));
+        }
+    }
+    Ok(())
+}
+
+/// A file of which no more is asked than it has, whatever it says of itself: the reader reserves memory first.
+struct Bounded {
+    file: File,
+    length: u64,
+}
+
+impl Length for Bounded {
+    fn len(&self) -> u64 {
+        self.length
+    }
+}
+
+impl ChunkReader for Bounded {
+    type T = BufReader<File>;
+
+    fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
+        self.file.get_read(start)
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
+        match start.checked_add(length as u64) {
+            Some(end) if end <= self.length => self.file.get_bytes(start, length),
+            _ => Err(ParquetError::EOF(format!("{length} bytes from {start} of a file of {}", self.length))),
+        }
+    }
+}
+
+fn read_group(group: &dyn RowGroupReader, touches: &mut Vec<Touch>) -> Result<(), TouchesProblem> {
+    let time = |name| Column::open(group, name)?.ok_or(TouchesProblem::NoColumn { name });
+    let mut times = [time("t1")?, time("t2")?, time("t3")?];
     let [mut direction, mut alignment] = [Column::open(group, "direction")?, Column::open(group, "alignment")?];
     loop {
-        let rows = times.iter_mut().map(Column::rows::<1>).collect::<Result<Vec<_>, _>>()?;
-        let vectors = |column: &mut Option<Column>| column.as_mut().map(Column::rows::<3>).transpose();
-        let (directions, alignments) = (vectors(&mut direction)?, vectors(&mut alignment)?);
+        let mut rows = Vec::with_capacity(times.len());
+        for column in &mut times {
+            rows.push(column.rows::<1>()?);
+        }
         let [first, middle, last] = rows.as_slice() else { return Ok(()) };
-        if first.is_empty() {
+        let count = first.len();
+        // A column that the file does not have is one of nulls.
+        let vectors =
+            |column: &mut Option<Column>| column.as_mut().map_or_else(|| Ok(vec![None; count]), Column::rows::<3>);
+        let (directions, alignments) = (vectors(&mut direction)?, vectors(&mut alignment)?);
+        if [middle.len(), last.len(), directions.len(), alignments.len()].iter().any(|&rows| rows != count) {
+            return Err(not_parquet(&"columns of different length"));
+        }
+        if count == 0 {
             return Ok(());
         }
-        for (index, first) in first.iter().enumerate() {
-            let row = touches.len() + 1;
-            let time = |value: Option<&Option<[f64; 1]>>| match value {
-                Some(Some([seconds])) if !seconds.is_finite() => {
-                    Err(format!("row {row}: the time {seconds} is not finite"))
-                }
-                Some(Some([seconds])) => contact_time(*seconds).map_err(|what| format!("row {row}: {what}")),
-                _ => Ok(ContactTime::MISSING),
-            };
-            let touch = Touch::new([time(Some(first))?, time(middle.get(index))?, time(last.get(index))?]);
-            let vector = |vectors: &Option<Vec<Option<[f64; 3]>>>| vectors.as_ref().and_then(|all| *all.get(index)?);
-            touches.push(match (vector(&directions), vector(&alignments)) {
-                (Some(direction), Some(alignment)) => {
-                    touch.with_pose(Pose { direction: direction.map(to_q15), alignment: alignment.map(to_q15) })
-                }
-                _ => touch,
-            });
+        let times = first.iter().zip(middle).zip(last);
+        for (((first, middle), last), (direction, alignment)) in times.zip(directions.iter().zip(&alignments)) {
+            let row = touches.len() as u64 + 1;
+            let touch = touch([*first, *middle, *last], *direction, *alignment);
+            touches.push(touch.map_err(|problem| TouchesProblem::Row { row, problem: Box::new(problem) })?);
         }
+    }
+}
+
+/// The touch of one row, checked as a line of text is.
+fn touch(
+    times: [Option<[f64; 1]>; 3],
+    direction: Option<[f64; 3]>,
+    alignment: Option<[f64; 3]>,
+) -> Result<Touch, TouchesProblem> {
+    let time = |time: Option<[f64; 1]>| time.map_or(Ok(ContactTime::MISSING), |[seconds]| contact_time(seconds));
+    let [first, middle, last] = times;
+    let touch = Touch::new([time(first)?, time(middle)?, time(last)?]);
+    match (direction, alignment) {
+        (None, None) => Ok(touch),
+        (Some(direction), Some(alignment)) => Ok(touch.with_pose(Pose {
+            direction: unit_vector("direction", direction)?,
+            alignment: unit_vector("alignment", alignment)?,
+        })),
+        (Some(_), None) => Err(TouchesProblem::HalfPose { there: "direction", missing: "alignment" }),
+        (None, Some(_)) => Err(TouchesProblem::HalfPose { there: "alignment", missing: "direction" }),
     }
 }
 
 /// A column of numbers, or of lists of numbers.
 struct Column {
+    name: &'static str,
     reader: ColumnReader,
     /// The definition level of a value that is there.
     present: i16,
@@ -170,22 +265,27 @@ struct Column {
 
 impl Column {
     /// The column of this name; none if the file has none.
-    fn open(group: &dyn RowGroupReader, name: &str) -> Result<Option<Self>, String> {
+    fn open(group: &dyn RowGroupReader, name: &'static str) -> Result<Option<Self>, TouchesProblem> {
         let metadata = group.metadata();
         let is_it =
             |index: &usize| metadata.column(*index).column_path().parts().first().is_some_and(|part| part == name);
         let Some(index) = (0..metadata.num_columns()).find(is_it) else { return Ok(None) };
         let descriptor = metadata.column(index).column_descr();
         let (present, lists) = (descriptor.max_def_level(), descriptor.max_rep_level() > 0);
-        let reader = group.get_column_reader(index).map_err(|error| format!("column {name}: {error}"))?;
-        Ok(Some(Self { reader, present, lists }))
+        let wrong = |error: ParquetError| TouchesProblem::Column { name, message: error.to_string() };
+        let reader = group.get_column_reader(index).map_err(wrong)?;
+        Ok(Some(Self { name, reader, present, lists }))
     }
 
     /// The next rows: N numbers each, or none where the row is null.
-    fn rows<const N: usize>(&mut self) -> Result<Vec<Option<[f64; N]>>, String> {
+    fn rows<const N: usize>(&mut self) -> Result<Vec<Option<[f64; N]>>, TouchesProblem> {
+        self.read().map_err(|message| TouchesProblem::Column { name: self.name, message })
+    }
+
+    fn read<const N: usize>(&mut self) -> Result<Vec<Option<[f64; N]>>, String> {
         let (present, lists) = (self.present, self.lists);
         if lists != (N > 1) {
-            return Err(format!("a column that should hold {N} numbers a row holds something else"));
+            return Err(format!("does not hold {N} numbers per row"));
         }
         let (values, definition, repetition) = match &mut self.reader {
             ColumnReader::DoubleColumnReader(reader) => records(reader)?,
@@ -193,7 +293,7 @@ impl Column {
                 let (values, definition, repetition) = records(reader)?;
                 (values.into_iter().map(f64::from).collect(), definition, repetition)
             }
-            _ => return Err("a column of times or cosines does not hold floating-point numbers".into()),
+            _ => return Err("does not hold floating-point numbers".into()),
         };
         // A column that is never null, or never a list, comes without levels.
         let levels = if present == 0 { values.len() } else { definition.len() };
@@ -207,7 +307,7 @@ impl Column {
             }
             let Some((count, row, _)) = rows.last_mut() else { return Err("a list starts in its middle".into()) };
             if is_there {
-                let value = values.next().ok_or("a column has fewer values than it says")?;
+                let value = values.next().ok_or("fewer values than it says")?;
                 *row.get_mut(*count).ok_or_else(|| format!("a list has more than {N} numbers"))? = value;
                 *count += 1;
             }
@@ -232,8 +332,7 @@ fn records<T: DataType>(reader: &mut ColumnReaderImpl<T>) -> Result<(Vec<T::T>, 
 }
 
 fn write_error(path: &Path, error: ParquetError) -> Error {
-    let what = format!("cannot write the touches: {error}");
-    Error::file(path, what, "Check the disk and the space on it, then repeat the command with --resume.")
+    Error::at(Place::file(path), TouchesProblem::ParquetNotWritten { message: error.to_string() })
 }
 
 #[cfg(test)]
@@ -250,7 +349,7 @@ mod tests {
 
     #[test]
     fn touches_with_and_without_pose_and_contacts_survive() {
-        let pose = Pose { direction: [32767, 0, -1], alignment: [12345, -32767, 7] };
+        let pose = Pose { direction: [32767, 0, -1], alignment: [12345, -30352, 7] };
         let mixed = [
             Touch::from_micros([0, 123_456, 4_294_967_294]),
             Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(1)]).with_pose(pose),
@@ -273,6 +372,114 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("cup.parquet");
         std::fs::write(&path, "PAR1 0 0 0 PAR1").unwrap();
-        assert!(read(&path).unwrap_err().to_string().contains("cup.parquet: no Parquet file"));
+        assert!(read(&path).unwrap_err().to_string().contains("cup.parquet: not a usable Parquet file"));
+    }
+
+    /// Writes a file with other poses than touches can have.
+    fn with_poses(poses: &[(Option<[f32; 3]>, Option<[f32; 3]>)]) -> Result<Vec<Touch>> {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("cup.parquet");
+        let file = File::create(&path).unwrap();
+        let schema = Arc::new(parquet::schema::parser::parse_message_type(SCHEMA).unwrap());
+        let mut writer = SerializedFileWriter::new(&file, schema, Arc::default()).unwrap();
+        let mut columns = writer.next_row_group().unwrap();
+        let touches = vec![Touch::from_micros([0, 1, 2]); poses.len()];
+        column::<ByteArrayType>(&mut columns, &touches, |_, values, _| values.push(ByteArray::from("cup"))).unwrap();
+        for _ in 0..3 {
+            column::<DoubleType>(&mut columns, &touches, |_, values, levels| {
+                values.push(0.5);
+                levels.push((1, 0));
+            })
+            .unwrap();
+        }
+        for vectors in [poses.iter().map(|pose| pose.0).collect::<Vec<_>>(), poses.iter().map(|pose| pose.1).collect()]
+        {
+            let mut column = columns.next_column().unwrap().unwrap();
+            let values: Vec<f32> = vectors.iter().flatten().copied().flatten().collect();
+            let levels = |vector: &Option<[f32; 3]>| match vector {
+                Some(_) => vec![(2, 0), (2, 1), (2, 1)],
+                None => vec![(0, 0)],
+            };
+            let (definition, repetition): (Vec<i16>, Vec<i16>) = vectors.iter().flat_map(levels).unzip();
+            column.typed::<FloatType>().write_batch(&values, Some(&definition), Some(&repetition)).unwrap();
+            column.close().unwrap();
+        }
+        columns.close().unwrap();
+        writer.close().unwrap();
+        read(&path)
+    }
+
+    #[test]
+    fn poses_in_parquet_are_checked_as_in_text() {
+        let (x, y) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        assert_eq!(with_poses(&[(None, None), (Some(x), Some(y))]).unwrap().len(), 2);
+        for (wrong, what) in [
+            ([10.0, 0.0, 0.0], "row 2: the direction has length 10.000 where a unit vector has 1"),
+            ([0.0; 3], "row 2: the direction has length 0.000"),
+            ([f32::NAN, 0.0, 0.0], "row 2: the direction has length NaN"),
+            ([f32::INFINITY, 0.0, 0.0], "row 2: the direction has length inf"),
+        ] {
+            let error = with_poses(&[(Some(x), Some(y)), (Some(wrong), Some(y))]).unwrap_err().to_string();
+            assert!(error.contains(what), "{error}");
+            assert!(with_poses(&[(Some(y), Some(wrong))]).unwrap_err().to_string().contains("row 1: the alignment"));
+        }
+    }
+
+    #[test]
+    fn a_lone_direction_or_alignment_is_refused() {
+        let x = Some([1.0, 0.0, 0.0]);
+        let error = |direction, alignment| with_poses(&[(x, x), (direction, alignment)]).unwrap_err().to_string();
+        assert!(error(x, None).contains("row 2: a direction without an alignment. Give both or neither."));
+        assert!(error(None, x).contains("row 2: an alignment without a direction"));
+    }
+
+    /// Bytes of a file of a few touches, and where its metadata begins.
+    fn written() -> (Vec<u8>, usize) {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("cup.parquet");
+        let file = File::create(&path).unwrap();
+        let pose = Pose { direction: [Q15_ONE, 0, 0], alignment: [0, Q15_ONE, 0] };
+        let touch = |i| Ok(Touch::from_micros([0, i, 2 * i]).with_pose(pose));
+        write(&path, &file, "cup", (0..40).map(touch)).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let length = bytes.len();
+        let metadata = u32::from_le_bytes(bytes[length - 8..length - 4].try_into().unwrap());
+        (bytes, length - 8 - metadata as usize)
+    }
+
+    #[test]
+    fn damaged_metadata_give_an_error_and_no_panic() {
+        // A negative column offset made the reader panic: every value of the metadata's numbers is tried in turn.
+        let (bytes, metadata) = written();
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("cup.parquet");
+        let (mut refused, mut outside, mut contained) = (0, 0, 0);
+        for position in metadata..bytes.len() {
+            for value in [0x00, 0x01, 0x15, 0x7f, 0xff] {
+                let mut damaged = bytes.clone();
+                damaged[position] = value;
+                std::fs::write(&path, damaged).unwrap();
+                if let Err(error) = read(&path) {
+                    assert!(error.to_string().contains("cup.parquet: "), "{error}");
+                    refused += 1;
+                    outside += u32::from(error.to_string().contains("lies outside the file"));
+                    contained += u32::from(error.to_string().contains("the reader cannot name"));
+                }
+            }
+        }
+        assert!(refused > 100 && outside > 5, "{refused} refused, {outside} of them for their columns' ranges");
+        assert!(contained > 0, "the reader does not panic any more: contain nothing");
+    }
+
+    #[test]
+    fn the_damaged_file_of_the_audit_gives_an_error_and_no_panic() {
+        let shared = std::env::var_os("PALPATE_SHARED").map_or_else(|| "../../shared".into(), std::path::PathBuf::from);
+        let path = shared.join("audit/panic.parquet");
+        if !path.exists() {
+            eprintln!("SKIPPED: no {} (the variable PALPATE_SHARED names its parent's parent)", path.display());
+            return;
+        }
+        let error = read(&path).unwrap_err().to_string();
+        assert!(error.contains("panic.parquet: not a usable Parquet file"), "{error}");
     }
 }

@@ -1,19 +1,19 @@
 //! Made-up touches for tests: objects whose surfaces bend differently, without any mesh.
 
-use crate::random;
+use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::{ContactTime, Touch};
 use rand::{Rng, RngExt};
 
-/// Objects of which number `k` has `counts[k]` touches, a good deal of them alike from object to object.
+/// Objects of which number `k` has `counts[k]` touches; many touches could be any object's.
 pub(crate) fn dataset(counts: &[usize], seed: u64) -> Dataset {
     let object = |(index, &count): (usize, &usize)| {
         let name = format!("object{index}");
-        let mut random = random::generator(seed, &name, 0);
+        let mut random = random::generator(seed, Purpose::Synthetic, &name, 0);
         let touches = (0..count).map(|_| touch(index, &mut random)).collect();
         ObjectTouches { name, touches }
     };
-    Dataset { objects: counts.iter().enumerate().map(object).collect() }
+    Dataset::new(counts.iter().enumerate().map(object).collect())
 }
 
 fn touch(object: usize, random: &mut impl Rng) -> Touch {

@@ -1,16 +1,18 @@
-//! Touches as text: a line a touch.
+//! Touches as text: one line per touch.
 //!
 //! A line holds three contact times in seconds, a missing contact as `-`, and optionally the probe's direction and
 //! alignment (six numbers). Fields are separated by spaces or commas. The published data set has the same format.
 
-use crate::error::{Error, Result};
+use super::dataset::Checked;
+use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::probe::approach::to_q15;
 use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// The touches of a text, one after the other; blank lines are skipped, and errors name `path`.
+/// The touches in a text, one after the other; blank lines are skipped, and errors name `path`.
 ///
 /// Memory: that of the longest line.
 pub fn touches(mut text: impl BufRead, path: &Path) -> impl Iterator<Item = Result<Touch>> {
@@ -24,9 +26,9 @@ pub fn touches(mut text: impl BufRead, path: &Path) -> impl Iterator<Item = Resu
                 Ok(0) => return None,
                 Ok(_) => {}
             }
-            let wrong = |what| Error::line(path, line, what, "Correct the line, or capture the object anew.");
+            let wrong = |problem| Error::at(Place::line(path, line), problem);
             match std::str::from_utf8(&bytes).map(str::trim) {
-                Err(_) => return Some(Err(wrong("not text (no UTF-8)".to_owned()))),
+                Err(_) => return Some(Err(wrong(TouchesProblem::NotText))),
                 Ok("") => {}
                 Ok(text) => return Some(parse_touch(text).map_err(wrong)),
             }
@@ -34,13 +36,16 @@ pub fn touches(mut text: impl BufRead, path: &Path) -> impl Iterator<Item = Resu
     })
 }
 
-/// The touches of a text file, one after the other.
+/// The touches in a text file, one after the other.
 ///
 /// # Errors
 /// When the file cannot be opened; then each line that is wrong.
 pub fn lines(path: &Path) -> Result<impl Iterator<Item = Result<Touch>>> {
-    let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-    Ok(touches(BufReader::with_capacity(1 << 16, file), path))
+    Ok(touches(BufReader::with_capacity(1 << 16, open(path)?), path))
+}
+
+fn open(path: &Path) -> Result<File> {
+    File::open(path).map_err(|source| Error::io(path, "read the touches", source))
 }
 
 /// Reads the touches of one text file; blank lines are skipped.
@@ -48,19 +53,25 @@ pub fn lines(path: &Path) -> Result<impl Iterator<Item = Result<Touch>>> {
 /// # Errors
 /// When the file cannot be read, holds no touch, or has a wrong line.
 pub fn read(path: &Path) -> Result<Vec<Touch>> {
-    let touches = lines(path)?.collect::<Result<Vec<_>>>()?;
+    read_with_checksum(path).map(|(touches, _)| touches)
+}
+
+/// The same with the file's checksum.
+pub(super) fn read_with_checksum(path: &Path) -> Result<(Vec<Touch>, u32)> {
+    let mut text = BufReader::with_capacity(1 << 16, Checked::new(open(path)?));
+    let touches = touches(&mut text, path).collect::<Result<Vec<_>>>()?;
     if touches.is_empty() {
-        return Err(Error::file(path, "no touches in it", "Capture the object anew, or remove the file."));
+        return Err(Error::at(Place::file(path), TouchesProblem::NoTouches));
     }
-    Ok(touches)
+    Ok((touches, text.into_inner().checksum()))
 }
 
 /// Reads one line: three contact times in seconds on any common clock (`-` where missing), rounded to whole
 /// microseconds and shifted so that the first contact is 0, and optionally direction and alignment.
 ///
 /// # Errors
-/// What is wrong with the line, without a full stop.
-pub fn parse_touch(line: &str) -> Result<Touch, String> {
+/// What is wrong with the line.
+pub fn parse_touch(line: &str) -> Result<Touch, TouchesProblem> {
     let mut fields = [""; 9];
     let mut count = 0;
     for field in line.split(|c: char| c == ',' || c.is_whitespace()).filter(|field| !field.is_empty()) {
@@ -70,7 +81,7 @@ pub fn parse_touch(line: &str) -> Result<Touch, String> {
         count += 1;
     }
     if count != 3 && count != 9 {
-        return Err(format!("{count} fields where a touch has three times, or three times and six direction cosines"));
+        return Err(TouchesProblem::Fields { count });
     }
     let [a, b, c, pose @ ..] = fields;
     let touch = Touch::new([parse_time(a)?, parse_time(b)?, parse_time(c)?]);
@@ -86,45 +97,45 @@ pub fn parse_touch(line: &str) -> Result<Touch, String> {
 /// The longest contact time that a touch can hold, in microseconds.
 const LONGEST: f64 = (u32::MAX - 1) as f64;
 
-fn parse_time(field: &str) -> Result<ContactTime, String> {
+fn parse_time(field: &str) -> Result<ContactTime, TouchesProblem> {
     if field == "-" {
         return Ok(ContactTime::MISSING);
     }
     contact_time(parse_number(field)?)
 }
 
-/// Finite seconds as whole microseconds.
-pub(super) fn contact_time(seconds: f64) -> Result<ContactTime, String> {
+/// Seconds as whole microseconds.
+pub(super) fn contact_time(seconds: f64) -> Result<ContactTime, TouchesProblem> {
+    if !seconds.is_finite() {
+        return Err(TouchesProblem::NotFinite { text: format!("the time {seconds}") });
+    }
     if seconds < 0.0 {
-        return Err(format!("the time {seconds} is negative"));
+        return Err(TouchesProblem::NegativeTime { seconds });
     }
     let micros = (seconds * 1e6).round();
     if micros > LONGEST {
-        return Err(format!("the time {seconds} is longer than the 4294 s that a touch can hold"));
+        return Err(TouchesProblem::LongTime { seconds });
     }
     Ok(ContactTime::from_micros(micros as u32))
 }
 
-/// A unit vector in Q15. Vectors shorter or longer than 1 by more than 1 % are refused.
-fn parse_unit(what: &str, fields: [&str; 3]) -> Result<[i16; 3], String> {
+fn parse_unit(name: &'static str, fields: [&str; 3]) -> Result<[i16; 3], TouchesProblem> {
     let [x, y, z] = fields;
-    let vector = [parse_number(x)?, parse_number(y)?, parse_number(z)?];
-    let length = vector.iter().map(|c| c * c).sum::<f64>().sqrt();
-    if (length - 1.0).abs() > 0.01 {
-        return Err(format!("the {what} has length {length:.3} where a unit vector has 1"));
+    unit_vector(name, [parse_number(x)?, parse_number(y)?, parse_number(z)?])
+}
+
+/// A unit vector in Q15. Vectors shorter or longer than 1 by more than 1 %, and such as are not finite, are refused.
+pub(super) fn unit_vector(name: &'static str, vector: [f64; 3]) -> Result<[i16; 3], TouchesProblem> {
+    let length = vector.iter().map(|cosine| cosine * cosine).sum::<f64>().sqrt();
+    if (length - 1.0).abs() <= 0.01 {
+        return Ok(vector.map(to_q15));
     }
-    Ok(vector.map(to_q15))
+    Err(TouchesProblem::NotUnit { vector: name, length })
 }
 
-fn parse_number(field: &str) -> Result<f64, String> {
-    let number: f64 = field.parse().map_err(|_| format!("{field:?} is not a number"))?;
-    if number.is_finite() { Ok(number) } else { Err(format!("{field} is not finite")) }
-}
-
-/// A direction cosine as the nearest Q15 number.
-pub fn to_q15(cosine: f64) -> i16 {
-    let one = f64::from(Q15_ONE);
-    (cosine * one).round().clamp(-one, one) as i16
+fn parse_number(field: &str) -> Result<f64, TouchesProblem> {
+    let number: f64 = field.parse().map_err(|_| TouchesProblem::NotANumber { text: field.into() })?;
+    if number.is_finite() { Ok(number) } else { Err(TouchesProblem::NotFinite { text: field.into() }) }
 }
 
 /// Appends the line of a touch with its line end: times with six decimals, and with `pose` the direction and alignment
@@ -196,7 +207,7 @@ mod tests {
             ("0 0 0 1 0 0 0 0 0", "the alignment has length 0.000"),
             ("0 0 0 - 0 0 0 0 0", "\"-\" is not a number"),
         ] {
-            let error = parse_touch(line).unwrap_err();
+            let error = parse_touch(line).unwrap_err().to_string();
             assert!(error.contains(what), "{line:?}: {error}");
         }
     }

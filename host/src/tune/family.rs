@@ -17,17 +17,17 @@ const TREES: [(usize, f64, &[usize]); 6] = [
     (4, 0.6, &[8, 12, 16, 20]),
 ];
 
-/// Trainings for the table layout: bins of curvature and of slope. Accuracy hangs on curvature, so it gets more.
+/// Trainings for the table layout: bins of curvature and of slope. Accuracy depends on curvature, so it gets more.
 const TABLES: [[usize; 2]; 9] =
     [[24, 8], [32, 12], [48, 12], [48, 24], [64, 16], [64, 24], [96, 24], [96, 48], [128, 32]];
 
-/// Trains the family; the first is the large one that all are held against.
+/// Trains the family; the first is the large one that all are compared with.
 pub(super) fn train(
     dataset: &Dataset,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Vec<(Recipe, Ensemble)>> {
-    let base = train::Settings { descriptor: settings.descriptor, ..train::Settings::compact() };
+    let base = train::Settings { descriptor: settings.descriptor, probe: settings.probe, ..train::Settings::compact() };
     let tables: &[[usize; 2]] = if settings.descriptor.feature_count() == 2 { &TABLES } else { &[] };
     progress.begin("trainings", Some((1 + TREES.len() + tables.len()) as u64));
     let mut family = Vec::new();

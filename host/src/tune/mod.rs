@@ -5,21 +5,31 @@
 //! that stops after the fewest touches at the wanted error rate, of those within the limits. Its own figures come from a
 //! third share of the touches, which chose nothing.
 //!
-//! Instructions a touch are those of the exporter's model of the evaluator on a Cortex-M4F
-//! ([`crate::compile::Compiled::instructions`]).
+//! Instructions per touch are the compiler's estimate ([`crate::compile::Instructions`]).
+//!
+//! ```no_run
+//! use palpate::touches::Dataset;
+//! use palpate::tune::{self, tune};
+//!
+//! # fn main() -> palpate::Result<()> {
+//! let dataset = Dataset::read("data".as_ref())?;
+//! let tuned = tune(&dataset, &tune::Settings { max_bytes: Some(16 << 10), ..Default::default() }, &())?;
+//! std::fs::write("model.palpate", &tuned.model).map_err(|e| palpate::Error::io("model.palpate", "write", e))?;
+//! # Ok(())
+//! # }
+//! ```
 
 mod family;
 #[cfg(test)]
 mod tests;
 
-use crate::compile::{self, Compiled, Layout, Leaf, compile};
-use crate::ensemble::Ensemble;
-use crate::error::{Error, Result};
+use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
+use crate::ensemble::{Ensemble, StatedProbe};
+use crate::error::{CompileProblem, Problem, Result, TuneProblem};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use crate::touches::folds;
-use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -31,8 +41,12 @@ pub struct Settings {
     pub descriptor: Descriptor,
     /// The most bytes of a model.
     pub max_bytes: Option<usize>,
-    /// The most instructions a touch.
+    /// The most instructions per touch on `core`.
     pub max_instructions: Option<u64>,
+    /// The processor that the limit of instructions is for.
+    pub core: Core,
+    /// The probe that made the touches, to be stated by the model.
+    pub probe: Option<StatedProbe>,
     /// The error rate that recognizers stop at.
     pub error_rate: f64,
     /// Groups, and sequences, drawn for each object.
@@ -47,6 +61,8 @@ impl Default for Settings {
             descriptor: Descriptor::Curvature,
             max_bytes: None,
             max_instructions: None,
+            core: Core::M4F,
+            probe: None,
             error_rate: 0.01,
             groups: 1000,
             seed: 1,
@@ -73,21 +89,24 @@ pub struct Row {
     /// How its ensemble was trained.
     #[serde(flatten)]
     pub recipe: Recipe,
-    /// What leaves are stored as; `None` for the full model without limits that all are held against.
+    /// What leaves are stored as; `None` for the full model without limits that all are compared with.
     pub leaf: Option<&'static str>,
     /// How trees are laid out.
     pub layout: Option<&'static str>,
     /// Size of the model.
     pub bytes: Option<usize>,
-    /// Instructions a touch on a Cortex-M4F, from the exporter's model of the evaluator.
+    /// Instructions per touch on a Cortex-M4F, estimated.
     pub instructions: Option<u64>,
+    /// The same on a Cortex-M0+.
+    pub instructions_m0_plus: Option<u64>,
     /// Accuracy after 10 and 30 touches, as far as the held-out touches go.
     pub accuracy: BTreeMap<usize, f64>,
     /// Touches until it stops, on average.
     pub mean_touches: f64,
     /// Share of wrong verdicts when it stops by itself.
     pub error: f64,
-    /// Whether no other model is at least as small, as fast and as quick to stop, and better in one of them.
+    /// Whether no other model is at least as small, as fast (on the processor of the limit) and as quick to stop, and
+    /// better in one of them.
     pub frontier: bool,
 }
 
@@ -113,7 +132,8 @@ pub struct Tuned {
 /// Trains the family on eight tenths of the touches, chooses on one tenth, and measures the choice on the last.
 ///
 /// # Errors
-/// As [`crate::ensemble::train::train`] and [`evaluate::evaluate`]; [`Error::Data`] if no model is within the limits.
+/// As [`crate::ensemble::train::train`], [`compile`] (but for layouts that an ensemble does not fit) and
+/// [`evaluate::evaluate`]; [`TuneProblem::NothingFits`] if no model is within the limits.
 pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Tuned> {
     let outer = folds::split(dataset, 0.2, settings.seed)?;
     let held_out = folds::split(&outer.test, 0.5, settings.seed)?;
@@ -131,13 +151,14 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
         }
         progress::advance(progress, 1)?;
     }
-    let Some(unlimited) = unlimited else { return Err(nothing_fits(None)) };
+    let Some(unlimited) = unlimited else { return Err(TuneProblem::NothingCompiles.into()) };
     models.sort_by_key(|(row, ..)| (row.bytes, row.instructions));
-    mark_frontier(&mut models);
+    mark_frontier(&mut models, settings.core);
     let chosen = choose_from(&models, settings)?;
     let (_, ensemble, compiled) = &models[chosen];
     let (ensemble, model) = ((*ensemble).clone(), compiled.bytes.clone());
-    let test = evaluate::evaluate(&Margins::new(Candidate::Compiled(&open(&model)?), &test)?, &of(settings, &test))?;
+    let opened = compile::open(&model)?;
+    let test = evaluate::evaluate(&Margins::new(Candidate::Compiled(&opened), &test)?, &evaluation(settings, &test))?;
     Ok(Tuned { unlimited, rows: models.into_iter().map(|(row, ..)| row).collect(), chosen, test, model, ensemble })
 }
 
@@ -162,17 +183,19 @@ fn compiled_models<'e>(
                 error_rate: settings.error_rate,
                 ..compile::Settings::default()
             };
-            // Not every ensemble fits every layout.
-            let Ok(compiled) = compile(ensemble, &how) else { continue };
-            let shape = Some((leaf, layout, compiled.bytes.len(), compiled.instructions));
+            let Some(compiled) = unless_unfit(compile(ensemble, &how))? else { continue };
             let row = match &measured {
                 Some(row) => Row {
-                    layout: Some(layout.name()),
+                    layout: Some(compiled.layout.name()),
                     bytes: Some(compiled.bytes.len()),
-                    instructions: Some(compiled.instructions),
+                    instructions: Some(compiled.instructions.m4f),
+                    instructions_m0_plus: compiled.instructions.m0_plus,
                     ..row.clone()
                 },
-                None => measure(Candidate::Compiled(&open(&compiled.bytes)?), recipe, shape, choose, settings)?,
+                None => {
+                    let model = compile::open(&compiled.bytes)?;
+                    measure(Candidate::Compiled(&model), recipe, Some((leaf, &compiled)), choose, settings)?
+                }
             };
             measured = Some(row.clone());
             models.push((row, ensemble, compiled));
@@ -181,20 +204,29 @@ fn compiled_models<'e>(
     Ok(models)
 }
 
+/// Not every ensemble fits every layout; all else that compiling refuses is an error.
+fn unless_unfit(compiled: Result<Compiled>) -> Result<Option<Compiled>> {
+    match compiled {
+        Err(error) if matches!(error.problem(), Some(Problem::Compile(CompileProblem::DoesNotFit { .. }))) => Ok(None),
+        compiled => compiled.map(Some),
+    }
+}
+
 fn measure(
     candidate: Candidate<'_>,
     recipe: &Recipe,
-    shape: Option<(Leaf, Layout, usize, u64)>,
+    compiled: Option<(Leaf, &Compiled)>,
     choose: &Dataset,
     settings: &Settings,
 ) -> Result<Row> {
-    let evaluation = evaluate::evaluate(&Margins::new(candidate, choose)?, &of(settings, choose))?;
+    let evaluation = evaluate::evaluate(&Margins::new(candidate, choose)?, &evaluation(settings, choose))?;
     Ok(Row {
         recipe: recipe.clone(),
-        leaf: shape.map(|(leaf, ..)| leaf.name()),
-        layout: shape.map(|(_, layout, ..)| layout.name()),
-        bytes: shape.map(|(_, _, bytes, _)| bytes),
-        instructions: shape.map(|(.., instructions)| instructions),
+        leaf: compiled.map(|(leaf, _)| leaf.name()),
+        layout: compiled.map(|(_, compiled)| compiled.layout.name()),
+        bytes: compiled.map(|(_, compiled)| compiled.bytes.len()),
+        instructions: compiled.map(|(_, compiled)| compiled.instructions.m4f),
+        instructions_m0_plus: compiled.and_then(|(_, compiled)| compiled.instructions.m0_plus),
         accuracy: evaluation.accuracy,
         mean_touches: evaluation.sequential.mean_touches,
         error: evaluation.sequential.error,
@@ -202,7 +234,7 @@ fn measure(
     })
 }
 
-fn of(settings: &Settings, touches: &Dataset) -> evaluate::Settings {
+fn evaluation(settings: &Settings, touches: &Dataset) -> evaluate::Settings {
     let fewest = touches.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
     evaluate::Settings {
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),
@@ -213,13 +245,9 @@ fn of(settings: &Settings, touches: &Dataset) -> evaluate::Settings {
     }
 }
 
-fn open(bytes: &[u8]) -> Result<Model<'_>> {
-    Model::new(bytes)
-        .map_err(|error| Error::data(format!("the exporter wrote no model: {error}"), "Report this as a bug."))
-}
-
-fn mark_frontier(models: &mut [Measured<'_>]) {
-    let figures: Vec<_> = models.iter().map(|(row, ..)| (row.bytes, row.instructions, row.mean_touches)).collect();
+fn mark_frontier(models: &mut [Measured<'_>], core: Core) {
+    let figures: Vec<_> =
+        models.iter().map(|(row, _, compiled)| (row.bytes, compiled.instructions.on(core), row.mean_touches)).collect();
     for ((row, ..), own) in models.iter_mut().zip(&figures) {
         let beats = |other: &&(Option<usize>, Option<u64>, f64)| {
             other.0 <= own.0 && other.1 <= own.1 && other.2 <= own.2 && *other != own
@@ -230,27 +258,30 @@ fn mark_frontier(models: &mut [Measured<'_>]) {
 
 /// The model within the limits that stops first, among those that err no more often than they should.
 fn choose_from(models: &[Measured<'_>], settings: &Settings) -> Result<usize> {
-    let fits = |row: &Row| {
+    let fits = |(row, _, compiled): &Measured<'_>| {
         settings.max_bytes.is_none_or(|most| row.bytes <= Some(most))
-            && settings.max_instructions.is_none_or(|most| row.instructions <= Some(most))
+            && settings
+                .max_instructions
+                .is_none_or(|most| compiled.instructions.on(settings.core).is_some_and(|own| own <= most))
     };
-    let fitting = || models.iter().enumerate().filter(|(_, (row, ..))| fits(row));
-    let least = |models: &mut dyn Iterator<Item = (usize, &Measured<'_>)>| {
-        models.min_by(|(_, (a, ..)), (_, (b, ..))| a.mean_touches.total_cmp(&b.mean_touches)).map(|(index, _)| index)
-    };
+    let fitting = || models.iter().enumerate().filter(|(_, model)| fits(model));
     // Where even the best errs more often, the quickest to stop would be the worst.
     let sound = |row: &Row| row.error <= settings.error_rate;
-    least(&mut fitting().filter(|(_, (row, ..))| sound(row)))
-        .or_else(|| fitting().min_by(|(_, (a, ..)), (_, (b, ..))| a.error.total_cmp(&b.error)).map(|(index, _)| index))
-        .ok_or_else(|| nothing_fits(models.first().map(|(row, ..)| row)))
+    let quickest = fitting()
+        .filter(|(_, (row, ..))| sound(row))
+        .min_by(|(_, (a, ..)), (_, (b, ..))| a.mean_touches.total_cmp(&b.mean_touches));
+    let chosen = quickest.or_else(|| fitting().min_by(|(_, (a, ..)), (_, (b, ..))| a.error.total_cmp(&b.error)));
+    match chosen {
+        Some((index, _)) => Ok(index),
+        None => Err(nothing_fits(models, settings.core).into()),
+    }
 }
 
-fn nothing_fits(smallest: Option<&Row>) -> Error {
-    let what = match smallest.and_then(|row| row.bytes.zip(row.instructions)) {
-        Some((bytes, instructions)) => {
-            format!("no model fits; the smallest has {bytes} bytes and takes {instructions} instructions a touch")
-        }
-        None => "no model fits".into(),
-    };
-    Error::data(what, "Allow more with --max-bytes or --max-instructions.")
+fn nothing_fits(models: &[Measured<'_>], core: Core) -> TuneProblem {
+    let bytes = models.iter().map(|(.., compiled)| compiled.bytes.len()).min();
+    let instructions = models.iter().filter_map(|(.., compiled)| compiled.instructions.on(core)).min();
+    match bytes.zip(instructions) {
+        Some((bytes, instructions)) => TuneProblem::NothingFits { bytes, instructions },
+        None => TuneProblem::NothingCompiles,
+    }
 }

@@ -18,7 +18,12 @@ fn the_choice_fits_and_nothing_that_fits_stops_sooner() {
             && row.error <= 0.01
             && row.mean_touches < chosen.mean_touches
     };
-    assert!(chosen.error > 0.01 || !tuned.rows.iter().any(|row| better(&row)));
+    assert!(chosen.error <= 0.01, "no model is sound, so this test holds nothing: {chosen:?}");
+    assert!(!tuned.rows.iter().any(|row| better(&row)));
+    // Some that fit are sound and slower, and some that are quicker do not fit: there was something to choose.
+    let fits = |row: &Row| row.bytes <= Some(6_000) && row.instructions <= Some(1_500);
+    assert!(tuned.rows.iter().any(|row| fits(row) && row.mean_touches > chosen.mean_touches));
+    assert!(tuned.rows.iter().any(|row| !fits(row)));
     assert_eq!(tuned.ensemble.trees.len(), chosen.recipe.trees);
     assert!(tuned.rows.iter().any(|row| row.layout == Some("grid")));
     assert!(tuned.test.accuracy[&30] > 0.8);
@@ -43,4 +48,42 @@ fn limits_that_nothing_fits_name_the_smallest_model() {
     let settings = Settings { max_bytes: Some(10), ..quick() };
     let error = tune(&synthetic::dataset(&[300, 300], 3), &settings, &()).unwrap_err();
     assert!(error.to_string().contains("the smallest has") && error.exit_code() == 1, "{error}");
+    let family = tune(&synthetic::dataset(&[300, 300], 3), &Settings { max_bytes: None, ..settings }, &()).unwrap();
+    let bytes = family.rows.iter().map(|row| row.bytes.unwrap()).min().unwrap();
+    let instructions = family.rows.iter().map(|row| row.instructions.unwrap()).min().unwrap();
+    assert_eq!(error.problem(), Some(&TuneProblem::NothingFits { bytes, instructions }.into()));
+}
+
+#[test]
+fn compile_errors_other_than_a_layout_that_does_not_fit_are_not_swallowed() {
+    let unfit = CompileProblem::DoesNotFit { layout: Layout::Grid };
+    assert!(unless_unfit(Err(unfit.into())).unwrap().is_none());
+    for problem in [CompileProblem::TooLarge, CompileProblem::FitsNoLayout] {
+        let error = unless_unfit(Err(problem.clone().into())).unwrap_err();
+        assert_eq!(error.problem(), Some(&problem.into()));
+    }
+    let wrong = crate::Error::setting("error_rate", 0.7, "less");
+    assert!(unless_unfit(Err(wrong)).is_err());
+    // Through the whole call: an error rate that no model can be compiled for.
+    let settings = Settings { error_rate: 0.7, ..quick() };
+    let error = tune(&synthetic::dataset(&[300, 300], 3), &settings, &()).unwrap_err();
+    assert!(matches!(error.problem(), Some(Problem::Setting { name: "error_rate", .. })), "{error}");
+}
+
+#[test]
+fn a_limit_of_instructions_holds_on_the_processor_that_it_is_for() {
+    let dataset = synthetic::dataset(&[400, 400], 4);
+    let settings = |core| Settings { max_bytes: None, max_instructions: Some(1_200), core, ..quick() };
+    let tuned = tune(&dataset, &settings(Core::M0Plus), &()).unwrap();
+    let chosen = &tuned.rows[tuned.chosen];
+    assert!(chosen.instructions_m0_plus <= Some(1_200), "{chosen:?}");
+    assert!(tuned.rows.iter().any(|row| row.instructions <= Some(1_200) && row.instructions_m0_plus > Some(1_200)));
+}
+
+#[test]
+fn the_model_states_the_probe_of_the_touches() {
+    let probe = crate::probe::approach::Probe { spacing: 2.0, ..Default::default() };
+    let settings = Settings { probe: Some(StatedProbe { probe, length: 10.0 }), ..quick() };
+    let tuned = tune(&synthetic::dataset(&[300, 300], 3), &settings, &()).unwrap();
+    assert_eq!(compile::open(&tuned.model).unwrap().header().spacing(), 2.0);
 }

@@ -32,7 +32,7 @@ fn is_complete(directory: &Path) -> bool {
     manifest["complete"].as_bool().unwrap()
 }
 
-/// Waits until the capture has written its first account, or a minute.
+/// Waits until the capture has written its first checkpoint, or a minute.
 fn wait_for(path: &Path) {
     let start = Instant::now();
     while !path.exists() {
@@ -149,12 +149,18 @@ fn a_capture_that_is_killed_again_and_again_ends_with_the_same_bytes() {
     for kill in 0..10_u64 {
         let mut running = capture(directory.path(), "killed", &more);
         let mut running = Running(running.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-        // From before the first account to well after it, in no order.
-        std::thread::sleep(Duration::from_millis(30 + kill * 379 % 900));
+        // The first kill comes when a capture has surely begun; the others from before the first checkpoint to well after
+        // it, in no order.
+        if kill == 0 {
+            wait_for(&killed.join("apple.part"));
+        } else {
+            std::thread::sleep(Duration::from_millis(30 + kill * 379 % 900));
+        }
         running.0.kill().unwrap();
         running.0.wait().unwrap();
         cut_short += u32::from(killed.join("dataset.json").exists() && !is_complete(&killed));
     }
+    assert!(cut_short > 0, "no kill came while the capture was writing");
     stdout(capture(directory.path(), "killed", &more).output().unwrap());
     assert!(files(&killed) == files(&directory.path().join("whole")), "after {cut_short} kills on the way");
     assert!(is_complete(&killed));
@@ -168,6 +174,7 @@ fn resuming_with_other_arguments_is_refused() {
     for other in [&["--touches", "30", "--resume"][..], &["--touches", "20", "--seed", "2", "--resume"]] {
         let error = stderr(capture(directory.path(), "out", other).output().unwrap(), 1);
         assert!(error.contains("dataset.json: cannot resume: other settings"), "{error}");
+        assert!(error.contains(" there and "), "what differs: {error}");
     }
     stdout(capture(directory.path(), "out", &["--touches", "20", "--resume"]).output().unwrap());
     assert_eq!(files(&directory.path().join("out")), before);
@@ -222,7 +229,7 @@ fn a_full_disk_stops_the_capture_which_can_be_resumed() {
 fn memory_does_not_grow_with_the_number_of_touches() {
     let directory = meshes();
     let peak = |touches: &str| -> u64 {
-        let mut child = capture(directory.path(), "out", &["--touches", touches]);
+        let mut child = capture(directory.path(), "out", &["--touches", touches, "--force"]);
         let mut child = Running(child.stdout(Stdio::null()).spawn().unwrap());
         let status = PathBuf::from(format!("/proc/{}/status", child.0.id()));
         let mut peak = 0;
@@ -239,6 +246,169 @@ fn memory_does_not_grow_with_the_number_of_touches() {
     let (few, many) = (peak("5000"), peak("200000"));
     // Up to a megabyte either way is the allocator's.
     assert!(many <= few + few / 5 + 1024, "{few} kB for 5,000 touches, {many} kB for 200,000");
+}
+
+#[test]
+fn touches_of_other_objects_are_kept_unless_the_capture_is_forced() {
+    let directory = meshes();
+    let one = |mesh: &str, more: &[&str]| {
+        let mesh = directory.path().join("meshes").join(mesh);
+        let mut command = command(["capture", "--touches", "20"]);
+        command.arg(mesh).arg("-o").arg(directory.path().join("real")).args(more).output().unwrap()
+    };
+    let real = directory.path().join("real");
+    stdout(one("apple.obj", &[]));
+    let before = files(&real);
+    let error = stderr(one("globe.obj", &[]), 1);
+    assert!(error.contains("real: holds 20 touches of apple, which this capture would not write"), "{error}");
+    assert!(error.contains("--add") && error.contains("--force"), "{error}");
+    assert_eq!(files(&real), before);
+    stdout(one("globe.obj", &["--force"]));
+    assert_eq!(files(&real).keys().collect::<Vec<_>>(), ["dataset.json", "globe.txt"]);
+    stderr(one("apple.obj", &["--force", "--add"]), 2);
+}
+
+#[test]
+fn an_object_is_added_with_the_settings_of_the_others() {
+    let directory = meshes();
+    let one = |mesh: &str, more: &[&str]| {
+        let mesh = directory.path().join("meshes").join(mesh);
+        command(["capture"]).arg(mesh).arg("-o").arg(directory.path().join("real")).args(more).output().unwrap()
+    };
+    let settings = ["--touches", "30", "--seed", "5", "--spacing", "2", "--pose"];
+    stdout(one("globe.obj", &settings));
+    stdout(one("apple.obj", &["--add"]));
+    stdout(capture(directory.path(), "together", &settings).output().unwrap());
+    assert!(files(&directory.path().join("real")) == files(&directory.path().join("together")));
+    let error = stderr(one("apple.obj", &["--add"]), 1);
+    assert!(error.contains("already holds touches of apple"), "{error}");
+    let error = stderr(one("apple.obj", &["--add", "--seed", "6"]), 1);
+    assert!(error.contains("cannot add to these touches: other settings: seed is 5 there and 6 here"), "{error}");
+}
+
+#[test]
+fn an_unfinished_capture_is_neither_overwritten_nor_forgotten() {
+    let directory = meshes();
+    let mut first = capture(directory.path(), "out", &["--touches", "100000000"]);
+    let mut first = Running(first.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    wait_for(&directory.path().join("out/apple.part"));
+    first.0.kill().unwrap();
+    first.0.wait().unwrap();
+    let before = files(&directory.path().join("out"));
+    for touches in ["100000000", "20"] {
+        let error = stderr(capture(directory.path(), "out", &["--touches", touches]).output().unwrap(), 1);
+        assert!(error.contains("out: holds an unfinished capture of apple, globe"), "{error}");
+        assert!(error.contains("--resume") && error.contains("--force"), "{error}");
+        assert!(files(&directory.path().join("out")) == before);
+    }
+    stdout(capture(directory.path(), "out", &["--touches", "20", "--force"]).output().unwrap());
+    assert!(is_complete(&directory.path().join("out")));
+}
+
+#[test]
+fn a_run_replaces_its_own_results_and_keeps_touches_of_other_objects() {
+    let directory = meshes();
+    let run = |sources: &[PathBuf], touches: &str| {
+        let mut command = command(["run", "--touches", touches, "-o"]);
+        command.arg(directory.path().join("mine")).args(sources).output().unwrap()
+    };
+    let both = [directory.path().join("meshes")];
+    stdout(run(&both, "100"));
+    stdout(run(&both, "120"));
+    let data = directory.path().join("mine/data");
+    let before = files(&data);
+    assert_eq!(before["apple.txt"].iter().filter(|&&byte| byte == b'\n').count(), 120);
+    let error = stderr(run(&["bowl".into(), "mouse".into()], "100"), 1);
+    assert!(error.contains("data: holds 240 touches of apple, globe, which this capture would not write"), "{error}");
+    assert_eq!(files(&data), before);
+}
+
+#[test]
+fn numbers_in_another_notation_are_refused_with_a_hint() {
+    let directory = meshes();
+    for text in ["1e6", "1_000_000"] {
+        let error = stderr(capture(directory.path(), "out", &["--touches", text]).output().unwrap(), 2);
+        assert!(error.contains("write the number out: 1000000"), "{error}");
+    }
+    let error = stderr(capture(directory.path(), "out", &["--format", "csv"]).output().unwrap(), 2);
+    assert!(error.contains("\"csv\" is no format of touches. Use text or parquet."), "{error}");
+    let error = stderr(capture(directory.path(), "out", &["--shard", "3/2"]).output().unwrap(), 2);
+    assert!(error.contains("Give K/N with K from 1 to N, like 2/5."), "{error}");
+    assert!(!directory.path().join("out").exists());
+}
+
+#[test]
+fn a_capture_to_standard_output_is_refused() {
+    let directory = meshes();
+    let mut command = command(["capture", "-o", "-"]);
+    let output = command.arg(directory.path().join("meshes")).current_dir(directory.path()).output().unwrap();
+    assert!(stderr(output, 2).contains("Use a directory"));
+    assert_eq!(listing(directory.path()), ["meshes"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_the_system_refuses_are_an_error_and_no_panic() {
+    // Four gigabytes of addresses do not hold the stacks of 100,000 threads.
+    let directory = meshes();
+    let script =
+        "ulimit -v 4000000; exec \"$1\" capture \"$2/meshes\" -o \"$2/out\" --touches 100000000 --threads 100000";
+    let error = stderr(shell(script, directory.path()), 1);
+    assert!(error.contains("threads (") && error.contains("Use fewer threads."), "{error}");
+}
+
+#[test]
+fn an_edited_line_is_a_warning_and_a_cut_file_an_error() {
+    let directory = meshes();
+    stdout(capture(directory.path(), "out", &["--touches", "400"]).output().unwrap());
+    let path = directory.path().join("out/apple.txt");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let train = || {
+        let mut command = command(["train", "--rounds", "2", "-o"]);
+        command.args([directory.path().join("ensemble.json"), directory.path().join("out")]).output().unwrap()
+    };
+    let untouched = train();
+    assert!(untouched.stderr.is_empty(), "{}", String::from_utf8_lossy(&untouched.stderr));
+    std::fs::write(&path, text.replacen("0.0", "0.1", 1)).unwrap();
+    let warned = train();
+    assert!(String::from_utf8_lossy(&warned.stderr).contains("apple.txt: changed since its capture"));
+    stdout(warned);
+    std::fs::write(&path, text.split_inclusive('\n').take(399).collect::<String>()).unwrap();
+    let error = stderr(train(), 1);
+    assert!(error.contains("apple.txt: 399 touches where dataset.json states 400"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn results_go_through_links_and_to_standard_output_and_never_onto_what_is_read() {
+    let directory = meshes();
+    stdout(capture(directory.path(), "out", &["--touches", "400"]).output().unwrap());
+    let at = |name: &str| directory.path().join(name);
+    let train = |output: &Path| command(["train", "--rounds", "2", "-o"]).arg(output).arg(at("out")).output().unwrap();
+    stdout(train(&at("ensemble.json")));
+    let ensemble = std::fs::read(at("ensemble.json")).unwrap();
+    // Through a link, and to standard output, where nothing else may stand.
+    std::os::unix::fs::symlink("real.json", at("link.json")).unwrap();
+    stdout(train(&at("link.json")));
+    assert!(at("link.json").is_symlink());
+    assert_eq!(std::fs::read(at("real.json")).unwrap(), ensemble);
+    for name in ["-", "/dev/stdout"] {
+        let output = train(Path::new(name));
+        assert!(output.status.success() && output.stdout == ensemble, "{name}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("trees"), "the summary goes to stderr");
+    }
+    // Onto what is read.
+    for (output, arguments) in
+        [(at("out/apple.txt"), ["train", "--rounds", "2"]), (at("out/dataset.json"), ["train", "--rounds", "2"])]
+    {
+        let before = std::fs::read(&output).unwrap();
+        let error = stderr(command(arguments).arg("-o").arg(&output).arg(at("out")).output().unwrap(), 2);
+        assert!(error.contains("Use another file than what is read"), "{error}");
+        assert_eq!(std::fs::read(&output).unwrap(), before);
+    }
+    let export = command(["export", "-o"]).args([at("ensemble.json"), at("ensemble.json")]).output().unwrap();
+    assert!(stderr(export, 2).contains("Use another file than what is read"));
+    assert_eq!(std::fs::read(at("ensemble.json")).unwrap(), ensemble);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The commands around a compiled model, as a user calls them: export, inspect, parity, recognize.
 
-use palpate::ensemble::{Ensemble, Node, Output, Tree};
+use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
 use palpate_shared::Descriptor;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
@@ -33,6 +33,7 @@ pub(crate) fn ensemble() -> Ensemble {
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0, 0.0],
         trees: vec![Tree { nodes, output: Output::Each }],
+        origin: Origin::default(),
     }
 }
 
@@ -296,4 +297,114 @@ fn leaves_beyond_reason_are_refused_at_export_and_nothing_is_written() {
     assert_eq!(code, 1);
     assert!(message.contains("huge.json") && message.contains("1e30"), "{message}");
     assert!(!place.path("huge.palpate").exists());
+}
+
+#[test]
+fn recognize_refuses_a_limit_of_no_touches_with_and_without_an_error_rate() {
+    let place = Place::new();
+    std::fs::write(place.path("touches.txt"), "0 0 0.08\n").unwrap();
+    let arguments = ["recognize", &place.text("model.palpate"), &place.text("touches.txt"), "--max-touches", "0"];
+    let (code, without) = refusal(&arguments);
+    assert_eq!(code, 2, "{without}");
+    let (code, with) = refusal(&[&arguments[..], &["--error-rate", "0.05"]].concat());
+    assert_eq!(code, 2, "{with}");
+    assert_eq!(without, with);
+    assert!(with.contains("touches is 0. Use at least 1."), "{with}");
+}
+
+#[test]
+fn recognize_refuses_times_in_milliseconds_and_names_the_unit() {
+    let place = Place::new();
+    std::fs::write(place.path("touches.txt"), "0 0 0.08\n62.2 0 2.2\n").unwrap();
+    let finished = palpate(&["recognize", &place.text("model.palpate"), &place.text("touches.txt")]);
+    assert_eq!(finished.status.code(), Some(1));
+    assert_eq!(finished.stdout.lines().count(), 1, "the touch before is answered");
+    let message = String::from_utf8(finished.stderr).unwrap();
+    assert!(message.contains("touches.txt:2: a finger touched 62.2 s after the first"), "{message}");
+    assert!(message.contains("Give times in seconds, not in milliseconds"), "{message}");
+}
+
+#[test]
+fn an_empty_line_begins_another_object_in_recognize_as_in_link() {
+    let place = Place::new();
+    std::fs::write(place.path("touches.txt"), "0 0 0.08\n0 0 0.08\n\n0 0 0.08\n").unwrap();
+    let finished = palpate(&["recognize", &place.text("model.palpate"), &place.text("touches.txt"), "--json"]);
+    let lines = finished.stdout.lines().map(|line| serde_json::from_str::<Value>(&line.unwrap()).unwrap());
+    assert_eq!(lines.map(|line| line["touch"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2, 1]);
+}
+
+#[test]
+fn error_rates_may_be_percent_and_one_half_is_outside_their_range() {
+    let place = Place::new();
+    let (ensemble, model) = (place.text("ensemble.json"), place.text("percent.palpate"));
+    json(&["export", &ensemble, "-o", &model, "--error-rate", "5%", "--json"]);
+    assert_eq!(json(&["inspect", &model, "--json"])["stopping"]["error_rate"], 0.05);
+    let (code, message) = refusal(&["export", &ensemble, "-o", &model, "--error-rate", "0.5"]);
+    assert_eq!(code, 2);
+    assert!(message.contains("is 0.5. Use a number of at least 1e-15 and below 0.5."), "{message}");
+    let (code, message) = refusal(&["export", &ensemble, "-o", &model, "--error-rate", "five"]);
+    assert!(code == 2 && message.contains("0.05, or percent such as 5%"), "{message}");
+}
+
+#[test]
+fn export_and_inspect_state_instructions_for_both_processors() {
+    let place = Place::new();
+    let exported = json(&["export", &place.text("ensemble.json"), "-o", &place.text("model.palpate"), "--json"]);
+    let instructions = &exported["instructions"];
+    assert!(
+        instructions["m4f"].as_u64() > Some(300) && instructions["m0_plus"].as_u64() > instructions["m4f"].as_u64()
+    );
+    let inspected = json(&["inspect", &place.text("model.palpate"), "--json"]);
+    assert_eq!(&inspected["instructions"], instructions);
+    let export = palpate(&["export", &place.text("ensemble.json"), "-o", &place.text("other.palpate")]);
+    let export = String::from_utf8(export.stdout).unwrap();
+    let inspect = String::from_utf8(palpate(&["inspect", &place.text("model.palpate")]).stdout).unwrap();
+    for text in [export, inspect] {
+        assert!(text.contains("on a Cortex-M4F") && text.contains("on a Cortex-M0+"), "{text}");
+        assert!(text.contains("estimated"), "{text}");
+    }
+}
+
+#[test]
+fn inspect_says_what_a_model_costs_on_a_chip_and_how_it_knows() {
+    let place = Place::new();
+    let model = place.text("model.palpate");
+    for (chip, name) in [("m0+", "Cortex-M0+"), ("m4f", "Cortex-M4F")] {
+        let inspected = json(&["inspect", &model, "--chip", chip, "--mhz", "48", "--json"]);
+        let cost = &inspected["chip"];
+        assert_eq!((&cost["core"], &cost["how"]), (&chip.into(), &"estimated".into()));
+        assert_eq!(cost["model_flash"], inspected["bytes"]);
+        for bytes in ["code_flash", "ram", "stack", "margin_instructions"] {
+            assert!(cost[bytes].as_u64() > Some(0), "{bytes} in {cost}");
+        }
+        let time = cost["verdict_instructions"].as_f64().unwrap() / 48.0;
+        assert_eq!(cost["microseconds"].as_f64(), Some(time));
+        let text = String::from_utf8(palpate(&["inspect", &model, "--chip", chip, "--mhz", "48"]).stdout).unwrap();
+        for part in [name, "flash", "RAM", "stack", "(per touch, estimated)", "µs per touch at 48 MHz"] {
+            assert!(text.contains(part), "{part} in {text}");
+        }
+    }
+    assert_eq!(refusal(&["inspect", &model, "--chip", "z80"]).0, 2);
+    assert_eq!(refusal(&["inspect", &model, "--mhz", "48"]).0, 2);
+}
+
+#[test]
+fn an_ensemble_trained_on_seconds_is_refused_at_export_with_its_feature() {
+    let place = Place::new();
+    let mut seconds = ensemble();
+    let tree = seconds.trees[0].clone();
+    seconds.trees = (1..9)
+        .map(|number| {
+            let mut tree = tree.clone();
+            if let Node::Split { threshold, .. } = &mut tree.nodes[0] {
+                *threshold = number as f32 * 0.037;
+            }
+            tree
+        })
+        .collect();
+    seconds.save(place.path("seconds.json")).unwrap();
+    let (code, message) = refusal(&["export", &place.text("seconds.json"), "-o", &place.text("seconds.palpate")]);
+    assert_eq!(code, 1);
+    assert!(message.contains("seconds.json: ") && message.contains("8 thresholds of curvature"), "{message}");
+    assert!(!place.path("seconds.palpate").exists());
 }

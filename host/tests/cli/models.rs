@@ -111,7 +111,7 @@ fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
     fails(at, &train("empty", &[]), 1, "empty");
     fails(at, &train("broken", &[]), 1, "fork.txt:2:");
     fails(at, &train("missing", &[]), 1, "missing");
-    fails(at, &train("data", &["--descriptor", "gravity"]), 1, "--pose");
+    fails(at, &train("data", &["--descriptor", "gravity"]), 1, "with their pose");
     fails(at, &train("data", &["--descriptor", "shape"]), 2, "curvature");
     fails(at, &train("data", &["--rounds", "0"]), 2, "--rounds");
     fails(at, &train("data", &["--noise", "5"]), 2, "unit");
@@ -144,4 +144,123 @@ fn what_cannot_be_evaluated_is_refused() {
     fails(at, &["evaluate", "model.palpate", "data", "--at", "401"], 2, "bowl has only 400");
     fails(at, &["evaluate", "model.palpate", "data", "--error-rate", "0.7"], 2, "--error-rate");
     fails(at, &["evaluate", "model.palpate", "data", "--groups", "0"], 2, "--groups");
+}
+
+fn json(directory: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&succeeds(directory, arguments)).unwrap()
+}
+
+#[test]
+fn the_probe_of_the_capture_stands_in_every_model_made_of_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let capture = ["capture", "builtin", "-o", "data", "--touches", "60", "--spacing", "2", "--speed", "20"];
+    succeeds(at, &capture);
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "2"]);
+    succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
+    succeeds(at, &["tune", "data", "-o", "tuned.palpate", "--groups", "5", "--ensemble", "tuned.json"]);
+    succeeds(at, &["export", "tuned.json", "-o", "again.palpate"]);
+    for model in ["model.palpate", "tuned.palpate", "again.palpate"] {
+        let probe = &json(at, &["inspect", model, "--json"])["probe"];
+        assert_eq!((probe["spacing"].as_f64(), probe["speed"].as_f64()), (Some(2.0), Some(20.0)), "{model}");
+    }
+}
+
+#[test]
+fn objects_that_no_model_can_hold_are_refused_before_training_and_nothing_is_written() {
+    let directory = set_up();
+    let at = directory.path();
+    std::fs::copy(at.join("data/fork.txt"), at.join("data/fo\trk.txt")).unwrap();
+    fails(
+        at,
+        &["train", "data", "-o", "ensemble.json"],
+        1,
+        "data: the object's name \"fo\\trk\" has a control character",
+    );
+    std::fs::create_dir(at.join("many")).unwrap();
+    for number in 0..300 {
+        std::fs::write(at.join(format!("many/{number}.txt")), "0 0 0.01\n0 0 0.02\n").unwrap();
+    }
+    fails(
+        at,
+        &["train", "many", "-o", "ensemble.json"],
+        1,
+        "many: there are 300 objects to train on, more than the 256",
+    );
+    assert!(!at.join("ensemble.json").exists());
+}
+
+#[test]
+fn evaluating_on_the_training_touches_says_so() {
+    let directory = set_up();
+    let at = directory.path();
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3", "--noise", "1ms"]);
+    let evaluate = |data, more: &[&str]| {
+        let arguments = [&["evaluate", "ensemble.json", data, "--groups", "50"], more].concat();
+        succeeds(at, &arguments)
+    };
+    let said = "The model was trained on these touches of bowl, fork";
+    assert!(evaluate("data", &[]).contains(said));
+    assert!(evaluate("data", &["--noise", "5ms"]).contains(said));
+    let figures: Value = serde_json::from_str(&evaluate("data", &["--json"])).unwrap();
+    assert_eq!(figures["trained_on"], serde_json::json!(["bowl", "fork"]));
+    // The same touches from the other end: other touches.
+    std::fs::create_dir(at.join("unseen")).unwrap();
+    for name in ["bowl.txt", "fork.txt"] {
+        let text = std::fs::read_to_string(at.join("data").join(name)).unwrap();
+        let lines: Vec<&str> = text.lines().rev().collect();
+        std::fs::write(at.join("unseen").join(name), lines.join("\n")).unwrap();
+    }
+    assert!(!evaluate("unseen", &[]).contains("was trained on"));
+}
+
+#[test]
+fn no_accuracy_rests_on_the_one_group_that_a_small_test_set_has() {
+    let directory = set_up();
+    let at = directory.path();
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3"]);
+    std::fs::create_dir(at.join("few")).unwrap();
+    for name in ["bowl.txt", "fork.txt"] {
+        let text = std::fs::read_to_string(at.join("data").join(name)).unwrap();
+        let lines: Vec<&str> = text.lines().take(30).collect();
+        std::fs::write(at.join("few").join(name), lines.join("\n")).unwrap();
+    }
+    let figures = json(at, &["evaluate", "ensemble.json", "few", "--groups", "50", "--json"]);
+    let given: Vec<&String> = figures["accuracy"].as_object().unwrap().keys().collect();
+    assert_eq!(given, ["10", "20", "5"]);
+    fails(at, &["evaluate", "ensemble.json", "few", "--at", "30"], 2, "of 30 touches only 1 different groups of 30");
+    fails(at, &["evaluate", "ensemble.json", "few", "--at", "31"], 2, "has only 30");
+}
+
+#[test]
+fn evaluate_shows_undecided_sequences_and_the_confusion_of_objects() {
+    let directory = set_up();
+    let at = directory.path();
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3"]);
+    let evaluate = ["evaluate", "ensemble.json", "data", "--groups", "100", "--max-touches", "1", "--confusion", "5"];
+    let table = succeeds(at, &evaluate);
+    assert!(table.lines().next().unwrap().ends_with("undecided"), "{table}");
+    assert!(table.contains("Taken for, after 5 touches"), "{table}");
+    let figures = json(at, &[&evaluate[..], &["--json"]].concat());
+    let sequential = &figures["sequential"];
+    assert!(sequential["undecided"].as_f64() > Some(0.5), "{sequential}");
+    assert!(sequential["undecided_per_object"]["bowl"].is_number());
+    for row in figures["confusion"]["counts"].as_array().unwrap() {
+        assert_eq!(row.as_array().unwrap().iter().map(|count| count.as_u64().unwrap()).sum::<u64>(), 100);
+    }
+    fails(at, &["evaluate", "ensemble.json", "data", "--max-touches", "0"], 2, "touches is 0. Use at least 1.");
+}
+
+#[test]
+fn tune_names_the_file_it_wrote_and_the_features_that_the_chip_needs() {
+    let directory = set_up();
+    let at = directory.path();
+    let tune = ["tune", "data", "--max-instructions", "2000", "--chip", "m0+", "--groups", "20"];
+    let written = succeeds(at, &[&tune[..], &["-o", "tuned.palpate"]].concat());
+    assert!(written.contains("Wrote the model: tuned.palpate"), "{written}");
+    let inspected = json(at, &["inspect", "tuned.palpate", "--json"]);
+    assert!(inspected["instructions"]["m0_plus"].as_u64() <= Some(2000), "{inspected}");
+    let [layout, leaf] = ["layout", "leaf"].map(|key| inspected[key].as_str().unwrap());
+    assert!(written.contains(&format!("features of palpate-onboard: {layout}, {leaf}-leaves")), "{written}");
+    assert!(succeeds(at, &tune).contains("The model was not written"));
 }

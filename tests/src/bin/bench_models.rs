@@ -67,10 +67,10 @@ fn main() -> Result<()> {
             compiled.bytes.len(),
             compiled.splits,
             compiled.bytes.len() as f64 / compiled.splits as f64,
-            compiled.instructions
+            compiled.instructions.m4f
         );
         write(&out.join(format!("{name}.palpate")), &compiled.bytes)?;
-        estimates.extend((compiled.instructions as u32).to_le_bytes());
+        estimates.extend((compiled.instructions.m4f as u32).to_le_bytes());
         if name == "identity" {
             write(&out.join("identity.bin"), &expected(&compiled.bytes, &touches)?)?;
         }
@@ -87,7 +87,7 @@ fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// A run's touches, trained and tested on.
 fn split(run: &Path) -> Result<Split> {
     let settings = palpate::run::Settings::default();
-    folds::split(&Dataset::read(&run.join("data"))?, settings.test_share, settings.capture.seed)
+    folds::split(&Dataset::read(&run.join("data"))?, settings.test_share, settings.capture.origin.seed)
 }
 
 /// Trained where there is data; otherwise random, of the same shape and without missing splits.

@@ -4,12 +4,13 @@
 //! the published method, and a compact one, whose trees hold one leaf value for each object, so that one walk through a
 //! tree serves all objects.
 //!
-//! Every object counts alike, however many touches it has: touches are weighted by the inverse of their object's share.
-//! Otherwise each margin would hold the log of that share, and summing margins over touches would count that prior once
-//! a touch instead of once.
+//! Every object is weighted equally, however many touches it has: touches are weighted by the inverse of their object's
+//! share. Otherwise each margin would hold the log of that share, and summing margins over touches would count that prior
+//! once per touch instead of once.
 
-use crate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
-use crate::error::{Error, Result};
+use crate::ensemble::check::check_names;
+use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Tree, feature_row};
+use crate::error::{EnsembleProblem, Error, Result};
 use crate::progress::Progress;
 use crate::touches::Dataset;
 use crate::touches::noise;
@@ -29,7 +30,7 @@ mod xgboost;
 /// What every margin starts from; the same for all objects, so it changes no verdict. XGBoost's default.
 pub const BASE_MARGIN: f32 = 0.5;
 
-/// Who grows the trees.
+/// The library that trains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Engine {
     /// hessboost, in Rust.
@@ -44,7 +45,7 @@ pub enum Engine {
 pub struct Settings {
     /// Which features a touch is turned into.
     pub descriptor: Descriptor,
-    /// Whether a leaf holds one value for each object (one tree a round) or one value (one tree an object a round).
+    /// Whether a leaf holds one value for each object (one tree per round) or one value (one tree per object and round).
     pub multi_output: bool,
     /// Boosting rounds.
     pub rounds: usize,
@@ -54,8 +55,8 @@ pub struct Settings {
     pub eta: f64,
     /// `min_child_weight`: the least sum of second derivatives in a leaf.
     pub min_child_weight: f64,
-    /// `max_bin`: the most bins of a feature's histogram: at most `bins − 1` different thresholds a feature, and one more
-    /// where contacts are missing.
+    /// `max_bin`: the most bins of a feature's histogram: at most `bins − 1` different thresholds per feature, and one
+    /// more where contacts are missing.
     pub bins: usize,
     /// Bins of each feature, at quantiles, if they are to differ: values are rounded down to the lower edge of their bin
     /// before training, so that no feature has more thresholds than that. For models that are compiled to a table.
@@ -69,12 +70,14 @@ pub struct Settings {
     pub seed: u64,
     /// Threads, or all of the machine's; the ensemble is the same for any number.
     pub threads: Option<usize>,
-    /// Who grows the trees.
-    pub engine: Engine,
+    /// The library that trains.
+    pub trainer: Engine,
+    /// The probe that made the touches, to be stated by the ensemble and every model compiled from it; changes no tree.
+    pub probe: Option<StatedProbe>,
 }
 
 impl Settings {
-    /// The published method: 100 rounds of one tree an object, depth 6, eta 0.3, on contact times.
+    /// The published method: 100 rounds of one tree per object, depth 6, eta 0.3, on contact times.
     pub fn paper() -> Self {
         Self {
             descriptor: Descriptor::Times,
@@ -89,7 +92,8 @@ impl Settings {
             noise: 0.0,
             seed: 1,
             threads: None,
-            engine: Engine::Hessboost,
+            trainer: Engine::Hessboost,
+            probe: None,
         }
     }
 
@@ -111,19 +115,21 @@ impl Settings {
 /// of threads. Progress is counted in rounds.
 ///
 /// # Errors
-/// [`Error::Argument`] if a setting is out of its range; [`Error::Data`] if there are fewer than two objects, an object
-/// has no touches, or the descriptor needs a pose that no touch has.
+/// [`Problem::Setting`](crate::error::Problem::Setting) if a setting is out of its range; [`EnsembleProblem`] if there are
+/// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
+/// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
     check(dataset, settings.descriptor)?;
     let parameters = parameters(settings, dataset.objects.len())?;
     let rows = Rows::new(dataset, settings);
-    let mut ensemble = match settings.engine {
+    let mut ensemble = match settings.trainer {
         Engine::Hessboost => with_hessboost(rows, settings, &parameters, dataset.names(), progress)?,
         Engine::Xgboost => with_xgboost(&rows, settings, dataset.names(), progress)?,
     };
     if let Some(bits) = settings.leaf_bits {
         round_leaves(&mut ensemble, bits);
     }
+    ensemble.origin = Origin::new(dataset, settings.probe);
     Ok(ensemble)
 }
 
@@ -170,66 +176,74 @@ fn with_hessboost(
 #[cfg(feature = "xgboost")]
 fn with_xgboost(rows: &Rows, settings: &Settings, objects: Vec<String>, progress: &dyn Progress) -> Result<Ensemble> {
     if settings.multi_output {
-        let what = "XGBoost 1.6.2 cannot train leaves that hold a value for each object";
-        return Err(Error::argument(what, "Use --preset paper or --leaves one, or --trainer hessboost."));
+        return Err(Error::setting(
+            "leaves",
+            "each",
+            "one: XGBoost 1.6.2 has no leaves that hold a value for each object",
+        ));
     }
     xgboost::train(rows, settings, objects, progress)
 }
 
 #[cfg(not(feature = "xgboost"))]
 fn with_xgboost(_: &Rows, _: &Settings, _: Vec<String>, _: &dyn Progress) -> Result<Ensemble> {
-    Err(Error::argument(
-        "this program was built without XGBoost",
-        "Use --trainer hessboost, or build with: cargo build --release --features xgboost (cmake, g++ and libclang needed).",
-    ))
+    let allowed = "hessboost; XGBoost is not built in, which needs cmake, g++, libclang and: cargo build --release \
+                   --features xgboost";
+    Err(Error::setting("trainer", "xgboost", allowed))
 }
 
 /// Whether there is something to learn from.
 fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
     let objects = &dataset.objects;
-    if objects.len() < 2 {
-        return Err(Error::data("there is only one object to train on", "Capture at least two."));
+    match objects.len() {
+        0 | 1 => return Err(EnsembleProblem::OneObject.into()),
+        2..=MAX_OBJECTS => {}
+        objects => return Err(EnsembleProblem::TooManyObjects { objects }.into()),
     }
+    check_names(&dataset.names())?;
     if let Some(empty) = objects.iter().find(|object| object.touches.is_empty()) {
-        return Err(Error::data(format!("{} has no touches to train on", empty.name), "Capture it anew."));
+        return Err(EnsembleProblem::NoTouches { object: empty.name.clone() }.into());
     }
     let posed = || objects.iter().flat_map(|object| &object.touches).any(|touch| touch.pose().is_some());
     if descriptor.needs_pose() && !posed() {
-        let what = format!("the descriptor {} needs the probe's pose, which no touch has", descriptor.name());
-        return Err(Error::data(what, "Capture with --pose, or use --descriptor curvature."));
+        return Err(EnsembleProblem::NoPose { descriptor }.into());
     }
     Ok(())
 }
 
 /// The trainer's parameters for `objects` classes.
 fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
-    let range =
-        |name: &str, range: &str| Err(Error::argument(format!("{name} is out of range"), format!("Use {range}.")));
-    if settings.rounds == 0 || settings.rounds > 10_000 {
-        return range("--rounds", "1 to 10000");
+    let Settings { rounds, depth, eta, min_child_weight, bins, noise, .. } = *settings;
+    let bins_allowed = 2..=65_536;
+    if !(1..=10_000).contains(&rounds) {
+        return Err(Error::setting("rounds", rounds, "1 to 10000"));
     }
-    if settings.depth == 0 || settings.depth > 16 {
-        return range("--depth", "1 to 16");
+    if !(1..=16).contains(&depth) {
+        return Err(Error::setting("depth", depth, "1 to 16"));
     }
-    if !(settings.eta > 0.0 && settings.eta <= 1.0) {
-        return range("--eta", "a number above 0, at most 1");
+    if !(eta > 0.0 && eta <= 1.0) {
+        return Err(Error::setting("eta", eta, "a number above 0, at most 1"));
     }
-    if !(settings.min_child_weight >= 0.0 && settings.min_child_weight.is_finite()) {
-        return range("--min-child-weight", "a number of at least 0");
+    if !(min_child_weight >= 0.0 && min_child_weight.is_finite()) {
+        return Err(Error::setting("min_child_weight", min_child_weight, "a number of at least 0"));
     }
-    if !(2..=65_536).contains(&settings.bins) {
-        return range("--bins", "2 to 65536");
+    if !bins_allowed.contains(&bins) {
+        return Err(Error::setting("bins", bins, "2 to 65536"));
     }
     if let Some(bins) = &settings.feature_bins
-        && (bins.len() != settings.descriptor.feature_count() || bins.iter().any(|bins| !(2..=65_536).contains(bins)))
+        && (bins.len() != settings.descriptor.feature_count() || bins.iter().any(|bins| !bins_allowed.contains(bins)))
     {
-        return range("--bins", "one number from 2 to 65536 for all features, or one for each");
+        let bins = bins.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        return Err(Error::setting("bins", bins, "one number from 2 to 65536 for all features, or one for each"));
     }
-    if settings.leaf_bits.is_some_and(|bits| !(4..=24).contains(&bits)) {
-        return range("--leaf-bits", "4 to 24, or 0 to leave the leaves as they are");
+    if let Some(bits) = settings.leaf_bits.filter(|bits| !(4..=24).contains(bits)) {
+        return Err(Error::setting("leaf_bits", bits, "4 to 24, or 0 to leave the leaves as they are"));
     }
-    if !(settings.noise >= 0.0 && settings.noise.is_finite()) {
-        return range("--noise", "a duration of at least 0");
+    if !(noise >= 0.0 && noise.is_finite()) {
+        return Err(Error::setting("noise", noise, "a duration of at least 0"));
+    }
+    if settings.threads == Some(0) {
+        return Err(Error::setting("threads", 0, "at least 1"));
     }
     let strategy = if settings.multi_output { MultiStrategy::MultiOutputTree } else { MultiStrategy::OneOutputPerTree };
     let builder = Multiclass::new(objects).map(|classes| {
@@ -248,18 +262,18 @@ fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
         Some(threads) => builder.nthread(threads).build(),
         None => builder.global_pool().build(),
     });
-    built.map_err(|error| Error::argument(format!("the trainer refused a setting: {error}"), "Choose another value."))
+    built.map_err(|error| refused(&error))
 }
 
 fn refused(error: &HessboostError) -> Error {
-    Error::data(format!("the trainer refused the touches: {error}"), "Report this as a bug, with the data.")
+    EnsembleProblem::Trainer { trainer: "hessboost", detail: error.to_string() }.into()
 }
 
-/// The training data as a trainer wants it: one row of features a touch, its object's position as label.
+/// The training data as a trainer wants it: one row of features per touch, its object's position as label.
 pub(crate) struct Rows {
     pub(crate) features: Vec<f32>,
     pub(crate) labels: Vec<f32>,
-    /// One weight a touch, or none where all objects have equally many touches.
+    /// One weight per touch, or none where all objects have equally many touches.
     pub(crate) weights: Option<Vec<f32>>,
     pub(crate) columns: usize,
 }
@@ -336,7 +350,8 @@ fn ensemble(model: &BoostedModel, descriptor: Descriptor, objects: Vec<String>) 
             })
             .collect(),
     });
-    Ensemble { descriptor, objects, base_margins: model.base_scores().to_vec(), trees: trees.collect() }
+    let (base_margins, trees) = (model.base_scores().to_vec(), trees.collect());
+    Ensemble { descriptor, objects, base_margins, trees, origin: Origin::default() }
 }
 
 #[cfg(test)]

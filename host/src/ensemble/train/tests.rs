@@ -1,5 +1,6 @@
 use super::*;
 use crate::compile;
+use crate::error::{NameProblem, Problem};
 use crate::touches::synthetic;
 
 fn quick() -> Settings {
@@ -59,23 +60,29 @@ fn touches_with_missing_contacts_train_and_predict() {
 }
 
 #[test]
-fn settings_out_of_range_are_argument_errors() {
+fn settings_out_of_range_are_refused_by_name() {
     let dataset = synthetic::dataset(&[50, 50], 6);
-    for (settings, option) in [
-        (Settings { rounds: 0, ..quick() }, "--rounds"),
-        (Settings { depth: 0, ..quick() }, "--depth"),
-        (Settings { depth: 17, ..quick() }, "--depth"),
-        (Settings { eta: 0.0, ..quick() }, "--eta"),
-        (Settings { eta: f64::NAN, ..quick() }, "--eta"),
-        (Settings { min_child_weight: -1.0, ..quick() }, "--min-child-weight"),
-        (Settings { bins: 1, ..quick() }, "--bins"),
-        (Settings { feature_bins: Some(vec![9]), ..quick() }, "--bins"),
-        (Settings { feature_bins: Some(vec![9, 1]), ..quick() }, "--bins"),
-        (Settings { noise: f64::INFINITY, ..quick() }, "--noise"),
-        (Settings { threads: Some(0), ..quick() }, "thread"),
+    for (settings, expected) in [
+        (Settings { rounds: 0, ..quick() }, "rounds"),
+        (Settings { depth: 0, ..quick() }, "depth"),
+        (Settings { depth: 17, ..quick() }, "depth"),
+        (Settings { eta: 0.0, ..quick() }, "eta"),
+        (Settings { eta: f64::NAN, ..quick() }, "eta"),
+        (Settings { min_child_weight: -1.0, ..quick() }, "min_child_weight"),
+        (Settings { bins: 1, ..quick() }, "bins"),
+        (Settings { feature_bins: Some(vec![9]), ..quick() }, "bins"),
+        (Settings { feature_bins: Some(vec![9, 1]), ..quick() }, "bins"),
+        (Settings { leaf_bits: Some(3), ..quick() }, "leaf_bits"),
+        (Settings { noise: f64::INFINITY, ..quick() }, "noise"),
+        (Settings { threads: Some(0), ..quick() }, "threads"),
     ] {
         let error = train(&dataset, &settings, &()).unwrap_err();
-        assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains(option), "{error}");
+        assert!(
+            matches!(error.problem(), Some(Problem::Setting { name, .. }) if *name == expected)
+                && error.exit_code() == 2,
+            "{error}"
+        );
+        assert!(!error.to_string().contains("--"), "the library names an option: {error}");
     }
 }
 
@@ -98,7 +105,56 @@ fn no_feature_has_more_thresholds_than_its_bins_leave() {
 fn a_pose_descriptor_without_poses_says_how_to_get_them() {
     let settings = Settings { descriptor: Descriptor::Gravity, ..quick() };
     let error = train(&synthetic::dataset(&[50, 50], 7), &settings, &()).unwrap_err();
-    assert!(error.to_string().contains("--pose"), "{error}");
+    assert!(error.to_string().contains("with their pose"), "{error}");
+    let problem = EnsembleProblem::NoPose { descriptor: Descriptor::Gravity };
+    assert_eq!(error.problem(), Some(&Problem::Ensemble(problem)));
+}
+
+#[test]
+fn more_objects_or_other_names_than_a_model_can_hold_are_refused_before_training() {
+    /// Fails the test as soon as the training begins.
+    struct Never;
+    impl Progress for Never {
+        fn begin(&self, stage: &str, _: Option<u64>) {
+            panic!("{stage} began");
+        }
+    }
+    let error = train(&synthetic::dataset(&[2; 300], 8), &quick(), &Never).unwrap_err();
+    assert_eq!(error.problem(), Some(&EnsembleProblem::TooManyObjects { objects: 300 }.into()), "{error}");
+    for (name, why) in [("", NameProblem::Empty), ("fo\trk", NameProblem::Control), ("object0", NameProblem::Twice)] {
+        let mut dataset = synthetic::dataset(&[50, 50], 8);
+        dataset.objects[1].name = name.into();
+        let error = train(&dataset, &quick(), &Never).unwrap_err();
+        let problem = EnsembleProblem::ObjectName { name: name.into(), why };
+        assert_eq!(error.problem(), Some(&problem.into()), "{error}");
+    }
+}
+
+#[test]
+fn the_most_objects_that_can_be_trained_can_be_saved_loaded_and_compiled() {
+    let dataset = synthetic::dataset(&[4; 256], 8);
+    let ensemble = train(&dataset, &Settings { rounds: 1, depth: 2, ..quick() }, &()).unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    ensemble.save(file.path()).unwrap();
+    assert_eq!(Ensemble::load(file.path()).unwrap(), ensemble);
+    compile::compile(&ensemble, &compile::Settings::default()).unwrap();
+}
+
+#[test]
+fn an_ensemble_states_the_probe_and_knows_its_touches_again_after_saving() {
+    let dataset = synthetic::dataset(&[60, 60], 8);
+    let probe = crate::probe::approach::Probe { spacing: 2.0, ..Default::default() };
+    let probe = Some(StatedProbe { probe, length: 12.5 });
+    let stated = train(&dataset, &Settings { probe, ..quick() }, &()).unwrap();
+    let silent = train(&dataset, &quick(), &()).unwrap();
+    assert_eq!(stated.trees, silent.trees);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    for ensemble in [stated, silent] {
+        ensemble.save(file.path()).unwrap();
+        let loaded = Ensemble::load(file.path()).unwrap();
+        assert_eq!(loaded, ensemble);
+        assert_eq!(loaded.origin.trained_on(&dataset).len(), 2);
+    }
 }
 
 #[test]
@@ -112,12 +168,12 @@ fn one_object_or_an_empty_one_cannot_be_trained() {
 #[test]
 #[cfg(not(feature = "xgboost"))]
 fn a_build_without_xgboost_says_how_to_get_it() {
-    let settings = Settings { engine: Engine::Xgboost, ..Settings::paper() };
+    let settings = Settings { trainer: Engine::Xgboost, ..Settings::paper() };
     let error = train(&synthetic::dataset(&[50, 50], 9), &settings, &()).unwrap_err();
-    assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains("--features xgboost"), "{error}");
+    assert!(error.exit_code() == 2 && error.to_string().contains("--features xgboost"), "{error}");
 }
 
-/// The comparison of trainers; shown as ignored where XGBoost is not built in.
+/// The trainers compared; shown as ignored where XGBoost is not built in.
 mod xgboost {
     use super::*;
     use crate::evaluate::{Candidate, Margins};
@@ -125,12 +181,12 @@ mod xgboost {
     /// What each trainer makes of the same touches.
     fn both(dataset: &Dataset, settings: &Settings) -> [Ensemble; 2] {
         [Engine::Hessboost, Engine::Xgboost]
-            .map(|engine| train(dataset, &Settings { engine, threads: Some(1), ..settings.clone() }, &()).unwrap())
+            .map(|trainer| train(dataset, &Settings { trainer, threads: Some(1), ..settings.clone() }, &()).unwrap())
     }
 
     #[test]
     #[cfg_attr(not(feature = "xgboost"), ignore = "needs XGBoost: cargo test -p palpate --features xgboost")]
-    fn both_trainers_grow_the_same_trees_bit_for_bit_over_the_same_bins() {
+    fn both_trainers_make_the_same_trees_bit_for_bit_over_the_same_bins() {
         // So few different values leave nothing to the quantile sketch, which XGBoost changed after 1.6.
         let settings = Settings { rounds: 30, feature_bins: Some(vec![40; 3]), ..Settings::paper() };
         for counts in [[2_000, 2_000, 2_000], [2_000, 500, 1_000]] {
@@ -162,9 +218,9 @@ mod xgboost {
     #[test]
     #[cfg_attr(not(feature = "xgboost"), ignore = "needs XGBoost: cargo test -p palpate --features xgboost")]
     fn xgboost_refuses_multi_output_trees() {
-        let settings = Settings { engine: Engine::Xgboost, ..quick() };
+        let settings = Settings { trainer: Engine::Xgboost, ..quick() };
         let error = train(&synthetic::dataset(&[50, 50], 12), &settings, &()).unwrap_err();
-        assert!(matches!(error, Error::Argument { .. }) && error.to_string().contains("--leaves one"), "{error}");
+        assert!(error.exit_code() == 2 && error.to_string().contains("leaves is each. Use one"), "{error}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{BASE_MARGIN, Rows, Settings};
 use crate::ensemble::Ensemble;
-use crate::error::{Error, Result};
+use crate::error::{EnsembleProblem, Error, Result};
 use crate::progress::{self, Progress};
 use std::collections::HashMap;
 use xgboost_rs::{Booster, DMatrix, XGBError};
@@ -14,7 +14,9 @@ pub(super) fn train(
     objects: Vec<String>,
     progress: &dyn Progress,
 ) -> Result<Ensemble> {
-    let failed = |error: XGBError| Error::data(format!("XGBoost failed: {error}"), "Use --trainer hessboost.");
+    let failed = |error: XGBError| -> Error {
+        EnsembleProblem::Trainer { trainer: "XGBoost", detail: error.to_string() }.into()
+    };
     let data = matrix(rows, settings).map_err(failed)?;
     let mut booster = Booster::new_with_json_config(&[&data], parameters(settings, objects.len())).map_err(failed)?;
     progress.begin("training", u64::try_from(settings.rounds).ok());

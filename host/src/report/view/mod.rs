@@ -11,10 +11,9 @@ use crate::page::html;
 use crate::page::scene::{self, Line, SimplifiedMesh};
 use crate::probe::approach::{Approach, FINGERS, Probe};
 use crate::probe::scene::Scene;
+use crate::random::{self, Purpose};
 use glam::DVec3;
 use maud::html;
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
 
 /// What a page shows.
 #[derive(Clone, Copy, Debug)]
@@ -110,7 +109,7 @@ struct Approaches {
 }
 
 fn draw(scene: &Scene, settings: &Settings) -> Approaches {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
+    let mut rng = random::generator(settings.seed, Purpose::View, "", 0);
     let (mut touches, mut misses) = (Vec::new(), Vec::new());
     let (mut tried, mut full) = (0, 0);
     while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < settings.misses) {

@@ -1,4 +1,5 @@
 use super::*;
+use palpate_shared::Descriptor;
 use crate::ensemble::train::{Settings, train};
 use crate::touches::synthetic;
 use serde_json::{Value, json};
@@ -9,7 +10,7 @@ fn ensemble(multi_output: bool) -> Ensemble {
 }
 
 fn document(multi_output: bool) -> Value {
-    serde_json::to_value(Document::of(&ensemble(multi_output))).unwrap()
+    serde_json::to_value(Document::new(&ensemble(multi_output))).unwrap()
 }
 
 fn load(text: &[u8]) -> Result<Ensemble> {
@@ -57,7 +58,7 @@ fn leaves_in_the_layout_of_xgboost_2_are_read_too() {
 
 #[test]
 fn a_model_that_xgboost_wrote_is_read() {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/ensemble/xgboost_json/xgboost-3.2.json");
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/ensemble/xgboost/xgboost-3.2.json");
     let ensemble = Ensemble::load(file).unwrap();
     assert_eq!(ensemble.objects, ["bowl", "fork", "mouse"]);
     assert_eq!(ensemble.descriptor, Descriptor::Curvature);

@@ -1,0 +1,119 @@
+//! Whether a capture may write into a directory, given what is there.
+
+use super::Settings;
+use crate::error::{CaptureProblem, Error, Place, Result};
+use crate::touches::{Entry, Listing, Origin, files};
+use std::path::Path;
+
+/// What a capture begins with.
+pub(super) struct Admission {
+    /// The data set that is to be deleted first.
+    pub(super) replaced: Option<Listing>,
+    /// The listing to start or go on from: it names every object of the capture.
+    pub(super) listing: Listing,
+}
+
+/// Compares what is in a directory with what a capture would write, and refuses what would be lost.
+pub(super) fn admit(directory: &Path, settings: &Settings, names: &[String]) -> Result<Admission> {
+    let refuse = |problem| Err(Error::at(Place::file(directory), problem));
+    let wanted = Listing::new(&settings.origin, names.iter().cloned());
+    let found = match Listing::read(directory) {
+        // What cannot be read cannot be compared.
+        Err(Error::At { .. }) if settings.force => None,
+        found => found?,
+    };
+    let Some(found) = found else {
+        let files: Vec<String> = files(directory)?.iter().filter_map(|(_, path, _)| file_name(path)).collect();
+        if !settings.force && !files.is_empty() {
+            return refuse(CaptureProblem::HoldsFiles { files });
+        }
+        return Ok(Admission { replaced: None, listing: wanted });
+    };
+    if settings.force {
+        return Ok(Admission { replaced: Some(found), listing: wanted });
+    }
+    if settings.resume && (!settings.add || !found.complete) {
+        return resumed(directory, found, &wanted, settings.add);
+    }
+    if !found.complete {
+        return refuse(CaptureProblem::HoldsUnfinished { touches: touches(&found.objects), objects: found.names() });
+    }
+    let differences = differences(&found.origin, &wanted.origin);
+    if settings.add {
+        if !differences.is_empty() {
+            return refuse(CaptureProblem::AddsOtherSettings { differences });
+        }
+        let there: Vec<String> = found.names().into_iter().filter(|name| names.contains(name)).collect();
+        // Resumed after it was done, nothing is left to do.
+        if !there.is_empty() && !settings.resume {
+            return refuse(CaptureProblem::AlreadyThere { objects: there });
+        }
+        return Ok(Admission { replaced: None, listing: merged(found, &wanted) });
+    }
+    let others: Vec<Entry> = found.objects.iter().filter(|entry| !names.contains(&entry.name)).cloned().collect();
+    if !others.is_empty() {
+        let objects = others.iter().map(|entry| entry.name.clone()).collect();
+        return refuse(CaptureProblem::HoldsOtherObjects { objects, touches: touches(&others) });
+    }
+    if !differences.is_empty() {
+        return refuse(CaptureProblem::HoldsOtherSettings { objects: found.names(), differences });
+    }
+    Ok(Admission { replaced: Some(found), listing: wanted })
+}
+
+/// What to go on from.
+fn resumed(directory: &Path, found: Listing, wanted: &Listing, add: bool) -> Result<Admission> {
+    let refuse = |problem| Err(Error::at(Place::file(Listing::path(directory)), problem));
+    if found.palpate != wanted.palpate {
+        return refuse(CaptureProblem::ResumesOtherVersion { found: found.palpate });
+    }
+    let differences = differences(&found.origin, &wanted.origin);
+    if !differences.is_empty() {
+        return refuse(CaptureProblem::ResumesOtherSettings { differences });
+    }
+    let samples = found.origin.samples();
+    let is_wanted = |entry: &Entry| wanted.objects.iter().any(|wanted| wanted.name == entry.name);
+    let is_done = |entry: &Entry| entry.touches == samples.end - samples.start;
+    let is_same = if add {
+        found.objects.iter().all(|entry| is_wanted(entry) || is_done(entry))
+    } else {
+        found.names() == wanted.names()
+    };
+    if !is_same {
+        return refuse(CaptureProblem::ResumesOtherObjects { objects: found.names() });
+    }
+    Ok(Admission { replaced: None, listing: merged(found, wanted) })
+}
+
+/// What was found, incomplete again, with the wanted objects that it lacks.
+fn merged(found: Listing, wanted: &Listing) -> Listing {
+    let mut objects = found.objects;
+    for entry in &wanted.objects {
+        if !objects.iter().any(|there| there.name == entry.name) {
+            objects.push(entry.clone());
+        }
+    }
+    objects.sort_by(|a, b| a.name.cmp(&b.name));
+    let complete = false;
+    Listing { palpate: wanted.palpate.clone(), complete, origin: found.origin, objects }
+}
+
+/// Which settings differ, and how: "touches is 20 there and 30 here". Empty if none does.
+fn differences(there: &Origin, here: &Origin) -> String {
+    let fields = |origin| match serde_json::to_value(origin) {
+        Ok(serde_json::Value::Object(fields)) => fields,
+        _ => serde_json::Map::new(),
+    };
+    let (there, here) = (fields(there), fields(here));
+    let different = there.iter().filter(|(name, value)| here.get(*name) != Some(value));
+    let said = different.map(|(name, value)| format!("{name} is {value} there and {} here", here[name]));
+    said.collect::<Vec<_>>().join(", ")
+}
+
+fn touches(entries: &[Entry]) -> u64 {
+    entries.iter().map(|entry| entry.touches).sum()
+}
+
+fn file_name(path: &Path) -> Option<String> {
+    Some(path.file_name()?.to_string_lossy().into_owned())
+}

@@ -1,0 +1,324 @@
+use super::*;
+use crate::ensemble::{Node, Origin, Output, StatedProbe, Tree};
+use crate::error::{Problem, TreeProblem};
+use crate::probe::approach::Probe;
+use palpate_onboard::ModelError;
+use palpate_shared::{Descriptor, Touch};
+
+fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
+    Node::Split { feature, threshold, missing_left: true, left, right }
+}
+
+fn leaf(values: &[f32]) -> Node {
+    Node::Leaf(values.into())
+}
+
+/// An ensemble of two objects over these trees, whose leaves have a value for each.
+fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
+    Ensemble {
+        descriptor,
+        objects: vec!["bowl".into(), "fork".into()],
+        base_margins: vec![0.0; 2],
+        trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
+        origin: Origin::default(),
+    }
+}
+
+/// One split.
+fn stump(threshold: f32, leaves: [[f32; 2]; 2]) -> Ensemble {
+    ensemble(Descriptor::Curvature, vec![vec![split(0, threshold, 1, 2), leaf(&leaves[0]), leaf(&leaves[1])]])
+}
+
+/// A tree that is a chain of splits, one below the other to the right, at whole thresholds.
+fn chain(splits: usize, feature: impl Fn(usize) -> usize) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for number in 0..splits {
+        nodes.push(split(feature(number), 1_000.0 * (number + 1) as f32, 2 * number + 1, 2 * number + 2));
+        nodes.push(leaf(&[0.5, -0.5]));
+    }
+    nodes.push(leaf(&[-0.5, 0.5]));
+    nodes
+}
+
+fn with(layout: Option<Layout>, leaf: Leaf) -> Settings {
+    Settings { layout, leaf, ..Settings::default() }
+}
+
+fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
+    match compile(ensemble, settings).unwrap_err() {
+        Error::At { problem: Problem::Compile(problem), .. } => problem,
+        other => panic!("{other}"),
+    }
+}
+
+/// What setting was refused.
+fn setting(settings: &Settings) -> &'static str {
+    let error = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), settings).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    match error.problem() {
+        Some(Problem::Setting { name, .. }) => name,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_layout_chosen_has_the_least_bytes_squared_times_instructions() {
+    let shallow: Vec<Vec<Node>> = (0..40).map(|_| chain(2, |number| number)).collect();
+    let deep: Vec<Vec<Node>> = (0..10).map(|_| chain(20, |number| number % 8)).collect();
+    let full = {
+        // Seven splits over eight features: no table.
+        let mut nodes: Vec<Node> = (0..7).map(|n| split(n, 1_000.0 * n as f32, 2 * n + 1, 2 * n + 2)).collect();
+        nodes.extend((0..8).map(|_| leaf(&[0.5, 0.25])));
+        vec![nodes; 30]
+    };
+    for (ensemble, expected) in [
+        (ensemble(Descriptor::Curvature, shallow), Layout::Grid),
+        (ensemble(Descriptor::Oriented, deep), Layout::Compact),
+        (ensemble(Descriptor::Oriented, full), Layout::Complete),
+    ] {
+        let chosen = compile(&ensemble, &Settings::default()).unwrap();
+        assert_eq!(chosen.layout, expected);
+        let cost = |compiled: &Compiled| (compiled.bytes.len() as u64).pow(2) * compiled.instructions.m4f;
+        let others =
+            [Layout::Compact, Layout::Complete, Layout::Grid].map(|l| compile(&ensemble, &with(Some(l), Leaf::I16)));
+        assert!(others.iter().flatten().count() >= 1);
+        // The text is the same in all and left out of the choice: room for it.
+        assert!(others.iter().flatten().all(|other| cost(other) as f64 >= 0.8 * cost(&chosen) as f64));
+    }
+}
+
+#[test]
+fn an_ensemble_that_does_not_fit_a_layout_says_so_in_a_variant() {
+    let deep = ensemble(Descriptor::Oriented, vec![chain(9, |number| number % 8)]);
+    for layout in [Layout::Complete, Layout::Grid] {
+        assert_eq!(refusal(&deep, &with(Some(layout), Leaf::I16)), CompileProblem::DoesNotFit { layout });
+    }
+    assert!(compile(&deep, &with(Some(Layout::Compact), Leaf::I16)).is_ok());
+    // More left splits than a byte counts: the compact layout becomes the wide one.
+    let lopsided = |left: bool| {
+        let mut nodes = Vec::new();
+        for number in 0..40_usize {
+            nodes.push(split(number % 8, 1_000.0 * (number + 1) as f32, 2 * number + 1, 2 * number + 2));
+            nodes.push(leaf(&[0.0, 0.0]));
+        }
+        nodes.push(leaf(&[1.0, 0.0]));
+        if left {
+            nodes.iter_mut().for_each(|node| {
+                if let Node::Split { left, right, .. } = node {
+                    std::mem::swap(left, right);
+                }
+            });
+        }
+        ensemble(Descriptor::Oriented, vec![nodes])
+    };
+    for left in [false, true] {
+        assert_eq!(compile(&lopsided(left), &with(Some(Layout::Compact), Leaf::I16)).unwrap().layout, Layout::Compact);
+    }
+}
+
+#[test]
+fn the_stated_margin_error_is_what_rounding_does_and_no_more() {
+    // Leaves that no power of two divides: i8 has 127 units for 1 nat.
+    let leaves = [[1.0, -0.3], [0.123_456, 0.7]];
+    let ensemble = stump(500.0, leaves);
+    for (kind, most) in [(Leaf::I8, 127.0), (Leaf::I16, 32_767.0), (Leaf::F32, f64::INFINITY)] {
+        for layout in [Layout::Compact, Layout::Complete, Layout::Grid] {
+            let compiled = compile(&ensemble, &with(Some(layout), kind)).unwrap();
+            let model = open(&compiled.bytes).unwrap();
+            let mut worst = 0.0_f64;
+            for (curvature, leaf) in [(0, leaves[0]), (500, leaves[1])] {
+                let mut margins = [0; 2];
+                model.margins(&Touch::from_micros([0, 0, curvature]), &mut margins);
+                for (margin, value) in margins.into_iter().zip(leaf) {
+                    worst = worst.max((f64::from(margin) * f64::from(model.unit()) - f64::from(value)).abs());
+                }
+            }
+            let stated = f64::from(compiled.margin_error);
+            assert_eq!(model.margin_error(), compiled.margin_error);
+            assert!(worst <= stated, "{worst} > {stated} with {kind:?} in {layout:?}");
+            assert!(stated <= 0.5 / most * 1.01 || kind == Leaf::F32, "{stated} with {kind:?} in {layout:?}");
+            if kind != Leaf::F32 {
+                assert!(worst > 0.0 && stated <= 1.001 * worst, "{stated} for {worst} with {kind:?} in {layout:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn leaves_of_a_common_power_of_two_are_exact_in_every_width() {
+    for kind in [Leaf::I8, Leaf::I16] {
+        let compiled = compile(&stump(500.0, [[1.5, -0.25], [0.75, 0.5]]), &with(None, kind)).unwrap();
+        assert_eq!(compiled.margin_error, 0.0);
+    }
+}
+
+#[test]
+fn the_header_says_what_was_compiled() {
+    let mut ensemble = stump(500.0, [[1.0, -0.3], [0.1, 0.7]]);
+    let settings = Settings { error_rate: 0.05, max_touches: 77, priors: Some(vec![1.0, 4.0]), ..Settings::default() };
+    let compiled = compile(&ensemble, &settings).unwrap();
+    let model = open(&compiled.bytes).unwrap();
+    let header = model.header();
+    assert_eq!(usize::try_from(header.length()).unwrap(), compiled.bytes.len());
+    assert_eq!((header.trees(), header.splits(), header.leaves()), (1, 1, 2));
+    assert_eq!((compiled.splits, compiled.leaves), (1, 2));
+    assert_eq!((model.descriptor(), model.layout()), (Some(Descriptor::Curvature), compiled.layout));
+    assert_eq!(model.leaf_type(), Leaf::I16);
+    assert_eq!(model.tool_version(), env!("CARGO_PKG_VERSION"));
+    assert_eq!(names(&model), ["bowl", "fork"]);
+    let stopping = Stopping::from_model(&model);
+    assert!((stopping.error_rate() - 0.05).abs() < 1e-12 && stopping.max_touches() == 77);
+    let prior = f64::from(model.prior(0)) * f64::from(model.unit());
+    assert!((prior - 0.25_f64.ln()).abs() <= f64::from(model.unit()) && model.prior(1) == 0, "{prior}");
+    // Which ensemble it was, wherever that came from.
+    let hash = |ensemble: &Ensemble| open(&compile(ensemble, &settings).unwrap().bytes).unwrap().header().ensemble();
+    let first = hash(&ensemble);
+    ensemble.origin.touches.insert("bowl".into(), 7);
+    assert_eq!(hash(&ensemble), first);
+    ensemble.base_margins[0] = 0.25;
+    assert_ne!(hash(&ensemble), first);
+}
+
+#[test]
+fn a_model_states_the_probe_of_its_touches_and_the_published_one_only_where_none_is_known() {
+    let mut ensemble = stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
+    let stated = |ensemble: &Ensemble| {
+        let compiled = compile(ensemble, &Settings::default()).unwrap();
+        let model = open(&compiled.bytes).unwrap();
+        (model.header().spacing(), model.header().speed())
+    };
+    assert_eq!(stated(&ensemble), (1.5, 10.0));
+    let probe = Probe { spacing: 2.0, speed: 25.0, ..Probe::default() };
+    ensemble.origin.probe = Some(StatedProbe { probe, length: 10.0 });
+    assert_eq!(stated(&ensemble), (2.0, 25.0));
+}
+
+#[test]
+fn every_ensemble_that_contradicts_itself_is_refused_by_what_is_wrong() {
+    let sound = || stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
+    let refused = |change: &dyn Fn(&mut Ensemble)| {
+        let mut changed = sound();
+        change(&mut changed);
+        refusal(&changed, &Settings::default())
+    };
+    let tree = |problem| CompileProblem::Tree { tree: 0, problem };
+    assert_eq!(refused(&|e| e.objects.push("cup".into())), CompileProblem::Objects { objects: 3, base_margins: 2 });
+    assert_eq!(
+        refused(&|e| {
+            e.objects.clear();
+            e.base_margins.clear();
+        }),
+        CompileProblem::Objects { objects: 0, base_margins: 0 }
+    );
+    assert_eq!(refused(&|e| e.trees[0].nodes.clear()), tree(TreeProblem::NoNodes));
+    assert_eq!(refused(&|e| e.trees[0].output = Output::One(2)), tree(TreeProblem::Object { object: 2, objects: 2 }));
+    assert_eq!(
+        refused(&|e| e.trees[0].output = Output::One(1)),
+        tree(TreeProblem::LeafValues { node: 1, found: 2, wanted: 1 })
+    );
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[0] = split(2, 500.0, 1, 2)),
+        tree(TreeProblem::Feature { node: 0, feature: 2, features: 2 })
+    );
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 9, 2)),
+        tree(TreeProblem::Child { node: 0, side: "left", child: 9, nodes: 3 })
+    );
+    assert_eq!(refused(&|e| e.trees[0].nodes = chain(65, |_| 0)), tree(TreeProblem::TooDeep { most: 64 }));
+    assert!(matches!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, f32::NAN, 1, 2)),
+        CompileProblem::Tree { problem: TreeProblem::Threshold { node: 0, .. }, .. }
+    ));
+    assert!(matches!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 0, 2)),
+        CompileProblem::Tree { problem: TreeProblem::ReachedTwice { .. } | TreeProblem::TooDeep { .. }, .. }
+    ));
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, f32::INFINITY])),
+        tree(TreeProblem::LeafValue { node: 2, value: f32::INFINITY })
+    );
+    assert!(matches!(
+        refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5])),
+        CompileProblem::MarginRange { object: 1, largest: 1e5, .. }
+    ));
+    assert_eq!(refused(&|e| e.objects[0] = "x".repeat(256)), CompileProblem::NameTooLong { name: "x".repeat(256) });
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    assert_eq!(setting(&Settings { error_rate: 0.5, ..Settings::default() }), "error_rate");
+    assert_eq!(setting(&Settings { error_rate: f64::NAN, ..Settings::default() }), "error_rate");
+    assert_eq!(setting(&Settings { max_touches: 0, ..Settings::default() }), "max_touches");
+    assert_eq!(setting(&Settings { priors: Some(vec![1.0]), ..Settings::default() }), "priors");
+    assert_eq!(setting(&Settings { priors: Some(vec![1.0, 0.0]), ..Settings::default() }), "priors");
+    assert_eq!(setting(&Settings { raw_features: Some(0), ..Settings::default() }), "raw_features");
+    assert_eq!(setting(&Settings { raw_features: Some(257), ..Settings::default() }), "raw_features");
+}
+
+#[test]
+fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
+    // Trained on seconds: curvature from -0.2 to 0.2.
+    let seconds: Vec<Vec<Node>> = (0..9)
+        .map(|number| vec![split(0, number as f32 * 0.05 - 0.2, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])])
+        .collect();
+    let problem = refusal(&ensemble(Descriptor::Curvature, seconds.clone()), &Settings::default());
+    assert_eq!(problem, CompileProblem::Thresholds { feature: "curvature", thresholds: 9, rounded: 2 });
+    // Rows of features are compared as they are, fractions and all.
+    let raw = Settings { raw_features: Some(2), leaf: Leaf::F32, ..Settings::default() };
+    compile(&ensemble(Descriptor::Curvature, seconds), &raw).unwrap();
+    // Whole thresholds, and halves between neighbors, are what trainers put between whole numbers.
+    for step in [1.0, 0.5] {
+        let whole = (0..9).map(|n| vec![split(0, n as f32 * step, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])]);
+        compile(&ensemble(Descriptor::Curvature, whole.collect()), &Settings::default()).unwrap();
+    }
+}
+
+#[test]
+fn a_compiled_model_opens_in_one_place_and_says_what_is_wrong_at_which_byte() {
+    let compiled = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), &Settings::default()).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("model.palpate");
+    std::fs::write(&path, &compiled.bytes).unwrap();
+    let read = CompiledModel::read(&path).unwrap();
+    assert_eq!((read.bytes(), read.path()), (&compiled.bytes[..], Some(&*path)));
+    assert_eq!(read.names(), ["bowl", "fork"]);
+    assert_eq!(read.model().checksum(), open(&compiled.bytes).unwrap().checksum());
+    let cut = &compiled.bytes[..50];
+    std::fs::write(&path, cut).unwrap();
+    let problem = CompileProblem::Model(ModelError::Length { expected: 96, found: 50 });
+    let error = CompiledModel::read(&path).unwrap_err();
+    assert!(error.to_string().contains("model.palpate: byte 50: the model is truncated"), "{error}");
+    for error in [error, CompiledModel::from_bytes(cut.to_vec()).unwrap_err(), open(cut).map(|_| ()).unwrap_err()] {
+        assert_eq!(error.problem(), Some(&problem.clone().into()));
+    }
+}
+
+#[test]
+fn estimates_from_a_models_bytes_are_those_of_its_compilation() {
+    let trees: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 2)).collect();
+    let many: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 8)).collect();
+    let mut seen = std::collections::HashSet::new();
+    for ensemble in [ensemble(Descriptor::Curvature, trees), ensemble(Descriptor::Oriented, many)] {
+        for layout in [Layout::Compact, Layout::Complete, Layout::Grid, Layout::Wide] {
+            for kind in [Leaf::I8, Leaf::I16, Leaf::F32] {
+                let Ok(compiled) = compile(&ensemble, &with(Some(layout), kind)) else { continue };
+                let model = open(&compiled.bytes).unwrap();
+                assert_eq!(Instructions::of_model(&model), compiled.instructions, "{layout:?} {kind:?}");
+                seen.insert(layout);
+            }
+        }
+    }
+    assert_eq!(seen.len(), 4);
+}
+
+#[test]
+fn the_longest_time_is_that_of_ten_units_or_follows_larger_thresholds() {
+    let longest = |threshold: f32, layout| {
+        let compiled = compile(&stump(threshold, [[1.0, -1.0], [-1.0, 1.0]]), &with(Some(layout), Leaf::I16)).unwrap();
+        longest_time(&open(&compiled.bytes).unwrap())
+    };
+    for layout in [Layout::Compact, Layout::Wide, Layout::Grid] {
+        assert!((longest(500_000.0, layout) - (10.0 * 3.0_f64.sqrt() + 3.0) / 10.0).abs() < 1e-9);
+        assert!((longest(-16_000_000.0, layout) - 64.0).abs() < 1e-9, "{}", longest(-16_000_000.0, layout));
+    }
+}

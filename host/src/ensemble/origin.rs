@@ -1,0 +1,79 @@
+//! Where the touches that an ensemble was trained on came from.
+
+use crate::probe::approach::Probe;
+use crate::touches::Dataset;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What an ensemble says about its training touches. Empty for ensembles from elsewhere.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Origin {
+    /// The probe that made them, where the data set states it.
+    pub probe: Option<StatedProbe>,
+    /// For each object, a fingerprint of the first of its touches.
+    pub touches: BTreeMap<String, u64>,
+}
+
+/// The probe that a data set was made with, and the size of its objects.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StatedProbe {
+    /// The probe's measures.
+    #[serde(flatten)]
+    pub probe: Probe,
+    /// The longest side of an object's bounding box, in units.
+    pub length: f64,
+}
+
+impl StatedProbe {
+    /// The probe that a data set states, if it states one.
+    pub fn of(dataset: &Dataset) -> Option<Self> {
+        dataset.origin.as_ref().map(|origin| Self { probe: origin.probe, length: origin.length })
+    }
+}
+
+/// A fingerprint is made of this many touches at most.
+const FINGERPRINTED: usize = 16;
+
+impl Origin {
+    /// What touches say about themselves, and the probe that they were made with.
+    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
+        Self { probe, touches: fingerprints(dataset) }
+    }
+
+    /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of the
+    /// same capture.
+    pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
+        let own = fingerprints(dataset);
+        let same = |name: &&str| own.get(*name).is_some_and(|own| self.touches.get(*name) == Some(own));
+        dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
+    }
+}
+
+/// A CRC-64 (XZ) of the contact times of each object's first touches.
+fn fingerprints(dataset: &Dataset) -> BTreeMap<String, u64> {
+    const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
+    let fingerprint = |object: &crate::touches::ObjectTouches| {
+        let mut digest = CRC.digest();
+        for time in object.touches.iter().take(FINGERPRINTED).flat_map(|touch| touch.times()) {
+            digest.update(&time.micros().unwrap_or(u32::MAX).to_le_bytes());
+        }
+        (object.name.clone(), digest.finalize())
+    };
+    dataset.objects.iter().map(fingerprint).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::touches::synthetic;
+
+    #[test]
+    fn training_touches_are_known_again_and_others_are_not() {
+        let trained = synthetic::dataset(&[100, 100, 100], 1);
+        let origin = Origin::new(&trained, None);
+        assert_eq!(origin.trained_on(&trained), ["object0", "object1", "object2"]);
+        assert_eq!(origin.trained_on(&synthetic::dataset(&[30, 400, 100], 1)).len(), 3, "of the same capture");
+        assert!(origin.trained_on(&synthetic::dataset(&[100, 100, 100], 2)).is_empty());
+        assert!(Origin::default().trained_on(&trained).is_empty());
+    }
+}

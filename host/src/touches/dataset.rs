@@ -1,0 +1,385 @@
+//! A data set: a directory with one file per object.
+
+use super::{Entry, Format, Listing, Origin};
+use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::probe::approach::Probe;
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use palpate_shared::Touch;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// The touches of two or more objects, and how they were made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dataset {
+    /// The objects, sorted by name.
+    pub objects: Vec<ObjectTouches>,
+    /// How the touches were made, where that is known: a directory without `dataset.json` does not say.
+    pub origin: Option<Origin>,
+    /// What looked wrong when the data set was read, and may be meant.
+    pub warnings: Vec<Warning>,
+}
+
+/// The touches of one object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectTouches {
+    /// The object's name.
+    pub name: String,
+    /// Its touches, in the order of the file; at least one.
+    pub touches: Vec<Touch>,
+}
+
+/// What looks wrong about a data set, and may be meant.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A text file has as many touches as `dataset.json` states, but was changed since its capture.
+    #[error("{}: changed since its capture: its checksum is not the one in {}", path.display(), Listing::FILE)]
+    Changed {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Dataset {
+    /// Touches that nothing is known about: no origin, no warnings. The objects are to be sorted by name.
+    pub fn new(objects: Vec<ObjectTouches>) -> Self {
+        Self { objects, origin: None, warnings: Vec::new() }
+    }
+
+    /// Other touches of the same origin, such as a part of these.
+    pub fn with(&self, objects: Vec<ObjectTouches>) -> Self {
+        Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
+    }
+
+    /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
+    /// `<object>.txt` and `<object>.parquet`.
+    ///
+    /// A text file that was changed since its capture but has as many touches as stated is a [`Warning`].
+    ///
+    /// # Errors
+    /// When the directory cannot be read, holds fewer than two objects or an unfinished capture; when a listed file is
+    /// missing, has another number of touches than stated, or is a Parquet file with another checksum; when a file
+    /// holds no touch, and when a line or row is wrong (it is named).
+    pub fn read(directory: &Path) -> Result<Self> {
+        let dataset = match Listing::read(directory)? {
+            Some(listing) => Self::listed(directory, listing)?,
+            None => Self::found(directory)?,
+        };
+        match dataset.objects.as_slice() {
+            [] => Err(Error::at(Place::file(directory), TouchesProblem::NoObjects)),
+            [one] => Err(Error::at(Place::file(directory), TouchesProblem::OneObject { name: one.name.clone() })),
+            _ => Ok(dataset),
+        }
+    }
+
+    /// What a listing names.
+    fn listed(directory: &Path, listing: Listing) -> Result<Self> {
+        if !listing.complete {
+            return Err(Error::at(Place::file(directory), TouchesProblem::Incomplete));
+        }
+        let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
+        for entry in listing.objects {
+            let path = entry.file(directory, listing.origin.format);
+            let touches = read_listed(&entry, listing.origin.format, &path, &mut warnings)?;
+            objects.push(ObjectTouches { name: entry.name, touches });
+        }
+        objects.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(Self { objects, origin: Some(listing.origin), warnings })
+    }
+
+    /// Every file of touches that there is.
+    fn found(directory: &Path) -> Result<Self> {
+        let files = files(directory)?;
+        if let Some([first, second]) = files.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            let [file, other] = [first, second].map(|(_, path, _)| path.clone());
+            return Err(Error::at(
+                Place::file(directory),
+                TouchesProblem::TwoFiles { name: first.0.clone(), file, other },
+            ));
+        }
+        let read =
+            |(name, path, format): (String, PathBuf, Format)| Ok(ObjectTouches { name, touches: format.read(&path)? });
+        Ok(Self::new(files.into_iter().map(read).collect::<Result<_>>()?))
+    }
+
+    /// The probe that made the touches, where that is known.
+    pub fn probe(&self) -> Option<&Probe> {
+        self.origin.as_ref().map(|origin| &origin.probe)
+    }
+
+    /// The objects' names, sorted.
+    pub fn names(&self) -> Vec<String> {
+        self.objects.iter().map(|object| object.name.clone()).collect()
+    }
+
+    /// How many touches there are, of all objects together.
+    pub fn len(&self) -> usize {
+        self.objects.iter().map(|object| object.touches.len()).sum()
+    }
+
+    /// Whether there is no touch at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Reads an object's file, and compares it with what the listing states.
+fn read_listed(entry: &Entry, format: Format, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
+    let wrong = |problem| Error::at(Place::file(path), problem);
+    if !path.exists() {
+        return Err(wrong(TouchesProblem::Missing { name: entry.name.clone() }));
+    }
+    let (touches, is_changed) = match format {
+        Format::Text => {
+            let (touches, found) = super::text::read_with_checksum(path)?;
+            (touches, entry.crc32.is_some_and(|stated| stated != found))
+        }
+        // Checked before it is decoded: a damaged file is better described by its checksum than by what it breaks.
+        Format::Parquet => match entry.crc32 {
+            Some(stated) if checksum(path)? != stated => return Err(wrong(TouchesProblem::OtherChecksum)),
+            _ => (format.read(path)?, false),
+        },
+    };
+    if touches.len() as u64 != entry.touches {
+        return Err(wrong(TouchesProblem::OtherCount { stated: entry.touches, found: touches.len() as u64 }));
+    }
+    if is_changed {
+        warnings.push(Warning::Changed { path: path.into() });
+    }
+    Ok(touches)
+}
+
+/// The objects' names and files in a directory, sorted by name, whatever a listing says.
+pub(crate) fn files(directory: &Path) -> Result<Vec<(String, PathBuf, Format)>> {
+    let io = |source| Error::io(directory, "read the data set", source);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(directory).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let is_in = |format: &Format| path.extension().is_some_and(|extension| extension == format.extension());
+        if let Some(format) = Format::ALL.into_iter().find(is_in)
+            && let Some(name) = path.file_stem().and_then(|stem| stem.to_str())
+        {
+            files.push((name.to_owned(), path, format));
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
+
+/// The checksum of a file, as listings state it.
+pub(crate) fn checksum(path: &Path) -> Result<u32> {
+    let io = |error| Error::io(path, "read the touches", error);
+    let mut file = Checked::new(std::fs::File::open(path).map_err(io)?);
+    std::io::copy(&mut file, &mut std::io::sink()).map_err(io)?;
+    Ok(file.checksum())
+}
+
+/// A reader that takes the checksum of all that passes through it.
+pub(super) struct Checked<R> {
+    inner: R,
+    digest: Digest<'static, u32, Table<16>>,
+}
+
+impl<R> Checked<R> {
+    pub(super) fn new(inner: R) -> Self {
+        Self { inner, digest: CRC.digest() }
+    }
+
+    /// The checksum of what has been read.
+    pub(super) fn checksum(self) -> u32 {
+        self.digest.finalize()
+    }
+}
+
+impl<R: Read> Read for Checked<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        self.digest.update(&buffer[..count]);
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Problem;
+
+    /// A complete data set of two objects in a format, with its listing.
+    fn captured(format: Format) -> tempfile::TempDir {
+        let directory = tempfile::tempdir().unwrap();
+        let origin = Origin { touches: 3, format, ..Origin::default() };
+        let mut listing = Listing::new(&origin, ["fork".into(), "spoon".into()]);
+        listing.complete = true;
+        for (index, entry) in listing.objects.iter_mut().enumerate() {
+            let path = entry.file(directory.path(), format);
+            let touch = |i: u32| Touch::from_micros([0, i, index as u32]);
+            match format {
+                Format::Text => {
+                    let mut text = String::new();
+                    (0..3).for_each(|i| super::super::write_touch(&mut text, &touch(i), false));
+                    std::fs::write(&path, text).unwrap();
+                }
+                #[cfg(feature = "parquet")]
+                Format::Parquet => {
+                    let file = std::fs::File::create(&path).unwrap();
+                    let touches = (0..3).map(|i| Ok(touch(i)));
+                    super::super::parquet::write(&path, &file, &entry.name, touches).unwrap();
+                }
+                #[cfg(not(feature = "parquet"))]
+                Format::Parquet => unreachable!(),
+            }
+            entry.touches = 3;
+            entry.crc32 = Some(checksum(&path).unwrap());
+        }
+        listing.write(directory.path()).unwrap();
+        directory
+    }
+
+    fn problem(directory: &Path) -> TouchesProblem {
+        match Dataset::read(directory).unwrap_err() {
+            Error::At { problem: Problem::Touches(problem), .. } => problem,
+            other => panic!("{other}"),
+        }
+    }
+
+    #[test]
+    fn objects_are_sorted_by_name_and_other_files_ignored() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["spoon.txt", "fork.txt", "notes.md", "cup.part"] {
+            std::fs::write(directory.path().join(name), "0 0.1 0.2\r\n\n0.000000,0.3,-").unwrap();
+        }
+        let dataset = Dataset::read(directory.path()).unwrap();
+        assert_eq!(dataset.names(), ["fork", "spoon"]);
+        assert_eq!(dataset.len(), 4);
+        assert_eq!(dataset.probe(), None);
+    }
+
+    #[test]
+    fn a_directory_that_is_missing_empty_or_of_one_object_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let error = |path: &Path| Dataset::read(path).unwrap_err().to_string();
+        assert!(error(&directory.path().join("nowhere")).contains("cannot read the data set"));
+        assert!(error(directory.path()).contains("no touches here"));
+        std::fs::write(directory.path().join("fork.txt"), "0 0 0\n").unwrap();
+        assert!(error(directory.path()).contains("only one object here, fork"));
+    }
+
+    #[test]
+    fn a_wrong_line_is_named_with_its_file() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("cup.txt"), "0 0 0\n").unwrap();
+        let path = directory.path().join("fork.txt");
+        for (text, place) in
+            [(&b"0 0 0\n\n0 0 -1\n"[..], "fork.txt:3: the time -1"), (b"0 0 0\n\xff\n", "fork.txt:2: not text")]
+        {
+            std::fs::write(&path, text).unwrap();
+            let error = Dataset::read(directory.path()).unwrap_err();
+            assert!(error.to_string().contains(place), "{error}");
+            assert_eq!(error.exit_code(), 1);
+        }
+        std::fs::write(&path, "\n").unwrap();
+        assert!(Dataset::read(directory.path()).unwrap_err().to_string().contains("fork.txt: no touches"));
+    }
+
+    #[test]
+    fn one_object_in_two_formats_is_refused_where_nothing_says_which_counts() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["fork.txt", "fork.parquet", "spoon.txt"] {
+            std::fs::write(directory.path().join(name), "0 0 0\n").unwrap();
+        }
+        assert!(matches!(problem(directory.path()), TouchesProblem::TwoFiles { name, .. } if name == "fork"));
+    }
+
+    #[test]
+    fn a_data_set_knows_the_probe_that_its_listing_states() {
+        let dataset = Dataset::read(captured(Format::Text).path()).unwrap();
+        assert_eq!(dataset.probe(), Some(&Probe::default()));
+        assert_eq!(dataset.with(Vec::new()).probe(), dataset.probe());
+        assert_eq!(dataset.warnings, []);
+    }
+
+    #[test]
+    fn an_old_file_that_the_listing_does_not_name_is_never_used() {
+        let directory = captured(Format::Text);
+        std::fs::write(directory.path().join("cup.txt"), "0 0 0\n").unwrap();
+        std::fs::write(directory.path().join("fork.parquet"), "no touches").unwrap();
+        assert_eq!(Dataset::read(directory.path()).unwrap().names(), ["fork", "spoon"]);
+    }
+
+    #[test]
+    fn a_missing_file_of_a_listed_object_is_an_error() {
+        let directory = captured(Format::Text);
+        std::fs::remove_file(directory.path().join("spoon.txt")).unwrap();
+        assert_eq!(problem(directory.path()), TouchesProblem::Missing { name: "spoon".into() });
+    }
+
+    #[test]
+    fn a_file_cut_at_a_line_end_is_an_error() {
+        let directory = captured(Format::Text);
+        let path = directory.path().join("spoon.txt");
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (touches, stated) in [(2, 3), (1, 3)] {
+            let cut: String = text.split_inclusive('\n').take(touches).collect();
+            std::fs::write(&path, cut).unwrap();
+            assert_eq!(problem(directory.path()), TouchesProblem::OtherCount { stated, found: touches as u64 });
+        }
+        std::fs::write(&path, text.clone() + "0 0 0\n").unwrap();
+        assert_eq!(problem(directory.path()), TouchesProblem::OtherCount { stated: 3, found: 4 });
+    }
+
+    #[test]
+    fn an_edited_text_file_is_a_warning_that_names_it() {
+        let directory = captured(Format::Text);
+        let path = directory.path().join("spoon.txt");
+        let text = std::fs::read_to_string(&path).unwrap().replace("0.000002", "0.000003");
+        std::fs::write(&path, text).unwrap();
+        let dataset = Dataset::read(directory.path()).unwrap();
+        assert_eq!(dataset.warnings, [Warning::Changed { path: path.clone() }]);
+        assert!(dataset.warnings[0].to_string().contains("spoon.txt: changed since its capture"));
+        assert_eq!(dataset.objects[1].touches[2].times()[1].micros(), Some(3));
+    }
+
+    #[test]
+    fn an_unfinished_capture_is_no_data_set() {
+        let directory = captured(Format::Text);
+        let mut listing = Listing::read(directory.path()).unwrap().unwrap();
+        listing.complete = false;
+        listing.write(directory.path()).unwrap();
+        assert_eq!(problem(directory.path()), TouchesProblem::Incomplete);
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn damage_that_leaves_a_parquet_file_readable_is_an_error() {
+        let directory = captured(Format::Parquet);
+        let path = directory.path().join("spoon.parquet");
+        assert_eq!(Dataset::read(directory.path()).unwrap().len(), 6);
+        let whole = std::fs::read(&path).unwrap();
+        for position in 0..whole.len() {
+            let mut damaged = whole.clone();
+            damaged[position] ^= 1;
+            std::fs::write(&path, damaged).unwrap();
+            assert_eq!(problem(directory.path()), TouchesProblem::OtherChecksum, "byte {position}");
+        }
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn another_number_of_rows_than_stated_is_an_error() {
+        let directory = captured(Format::Parquet);
+        let mut listing = Listing::read(directory.path()).unwrap().unwrap();
+        listing.objects[1].touches = 4;
+        listing.write(directory.path()).unwrap();
+        assert_eq!(problem(directory.path()), TouchesProblem::OtherCount { stated: 4, found: 3 });
+    }
+
+    #[test]
+    fn checksums_are_those_of_gzip() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("check");
+        std::fs::write(&path, "123456789").unwrap();
+        assert_eq!(checksum(&path).unwrap(), 0xcbf4_3926);
+    }
+}

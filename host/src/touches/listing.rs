@@ -1,0 +1,185 @@
+//! `dataset.json`: what a data set holds, how it was made, and whether it is complete.
+
+use super::{Format, Origin};
+use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::output;
+use std::path::{Component, Path, PathBuf};
+
+/// What a data set's directory holds. The same capture writes the same bytes: no times of day, no durations.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Listing {
+    /// The version of the program that made it.
+    pub palpate: String,
+    /// Whether every touch is there.
+    pub complete: bool,
+    /// How the touches were made.
+    #[serde(rename = "settings")]
+    pub origin: Origin,
+    /// The objects, sorted by name.
+    pub objects: Vec<Entry>,
+}
+
+/// What there is of one object.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Entry {
+    /// The object's name.
+    pub name: String,
+    /// How many touches are on the disk.
+    pub touches: u64,
+    /// How many approaches it took to get them.
+    pub approaches: u64,
+    /// The size of the object's file; of the text so far, while the object is being captured.
+    pub bytes: u64,
+    /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's complete file. Version 0.1.0 wrote none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crc32: Option<u32>,
+}
+
+impl Listing {
+    /// The file's name.
+    pub const FILE: &str = "dataset.json";
+
+    /// A listing of objects of which there is no touch yet.
+    pub fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            palpate: env!("CARGO_PKG_VERSION").into(),
+            complete: false,
+            origin: origin.clone(),
+            objects: names.into_iter().map(|name| Entry { name, ..Entry::default() }).collect(),
+        }
+    }
+
+    /// Where the listing of a directory is.
+    pub fn path(directory: &Path) -> PathBuf {
+        directory.join(Self::FILE)
+    }
+
+    /// The listing of a directory; none if it has none, as data sets from elsewhere.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is no listing, and when it names an object twice or by a name that is no file's.
+    pub fn read(directory: &Path) -> Result<Option<Self>> {
+        let path = Self::path(directory);
+        match std::fs::read(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Error::io(&path, "read the listing of the data set", error)),
+            Ok(bytes) => Self::parse(&bytes, &path).map(Some),
+        }
+    }
+
+    /// Reads the bytes of a listing; errors name `path`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        let listing: Self = serde_json::from_slice(bytes).map_err(|error| {
+            let problem = TouchesProblem::BadListing { message: error.to_string() };
+            Error::at(Place::line(path, error.line() as u64), problem)
+        })?;
+        let mut names: Vec<&str> = listing.objects.iter().map(|entry| entry.name.as_str()).collect();
+        names.sort_unstable();
+        if let Some(&name) = names.iter().find(|name| !is_file_name(name)) {
+            return Err(Error::at(Place::file(path), TouchesProblem::BadName { name: name.into() }));
+        }
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(Error::at(Place::file(path), TouchesProblem::ListedTwice { name: pair[0].into() }));
+        }
+        Ok(listing)
+    }
+
+    /// Writes the listing, whole or not at all.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, directory: &Path) -> Result<()> {
+        output::write_json(&Self::path(directory), self)
+    }
+
+    /// The objects' names.
+    pub fn names(&self) -> Vec<String> {
+        self.objects.iter().map(|entry| entry.name.clone()).collect()
+    }
+}
+
+impl Entry {
+    /// The object's file of touches in a directory.
+    pub fn file(&self, directory: &Path, format: Format) -> PathBuf {
+        directory.join(format!("{}.{}", self.name, format.extension()))
+    }
+}
+
+/// Whether files of the directory itself can be called this.
+fn is_file_name(name: &str) -> bool {
+    let mut components = Path::new(name).components();
+    !name.is_empty()
+        && !name.contains(['/', '\\', '\0'])
+        && matches!((components.next(), components.next()), (Some(Component::Normal(_)), None))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Problem;
+
+    /// As version 0.1.0 wrote it.
+    const OLD: &str = r#"{
+  "palpate": "0.1.0",
+  "complete": true,
+  "settings": {
+    "touches": 2,
+    "seed": 1,
+    "length": 10.0,
+    "probe": {"radius": 0.15, "spacing": 2.0, "speed": 10.0, "tilt": 10.0},
+    "pose": false,
+    "approaches": false,
+    "format": "text",
+    "shard": "1/1"
+  },
+  "objects": [
+    {"name": "fork", "touches": 2, "approaches": 31, "bytes": 54}
+  ]
+}"#;
+
+    #[test]
+    fn a_listing_of_version_0_1_0_can_be_read() {
+        let listing = Listing::parse(OLD.as_bytes(), Path::new("dataset.json")).unwrap();
+        assert_eq!(listing.origin.probe.spacing, 2.0);
+        assert_eq!(listing.names(), ["fork"]);
+        assert_eq!(listing.objects[0].crc32, None);
+    }
+
+    #[test]
+    fn a_listing_is_read_as_it_was_written() {
+        let directory = tempfile::tempdir().unwrap();
+        assert_eq!(Listing::read(directory.path()).unwrap(), None);
+        let mut listing = Listing::new(&Origin::default(), ["fork".into(), "spoon".into()]);
+        listing.objects[0].crc32 = Some(u32::MAX);
+        listing.write(directory.path()).unwrap();
+        assert_eq!(Listing::read(directory.path()).unwrap(), Some(listing));
+    }
+
+    #[test]
+    fn a_listing_that_names_files_outside_its_directory_is_refused() {
+        for name in ["", "..", ".", "../fork", "/etc/fork", "a/b", "a\\\\b", "fork/"] {
+            let text = OLD.replace("\"fork\"", &format!("\"{name}\""));
+            let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err();
+            assert!(matches!(error.problem(), Some(Problem::Touches(TouchesProblem::BadName { .. }))), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_listing_that_names_an_object_twice_is_refused() {
+        let entry = "{\"name\": \"fork\", \"touches\": 2, \"approaches\": 31, \"bytes\": 54}";
+        let text = OLD.replace(entry, &format!("{entry}, {entry}"));
+        let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
+        assert!(error.contains("dataset.json: the object fork is listed twice"), "{error}");
+    }
+
+    #[test]
+    fn what_is_no_listing_is_refused_with_its_line() {
+        for (text, line) in [("", 1), ("{", 1), ("[]", 1), (&OLD.replace("seed", "sed"), 6)] {
+            let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("dataset.json:{line}: not the listing of a data set")), "{error}");
+        }
+    }
+}
