@@ -287,7 +287,7 @@ fn run_gpio(image: &Path, machine: &str, recording: Vec<u8>, count: usize) -> Ve
         assert!(read > 0, "the emulator has ended, or 300 s are over, after {} of {count} events", events.len());
         for &byte in &buffer[..read] {
             if let Some(frame) = decoder.feed(byte)
-                && let Message::Event { sequence, event } = frame.unwrap().message
+                && let Message::Event { sequence, event, .. } = frame.unwrap().message
             {
                 events.push((sequence, event));
             }

@@ -57,7 +57,7 @@ fn the_chips_process() {
     let [mut a, mut b] = [(); 2].map(|()| vec![0; 100_000]);
     let [mut c, mut d] = [(); 2].map(|()| vec![0; Memory::record_length(OBJECTS)]);
     let memory = Memory { built_in: &[], models: [&mut a, &mut b], records: [&mut c, &mut d] };
-    serve::<OBJECTS, _>(memory, &mut wire).unwrap();
+    serve::<OBJECTS, _>(memory, 0, &mut wire).unwrap();
 }
 
 /// Resident memory of a process in bytes, where the system reports it.

@@ -3,12 +3,12 @@
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate_onboard::station::{Memory, serve};
+use palpate_onboard::station::{Memory, ServeError, serve};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::link::{
-    CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, Message, Outcome, Payload, Query,
-    Refusal, checksum,
+    CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Payload,
+    Query, Refusal, checksum,
 };
 use palpate_shared::{ContactTime, Descriptor, Patterns, Pose, Touch};
 use palpate_tests::random::{self, Shape};
@@ -16,6 +16,7 @@ use palpate_tests::sections::trained;
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 const OBJECTS: usize = 16;
 
@@ -60,7 +61,11 @@ impl Chip {
 
     fn run(&mut self, desk: &mut Desk) -> Result<(), PowerCut> {
         let Self { built_in, models: [a, b], records: [c, d] } = self;
-        serve::<OBJECTS, _>(Memory { built_in, models: [a, b], records: [c, d] }, desk)
+        match serve::<OBJECTS, _>(Memory { built_in, models: [a, b], records: [c, d] }, 0, desk) {
+            Ok(()) => Ok(()),
+            Err(ServeError::Transport(cut)) => Err(cut),
+            Err(error) => panic!("{error}"),
+        }
     }
 }
 
@@ -103,6 +108,9 @@ struct Desk {
     /// The outcome of the last executed command had not been sent when the power was cut.
     untold: bool,
     newest: Option<u32>,
+    /// The session may end, and how it did.
+    may_fail: bool,
+    failed: Option<LinkError>,
 }
 
 impl Desk {
@@ -119,9 +127,14 @@ impl Desk {
             cut_every,
             untold: false,
             newest: None,
+            may_fail: false,
+            failed: None,
         };
+        // Another host each time.
+        static SESSIONS: AtomicU32 = AtomicU32::new(1);
+        let session = SESSIONS.fetch_add(1, Ordering::Relaxed);
         let Self { host, to_chip, .. } = &mut desk;
-        host.connect(0, |bytes| to_chip.extend(bytes));
+        host.connect(session, 0, |bytes| to_chip.extend(bytes));
         desk
     }
 
@@ -162,7 +175,11 @@ impl Read for Desk {
             }
             self.now += 100;
             let Self { host, to_chip, now, .. } = self;
-            host.tick(*now, |bytes| to_chip.extend(bytes)).unwrap();
+            if let Err(error) = host.tick(*now, |bytes| to_chip.extend(bytes)) {
+                assert!(self.may_fail, "{error}");
+                self.failed = Some(error);
+                return Ok(0);
+            }
         }
         panic!("the script does not end: {:?}", self.host.statistics());
     }
@@ -328,8 +345,11 @@ fn a_model_that_arrives_wrong_is_refused_and_the_old_one_stays() {
     script.extend(touches.iter().map(push));
     let mut desk = Desk::new(script, 0);
     Chip::new(good.clone()).run(&mut desk).unwrap();
-    let refused: Vec<Refusal> =
-        desk.outcomes.iter().filter_map(|o| if let Outcome::Refused(r) = o { Some(*r) } else { None }).collect();
+    let refused: Vec<Refusal> = desk
+        .outcomes
+        .iter()
+        .filter_map(|o| if let Outcome::Refused(r) = o { Some(*r).filter(|r| !r.is_of_a_touch()) } else { None })
+        .collect();
     assert_eq!(refused[..2], [Refusal::Checksum, Refusal::Invalid]);
     let mut rest = refused[2..].to_vec();
     rest.dedup();
@@ -358,6 +378,46 @@ fn a_snapshot_taken_over_the_link_goes_on_in_another_chip_and_not_under_another_
     Chip::new(other.clone()).run(&mut desk).unwrap();
     assert!(desk.outcomes.contains(&Outcome::Refused(Refusal::Invalid)));
     assert!(desk.outcomes.ends_with(&expected(&other, &touches[10..])));
+}
+
+#[test]
+fn places_for_records_that_are_too_short_are_refused_at_once() {
+    let mut chip = Chip::new(model(1));
+    chip.records[1].truncate(Memory::record_length(8));
+    let mut desk = Desk::new(touches(3).iter().map(push), 0);
+    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let memory = Memory { built_in, models: [a, b], records: [c, d] };
+    let (needed, found) = (Memory::record_length(OBJECTS), Memory::record_length(8));
+    assert_eq!(serve::<OBJECTS, _>(memory, 0, &mut desk), Err(ServeError::Records { needed, found }));
+    assert!(desk.outcomes.is_empty());
+}
+
+#[test]
+fn a_record_of_another_model_is_dropped_with_its_evidence_and_its_session() {
+    let touches = touches(10);
+    let (before, after) = touches.split_at(5);
+    let mut chip = Chip::new(model(1));
+    let mut desk = Desk::new(before.iter().map(push), 0);
+    chip.run(&mut desk).unwrap();
+    // Another model was flashed. The host goes on, and has to be told that the chip does not.
+    chip.built_in = model(2);
+    desk.may_fail = true;
+    desk.script.extend(after.iter().map(push));
+    chip.run(&mut desk).unwrap();
+    assert!(matches!(desk.failed, Some(LinkError::Forgotten { answered: 5, .. })), "{:?}", desk.failed);
+    let mut desk = Desk::new(after.iter().map(push), 0);
+    chip.run(&mut desk).unwrap();
+    assert_eq!(desk.outcomes, expected(&model(2), after));
+}
+
+#[test]
+fn a_chip_without_room_for_models_does_not_ask_for_a_smaller_one() {
+    let mut chip = Chip::new(model(1));
+    chip.models = [Vec::new(), Vec::new()];
+    let begin = Command::Begin { payload: Payload::Model, length: 100, checksum: 0 };
+    let mut desk = Desk::new([Step::Do(begin)], 0);
+    chip.run(&mut desk).unwrap();
+    assert_eq!(desk.outcomes, [Outcome::Refused(Refusal::Unsupported)]);
 }
 
 #[test]

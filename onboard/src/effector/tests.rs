@@ -433,7 +433,7 @@ fn model_of(trained: &Trained) -> Vec<u8> {
         .with_descriptor(1)
         .with_last_feature(1)
         .with_leaf(1)
-        .with_unit(1.0)
+        .with_unit(0.5)
         .with_unit_bits(3_098_164_010)
         .with_odds(1 << 49)
         .with_max_touches(60)

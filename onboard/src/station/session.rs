@@ -1,10 +1,10 @@
 //! A model in use, and the commands it can be given.
 
-use super::record::{Records, Source, Staged};
+use super::record::{Record, Records, Source, Staged};
 use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    Decision, Detail, Device, ModelInfo, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
+    Decision, Detail, Device, ModelInfo, NotStored, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
 };
 
 /// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: for each object what one
@@ -23,6 +23,8 @@ pub struct Station<'m, 'r, const N: usize> {
     /// What the model that is arriving will be.
     next_source: Source,
     switched: bool,
+    /// The checksum of the model that was switched to.
+    switched_to: u32,
     /// Touches that were not counted.
     refused: u32,
     records: Option<&'m mut Records<'r>>,
@@ -49,6 +51,7 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
             source,
             next_source,
             switched: false,
+            switched_to: 0,
             refused: 0,
             records,
         };
@@ -58,8 +61,9 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
 
     /// Continues from the newest record if it is of this model.
     fn resume(&mut self) {
+        let model = self.model.map_or(0, |model| model.checksum());
         let Some(record) = self.records.as_ref().and_then(|records| records.newest()) else { return };
-        if record.source == self.source {
+        if (record.source, record.model) == (self.source, model) {
             self.staged = record.staged;
             if let Some(recognizer) = &mut self.recognizer {
                 // A record without evidence is from the moment of a switch.
@@ -118,6 +122,7 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
                 }
                 self.source = self.next_source.with_length(staged.length);
                 self.switched = true;
+                self.switched_to = model.checksum();
                 Ok(())
             }
             Payload::Snapshot => {
@@ -159,6 +164,10 @@ impl<const N: usize> Device for Station<'_, '_, N> {
     }
 
     fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome {
+        if self.staging.is_empty() {
+            // No smaller model would fit either.
+            return Outcome::Refused(Refusal::Unsupported);
+        }
         let fits = usize::try_from(length).is_ok_and(|length| length <= self.staging.len());
         self.staged = fits.then_some(Staged { payload, length, checksum, received: 0 });
         outcome(fits.then_some(()).ok_or(Refusal::TooLong))
@@ -217,12 +226,15 @@ impl<const N: usize> Device for Station<'_, '_, N> {
         self.refused
     }
 
-    fn store(&mut self, progress: &Progress) {
-        let Some(records) = &mut self.records else { return };
+    fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
+        let Some(records) = self.records.as_mut().filter(|records| !records.is_empty()) else { return Ok(()) };
         let mut buffer: SnapshotBuffer<N> = [[0; _]; N];
         // The evidence of the model before is none of the next one's.
         let recognizer = self.recognizer.as_ref().filter(|_| !self.switched);
         let evidence = recognizer.and_then(|recognizer| recognizer.snapshot(buffer.as_flattened_mut()).ok());
-        records.write(self.source, self.staged, progress, evidence.unwrap_or_default());
+        let model = if self.switched { self.switched_to } else { self.model.map_or(0, |model| model.checksum()) };
+        let evidence = evidence.unwrap_or_default();
+        let progress = progress.clone();
+        records.write(Record { counter: 0, model, source: self.source, staged: self.staged, progress, evidence })
     }
 }

@@ -46,7 +46,9 @@ pub enum Message<'a> {
     },
     /// Chip: something happened without a command.
     Event {
-        /// Counts events from 0 since power-up.
+        /// The chip's boot number, another one after each start.
+        boot: u32,
+        /// Counts events from 0 since the start.
         sequence: u32,
         /// What happened.
         event: Event,
@@ -62,7 +64,9 @@ pub enum Query {
     /// Open the session of this frame if the current one is `previous`.
     Open {
         /// The session that the host believes to be current.
-        previous: u16,
+        previous: u32,
+        /// The chip's boot number as the host knows it: a late copy opens nothing after a reset.
+        boot: u32,
     },
     /// Which model is in use?
     Model,
@@ -93,6 +97,8 @@ pub enum Answer<'a> {
     Session {
         /// The number of its next command.
         next: u32,
+        /// The chip's boot number.
+        boot: u32,
     },
     /// To [`Query::Model`].
     Model(ModelInfo),
@@ -241,6 +247,8 @@ pub enum Event {
         /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
     },
+    /// The chip cannot store its state any more: what follows is lost if it is reset. Sent once per start.
+    NotStored,
     /// The chip's own fingers touched, and the touch was not counted.
     Refused {
         /// The touch.
@@ -398,4 +406,6 @@ pub struct Statistics {
     pub foreign: u32,
     /// Touches that were not counted because the model was not trained for them.
     pub refused: u32,
+    /// Commands whose effect could not be stored: a reset forgets it.
+    pub unstored: u32,
 }

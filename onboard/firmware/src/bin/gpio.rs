@@ -39,7 +39,7 @@ fn main() -> ! {
     let mut uart = Uart::take(Port::Link);
     let mut player = Player::new();
     let mut station = Station::<OBJECTS>::new(&model);
-    let mut end = DeviceEnd::new(Progress::NONE);
+    let mut end = DeviceEnd::new(Progress::NONE, chip::count_start());
     let mut effector = Effector::new(Settings::default().for_model(&model, &Scale::IDENTITY));
 
     let Some(queue) = cortex_m::singleton!(: Queue<Edge, 64> = Queue::new()) else { palpate_firmware::fail() };

@@ -84,6 +84,9 @@ fn run() -> Option<core::convert::Infallible> {
     let mut pac = pac::Peripherals::take()?;
     let mut watchdog = hal::Watchdog::new(pac.WATCHDOG);
     let resets = &mut pac.RESETS;
+    // Another number after each start: the ring oscillator's noise.
+    let noise = hal::rosc::RingOscillator::new(pac.ROSC).initialize();
+    let boot = (0..32).fold(0, |bits, _| bits << 1 | u32::from(noise.get_random_bit()));
     let clocks = hal::clocks::init_clocks_and_plls(
         CRYSTAL_HZ,
         pac.XOSC,
@@ -111,7 +114,7 @@ fn run() -> Option<core::convert::Infallible> {
     };
     let scale = Scale::new(MODEL_PROBE, PROBE)?;
     let mut station = Station::<OBJECTS>::new(&model);
-    let mut end = DeviceEnd::new(Progress::NONE);
+    let mut end = DeviceEnd::new(Progress::NONE, boot);
     let mut effector = Effector::new(Settings::default().for_model(&model, &scale));
 
     let queue = cortex_m::singleton!(: Queue<Edge, 64> = Queue::new())?;
