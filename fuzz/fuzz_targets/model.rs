@@ -36,11 +36,14 @@ fn walk(model: &Model<'_>) {
     let Ok(mut recognizer) = Recognizer::<256>::new(model, stopping) else { return };
     let mut buffer = [0; 4096];
     for times in [[0, 0, 0], [30_000, 0, 50_000], [0, u32::MAX, 7], [u32::MAX; 3], [0, 4_000_000_000, 1]] {
-        recognizer.push(&Touch::from_micros(times));
+        let _ = recognizer.push(&Touch::from_micros(times));
         recognizer.posterior(recognizer.best());
     }
     for row in [&[][..], &[i32::MIN; 256], &[i32::MAX; 256], &[0; 256], &[1000, -1000, 5]] {
-        recognizer.push_features(row);
+        let _ = recognizer.push_features(row);
+        let mut margins = [0; 256];
+        model.margins_of(row, &mut margins);
+        recognizer.push_margins(&margins);
     }
     let snapshot = recognizer.snapshot(&mut buffer).expect("the buffer is long enough").to_vec();
     recognizer.restore(&snapshot).expect("its own snapshot");

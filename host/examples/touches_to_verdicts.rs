@@ -31,13 +31,17 @@ fn recognize(bytes: &[u8], touches: impl Iterator<Item = palpate::Result<Touch>>
     let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model))?;
     for touch in touches {
         match recognizer.push(&touch?) {
-            Verdict::Undecided => continue,
-            Verdict::Recognized { object, touches } => {
+            Ok(Verdict::Undecided) => continue,
+            Err(refused) => {
+                println!("not counted: {refused}");
+                continue;
+            }
+            Ok(Verdict::Recognized { object, touches }) => {
                 let object = usize::from(object);
                 let posterior = recognizer.posterior(object).to_f64();
                 println!("{} after {touches} touches, posterior {posterior:.4}", model.object_name(object));
             }
-            Verdict::Unknown => println!("unknown"),
+            Ok(Verdict::Unknown) => println!("unknown"),
         }
         recognizer.reset();
     }

@@ -38,7 +38,7 @@
 //! let unseen = Origin { seed: 2, ..origin };
 //! let mut verdict = Verdict::Undecided;
 //! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {
-//!     verdict = recognizer.push(&touch);
+//!     verdict = recognizer.push(&touch)?;
 //!     if verdict != Verdict::Undecided {
 //!         break;
 //!     }

@@ -275,7 +275,8 @@ fn model_path(out: &Path, stem: &str) -> PathBuf {
 fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]) -> Result<Recognition> {
     let mut recognizer = Recognizer::<256>::new(model, Stopping::from_model(model))
         .map_err(|_| ReportProblem::TooManyObjects { objects: model.object_count() })?;
-    let verdict = touches.iter().map(|touch| recognizer.push(touch)).find(|verdict| *verdict != Verdict::Undecided);
+    let verdict =
+        touches.iter().filter_map(|touch| recognizer.push(touch).ok()).find(|verdict| *verdict != Verdict::Undecided);
     let best = recognizer.best();
     let recognized = matches!(verdict, Some(Verdict::Recognized { .. })).then(|| model.object_name(best).into());
     let posterior = recognizer.posterior(best).to_f64();

@@ -21,11 +21,14 @@
 //! let mut recognizer = Recognizer::<16>::new(&model, Stopping::from_model(&model))?;
 //! // Contact times of the three fingers in microseconds, as an `effector` measures them.
 //! match recognizer.push(&Touch::from_micros([30_000, 0, 50_000])) {
-//!     Verdict::Undecided => { /* touch again */ }
-//!     Verdict::Recognized { object, touches } => {
+//!     Ok(Verdict::Undecided) => { /* touch again */ }
+//!     Ok(Verdict::Recognized { object, touches }) => {
 //!         let _ = (model.object_name(object.into()), touches);
 //!     }
-//!     Verdict::Unknown => { /* the limit of touches was reached */ }
+//!     Ok(Verdict::Unknown) => { /* the limit of touches was reached */ }
+//!     Err(refused) => { /* the model was not trained for such touches: not counted, touch again */
+//! #       let _ = refused;
+//!     }
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -55,5 +58,5 @@ pub use bytes::{Aligned, ModelError};
 pub use decide::{
     CapacityError, Posterior, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative,
 };
-pub use model::Model;
+pub use model::{Model, Refused};
 pub use palpate_shared as shared;

@@ -47,21 +47,9 @@ pub struct Features {
 }
 
 impl Features {
-    const EMPTY: Self = Self { values: [MISSING_FEATURE; MAX_FEATURES], len: 0 };
-
     /// The features in the descriptor's order.
     pub fn as_slice(&self) -> &[i32] {
         self.values.get(..usize::from(self.len)).unwrap_or(&self.values)
-    }
-
-    /// Appends features; there is always room for those of a descriptor.
-    fn push<const N: usize>(&mut self, features: [i32; N]) {
-        for feature in features {
-            if let Some(slot) = self.values.get_mut(usize::from(self.len)) {
-                *slot = feature;
-                self.len += 1;
-            }
-        }
     }
 }
 
@@ -117,8 +105,17 @@ impl Descriptor {
     }
 
     /// The descriptor with this [`code`](Self::code).
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|d| d.code() == code)
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
+            0 => Self::Times,
+            1 => Self::Curvature,
+            2 => Self::Gravity,
+            3 => Self::Oriented,
+            4 => Self::ContactsCurvature,
+            5 => Self::ContactsGravity,
+            6 => Self::ContactsOriented,
+            _ => return None,
+        })
     }
 
     /// The features' names, in order.
@@ -156,7 +153,19 @@ impl Descriptor {
 
     /// How many features a touch has.
     pub const fn feature_count(self) -> usize {
-        self.feature_names().len()
+        self.length() as usize
+    }
+
+    /// Not from the names, which would then be linked.
+    const fn length(self) -> u8 {
+        match self {
+            Self::Times => 3,
+            Self::Curvature => 2,
+            Self::Gravity | Self::ContactsCurvature => 4,
+            Self::Oriented => 8,
+            Self::ContactsGravity => 6,
+            Self::ContactsOriented => 10,
+        }
     }
 
     /// Whether the features need the probe's pose; without one those features are missing.
@@ -203,10 +212,9 @@ impl Descriptor {
     pub fn features(self, touch: &Touch) -> Features {
         const NONE: i32 = MISSING_FEATURE;
         let [first, middle, last] = touch.times().map(within_limit);
-        let mut features = Features::EMPTY;
         if self == Self::Times {
-            features.push([clamp(first), clamp(middle), clamp(last)]);
-            return features;
+            let values = [clamp(first), clamp(middle), clamp(last), NONE, NONE, NONE, NONE, NONE, NONE, NONE];
+            return Features { values, len: 3 };
         }
         let (mut curvature, mut slope, mut pair) = (NONE, NONE, NONE);
         if first != NONE && last != NONE {
@@ -222,30 +230,26 @@ impl Descriptor {
             }
         }
         let contacts = self.uses_partial_touches();
-        if contacts {
-            features.push([touch.pattern().code().into(), curvature, slope, pair]);
+        // What the pose gives comes after these; without a pattern, already where the last two are.
+        let (head, start) = if contacts {
+            ([touch.pattern().code().into(), curvature, slope, pair], 4)
         } else {
-            features.push([curvature, slope]);
-        }
-        let (direction, alignment) = match touch.pose() {
-            Some(pose) => {
-                let ends = if contacts { by_height } else { by_first };
-                (pose.direction.map(i32::from), oriented(pose.alignment, touch.times(), ends).map(i32::from))
-            }
-            None => ([NONE; 3], [NONE; 3]),
+            ([curvature, slope, NONE, NONE], 2)
         };
-        match self.frame() {
-            Frame::Nothing => {}
-            Frame::Vertical => {
-                let ([_, _, down], [_, _, along]) = (direction, alignment);
-                features.push([down, along]);
-            }
-            Frame::Object => {
-                features.push(direction);
-                features.push(alignment);
+        let [a, b, c, d] = head;
+        let mut values = [a, b, c, d, NONE, NONE, NONE, NONE, NONE, NONE];
+        if let Some(pose) = touch.pose()
+            && let Some(tail) = values.get_mut(start..).and_then(<[i32]>::first_chunk_mut)
+        {
+            let [x, y, z] = pose.direction.map(i32::from);
+            let [u, v, w] = oriented(pose.alignment, [first, last], contacts).map(i32::from);
+            match self.frame() {
+                Frame::Nothing => {}
+                Frame::Vertical => *tail = [z, w, NONE, NONE, NONE, NONE],
+                Frame::Object => *tail = [x, y, z, u, v, w],
             }
         }
-        features
+        Features { values, len: self.length() }
     }
 }
 
@@ -262,27 +266,23 @@ fn clamp(value: i32) -> i32 {
 }
 
 /// The alignment from the outer finger that touched first to the other one; a missing contact counts as later than any
-/// other. If the times do not say which end is first, `is_reversed` does.
-fn oriented(alignment: [i16; 3], times: [ContactTime; 3], is_reversed: fn([i16; 3]) -> bool) -> [i16; 3] {
-    let [first, _, last] = times.map(|t| t.micros().unwrap_or(u32::MAX));
-    let flip = match first.cmp(&last) {
-        core::cmp::Ordering::Less => false,
-        core::cmp::Ordering::Greater => true,
-        core::cmp::Ordering::Equal => is_reversed(alignment),
+/// other. Where the times do not say which end is first, a component that is not zero is made positive: the last one of
+/// touches with any contacts, so that the vertical component is the same whichever way an object is turned about the
+/// vertical; otherwise the first one, as the models of full touches have learned it.
+fn oriented(alignment: [i16; 3], ends: [i32; 2], contacts: bool) -> [i16; 3] {
+    // A missing contact is the least number, and so the largest as one without a sign.
+    let [first, last] = ends.map(i32::cast_unsigned);
+    let [u, v, w] = alignment;
+    let [a, b, c] = if contacts { [w, v, u] } else { [u, v, w] };
+    let sign = if a != 0 {
+        a
+    } else if b != 0 {
+        b
+    } else {
+        c
     };
+    let flip = if first == last { sign < 0 } else { first > last };
     if flip { alignment.map(i16::saturating_neg) } else { alignment }
-}
-
-/// Makes the first component that is not zero positive. It depends on which way an object is turned about the vertical,
-/// which the models made with it have learned; hence not [`by_height`].
-fn by_first(alignment: [i16; 3]) -> bool {
-    alignment.into_iter().find(|&c| c != 0).is_some_and(|c| c < 0)
-}
-
-/// Makes the vertical component positive; of a level row the first component, from the last to the first, that is not
-/// zero. So the vertical component is the same whichever way an object is turned about the vertical.
-fn by_height(alignment: [i16; 3]) -> bool {
-    alignment.into_iter().rfind(|&c| c != 0).is_some_and(|c| c < 0)
 }
 
 #[cfg(test)]
@@ -417,6 +417,7 @@ mod tests {
             assert_eq!(Descriptor::from_name(descriptor.name()), Some(descriptor));
             assert_eq!(Descriptor::from_code(descriptor.code()), Some(descriptor));
             assert_eq!(descriptor.features(&touch()).as_slice().len(), descriptor.feature_count());
+            assert_eq!(descriptor.feature_names().len(), descriptor.feature_count());
         }
         assert_eq!(Descriptor::from_code(9), None);
     }

@@ -50,7 +50,7 @@ fn a_million_touches_add_up_without_drift() {
     let mut margins = [0; 3];
     for index in 0..1_000_000_u32 {
         let touch = touch(index.wrapping_mul(2_654_435_761) % 1000);
-        assert_eq!(recognizer.push(&touch), Verdict::Undecided);
+        assert_eq!(recognizer.push(&touch), Ok(Verdict::Undecided));
         model.margins(&touch, &mut margins);
         exact.iter_mut().zip(margins).for_each(|(sum, margin)| *sum += i128::from(margin));
     }
@@ -65,8 +65,8 @@ fn a_touch_that_only_one_object_can_explain_decides_at_once() {
         let bytes = compiled(&steps(&[500.0], &[&[0.01, 0.0, 0.0], &[-900.0, 900.0, -900.0]]), leaf);
         let model = Model::new(&bytes).unwrap();
         let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(1e-12, 10)).unwrap();
-        assert_eq!(recognizer.push(&touch(0)), Verdict::Undecided);
-        assert_eq!(recognizer.push(&touch(1000)), Verdict::Recognized { object: 1, touches: 2 });
+        assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Undecided));
+        assert_eq!(recognizer.push(&touch(1000)), Ok(Verdict::Recognized { object: 1, touches: 2 }));
         assert_eq!(recognizer.posterior(1).complement(), 0.0);
         assert_eq!(recognizer.posterior(0).to_f64(), 0.0);
     }
@@ -80,10 +80,10 @@ fn the_posterior_passes_one_minus_a_billionth_exactly_when_the_evidence_says_so(
         let mut recognizer: Recognizer<2> = Recognizer::new(&model, stopping(error_rate, 1000)).unwrap();
         let needed = ((1.0 / error_rate - 1.0).ln() / 0.25).ceil() as u32;
         for number in 1..needed {
-            assert_eq!(recognizer.push(&touch(0)), Verdict::Undecided, "after {number} of {needed}");
+            assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Undecided), "after {number} of {needed}");
             assert!(recognizer.posterior(0).complement() > error_rate);
         }
-        assert_eq!(recognizer.push(&touch(0)), Verdict::Recognized { object: 0, touches: needed });
+        assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Recognized { object: 0, touches: needed }));
         let complement = recognizer.posterior(0).complement();
         assert!(complement <= error_rate && complement > error_rate / 2.0, "{complement:e}");
     }
@@ -96,10 +96,10 @@ fn ties_and_equal_margins_are_unknown_in_the_end() {
         let model = Model::new(&bytes).unwrap();
         let mut recognizer: Recognizer<256> = Recognizer::new(&model, stopping(0.49, 50)).unwrap();
         for _ in 1..50 {
-            assert_eq!(recognizer.push(&touch(1)), Verdict::Undecided);
+            assert_eq!(recognizer.push(&touch(1)), Ok(Verdict::Undecided));
         }
-        assert_eq!(recognizer.push(&touch(1)), Verdict::Unknown);
-        assert_eq!(recognizer.push(&touch(1)), Verdict::Unknown);
+        assert_eq!(recognizer.push(&touch(1)), Ok(Verdict::Unknown));
+        assert_eq!(recognizer.push(&touch(1)), Ok(Verdict::Unknown));
         assert_eq!(recognizer.touches(), 50);
         assert!((recognizer.posterior(objects - 1).to_f64() - 1.0 / objects as f64).abs() < 1e-9);
         recognizer.reset();
@@ -139,13 +139,13 @@ fn thousands_of_touches_pulling_back_and_forth_leave_nothing_behind() {
     let model = Model::new(&bytes).unwrap();
     let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(0.01, u32::MAX)).unwrap();
     for _ in 0..5000 {
-        assert_eq!(recognizer.push(&touch(0)), Verdict::Undecided);
-        assert_eq!(recognizer.push(&touch(1000)), Verdict::Undecided);
+        assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Undecided));
+        assert_eq!(recognizer.push(&touch(1000)), Ok(Verdict::Undecided));
     }
     assert_eq!(recognizer.evidence(), [0, 0, 0]);
-    recognizer.push(&touch(1000));
-    recognizer.push(&touch(1000));
-    assert_eq!(recognizer.push(&touch(1000)), Verdict::Recognized { object: 1, touches: 10_003 });
+    recognizer.push(&touch(1000)).unwrap();
+    recognizer.push(&touch(1000)).unwrap();
+    assert_eq!(recognizer.push(&touch(1000)), Ok(Verdict::Recognized { object: 1, touches: 10_003 }));
 }
 
 /// A snapshot with this evidence.
@@ -168,7 +168,7 @@ fn evidence_at_its_limits_saturates_towards_undecided_and_never_wraps() {
         let near = limit - limit.signum() * 10;
         recognizer.restore(&snapshot(&model, &[near, near, near])).unwrap();
         for _ in 0..100 {
-            assert_eq!(recognizer.push(&touch(curvature)), Verdict::Undecided);
+            assert_eq!(recognizer.push(&touch(curvature)), Ok(Verdict::Undecided));
         }
         assert_eq!(recognizer.evidence(), [limit, limit, limit]);
     }
@@ -185,7 +185,7 @@ fn a_snapshot_goes_on_where_it_was_taken() {
         let mut buffer = [0; SNAPSHOT_LENGTH + 80];
         let snapshot = whole.snapshot(&mut buffer).unwrap().to_vec();
         let mut resumed: Recognizer<4> = Recognizer::new(&model, limit).unwrap();
-        resumed.push(&touch);
+        let _ = resumed.push(&touch);
         resumed.restore(&snapshot).unwrap();
         assert_eq!(resumed.verdict(), whole.verdict());
         assert_eq!(whole.push(&touch), resumed.push(&touch), "at touch {index}");
@@ -203,11 +203,11 @@ fn snapshots_of_other_models_and_damaged_ones_are_refused_and_change_nothing() {
     let (model, other) = (Model::new(&bytes).unwrap(), Model::new(&other).unwrap());
     let limit = stopping(0.01, 60);
     let mut recognizer: Recognizer<2> = Recognizer::new(&model, limit).unwrap();
-    recognizer.push(&touch(5));
+    recognizer.push(&touch(5)).unwrap();
     let evidence = recognizer.evidence().to_vec();
     let mut buffer = [0; 64];
     let mut other_recognizer: Recognizer<2> = Recognizer::new(&other, limit).unwrap();
-    other_recognizer.push(&touch(900));
+    other_recognizer.push(&touch(900)).unwrap();
     let foreign = other_recognizer.snapshot(&mut buffer).unwrap().to_vec();
     assert_eq!(recognizer.restore(&foreign), Err(SnapshotError::OtherModel));
     let own = recognizer.snapshot(&mut buffer).unwrap().to_vec();
@@ -231,6 +231,6 @@ fn priors_count_once() {
     let model = Model::new(&bytes).unwrap();
     let mut recognizer: Recognizer<2> = Recognizer::new(&model, stopping(0.01, 60)).unwrap();
     assert!((recognizer.posterior(0).to_f64() - 0.9).abs() < 1e-3);
-    recognizer.push(&touch(0));
+    recognizer.push(&touch(0)).unwrap();
     assert!((recognizer.posterior(0).to_f64() - 0.9).abs() < 1e-3);
 }

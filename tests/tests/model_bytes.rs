@@ -49,8 +49,10 @@ fn models() -> Vec<Vec<u8>> {
 fn walk(model: &Model<'_>) {
     let Ok(mut recognizer) = Recognizer::<256>::new(model, Stopping::from_model(model)) else { return };
     for touch in random::touches(40, 3) {
-        recognizer.push(&touch);
-        recognizer.push_features(&[i32::MIN, i32::MAX]);
+        let _ = recognizer.push(&touch);
+        let mut margins = [0; 256];
+        model.margins_of(&[i32::MIN, i32::MAX], &mut margins);
+        recognizer.push_margins(&margins);
         recognizer.posterior(0);
     }
     for object in 0..model.object_count() {
@@ -127,6 +129,31 @@ fn another_version_is_refused_by_name_before_anything_else() {
     bytes.truncate(200);
     assert_eq!(Model::new(&bytes).unwrap_err(), ModelError::Version(3));
     assert!(ModelError::Version(3).to_string().contains("version 3"));
+}
+
+#[test]
+fn numbers_of_the_header_that_make_no_sense_are_refused_at_their_place() {
+    for bytes in models() {
+        Model::new(&bytes).unwrap();
+        let wrong: [(usize, &[u8]); 9] = [
+            // A unit that never decides, one that is too coarse, none.
+            (32, &1e-9_f32.to_le_bytes()),
+            (32, &1.0_f32.to_le_bytes()),
+            (32, &f32::NAN.to_le_bytes()),
+            (36, &bytes[36..40].iter().map(|byte| byte ^ 0x10).collect::<Vec<u8>>()),
+            (40, &[64]),
+            // A threshold that a tie passes, and no touch at all.
+            (48, &(1_u64 << 56).to_le_bytes()),
+            (48, &u64::MAX.to_le_bytes()),
+            (56, &0_u32.to_le_bytes()),
+            (4, &3_u16.to_le_bytes()),
+        ];
+        for (offset, field) in wrong {
+            let mut changed = bytes.clone();
+            changed[offset..offset + field.len()].copy_from_slice(field);
+            assert_eq!(Model::new(&with_checksum(changed)).unwrap_err().offset(), offset, "{field:?}");
+        }
+    }
 }
 
 #[test]

@@ -3,19 +3,34 @@
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate_onboard::station::{Memory, serve};
-use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_onboard::station::{Memory, ServeError, serve};
+use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
+use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::link::{
-    CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, Message, Outcome, Payload, Query,
-    Refusal, checksum,
+    CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Payload,
+    Query, Refusal, checksum,
 };
-use palpate_shared::{Descriptor, Touch};
+use palpate_shared::{ContactTime, Descriptor, Patterns, Pose, Touch};
 use palpate_tests::random::{self, Shape};
+use palpate_tests::sections::trained;
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 const OBJECTS: usize = 16;
+
+/// Most touches count; those without any contact, and those that spread too far, do not.
+const CONTACTS: Trained = Trained {
+    probe: None,
+    touches: Some(TrainedTouches {
+        patterns: Patterns::CONTACTS,
+        counted: Counted::Contacts,
+        needs_pose: false,
+        largest_spread: 1_000_000,
+    }),
+    noise: None,
+};
 
 fn model(seed: u64) -> Vec<u8> {
     let shape = Shape {
@@ -28,7 +43,7 @@ fn model(seed: u64) -> Vec<u8> {
         leaf: 0.05,
     };
     let settings = Settings { leaf: Leaf::I16, ..Settings::default() };
-    compile(&random::ensemble(shape, seed), &settings).unwrap().bytes
+    trained(&compile(&random::ensemble(shape, seed), &settings).unwrap().bytes, &CONTACTS)
 }
 
 /// A chip's memory, which outlasts its program.
@@ -46,7 +61,11 @@ impl Chip {
 
     fn run(&mut self, desk: &mut Desk) -> Result<(), PowerCut> {
         let Self { built_in, models: [a, b], records: [c, d] } = self;
-        serve::<OBJECTS, _>(Memory { built_in, models: [a, b], records: [c, d] }, desk)
+        match serve::<OBJECTS, _>(Memory { built_in, models: [a, b], records: [c, d] }, 0, desk) {
+            Ok(()) => Ok(()),
+            Err(ServeError::Transport(cut)) => Err(cut),
+            Err(error) => panic!("{error}"),
+        }
     }
 }
 
@@ -89,6 +108,9 @@ struct Desk {
     /// The outcome of the last executed command had not been sent when the power was cut.
     untold: bool,
     newest: Option<u32>,
+    /// The session may end, and how it did.
+    may_fail: bool,
+    failed: Option<LinkError>,
 }
 
 impl Desk {
@@ -105,9 +127,14 @@ impl Desk {
             cut_every,
             untold: false,
             newest: None,
+            may_fail: false,
+            failed: None,
         };
+        // Another host each time.
+        static SESSIONS: AtomicU32 = AtomicU32::new(1);
+        let session = SESSIONS.fetch_add(1, Ordering::Relaxed);
         let Self { host, to_chip, .. } = &mut desk;
-        host.connect(0, |bytes| to_chip.extend(bytes));
+        host.connect(session, 0, |bytes| to_chip.extend(bytes));
         desk
     }
 
@@ -148,7 +175,11 @@ impl Read for Desk {
             }
             self.now += 100;
             let Self { host, to_chip, now, .. } = self;
-            host.tick(*now, |bytes| to_chip.extend(bytes)).unwrap();
+            if let Err(error) = host.tick(*now, |bytes| to_chip.extend(bytes)) {
+                assert!(self.may_fail, "{error}");
+                self.failed = Some(error);
+                return Ok(0);
+            }
         }
         panic!("the script does not end: {:?}", self.host.statistics());
     }
@@ -216,9 +247,12 @@ fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
     let mut recognizer = Recognizer::<OBJECTS>::new(&model, Stopping::from_model(&model)).unwrap();
     let verdict = |touch| {
         let decision = match recognizer.push(touch) {
-            Verdict::Undecided => Decision::Undecided,
-            Verdict::Recognized { object, .. } => Decision::Recognized(object),
-            Verdict::Unknown => Decision::Unknown,
+            Ok(Verdict::Undecided) => Decision::Undecided,
+            Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
+            Ok(Verdict::Unknown) => Decision::Unknown,
+            Err(Refused::Pattern(_)) => return Outcome::Refused(Refusal::Pattern),
+            Err(Refused::Spread) => return Outcome::Refused(Refusal::Spread),
+            Err(refused) => panic!("{refused}"),
         };
         let best = recognizer.best();
         let detail = Some(Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
@@ -226,6 +260,35 @@ fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
         Outcome::Verdict(palpate_shared::link::VerdictMessage { decision, best: best as u8, touches, detail })
     };
     touches.iter().map(verdict).collect()
+}
+
+/// Outcomes of touches, counted or not.
+fn answers_to_touches(desk: &Desk) -> Vec<Outcome> {
+    let is_answer = |outcome: &&Outcome| match outcome {
+        Outcome::Verdict(_) => true,
+        Outcome::Refused(refusal) => refusal.is_of_a_touch(),
+        _ => false,
+    };
+    desk.outcomes.iter().filter(is_answer).copied().collect()
+}
+
+#[test]
+fn touches_that_the_model_was_not_trained_for_are_refused_counted_and_reported_over_the_link() {
+    let bytes = model(1);
+    let pose = Pose { direction: [0, 0, -32_767], alignment: [32_767, 0, 0] };
+    let missing = ContactTime::MISSING;
+    let touches = [
+        Touch::from_micros([0, 5, 9]),
+        Touch::new([missing; 3]).with_pose(pose),
+        Touch::from_micros([0, 1_000_001, 9]),
+        Touch::new([ContactTime::FIRST, missing, missing]),
+    ];
+    let mut desk = Desk::new(touches.iter().map(push).chain([Step::Ask(Query::Statistics)]), 0);
+    Chip::new(bytes.clone()).run(&mut desk).unwrap();
+    assert_eq!(desk.outcomes, expected(&bytes, &touches));
+    let refusals = [Outcome::Refused(Refusal::Pattern), Outcome::Refused(Refusal::Spread)];
+    assert_eq!(desk.outcomes[1..3], refusals);
+    assert!(desk.answers[0].contains("refused: 2"), "{}", desk.answers[0]);
 }
 
 #[test]
@@ -257,8 +320,7 @@ fn a_loaded_model_is_used_from_its_commit_on_and_after_a_restart() {
     let mut chip = Chip::new(Vec::new());
     let mut desk = Desk::new(script, 0);
     chip.run(&mut desk).unwrap();
-    let verdicts: Vec<Outcome> = desk.outcomes.iter().filter(|o| matches!(o, Outcome::Verdict(_))).copied().collect();
-    assert_eq!(verdicts, [expected(first, before), expected(second, after)].concat());
+    assert_eq!(answers_to_touches(&desk), [expected(first, before), expected(second, after)].concat());
     let mut desk = Desk::new([Step::Ask(Query::Model), Step::Do(Command::Reset), push(&after[0])], 0);
     chip.run(&mut desk).unwrap();
     assert!(desk.answers[0].contains(&format!("length: {}", second.len())), "{}", desk.answers[0]);
@@ -283,8 +345,11 @@ fn a_model_that_arrives_wrong_is_refused_and_the_old_one_stays() {
     script.extend(touches.iter().map(push));
     let mut desk = Desk::new(script, 0);
     Chip::new(good.clone()).run(&mut desk).unwrap();
-    let refused: Vec<Refusal> =
-        desk.outcomes.iter().filter_map(|o| if let Outcome::Refused(r) = o { Some(*r) } else { None }).collect();
+    let refused: Vec<Refusal> = desk
+        .outcomes
+        .iter()
+        .filter_map(|o| if let Outcome::Refused(r) = o { Some(*r).filter(|r| !r.is_of_a_touch()) } else { None })
+        .collect();
     assert_eq!(refused[..2], [Refusal::Checksum, Refusal::Invalid]);
     let mut rest = refused[2..].to_vec();
     rest.dedup();
@@ -316,6 +381,46 @@ fn a_snapshot_taken_over_the_link_goes_on_in_another_chip_and_not_under_another_
 }
 
 #[test]
+fn places_for_records_that_are_too_short_are_refused_at_once() {
+    let mut chip = Chip::new(model(1));
+    chip.records[1].truncate(Memory::record_length(8));
+    let mut desk = Desk::new(touches(3).iter().map(push), 0);
+    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let memory = Memory { built_in, models: [a, b], records: [c, d] };
+    let (needed, found) = (Memory::record_length(OBJECTS), Memory::record_length(8));
+    assert_eq!(serve::<OBJECTS, _>(memory, 0, &mut desk), Err(ServeError::Records { needed, found }));
+    assert!(desk.outcomes.is_empty());
+}
+
+#[test]
+fn a_record_of_another_model_is_dropped_with_its_evidence_and_its_session() {
+    let touches = touches(10);
+    let (before, after) = touches.split_at(5);
+    let mut chip = Chip::new(model(1));
+    let mut desk = Desk::new(before.iter().map(push), 0);
+    chip.run(&mut desk).unwrap();
+    // Another model was flashed. The host goes on, and has to be told that the chip does not.
+    chip.built_in = model(2);
+    desk.may_fail = true;
+    desk.script.extend(after.iter().map(push));
+    chip.run(&mut desk).unwrap();
+    assert!(matches!(desk.failed, Some(LinkError::Forgotten { answered: 5, .. })), "{:?}", desk.failed);
+    let mut desk = Desk::new(after.iter().map(push), 0);
+    chip.run(&mut desk).unwrap();
+    assert_eq!(desk.outcomes, expected(&model(2), after));
+}
+
+#[test]
+fn a_chip_without_room_for_models_does_not_ask_for_a_smaller_one() {
+    let mut chip = Chip::new(model(1));
+    chip.models = [Vec::new(), Vec::new()];
+    let begin = Command::Begin { payload: Payload::Model, length: 100, checksum: 0 };
+    let mut desk = Desk::new([Step::Do(begin)], 0);
+    chip.run(&mut desk).unwrap();
+    assert_eq!(desk.outcomes, [Outcome::Refused(Refusal::Unsupported)]);
+}
+
+#[test]
 fn through_power_cuts_and_torn_records_no_touch_is_lost_or_doubled() {
     let loaded: &[u8] = model(1).leak();
     let touches = touches(2_000);
@@ -344,9 +449,9 @@ fn through_power_cuts_and_torn_records_no_touch_is_lost_or_doubled() {
         }
     }
     assert!(cuts > 100 && torn > 30, "{cuts} {torn}");
-    let told: Vec<Outcome> = desk.outcomes.iter().filter(|o| matches!(o, Outcome::Verdict(_))).copied().collect();
-    assert_eq!(told, verdicts);
-    assert!(!desk.outcomes.iter().any(|o| matches!(o, Outcome::Refused(_))), "loading continues after a power cut");
+    assert_eq!(answers_to_touches(&desk), verdicts);
+    let is_refused = |outcome: &Outcome| matches!(outcome, Outcome::Refused(refusal) if !refusal.is_of_a_touch());
+    assert!(!desk.outcomes.iter().any(is_refused), "loading continues after a power cut");
 }
 
 /// The place of the newest record, by its counter: postcard's first number.

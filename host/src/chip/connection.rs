@@ -8,6 +8,7 @@ use palpate_shared::link::{
     Refusal, Statistics, checksum,
 };
 use std::collections::VecDeque;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::{Duration, Instant};
 
 /// What a chip says by itself or about a command.
@@ -64,7 +65,7 @@ impl Connection {
         };
         let now = connection.now();
         let mut sent = Ok(());
-        connection.end.connect(now, |bytes| sent = connection.transport.send(bytes));
+        connection.end.connect(session(), now, |bytes| sent = connection.transport.send(bytes));
         sent?;
         while !connection.open {
             connection.exchange(Duration::from_millis(20))?;
@@ -266,4 +267,10 @@ fn keep(answer: Answer<'_>) -> Reply {
         Answer::Refused(refusal) => Reply::Refused(refusal),
         _ => Reply::Other,
     }
+}
+
+/// A number for a session that no other host takes: from the keys that the system gives to hash maps.
+fn session() -> u32 {
+    let [a, b, c, d, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
+    u32::from_le_bytes([a, b, c, d])
 }

@@ -120,6 +120,9 @@ impl Entry {
                 let what = if *finger < 3 { format!("finger {}: {kind}", finger + 1) } else { kind.to_string() };
                 Some(Self::Fault { what })
             }
+            Update::Refused { refusal, .. } | Update::Event(Event::Refused { refusal, .. }, _) => {
+                Some(Self::Fault { what: format!("a touch was not counted: {refusal}") })
+            }
             Update::Event(..) | Update::Idle => None,
         }
     }

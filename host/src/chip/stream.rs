@@ -5,7 +5,7 @@ use crate::error::{ChipProblem, Result};
 use palpate_onboard::Model;
 use palpate_onboard::station::Station;
 use palpate_shared::Touch;
-use palpate_shared::link::{Command, Decision, Device, Event, Outcome, TouchMessage, VerdictMessage};
+use palpate_shared::link::{Command, Decision, Device, Event, Outcome, Refusal, TouchMessage, VerdictMessage};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
@@ -27,6 +27,13 @@ pub enum Update {
         /// The posterior of each object, where the host recognizes too.
         posteriors: Option<Vec<f64>>,
     },
+    /// A touch that the chip did not count, because its model was not trained for it.
+    Refused {
+        /// The touch.
+        touch: Touch,
+        /// Why.
+        refusal: Refusal,
+    },
     /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
     /// Nothing has happened for a while.
@@ -38,7 +45,9 @@ pub enum Update {
 pub struct Summary {
     /// Touches that the chip counted.
     pub touches: u64,
-    /// Of these, compared with the host's recognizer.
+    /// Touches that the chip did not count, because its model was not trained for them.
+    pub refused: u64,
+    /// Touches, counted or not, that were compared with the host's recognizer.
     pub compared: u64,
     /// Of these, with another verdict, posterior or evidence.
     pub differences: u64,
@@ -99,7 +108,7 @@ impl Busy {
 /// What was sent and has no outcome yet.
 enum Sent {
     Object(Option<String>),
-    Touch { touch: Touch, expected: Option<VerdictMessage>, posteriors: Option<Vec<f64>> },
+    Touch { touch: Touch, expected: Option<Result<VerdictMessage, Refusal>>, posteriors: Option<Vec<f64>> },
 }
 
 /// Streams `steps` to the chip until they end or `each` breaks, and passes every update to `each`, in order. With a
@@ -188,7 +197,7 @@ fn sent(step: Step, mirror: Option<&mut Station<'_, '_, 256>>, chip: &ChipModel)
         }
         Step::Touch(touch) => {
             let Some(mirror) = mirror else { return Sent::Touch { touch, expected: None, posteriors: None } };
-            let expected = mirror.push(&touch, true);
+            let expected = Some(mirror.push(&touch, true));
             let objects = 0..=chip.info.last_object;
             let posteriors = objects.map(|object| mirror.posterior(object).map_or(0.0, probability)).collect();
             Sent::Touch { touch, expected, posteriors: Some(posteriors) }
@@ -211,10 +220,13 @@ struct Run {
 
 impl Run {
     fn take(&mut self, outcome: Outcome, chip: &ChipModel) -> Result<Update, ChipProblem> {
-        if let Outcome::Refused(refusal) = outcome {
-            return Err(ChipProblem::Refused(refusal));
-        }
         match (self.under_way.pop_front(), outcome) {
+            (Some(Sent::Touch { touch, expected, .. }), Outcome::Refused(refusal)) if refusal.is_of_a_touch() => {
+                self.summary.refused += 1;
+                self.compare(&touch, expected, Err(refusal));
+                Ok(Update::Refused { touch, refusal })
+            }
+            (_, Outcome::Refused(refusal)) => Err(ChipProblem::Refused(refusal)),
             (Some(Sent::Object(name)), Outcome::Done) => {
                 self.end_object(chip);
                 self.truth.clone_from(&name);
@@ -222,7 +234,7 @@ impl Run {
             }
             (Some(Sent::Touch { touch, expected, posteriors }), Outcome::Verdict(verdict)) => {
                 self.summary.touches += 1;
-                self.compare(&touch, expected, verdict);
+                self.compare(&touch, expected, Ok(verdict));
                 let decided = verdict.decision != Decision::Undecided && !self.decided;
                 if decided {
                     self.decided = true;
@@ -234,12 +246,17 @@ impl Run {
         }
     }
 
-    fn compare(&mut self, touch: &Touch, expected: Option<VerdictMessage>, verdict: VerdictMessage) {
+    fn compare(
+        &mut self,
+        touch: &Touch,
+        expected: Option<Result<VerdictMessage, Refusal>>,
+        verdict: Result<VerdictMessage, Refusal>,
+    ) {
         let Some(expected) = expected else { return };
         self.summary.compared += 1;
         if expected != verdict {
             self.summary.differences += 1;
-            let number = self.summary.touches;
+            let number = self.summary.touches + self.summary.refused;
             let difference = || format!("touch {number}, {touch:?}: the host says {expected:?}, the chip {verdict:?}");
             self.summary.first_difference.get_or_insert_with(difference);
         }

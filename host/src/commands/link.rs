@@ -128,7 +128,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
     let summary = stream(&mut connection, steps, &chip, model.as_ref(), |_, update| {
-        if matches!(update, Update::Touch { .. }) {
+        if matches!(update, Update::Touch { .. } | Update::Refused { .. }) {
             progress.advance(1);
         }
         progress.current().suspend(|| printer.update(&update, interactive))?;
@@ -210,6 +210,9 @@ impl<'c> Printer<'c> {
                 let s = if touches == 1 { "" } else { "es" };
                 print(&format!("{truth}{said} after {touches} touch{s}, posterior {posterior:.4}\n"))?;
             }
+            Update::Refused { refusal, .. } if !self.json && every_touch => {
+                print(&format!("not counted: {refusal}\n"))?
+            }
             Update::Event(event, missed) if !self.json => print(&format!("the chip: {event:?}, {missed} missed\n"))?,
             _ => {}
         }
@@ -228,6 +231,9 @@ impl<'c> Printer<'c> {
         let mut text = format!("{touches} touches in {:.1} s, {:.0} per second\n", summary.seconds, summary.rate());
         if right + wrong + undecided > 0 {
             text += &format!("objects: {right} correct, {wrong} wrong, {undecided} not recognized\n");
+        }
+        if summary.refused > 0 {
+            text += &format!("not counted: {} touches that the model was not trained for\n", summary.refused);
         }
         if *compared > 0 {
             text += &format!("compared with the host: {compared} touches, {differences} differences\n");

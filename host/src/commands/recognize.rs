@@ -4,7 +4,7 @@ use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
 use palpate::output;
 use palpate::touches::parse_touch;
-use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -43,6 +43,9 @@ struct Line<'a> {
     verdict: &'static str,
     object: &'a str,
     posterior: f64,
+    /// Why the touch was not counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<String>,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
@@ -96,8 +99,8 @@ impl Stream<'_> {
             let touch = parse_touch(line).map_err(|problem| wrong(problem.into()))?;
             self.check(&touch).map_err(|problem| wrong(problem.into()))?;
             let verdict = self.recognizer.push(&touch);
-            self.print(verdict)?;
-            if verdict != Verdict::Undecided {
+            self.print(verdict.err())?;
+            if self.recognizer.verdict() != Verdict::Undecided {
                 self.recognizer.reset();
             }
         }
@@ -114,22 +117,27 @@ impl Stream<'_> {
         Err(EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed: self.model.header().speed() })
     }
 
-    fn print(&self, verdict: Verdict) -> Result<()> {
+    fn print(&self, refused: Option<Refused>) -> Result<()> {
         let best = self.recognizer.best();
         let line = Line {
             touch: self.recognizer.touches(),
-            verdict: match verdict {
+            verdict: match self.recognizer.verdict() {
                 Verdict::Undecided => "undecided",
                 Verdict::Recognized { .. } => "recognized",
                 Verdict::Unknown => "unknown",
             },
-            object: self.model.object_name(best),
+            // Before the first counted touch no object is more likely than the others.
+            object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),
+            refused: refused.map(|refused| refused.to_string()),
         };
         if self.json {
             // Numbers and strings are always JSON.
             let text = serde_json::to_string(&line).unwrap_or_default();
             return output::print(&format!("{text}\n"));
+        }
+        if let Some(refused) = line.refused {
+            return output::print(&format!("{:4}  not counted: {refused}\n", line.touch));
         }
         output::print(&format!("{:4}  {:10}  {} {:.4}\n", line.touch, line.verdict, line.object, line.posterior))
     }

@@ -139,9 +139,12 @@ fn compare_verdicts<const N: usize>(
     while let Some(touch) = draw.next()
         && (compiled.verdict() == Verdict::Undecided || full.verdict() == Verdict::Undecided)
     {
-        compiled.push(&touch);
+        // What the model was not trained for is not counted by either.
+        let accepted = compiled.push(&touch).is_ok();
         if full.verdict() == Verdict::Undecided {
-            full.push(&ensemble.margins(&touch));
+            if accepted {
+                full.push(&ensemble.margins(&touch));
+            }
         }
     }
     Ok(match (compiled.verdict(), full.verdict()) {

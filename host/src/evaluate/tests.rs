@@ -109,7 +109,7 @@ fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
             let mut recognizer = Recognizer::<3>::new(&model, Stopping::new(0.01, 40).unwrap()).unwrap();
             let mut verdict = Verdict::Undecided;
             for touch in margins.draw(position, sequence, 40, 1) {
-                verdict = recognizer.push(&touches.objects[position].touches[touch]);
+                verdict = recognizer.push(&touches.objects[position].touches[touch]).unwrap();
                 if verdict != Verdict::Undecided {
                     break;
                 }

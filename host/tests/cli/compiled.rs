@@ -183,6 +183,37 @@ fn recognize_answers_each_line_of_a_slow_pipe_before_the_next_comes() {
 }
 
 #[test]
+fn six_touches_of_one_outer_finger_give_no_name_with_a_model_of_full_touches() {
+    let place = Place::new();
+    let household = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/household.palpate");
+    for model in [household.to_owned(), place.text("model.palpate")] {
+        let bytes = std::fs::read(&model).unwrap();
+        let opened = palpate_onboard::Model::new(&bytes).unwrap();
+        if opened.trained_touches().patterns != palpate_shared::Patterns::FULL {
+            println!("SKIPPED: {model} was trained on partial touches");
+            continue;
+        }
+        for touch in ["0 - -\n", "0 - 0.015\n", "- - -\n"] {
+            std::fs::write(place.path("touches.txt"), touch.repeat(6)).unwrap();
+            let finished = palpate(&["recognize", &model, &place.text("touches.txt")]);
+            assert_eq!(finished.status.code(), Some(0));
+            let text = String::from_utf8(finished.stdout).unwrap();
+            assert_eq!(text.lines().filter(|line| line.contains("not counted")).count(), 6, "{text}");
+            for object in 0..opened.object_count() {
+                assert!(!text.contains(opened.object_name(object)), "{text}");
+            }
+            let finished = palpate(&["recognize", &model, &place.text("touches.txt"), "--json"]);
+            for line in finished.stdout.lines() {
+                let line: Value = serde_json::from_str(&line.unwrap()).unwrap();
+                let verdict = (line["touch"].as_u64(), line["verdict"].as_str(), line["object"].as_str());
+                assert_eq!(verdict, (Some(0), Some("undecided"), Some("")));
+                assert!(line["refused"].is_string(), "{line}");
+            }
+        }
+    }
+}
+
+#[test]
 fn recognize_gives_up_after_the_limit_of_touches() {
     let place = Place::new();
     std::fs::write(place.path("touches.txt"), "0 0 0.08\n0 0 0.01\n".repeat(3)).unwrap();

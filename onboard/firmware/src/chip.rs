@@ -92,6 +92,18 @@ pub fn take_retained() -> &'static mut [u8] {
     unsafe { core::slice::from_raw_parts_mut(addr_of_mut!(_retained_start), length) }
 }
 
+/// A number that is another one after each start: the retained memory's first word, counted up. For images that keep
+/// nothing else there.
+///
+/// # Panics
+/// As [`take_retained`].
+pub fn count_start() -> u32 {
+    let Some(word) = take_retained().first_chunk_mut::<4>() else { return 0 };
+    let count = u32::from_le_bytes(*word).wrapping_add(1);
+    *word = count.to_le_bytes();
+    count
+}
+
 /// The emulated machines' external RAM, 16 MB of it, where QEMU's `-device loader,addr=0x21000000` puts what an image is
 /// to work on. Only for images that run only there.
 pub fn loaded() -> &'static [u8] {

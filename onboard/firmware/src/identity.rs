@@ -6,18 +6,19 @@ use palpate_shared::Touch;
 /// Bytes of [`record`].
 pub const LENGTH: usize = 52;
 
-/// Ten margins, the best object's posterior in Q56, and the verdict with its object and touches. After a verdict the
-/// recognizer starts again.
+/// Ten margins, the best object's posterior in Q56, and the verdict with its object and touches, or that the
+/// touch was refused. After a verdict the recognizer starts again.
 pub fn record(model: &Model<'_>, recognizer: &mut Recognizer<'_, 10>, touch: &Touch) -> [u8; LENGTH] {
     let mut margins = [0; 10];
     model.margins(touch, &mut margins);
     let verdict = match recognizer.push(touch) {
-        Verdict::Undecided => 0,
-        Verdict::Recognized { object, touches } => 1 << 30 | u32::from(object) << 16 | touches,
-        Verdict::Unknown => 2 << 30,
+        Ok(Verdict::Undecided) => 0,
+        Ok(Verdict::Recognized { object, touches }) => 1 << 30 | u32::from(object) << 16 | touches,
+        Ok(Verdict::Unknown) => 2 << 30,
+        Err(_) => 3 << 30,
     };
     let posterior = recognizer.posterior(recognizer.best()).q56();
-    if verdict != 0 {
+    if recognizer.verdict() != Verdict::Undecided {
         recognizer.reset();
     }
     let mut bytes = [0; LENGTH];

@@ -2,7 +2,7 @@
 
 use super::evidence::{self, Posterior, Unit};
 use super::stopping::Stopping;
-use crate::model::Model;
+use crate::model::{Model, Refused};
 use core::fmt;
 use palpate_shared::Touch;
 
@@ -18,8 +18,8 @@ pub enum Verdict {
         /// How many touches it took.
         touches: u32,
     },
-    /// The limit of touches was reached without a decision: undecided for good, until [`Recognizer::reset`]. Most
-    /// likely an object that the model does not know.
+    /// The limit of touches was reached without a decision, which stays so until [`Recognizer::reset`]: an object that
+    /// the model does not know, or a known one whose touches said too little.
     Unknown,
 }
 
@@ -73,17 +73,27 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// Cost: the margins, then about 15 instructions per object and one exponential, rarely more. Cannot fail: evidence
     /// that reaches the limits of 64 bits (after 2^33 touches at the earliest) stays there, which brings objects closer
     /// together and never makes one recognized.
-    pub fn push(&mut self, touch: &Touch) -> Verdict {
+    ///
+    /// # Errors
+    /// [`Refused`], for a touch that the model was not trained for: it is not counted and changes nothing.
+    pub fn push(&mut self, touch: &Touch) -> Result<Verdict, Refused> {
+        self.model.accepts(touch)?;
         let mut margins = [0; N];
         self.model.margins(touch, &mut margins);
-        self.add(&margins)
+        Ok(self.add(&margins))
     }
 
     /// Takes in a row of features, as [`Model::margins_of`].
-    pub fn push_features(&mut self, features: &[i32]) -> Verdict {
+    ///
+    /// # Errors
+    /// [`Refused::NeedsTouches`], for a model over touches.
+    pub fn push_features(&mut self, features: &[i32]) -> Result<Verdict, Refused> {
+        if self.model.descriptor().is_some() {
+            return Err(Refused::NeedsTouches);
+        }
         let mut margins = [0; N];
         self.model.margins_of(features, &mut margins);
-        self.add(&margins)
+        Ok(self.add(&margins))
     }
 
     /// Takes in a touch by its margins, computed beforehand with [`Model::margins`]; missing ones count as 0. For

@@ -13,7 +13,7 @@ pub enum State {
     Touching,
     /// All three have touched; some are still closed.
     Complete,
-    /// Time ran out before all three touched; some are still closed.
+    /// Time ran out before all three touched, or all opened again; some may still be closed.
     TimedOut,
     /// The touch is over, and the fingers have to be open for [`Settings::rest`]. Also the state at power-up.
     Released,
@@ -27,7 +27,7 @@ const MOST_TIMERS: usize = 16;
 /// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
 /// with a missing finger, and faults, are only seen at the first call after they are due.
 ///
-/// RAM: 172 bytes. Cannot fail or panic, whatever the edges.
+/// RAM: 176 bytes. Cannot fail or panic, whatever the edges.
 #[derive(Clone, Debug)]
 pub struct Effector {
     settings: Settings,
@@ -37,7 +37,7 @@ pub struct Effector {
     missing_in_a_row: [u16; 3],
     state: State,
     now: Option<u32>,
-    /// Since when all fingers have been open, while the state is [`State::Released`].
+    /// Since when all fingers have been open, as far as anybody asked.
     open_since: Option<u32>,
     touch: Option<Touch>,
     faults: Faults,
@@ -122,9 +122,18 @@ impl Effector {
         self.result()
     }
 
-    /// A pin of this finger cannot be read.
-    pub(super) fn unreadable(&mut self, finger: Finger) {
-        *finger.of(&mut self.faults.unreadable) = true;
+    /// Takes in a fault that was seen elsewhere, as by [`Watcher::service`](super::Watcher::service):
+    /// [`Effector::poll`] reports it in its turn.
+    pub fn report(&mut self, fault: Fault) {
+        let faults = &mut self.faults;
+        let flag = match fault {
+            Fault::Stuck(finger) => finger.of(&mut faults.stuck),
+            Fault::Bouncing(finger) => finger.of(&mut faults.bouncing),
+            Fault::Silent(finger) => finger.of(&mut faults.silent),
+            Fault::Unreadable(finger) => finger.of(&mut faults.unreadable),
+            Fault::Overrun => &mut faults.overrun,
+        };
+        *flag = true;
     }
 
     fn result(&mut self) -> Result<Option<Touch>, Fault> {
@@ -159,11 +168,13 @@ impl Effector {
         let fingers = self.fingers.iter().filter_map(|finger| finger.due(now, settings));
         let state = match self.state {
             State::Waiting => None,
-            State::Touching => self.deadline().filter(|&d| !self.awaits_contact(d)).map(|d| after(d, now)),
-            State::Complete | State::TimedOut => self.all_open().then_some(0),
-            State::Released if self.all_open() => {
-                Some(self.open_since.map_or(0, |since| after(since.wrapping_add(self.settings.rest), now)))
+            State::Touching => {
+                let deadline = self.deadline().filter(|&d| !self.awaits_contact(d)).map(|d| after(d, now));
+                let release = self.all_open().then(|| self.until_open_for(settings.release, now));
+                deadline.into_iter().chain(release).min()
             }
+            State::Complete | State::TimedOut => self.all_open().then_some(0),
+            State::Released if self.all_open() => Some(self.until_open_for(settings.rest, now)),
             State::Released => None,
         };
         fingers.chain(state).min()
@@ -179,12 +190,15 @@ impl Effector {
         match state {
             State::Touching => {
                 let timed_out = self.deadline().is_some_and(|d| !self.awaits_contact(d) && is_past(d, now));
-                if timed_out || self.contacts.iter().all(Option::is_some) {
+                let released = self.all_open() && self.open_for(self.settings.release, now);
+                if timed_out || released || self.contacts.iter().all(Option::is_some) {
                     self.finish();
                 }
             }
             State::Complete | State::TimedOut if self.all_open() => self.state = State::Released,
-            State::Released if self.all_open() && self.rested(now) => self.state = State::Waiting,
+            State::Released if self.all_open() && self.open_for(self.settings.rest, now) => {
+                self.state = State::Waiting;
+            }
             _ => {}
         }
     }
@@ -216,9 +230,14 @@ impl Effector {
         self.fingers.iter().all(Debounce::is_open)
     }
 
-    /// Whether the open fingers have rested for long enough, counted from the first time that this is asked.
-    fn rested(&mut self, now: u32) -> bool {
-        after(now, *self.open_since.get_or_insert(now)) >= self.settings.rest
+    /// Whether the open fingers have been open for this long, counted from the first time that this is asked.
+    fn open_for(&mut self, time: u32, now: u32) -> bool {
+        after(now, *self.open_since.get_or_insert(now)) >= time
+    }
+
+    /// Microseconds until [`Effector::open_for`] is true.
+    fn until_open_for(&self, time: u32, now: u32) -> u32 {
+        self.open_since.map_or(0, |since| after(since.wrapping_add(time), now))
     }
 
     /// The first contact of the touch in progress.

@@ -44,7 +44,8 @@ impl<A: InputPin, B: InputPin, C: InputPin> Fingers<A, B, C> {
     /// taken is offered again next time. Each pin is read exactly once.
     ///
     /// # Errors
-    /// [`Fault::Unreadable`], the first time that a pin cannot be read; the others have been read all the same.
+    /// [`Fault::Unreadable`], the first time that a pin cannot be read; the others have been read all the same. Where
+    /// several cannot be read, the first of them: the next call returns the next one.
     pub fn read(&mut self, at: u32, mut tell: impl FnMut(Edge) -> bool) -> Result<(), Fault> {
         let levels = [
             self.first.is_high().map_err(drop),
@@ -57,9 +58,11 @@ impl<A: InputPin, B: InputPin, C: InputPin> Fingers<A, B, C> {
             let known = finger.of(&mut self.closed);
             match level {
                 Err(()) if *unreadable => {}
+                // Only one of several can be returned.
+                Err(()) if fault.is_err() => {}
                 Err(()) => {
                     *unreadable = true;
-                    fault = fault.and(Err(Fault::Unreadable(finger)));
+                    fault = Err(Fault::Unreadable(finger));
                 }
                 Ok(high) => {
                     *unreadable = false;

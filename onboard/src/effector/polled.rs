@@ -35,8 +35,8 @@ impl<A: InputPin, B: InputPin, C: InputPin, T: Clock> Probe<A, B, C, T> {
             }
             room
         });
-        if let Err(Fault::Unreadable(finger)) = read {
-            effector.unreadable(finger);
+        if let Err(fault) = read {
+            effector.report(fault);
         }
         match outcome {
             Ok(None) => self.effector.poll(now),

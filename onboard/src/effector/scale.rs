@@ -45,6 +45,13 @@ impl Scale {
         Some(Self { linear, square })
     }
 
+    /// The longest that contacts can be apart with this probe if they are at most `micros` apart with the model's.
+    pub fn longest(&self, micros: u32) -> u32 {
+        // At least 2^-12 in Q16, as three ratios of at least 1/16 are.
+        let least = self.linear.min(self.square).max(1);
+        u32::try_from((u64::from(micros) * ONE).div_ceil(least)).unwrap_or(u32::MAX)
+    }
+
     /// The touch as the model's probe would have made it, rounded to whole microseconds; the pose stays.
     ///
     /// Cost: about 300 instructions on a Cortex-M. Cannot fail: times too long for a [`ContactTime`] become the longest.

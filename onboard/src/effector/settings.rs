@@ -1,5 +1,8 @@
 //! How long the driver waits for what.
 
+use super::Scale;
+use crate::model::Model;
+
 /// The longest duration of any setting: 2³⁰ µs, 18 minutes, so that differences of wrapping times keep their sign.
 const LONGEST: u32 = 1 << 30;
 
@@ -10,8 +13,13 @@ pub struct Settings {
     pub debounce: u32,
     /// How long a switch may take to settle before it counts as bouncing. More than `debounce`.
     pub settle: u32,
-    /// After the first contact, fingers that have not touched within this time are missing.
+    /// After the first contact, fingers that have not touched within this time are missing. Longer than the largest
+    /// time between contacts that the model was trained on, or full touches become partial ones; see
+    /// [`Settings::for_model`].
     pub timeout: u32,
+    /// How long all fingers must be open before a touch in progress ends without its missing contacts. Longer than a
+    /// finger loses contact within one approach, and shorter than the way from one approach to the next takes.
+    pub release: u32,
     /// How long all fingers must be open after a touch before the next one can begin.
     pub rest: u32,
     /// How long a finger may stay closed before it counts as stuck. More than `timeout` and the time a touch is held.
@@ -21,21 +29,40 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// For micro-switches (which bounce for 1 to 5 ms) and the paper's probe: 5 ms to debounce, 25 ms to settle, 400 ms
-    /// for the other fingers (4 units of length at 10 units per second), 10 ms rest, 5 s until stuck, silent after 100
-    /// touches.
+    /// For micro-switches (which bounce for 1 to 5 ms) and the paper's probe: 5 ms to debounce, 25 ms to settle, 1.2 s
+    /// for the other fingers (of 200,000 simulated touches the contacts were up to 1.05 s apart), 100 ms release, 10 ms
+    /// rest, 5 s until stuck, silent after 100 touches.
     fn default() -> Self {
-        Self { debounce: 5_000, settle: 25_000, timeout: 400_000, rest: 10_000, stuck: 5_000_000, silent_after: 100 }
+        Self {
+            debounce: 5_000,
+            settle: 25_000,
+            timeout: 1_200_000,
+            release: 100_000,
+            rest: 10_000,
+            stuck: 5_000_000,
+            silent_after: 100,
+        }
     }
 }
 
 impl Settings {
+    /// The same with the timeout that a model needs: a sixteenth more than the largest time between contacts that it was
+    /// trained on, as `scale`'s probe takes it. The timeout stays if the model does not state that time.
+    pub fn for_model(self, model: &Model<'_>, scale: &Scale) -> Self {
+        let spread = model.trained_touches().largest_spread;
+        if spread == u32::MAX {
+            return self;
+        }
+        let spread = scale.longest(spread);
+        Self { timeout: spread.saturating_add(spread / 16).saturating_add(1), ..self }
+    }
+
     /// The same with every duration in range, and `settle` and `stuck` long enough to make sense.
     pub(super) fn in_range(self) -> Self {
-        let [debounce, settle, timeout, rest, stuck] =
-            [self.debounce, self.settle, self.timeout, self.rest, self.stuck].map(|d| d.min(LONGEST));
+        let [debounce, settle, timeout, release, rest, stuck] =
+            [self.debounce, self.settle, self.timeout, self.release, self.rest, self.stuck].map(|d| d.min(LONGEST));
         let settle = settle.max(debounce.saturating_add(1));
         let stuck = stuck.max(timeout.saturating_add(1)).max(settle.saturating_add(1));
-        Self { debounce, settle, timeout, rest, stuck, silent_after: self.silent_after }
+        Self { debounce, settle, timeout, release, rest, stuck, silent_after: self.silent_after }
     }
 }

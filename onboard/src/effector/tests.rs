@@ -2,13 +2,21 @@ use super::*;
 use core::cell::Cell;
 use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::digital::{Mock, State as Level, Transaction};
-use heapless::spsc::Queue;
+use heapless::spsc::{Consumer, Producer, Queue};
+use palpate_shared::format::{HeaderBuilder, Trained, TrainedTouches, checksum};
 use palpate_shared::{ContactTime, Touch};
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
 
-const SETTINGS: Settings =
-    Settings { debounce: 5_000, settle: 25_000, timeout: 400_000, rest: 10_000, stuck: 5_000_000, silent_after: 4 };
+const SETTINGS: Settings = Settings {
+    debounce: 5_000,
+    settle: 25_000,
+    timeout: 400_000,
+    release: 100_000,
+    rest: 10_000,
+    stuck: 5_000_000,
+    silent_after: 4,
+};
 
 /// What came out of a run: a touch or a fault, in order.
 type Outcomes = Vec<Result<Touch, Fault>>;
@@ -223,7 +231,7 @@ fn fault_overrun_drops_the_touch_whose_edges_were_lost() {
     let (mut producer, mut consumer) = queue.split();
     let levels = [Cell::new(false), Cell::new(false), Cell::new(false)];
     let [a, b, c] = levels.each_ref().map(TestPin);
-    let mut watcher = Watcher::new(Fingers::new(a, b, c, Active::High));
+    let mut watcher = Watcher::start(Fingers::new(a, b, c, Active::High), &clock, &mut producer);
     let mut effector = Effector::new(SETTINGS);
     let mut outcomes = Outcomes::new();
     let mut drain_all = |clock: &TestClock, outcomes: &mut Outcomes| {
@@ -235,15 +243,206 @@ fn fault_overrun_drops_the_touch_whose_edges_were_lost() {
     for time in [50_000, 51_000] {
         clock.0.set(time);
         levels.iter().for_each(|level| level.set(!level.get()));
-        watcher.interrupt(&clock, &mut producer).unwrap();
+        watcher.interrupt(&clock, &mut producer);
     }
     drain_all(&clock, &mut outcomes);
     clock.0.set(52_000);
     levels.iter().for_each(|level| level.set(!level.get()));
-    watcher.interrupt(&clock, &mut producer).unwrap();
+    watcher.interrupt(&clock, &mut producer);
     clock.0.set(1_000_000);
     drain_all(&clock, &mut outcomes);
     assert_eq!(outcomes, [Err(Fault::Overrun)]);
+}
+
+/// Three pins, the watcher's end of a queue of `N` − 1 edges, and what the main loop makes of them.
+struct Board<'a, const N: usize> {
+    levels: &'a [Cell<bool>; 3],
+    clock: &'a TestClock,
+    producer: Producer<'a, Edge>,
+    consumer: Consumer<'a, Edge>,
+    watcher: Watcher<TestPin<'a>, TestPin<'a>, TestPin<'a>>,
+    effector: Effector,
+    outcomes: Outcomes,
+}
+
+impl<'a, const N: usize> Board<'a, N> {
+    fn start(levels: &'a [Cell<bool>; 3], clock: &'a TestClock, queue: &'a mut Queue<Edge, N>) -> Self {
+        let (mut producer, consumer) = queue.split();
+        let [a, b, c] = levels.each_ref().map(TestPin);
+        let watcher = Watcher::start(Fingers::new(a, b, c, Active::High), clock, &mut producer);
+        let (effector, outcomes) = (Effector::new(SETTINGS), Outcomes::new());
+        Self { levels, clock, producer, consumer, watcher, effector, outcomes }
+    }
+
+    /// Pins change, and interrupt.
+    fn set(&mut self, at: u32, changes: &[(Finger, bool)]) {
+        self.clock.0.set(at);
+        for &(finger, closed) in changes {
+            finger.of(&mut self.levels.each_ref()).set(closed);
+        }
+        self.watcher.interrupt(self.clock, &mut self.producer);
+    }
+
+    /// The main loop, once.
+    fn step(&mut self, at: u32) {
+        self.clock.0.set(at);
+        loop {
+            while let Some(fault) = self.watcher.service(self.clock, &mut self.producer) {
+                self.effector.report(fault);
+            }
+            match drain(&mut self.effector, &mut self.consumer, self.clock).transpose() {
+                Some(outcome) => self.outcomes.push(outcome),
+                None => return,
+            }
+        }
+    }
+}
+
+#[test]
+fn a_switch_that_is_closed_at_power_up_is_seen_before_any_interrupt_and_is_no_contact_of_a_later_touch() {
+    let (levels, clock) = ([Cell::new(false), Cell::new(true), Cell::new(false)], TestClock::default());
+    let mut queue: Queue<Edge, 64> = Queue::new();
+    let mut board = Board::start(&levels, &clock, &mut queue);
+    board.step(0);
+    board.step(1_000_000);
+    // The first finger's interrupt must not read the middle one as touching at the same time.
+    board.set(1_000_000, &[(First, true)]);
+    board.step(1_500_000);
+    board.step(6_000_000);
+    assert!(!board.outcomes.iter().any(|outcome| outcome.is_ok()), "{:?}", board.outcomes);
+    assert!(board.outcomes.contains(&Err(Fault::Stuck(Middle))), "{:?}", board.outcomes);
+}
+
+#[test]
+fn an_opening_that_did_not_fit_into_the_queue_is_read_again_without_another_interrupt() {
+    let (levels, clock) = ([Cell::new(false), Cell::new(false), Cell::new(false)], TestClock::default());
+    // Room for four edges.
+    let mut queue: Queue<Edge, 5> = Queue::new();
+    let mut board = Board::start(&levels, &clock, &mut queue);
+    board.step(0);
+    board.step(50_000);
+    board.set(100_000, &Finger::ALL.map(|finger| (finger, true)));
+    // The main loop is busy: of three openings one fits.
+    board.set(200_000, &Finger::ALL.map(|finger| (finger, false)));
+    board.step(201_000);
+    board.step(300_000);
+    for finger in Finger::ALL {
+        board.set(400_000, &[(finger, true)]);
+    }
+    board.step(500_000);
+    let touch = Ok(Touch::from_micros([0; 3]));
+    assert_eq!(board.outcomes.last(), Some(&touch), "no finger's next closing looks unchanged: {:?}", board.outcomes);
+    board.set(600_000, &Finger::ALL.map(|finger| (finger, false)));
+    board.step(20_000_000);
+    assert!(board.outcomes.contains(&Err(Fault::Overrun)), "{:?}", board.outcomes);
+    assert!(!board.outcomes.iter().any(|outcome| matches!(outcome, Err(Fault::Stuck(_)))), "{:?}", board.outcomes);
+}
+
+/// A pin that cannot be read.
+struct BrokenPin;
+
+impl embedded_hal::digital::ErrorType for BrokenPin {
+    type Error = embedded_hal::digital::ErrorKind;
+}
+
+impl embedded_hal::digital::InputPin for BrokenPin {
+    fn is_high(&mut self) -> Result<bool, Self::Error> {
+        Err(embedded_hal::digital::ErrorKind::Other)
+    }
+
+    fn is_low(&mut self) -> Result<bool, Self::Error> {
+        self.is_high()
+    }
+}
+
+#[test]
+fn unreadable_pins_are_all_reported_although_a_touch_comes_at_the_same_time() {
+    let clock = TestClock::default();
+    let mut queue: Queue<Edge, 8> = Queue::new();
+    let (mut producer, mut consumer) = queue.split();
+    let level = Cell::new(false);
+    let fingers = Fingers::new(TestPin(&level), BrokenPin, BrokenPin, Active::High);
+    let mut watcher = Watcher::start(fingers, &clock, &mut producer);
+    let mut effector = Effector::new(SETTINGS);
+    let mut outcomes = Outcomes::new();
+    outcomes.extend(drain(&mut effector, &mut consumer, &clock).transpose());
+    clock.0.set(100_000);
+    outcomes.extend(drain(&mut effector, &mut consumer, &clock).transpose());
+    level.set(true);
+    watcher.interrupt(&clock, &mut producer);
+    clock.0.set(600_000);
+    // Touch and faults are there at the same time.
+    while let Some(fault) = watcher.service(&clock, &mut producer) {
+        effector.report(fault);
+    }
+    while let Some(outcome) = drain(&mut effector, &mut consumer, &clock).transpose() {
+        outcomes.push(outcome);
+    }
+    let alone = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]);
+    assert_eq!(outcomes, [Err(Fault::Unreadable(Middle)), Ok(alone), Err(Fault::Unreadable(Last))]);
+}
+
+#[test]
+fn an_approach_that_was_given_up_does_not_merge_with_the_next_one() {
+    // One finger, retracted; then the next approach's middle finger, before the first one's time is up.
+    let edges = [(First, true, 50_000), (First, false, 110_000), (Middle, true, 400_000), (Middle, false, 450_000)];
+    let alone = |finger: usize| {
+        let mut times = [ContactTime::MISSING; 3];
+        times[finger] = ContactTime::FIRST;
+        Ok(Touch::new(times))
+    };
+    let (outcomes, effector) = play(0, &edges, &[], 600_000);
+    assert_eq!((outcomes, effector.state()), (vec![alone(0), alone(1)], State::Waiting));
+    // The first touch is over 100 ms after the finger has settled open.
+    assert_eq!(play(0, &edges[..2], &[], 214_999).0, []);
+    assert_eq!(play(0, &edges[..2], &[], 215_000).0, [alone(0)]);
+}
+
+#[test]
+fn the_timeout_is_that_of_the_model_and_so_no_full_touch_becomes_a_partial_one() {
+    let spread = 1_050_000;
+    let touches = TrainedTouches { largest_spread: spread, ..TrainedTouches::full(false) };
+    let bytes = model_of(&Trained { touches: Some(touches), ..Trained::default() });
+    let model = crate::Model::new(&bytes).unwrap();
+    let half_speed = Scale::new(Geometry { spacing: 10, speed: 10 }, Geometry { spacing: 10, speed: 5 }).unwrap();
+    for (scale, spread) in [(Scale::IDENTITY, spread), (half_speed, 2 * spread)] {
+        let settings = SETTINGS.for_model(&model, &scale);
+        let mut effector = Effector::new(settings);
+        let mut outcomes = Outcomes::new();
+        poll(&mut effector, 0, &mut outcomes);
+        poll(&mut effector, 50_000, &mut outcomes);
+        for (finger, at) in [(First, 0), (Middle, spread / 2), (Last, spread)] {
+            outcomes.extend(effector.edge(Edge::new(finger, true, 50_000 + at)).transpose());
+        }
+        poll(&mut effector, 100_000 + spread, &mut outcomes);
+        assert_eq!(outcomes, [Ok(Touch::from_micros([0, spread / 2, spread]))]);
+        assert!(model.accepts(&scale.apply(&Touch::from_micros([0, spread / 2, spread]))).is_ok());
+    }
+    let unstated = model_of(&Trained::default());
+    let unstated = crate::Model::new(&unstated).unwrap();
+    assert_eq!(SETTINGS.for_model(&unstated, &Scale::IDENTITY), SETTINGS);
+    assert!(Settings::default().timeout > spread, "longer than the paper's probe takes");
+}
+
+/// A model without a tree.
+fn model_of(trained: &Trained) -> Vec<u8> {
+    let mut sections = Vec::new();
+    trained.write(|bytes| sections.extend_from_slice(bytes));
+    let length = 96 + 4 + sections.len() + 4 + 4 + 4;
+    let header = HeaderBuilder::default()
+        .with_descriptor(1)
+        .with_last_feature(1)
+        .with_leaf(1)
+        .with_unit(0.5)
+        .with_unit_bits(3_098_164_010)
+        .with_odds(1 << 49)
+        .with_max_touches(60)
+        .with_text_length(4)
+        .with_length(length as u32)
+        .with_sections(sections.len() as u32);
+    let mut bytes = [&header.bytes()[..], &[0, 1, b'a', 0], &sections, &[0; 8]].concat();
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes
 }
 
 #[test]
@@ -297,8 +496,15 @@ fn every_fault_says_what_to_do() {
 
 #[test]
 fn settings_out_of_range_are_brought_into_it() {
-    let settings =
-        Settings { debounce: u32::MAX, settle: 0, timeout: u32::MAX, rest: u32::MAX, stuck: 0, silent_after: 0 };
+    let settings = Settings {
+        debounce: u32::MAX,
+        settle: 0,
+        timeout: u32::MAX,
+        release: u32::MAX,
+        rest: u32::MAX,
+        stuck: 0,
+        silent_after: 0,
+    };
     let mut effector = Effector::new(settings);
     for at in 0..1_000 {
         let closed = at % 3 == 0;
@@ -454,9 +660,9 @@ proptest! {
         let clock = TestClock::default();
         clock.0.set(start);
         let mut probe = { let [a, b, c] = levels.each_ref().map(TestPin); Probe::new(Fingers::new(a, b, c, Active::High), &clock, SETTINGS) };
-        let mut watcher = { let [a, b, c] = levels.each_ref().map(TestPin); Watcher::new(Fingers::new(a, b, c, Active::High)) };
         let mut queue: Queue<Edge, 128> = Queue::new();
         let (mut producer, mut consumer) = queue.split();
+        let mut watcher = { let [a, b, c] = levels.each_ref().map(TestPin); Watcher::start(Fingers::new(a, b, c, Active::High), &clock, &mut producer) };
         let mut effector = Effector::new(SETTINGS);
         let (mut polled, mut interrupted) = (Outcomes::new(), Outcomes::new());
         polled.extend(probe.poll().transpose());
@@ -468,7 +674,7 @@ proptest! {
             let mut levels = levels.each_ref();
             finger.of(&mut levels).set(closed);
             for _ in 0..8 { polled.extend(probe.poll().transpose()); }
-            watcher.interrupt(&clock, &mut producer).unwrap();
+            watcher.interrupt(&clock, &mut producer);
             if i % 3 == 0 {
                 while let Some(outcome) = drain(&mut effector, &mut consumer, &clock).transpose() { interrupted.push(outcome); }
             }
@@ -580,6 +786,6 @@ fn calibration_says_what_is_wrong() {
 
 #[test]
 fn the_driver_takes_the_ram_that_its_documentation_states() {
-    assert_eq!(size_of::<Effector>(), 172);
+    assert_eq!(size_of::<Effector>(), 176);
     assert_eq!(size_of::<Edge>(), 8);
 }

@@ -1,6 +1,6 @@
 //! The sections of a model, found but not yet checked.
 
-use palpate_shared::format::{Layout, LeafType};
+use palpate_shared::format::{Header, Layout, LeafType};
 
 /// Where the sections of a model are. What a layout reads from them it has checked before.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +20,13 @@ pub(crate) struct Sections<'a> {
     pub(crate) leaf: LeafType,
 }
 
-impl Sections<'_> {
+impl<'a> Sections<'a> {
+    /// The header.
+    pub(crate) fn header(&self) -> Header<'a> {
+        // Sections are only found in bytes that have a header.
+        Header::split(self.bytes).map_or(Header::EMPTY, |(header, _)| header)
+    }
+
     /// The offset in the model at which a section, or what is left of one, starts.
     pub(crate) fn offset(&self, section: &[u8]) -> usize {
         section.as_ptr().addr().saturating_sub(self.bytes.as_ptr().addr())

@@ -3,29 +3,25 @@
 use super::optional;
 use crate::bytes::{ModelError, take};
 use crate::layouts::{Sections, built_in, complete, grid, preorder, ranks};
-use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
+use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, TrainedTouches};
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
 
 /// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves.
 #[inline(never)]
-pub(super) fn check(model: &Sections<'_>, header: &Header<'_>) -> Result<(), ModelError> {
+pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
     if Key::from_code(header.key()).is_none() {
         return Err(ModelError::Field { offset: 13 });
     }
-    let positive = |bits: u32| bits.wrapping_sub(1) < f32::INFINITY.to_bits() - 1;
-    if !positive(header.unit().to_bits()) {
-        return Err(ModelError::Field { offset: 32 });
-    }
-    if header.unit_shift() > 63 {
-        return Err(ModelError::Field { offset: 40 });
+    if let Some(offset) = wrong_number(header) {
+        return Err(ModelError::Field { offset });
     }
     let built_in = built_in::layout(model.layout);
     if !built_in || !built_in::leaf(model.leaf) {
         return Err(ModelError::NotBuiltIn { offset: if built_in { 7 } else { 6 } });
     }
-    optional::check(model)?;
+    optional::check(model, touches)?;
     ranks::check(model, header.last_feature())?;
     let section =
         |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };
@@ -87,4 +83,30 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>) -> Result<(), Mod
         }
     }
     if range.saturating_add(largest_base) > limit { Err(ModelError::MarginRange) } else { Ok(()) }
+}
+
+/// The offset of a number of the header that makes no sense: a unit beyond its limits or in other bits than `unit_bits`
+/// states, a threshold that a tie would pass, no touch. Without floating point.
+fn wrong_number(header: &Header<'_>) -> Option<usize> {
+    const LEAST_UNIT: u32 = 0x3380_0000; // 2^-24 nats
+    const LARGEST_UNIT: u32 = 0x3f00_0000; // 0.5 nats
+    const LOG2_E: u64 = 3_098_164_010; // in Q31
+    let unit = header.unit().to_bits();
+    if !(LEAST_UNIT..=LARGEST_UNIT).contains(&unit) {
+        return Some(32);
+    }
+    // The unit is mantissa · 2^(exponent − 150) nats, and unit_bits · 2^-(32 + unit_shift) bits.
+    let (mantissa, exponent) = (unit & 0x7f_ffff | 0x80_0000, unit >> 23);
+    let bits = u64::from(mantissa) * LOG2_E;
+    let shift = 149_u32.wrapping_sub(exponent).wrapping_sub(header.unit_shift().into());
+    if shift > 63 {
+        return Some(40);
+    }
+    if (bits >> shift).abs_diff(header.unit_bits().into()) > 2 {
+        return Some(36);
+    }
+    if header.odds() >= 1 << 56 {
+        return Some(48);
+    }
+    (header.max_touches() == 0).then_some(56)
 }

@@ -5,6 +5,9 @@ mod fixed;
 mod header;
 mod margins;
 mod optional;
+mod refused;
+
+pub use refused::Refused;
 
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Sections, built_in};
@@ -21,6 +24,7 @@ use palpate_shared::format::{
 pub struct Model<'a> {
     sections: Sections<'a>,
     descriptor: Option<Descriptor>,
+    touches: TrainedTouches,
 }
 
 impl<'a> Model<'a> {
@@ -32,9 +36,12 @@ impl<'a> Model<'a> {
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
     #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
-        let mut model = header::read(bytes).map(|(sections, descriptor)| Self { sections, descriptor });
-        if let Ok(opened) = &model
-            && let Err(error) = check::check(&opened.sections, &opened.header())
+        let mut model = header::read(bytes).map(|(sections, descriptor)| {
+            let touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
+            Self { sections, descriptor, touches }
+        });
+        if let Ok(opened) = &mut model
+            && let Err(error) = check::check(&opened.sections, &opened.sections.header(), &mut opened.touches)
         {
             model = Err(error);
         }
@@ -43,8 +50,7 @@ impl<'a> Model<'a> {
 
     /// The header.
     pub fn header(&self) -> Header<'a> {
-        // A model is only made from bytes that have a header.
-        Header::split(self.sections.bytes).map_or(Header::EMPTY, |(header, _)| header)
+        self.sections.header()
     }
 
     /// All of the model's bytes.
@@ -124,11 +130,8 @@ impl<'a> Model<'a> {
 
     /// The touches that the model was trained on, and so the only ones that count as evidence: full touches, with a pose
     /// if the descriptor needs one, unless the model states others.
-    ///
-    /// Cost: about 100 instructions.
-    pub fn trained_touches(&self) -> TrainedTouches {
-        TrainedTouches::from_bytes(optional::find(self.sections.optional, Tag::Touches))
-            .unwrap_or_else(|| TrainedTouches::full(self.descriptor.is_some_and(Descriptor::needs_pose)))
+    pub const fn trained_touches(&self) -> TrainedTouches {
+        self.touches
     }
 
     /// The noise in the training, if the model states it.

@@ -14,9 +14,10 @@ pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
     &[]
 }
 
-/// Checks that sections fill their part of the model, in the order of their tags, and make sense, and that none is there
-/// that has to be understood and is not.
-pub(super) fn check(model: &Sections<'_>) -> Result<(), ModelError> {
+/// Checks that sections fill their part of the model, in the order of their tags, that what recognition depends on makes
+/// sense (whoever asks for probe or noise finds out about those), and that none is there
+/// that has to be understood and is not. Sets `touches` if the model states them.
+pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
     let mut rest = model.optional;
     let mut last = 0;
     while !rest.is_empty() {
@@ -25,9 +26,11 @@ pub(super) fn check(model: &Sections<'_>) -> Result<(), ModelError> {
             take_section(&mut rest).ok_or(ModelError::Section { offset })?;
         let valid = match tag {
             _ if tag <= last => false,
-            _ if tag == Tag::Probe.code() => TrainedProbe::from_bytes(content).is_some(),
-            _ if tag == Tag::Touches.code() => TrainedTouches::from_bytes(content).is_some(),
-            _ if tag == Tag::Noise.code() => TrainedNoise::from_bytes(content).is_some(),
+            _ if tag == Tag::Probe.code() => content.len() >= TrainedProbe::LENGTH,
+            _ if tag == Tag::Touches.code() => {
+                TrainedTouches::from_bytes(content).map(|stated| *touches = stated).is_some()
+            }
+            _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
             _ if must_understand => return Err(ModelError::NotUnderstood { tag, offset }),
             _ => true,
         };

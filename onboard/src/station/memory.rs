@@ -14,7 +14,7 @@ pub struct Memory<'a> {
 impl Memory<'_> {
     /// The most bytes that a record takes for models of up to `objects` objects.
     pub const fn record_length(objects: usize) -> usize {
-        // Header, counter, source and staging; an outcome takes up to 26 bytes; the snapshot.
-        6 + 40 + 16 + 26 * palpate_shared::link::WINDOW + crate::SNAPSHOT_LENGTH + 10 * objects
+        // Header; counter, model, source and staging; session; an outcome takes up to 26 bytes; the snapshot.
+        6 + 45 + 18 + 26 * palpate_shared::link::WINDOW + crate::SNAPSHOT_LENGTH + 10 * objects
     }
 }

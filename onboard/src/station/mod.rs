@@ -22,5 +22,5 @@ mod serve;
 mod session;
 
 pub use memory::Memory;
-pub use serve::serve;
+pub use serve::{ServeError, serve};
 pub use session::Station;

@@ -1,7 +1,7 @@
 //! What a chip remembers through a power cut.
 
 use core::sync::atomic::{Ordering, compiler_fence};
-use palpate_shared::link::{Payload, Progress, checksum};
+use palpate_shared::link::{NotStored, Payload, Progress, checksum};
 use serde::{Deserialize, Serialize};
 
 /// Which model is in use; bytes of it where it was loaded.
@@ -31,10 +31,15 @@ pub(super) struct Staged {
     pub(super) received: u32,
 }
 
+/// What the bytes of a record mean; goes into its checksum, so that records of other versions count as damaged.
+const VERSION: u32 = 2;
+
 /// A record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Record<'a> {
-    counter: u32,
+    pub(super) counter: u32,
+    /// The checksum of the model that it is of; 0 for none.
+    pub(super) model: u32,
     pub(super) source: Source,
     pub(super) staged: Option<Staged>,
     pub(super) progress: Progress,
@@ -64,21 +69,27 @@ impl<'a> Records<'a> {
         newest(&self.places)
     }
 
-    /// Writes a record over the older one. One that does not fit is not written, and the older ones stay.
-    pub(super) fn write(&mut self, source: Source, staged: Option<Staged>, progress: &Progress, evidence: &[u8]) {
+    /// Whether there are no places: the chip does without records.
+    pub(super) fn is_empty(&self) -> bool {
+        self.places.iter().all(|place| place.is_empty())
+    }
+
+    /// Writes a record over the older one; its counter is put in. On an error the newest one stays.
+    pub(super) fn write(&mut self, record: Record<'_>) -> Result<(), NotStored> {
         let counter = self.counter.wrapping_add(1);
         let [even, odd] = &mut self.places;
         let place = if counter.is_multiple_of(2) { even } else { odd };
-        let Some((header, body)) = place.split_first_chunk_mut::<HEADER>() else { return };
-        let record = Record { counter, source, staged, progress: progress.clone(), evidence };
-        let Some(written) = postcard::to_slice(&record, body).ok() else { return };
-        let Ok(length) = u16::try_from(written.len()) else { return };
-        let [c0, c1, c2, c3] = checksum(written).to_le_bytes();
+        let (header, body) = place.split_first_chunk_mut::<HEADER>().ok_or(NotStored)?;
+        let record = Record { counter, ..record };
+        let written = postcard::to_slice(&record, body).map_err(|_| NotStored)?;
+        let length = u16::try_from(written.len()).map_err(|_| NotStored)?;
+        let [c0, c1, c2, c3] = (checksum(written) ^ VERSION).to_le_bytes();
         let [l0, l1] = length.to_le_bytes();
         *header = [l0, l1, c0, c1, c2, c3];
         self.counter = counter;
         // The power may go at any moment from here on: the writes must not be delayed.
         compiler_fence(Ordering::SeqCst);
+        Ok(())
     }
 }
 
@@ -93,7 +104,7 @@ fn newest<'p>(places: &'p [&mut [u8]; 2]) -> Option<Record<'p>> {
 fn read(place: &[u8]) -> Option<Record<'_>> {
     let (&[l0, l1, c0, c1, c2, c3], body) = place.split_first_chunk::<HEADER>()?;
     let written = body.get(..usize::from(u16::from_le_bytes([l0, l1])))?;
-    if checksum(written) != u32::from_le_bytes([c0, c1, c2, c3]) {
+    if checksum(written) ^ VERSION != u32::from_le_bytes([c0, c1, c2, c3]) {
         return None;
     }
     postcard::from_bytes(written).ok()

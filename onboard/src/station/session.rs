@@ -1,10 +1,10 @@
 //! A model in use, and the commands it can be given.
 
-use super::record::{Records, Source, Staged};
-use crate::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
+use super::record::{Record, Records, Source, Staged};
+use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    Decision, Detail, Device, ModelInfo, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
+    Decision, Detail, Device, ModelInfo, NotStored, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
 };
 
 /// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: for each object what one
@@ -23,6 +23,10 @@ pub struct Station<'m, 'r, const N: usize> {
     /// What the model that is arriving will be.
     next_source: Source,
     switched: bool,
+    /// The checksum of the model that was switched to.
+    switched_to: u32,
+    /// Touches that were not counted.
+    refused: u32,
     records: Option<&'m mut Records<'r>>,
 }
 
@@ -39,16 +43,27 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
         records: Option<&'m mut Records<'r>>,
     ) -> Self {
         let recognizer = model.and_then(|model| Recognizer::new(model, Stopping::from_model(model)).ok());
-        let mut station =
-            Self { model, recognizer, staging, staged: None, source, next_source, switched: false, records };
+        let mut station = Self {
+            model,
+            recognizer,
+            staging,
+            staged: None,
+            source,
+            next_source,
+            switched: false,
+            switched_to: 0,
+            refused: 0,
+            records,
+        };
         station.resume();
         station
     }
 
     /// Continues from the newest record if it is of this model.
     fn resume(&mut self) {
+        let model = self.model.map_or(0, |model| model.checksum());
         let Some(record) = self.records.as_ref().and_then(|records| records.newest()) else { return };
-        if record.source == self.source {
+        if (record.source, record.model) == (self.source, model) {
             self.staged = record.staged;
             if let Some(recognizer) = &mut self.recognizer {
                 // A record without evidence is from the moment of a switch.
@@ -62,20 +77,34 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
         self.switched.then_some(self.source)
     }
 
-    /// Takes a touch into account; `None` without a usable model.
+    /// Takes a touch into account.
     ///
     /// Cost: [`Recognizer::push`], and with a detail a posterior and 400 instructions per object.
-    pub fn push(&mut self, touch: &Touch, detail: bool) -> Option<VerdictMessage> {
-        let recognizer = self.recognizer.as_mut()?;
+    ///
+    /// # Errors
+    /// [`Refusal::NoModel`] without a usable model; [`Refusal::Pattern`], [`Refusal::Spread`], [`Refusal::NoPose`] or
+    /// [`Refusal::Features`] for a touch that the model was not trained for: [`Station::refused`] counts those.
+    pub fn push(&mut self, touch: &Touch, detail: bool) -> Result<VerdictMessage, Refusal> {
+        let recognizer = self.recognizer.as_mut().ok_or(Refusal::NoModel)?;
         let decision = match recognizer.push(touch) {
-            Verdict::Undecided => Decision::Undecided,
-            Verdict::Recognized { object, .. } => Decision::Recognized(object),
-            Verdict::Unknown => Decision::Unknown,
+            Ok(Verdict::Undecided) => Decision::Undecided,
+            Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
+            Ok(Verdict::Unknown) => Decision::Unknown,
+            Err(refused) => {
+                self.refused = self.refused.saturating_add(1);
+                return Err(refusal(refused));
+            }
         };
         let best = recognizer.best();
         let detail = detail.then(|| Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
         let best = u8::try_from(best).unwrap_or(u8::MAX);
-        Some(VerdictMessage { decision, best, touches: recognizer.touches(), detail })
+        Ok(VerdictMessage { decision, best, touches: recognizer.touches(), detail })
+    }
+
+    /// How many touches were not counted because the model was not trained for them, since power-up or the last change
+    /// of the model.
+    pub const fn refused(&self) -> u32 {
+        self.refused
     }
 
     /// Puts what has arrived into use.
@@ -93,6 +122,7 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
                 }
                 self.source = self.next_source.with_length(staged.length);
                 self.switched = true;
+                self.switched_to = model.checksum();
                 Ok(())
             }
             Payload::Snapshot => {
@@ -104,13 +134,23 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
     }
 }
 
+/// As the link reports it.
+const fn refusal(refused: Refused) -> Refusal {
+    match refused {
+        Refused::Pattern(_) => Refusal::Pattern,
+        Refused::Spread => Refusal::Spread,
+        Refused::NoPose => Refusal::NoPose,
+        Refused::NeedsFeatures | Refused::NeedsTouches => Refusal::Features,
+    }
+}
+
 fn outcome(result: Result<(), Refusal>) -> Outcome {
     result.map_or_else(Outcome::Refused, |()| Outcome::Done)
 }
 
 impl<const N: usize> Device for Station<'_, '_, N> {
     fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome {
-        self.push(touch, detail).map_or(Outcome::Refused(Refusal::NoModel), Outcome::Verdict)
+        self.push(touch, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
     }
 
     fn reset(&mut self) -> Outcome {
@@ -124,6 +164,10 @@ impl<const N: usize> Device for Station<'_, '_, N> {
     }
 
     fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome {
+        if self.staging.is_empty() {
+            // No smaller model would fit either.
+            return Outcome::Refused(Refusal::Unsupported);
+        }
         let fits = usize::try_from(length).is_ok_and(|length| length <= self.staging.len());
         self.staged = fits.then_some(Staged { payload, length, checksum, received: 0 });
         outcome(fits.then_some(()).ok_or(Refusal::TooLong))
@@ -178,12 +222,19 @@ impl<const N: usize> Device for Station<'_, '_, N> {
         Ok((u32::try_from(whole.len()).unwrap_or(u32::MAX), count))
     }
 
-    fn store(&mut self, progress: &Progress) {
-        let Some(records) = &mut self.records else { return };
+    fn refused(&self) -> u32 {
+        self.refused
+    }
+
+    fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
+        let Some(records) = self.records.as_mut().filter(|records| !records.is_empty()) else { return Ok(()) };
         let mut buffer: SnapshotBuffer<N> = [[0; _]; N];
         // The evidence of the model before is none of the next one's.
         let recognizer = self.recognizer.as_ref().filter(|_| !self.switched);
         let evidence = recognizer.and_then(|recognizer| recognizer.snapshot(buffer.as_flattened_mut()).ok());
-        records.write(self.source, self.staged, progress, evidence.unwrap_or_default());
+        let model = if self.switched { self.switched_to } else { self.model.map_or(0, |model| model.checksum()) };
+        let evidence = evidence.unwrap_or_default();
+        let progress = progress.clone();
+        records.write(Record { counter: 0, model, source: self.source, staged: self.staged, progress, evidence })
     }
 }

@@ -39,17 +39,30 @@ pub trait Device {
     /// A [`Refusal`] to send instead.
     fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal>;
 
+    /// How many touches were not counted because the model was not trained for them, since power-up.
+    fn refused(&self) -> u32 {
+        0
+    }
+
     /// Called after a command was executed and before its outcome is sent: a device that is to survive power cuts
     /// stores its evidence and this, at once or not at all.
-    fn store(&mut self, progress: &Progress) {
+    ///
+    /// # Errors
+    /// [`NotStored`], which the host is told; the command counts as executed.
+    fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
         let _ = progress;
+        Ok(())
     }
 }
 
-/// How far a session has come: together with the evidence, all that a chip has to remember through a power cut.
+/// A chip that is to survive resets could not store its state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotStored;
+
+/// The state of a session: together with the evidence, all that a chip has to keep through a power cut.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Progress {
-    session: u16,
+    session: u32,
     next: u32,
     outcomes: [Option<Outcome>; WINDOW],
 }
@@ -59,7 +72,7 @@ impl Progress {
     pub const NONE: Self = Self { session: 0, next: 0, outcomes: [None; WINDOW] };
 
     /// The current session; 0 before the first.
-    pub const fn session(&self) -> u16 {
+    pub const fn session(&self) -> u32 {
         self.session
     }
 
@@ -79,21 +92,32 @@ impl Progress {
 /// The chip's end: bytes from the line in, bytes for the line out.
 ///
 /// RAM: about 500 bytes, and on the stack 350 while a frame is answered.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct DeviceEnd {
     decoder: Decoder,
     progress: Progress,
     statistics: Statistics,
+    boot: u32,
     events: u32,
 }
 
 impl DeviceEnd {
-    /// An end that continues from `progress`; [`Progress::NONE`] at first.
-    pub const fn new(progress: Progress) -> Self {
+    /// An end that continues from `progress`; [`Progress::NONE`] at first. `boot` should be another number after each
+    /// start, counted or random: it is how a host notices a start whose announcement was lost.
+    pub const fn new(progress: Progress, boot: u32) -> Self {
         Self {
             decoder: Decoder::new(),
             progress,
-            statistics: Statistics { frames: 0, garbled: 0, repeated: 0, early: 0, foreign: 0 },
+            statistics: Statistics {
+                frames: 0,
+                garbled: 0,
+                repeated: 0,
+                early: 0,
+                foreign: 0,
+                refused: 0,
+                unstored: 0,
+            },
+            boot,
             events: 0,
         }
     }
@@ -112,14 +136,18 @@ impl DeviceEnd {
     ///
     /// Cannot fail or panic, whatever the bytes.
     pub fn receive(&mut self, bytes: &[u8], device: &mut impl Device, mut send: impl FnMut(&[u8])) {
-        let Self { decoder, progress, statistics, .. } = self;
+        let Self { decoder, progress, statistics, boot, events } = self;
         for &byte in bytes {
             match decoder.feed(byte) {
                 None => {}
                 Some(Err(_)) => statistics.garbled = statistics.garbled.saturating_add(1),
                 Some(Ok(frame)) => {
                     statistics.frames = statistics.frames.saturating_add(1);
-                    respond(frame, progress, statistics, device, &mut send);
+                    let unstored = statistics.unstored;
+                    respond(frame, progress, statistics, *boot, device, &mut send);
+                    if unstored == 0 && statistics.unstored > 0 {
+                        announce(Event::NotStored, progress, *boot, events, &mut send);
+                    }
                 }
             }
         }
@@ -127,9 +155,7 @@ impl DeviceEnd {
 
     /// Sends an event to the host.
     pub fn tell(&mut self, event: Event, mut send: impl FnMut(&[u8])) {
-        let message = Message::Event { sequence: self.events, event };
-        self.events = self.events.wrapping_add(1);
-        send(encode(&Frame { session: self.progress.session, message }, &mut [0; FRAME_MAX]));
+        announce(event, &self.progress, self.boot, &mut self.events, &mut send);
     }
 
     /// Waits for bytes on `transport`, and answers them there. Call it in a loop.
@@ -150,24 +176,39 @@ impl DeviceEnd {
     }
 }
 
+fn announce(event: Event, progress: &Progress, boot: u32, events: &mut u32, send: &mut impl FnMut(&[u8])) {
+    let message = Message::Event { boot, sequence: *events, event };
+    *events = events.wrapping_add(1);
+    send(encode(&Frame { session: progress.session, message }, &mut [0; FRAME_MAX]));
+}
+
+/// Stores the progress, and counts it if that failed.
+fn store(progress: &Progress, statistics: &mut Statistics, device: &mut impl Device) {
+    if device.store(progress).is_err() {
+        statistics.unstored = statistics.unstored.saturating_add(1);
+    }
+}
+
 fn respond(
     frame: Frame<'_>,
     progress: &mut Progress,
     statistics: &mut Statistics,
+    boot: u32,
     device: &mut impl Device,
     send: &mut impl FnMut(&[u8]),
 ) {
     match frame.message {
         Message::Query { tag, query } => {
-            if let Query::Open { previous } = query
+            if let Query::Open { previous, boot: known } = query
                 && previous == progress.session
+                && known == boot
                 && frame.session != progress.session
             {
                 *progress = Progress { session: frame.session, ..Progress::NONE };
-                device.store(progress);
+                store(progress, statistics, device);
             }
             let mut buffer = [0; CHUNK];
-            let answer = answer(query, progress, statistics, device, &mut buffer);
+            let answer = answer(query, progress, statistics, boot, device, &mut buffer);
             let message = Message::Answer { tag, answer };
             send(encode(&Frame { session: progress.session, message }, &mut [0; FRAME_MAX]));
         }
@@ -184,7 +225,7 @@ fn respond(
 
 /// Executes the command if it is the next one; the message to send in any case.
 fn execute<'a>(
-    session: u16,
+    session: u32,
     sequence: u32,
     command: &Command<'_>,
     progress: &mut Progress,
@@ -215,7 +256,7 @@ fn execute<'a>(
         *slot = Some(outcome);
     }
     progress.next = sequence.wrapping_add(1);
-    device.store(progress);
+    store(progress, statistics, device);
     Message::Outcome { sequence, outcome }
 }
 
@@ -223,18 +264,19 @@ fn answer<'b>(
     query: Query,
     progress: &Progress,
     statistics: &Statistics,
+    boot: u32,
     device: &'b mut impl Device,
     buffer: &'b mut [u8; CHUNK],
 ) -> Answer<'b> {
     match query {
-        Query::Hello | Query::Open { .. } => Answer::Session { next: progress.next },
+        Query::Hello | Query::Open { .. } => Answer::Session { next: progress.next, boot },
         Query::Model => device.model().map_or(Answer::Refused(Refusal::NoModel), Answer::Model),
         Query::Name { object } => match device.name(object) {
             // A name longer than a chunk would make too long a frame.
             Some(name) => Answer::Name(name.get(..name.floor_char_boundary(CHUNK)).unwrap_or_default()),
             None => Answer::Refused(Refusal::NoObject),
         },
-        Query::Statistics => Answer::Statistics(*statistics),
+        Query::Statistics => Answer::Statistics(Statistics { refused: device.refused(), ..*statistics }),
         Query::Posteriors { first } => {
             let objects = (first..=u8::MAX).take(POSTERIORS);
             let posteriors = objects.map_while(|object| device.posterior(object));

@@ -5,10 +5,10 @@ use crate::checksum::checksum;
 use cobs::{DecodeResult, DecoderState};
 
 /// The version of frames and messages. A frame of another version is not read.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 /// Version and session.
-const HEADER: usize = 3;
+const HEADER: usize = 5;
 /// CRC-32.
 const TRAILER: usize = 4;
 /// The longest message: a chunk and what stands around it.
@@ -22,7 +22,7 @@ pub const FRAME_MAX: usize = DECODED_MAX + 3;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame<'a> {
     /// The session's number; 0 before one is open.
-    pub session: u16,
+    pub session: u32,
     /// What is said.
     pub message: Message<'a>,
 }
@@ -60,8 +60,8 @@ pub fn encode<'o>(frame: &Frame<'_>, out: &'o mut [u8; FRAME_MAX]) -> &'o [u8] {
 /// Header, message and checksum; the length of all.
 fn fill(frame: &Frame<'_>, plain: &mut [u8; DECODED_MAX]) -> Option<usize> {
     let (header, rest) = plain.split_first_chunk_mut::<HEADER>()?;
-    let [low, high] = frame.session.to_le_bytes();
-    *header = [VERSION, low, high];
+    let [a, b, c, d] = frame.session.to_le_bytes();
+    *header = [VERSION, a, b, c, d];
     let room = rest.get_mut(..MESSAGE_MAX)?;
     let length = HEADER + postcard::to_slice(&frame.message, room).ok()?.len();
     let (covered, rest) = plain.split_at_mut_checked(length)?;
@@ -127,7 +127,7 @@ impl Decoder {
 
 fn parse(plain: &[u8]) -> Result<Frame<'_>, FrameError> {
     let (covered, stated) = plain.split_last_chunk::<TRAILER>().ok_or(FrameError::Garbled)?;
-    let (&[version, low, high], message) = covered.split_first_chunk::<HEADER>().ok_or(FrameError::Garbled)?;
+    let (&[version, a, b, c, d], message) = covered.split_first_chunk::<HEADER>().ok_or(FrameError::Garbled)?;
     if checksum(covered) != u32::from_le_bytes(*stated) {
         return Err(FrameError::Garbled);
     }
@@ -135,7 +135,7 @@ fn parse(plain: &[u8]) -> Result<Frame<'_>, FrameError> {
         return Err(FrameError::Version(version));
     }
     match postcard::take_from_bytes(message) {
-        Ok((message, [])) => Ok(Frame { session: u16::from_le_bytes([low, high]), message }),
+        Ok((message, [])) => Ok(Frame { session: u32::from_le_bytes([a, b, c, d]), message }),
         _ => Err(FrameError::Message),
     }
 }

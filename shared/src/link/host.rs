@@ -145,7 +145,6 @@ impl Sent {
 
     fn again(&mut self, now: u64, statistics: &mut HostStatistics, send: &mut impl FnMut(&[u8])) {
         self.at = now;
-        self.attempts = self.attempts.saturating_add(1);
         statistics.resent += 1;
         send(self.bytes());
     }
@@ -160,14 +159,19 @@ pub struct HostEnd {
     settings: HostSettings,
     decoder: Decoder,
     phase: Phase,
-    session: u16,
+    session: u32,
     next: u32,
     oldest: u32,
     window: [Option<Sent>; WINDOW],
     question: Option<(u8, Sent)>,
     tag: u8,
-    next_event: Option<u32>,
+    /// The chip's boot number, and the number of its next event.
+    boot: Option<(u32, u32)>,
+    /// The boot number before: events that come with it are late.
+    previous_boot: Option<u32>,
     last_rush: Option<(u32, u64)>,
+    /// Commands answered when we asked whether the chip has forgotten them.
+    doubted: u32,
     forgotten: bool,
     statistics: HostStatistics,
 }
@@ -185,8 +189,10 @@ impl HostEnd {
             window: [None; WINDOW],
             question: None,
             tag: 0,
-            next_event: None,
+            boot: None,
+            previous_boot: None,
             last_rush: None,
+            doubted: 0,
             forgotten: false,
             statistics: HostStatistics {
                 sent: 0,
@@ -206,9 +212,13 @@ impl HostEnd {
     }
 
     /// Starts opening a session; [`Incoming::Opened`] says when it is. Everything in flight is dropped.
-    pub fn connect(&mut self, now: u64, mut send: impl FnMut(&[u8])) {
+    ///
+    /// `session` is the session's number: a random one, another each time, so that no two hosts take the same. 0 counts
+    /// as 1.
+    pub fn connect(&mut self, session: u32, now: u64, mut send: impl FnMut(&[u8])) {
         self.phase = Phase::Asking;
-        (self.session, self.next, self.oldest) = (0, 0, 0);
+        // 0 is the session of a chip that knows of none.
+        (self.session, self.next, self.oldest) = (session.max(1), 0, 0);
         self.window = [None; WINDOW];
         self.forgotten = false;
         self.put_question(Query::Hello, now, &mut send);
@@ -299,6 +309,7 @@ impl HostEnd {
         send: &mut impl FnMut(&[u8]),
         incoming: &mut impl FnMut(Incoming<'_>),
     ) {
+        self.is_alive(&frame.message);
         match frame.message {
             Message::Answer { tag, answer } if self.question.as_ref().is_some_and(|(t, _)| *t == tag) => {
                 self.question = None;
@@ -311,23 +322,35 @@ impl HostEnd {
                 self.statistics.early += 1;
                 if self.is_under_way(sequence) {
                     self.rush(sequence, now, send);
+                } else if sequence.wrapping_sub(self.oldest) >> 31 == 1 && self.can_ask() {
+                    // Late, or the chip is in an earlier state than it was: ask.
+                    self.doubt(now, send);
                 }
             }
             // Either late, or the chip has forgotten our session: ask.
             Message::Expected { .. } if self.can_ask() => {
-                self.phase = Phase::Doubting;
-                self.put_question(Query::Hello, now, send);
+                self.doubt(now, send);
             }
-            Message::Event { sequence, event } => {
-                // A chip that has started counts from 0.
-                let expected = if event == Event::Started { sequence } else { self.next_event.unwrap_or(sequence) };
+            Message::Event { boot, .. } if self.previous_boot == Some(boot) => self.statistics.repeated += 1,
+            Message::Event { boot, sequence, event } => {
+                let known = self.boot.filter(|(known, _)| *known == boot);
+                let is_new_boot = known.is_none() && self.boot.is_some();
+                let expected = match known {
+                    Some((_, next)) => next,
+                    // A chip that has started counts from 0; what it said before we listened is not missed.
+                    None if is_new_boot => 0,
+                    None => sequence,
+                };
                 let missed = sequence.wrapping_sub(expected);
                 if missed >> 31 == 1 {
                     self.statistics.repeated += 1;
                     return;
                 }
-                self.next_event = Some(sequence.wrapping_add(1));
-                if event == Event::Started {
+                if is_new_boot {
+                    self.previous_boot = self.boot.map(|(boot, _)| boot);
+                }
+                self.boot = Some((boot, sequence.wrapping_add(1)));
+                if event == Event::Started || is_new_boot {
                     // What was on its way to the chip when it was reset is gone.
                     self.send_again(self.oldest, now, send);
                     if let Some((_, question)) = &mut self.question {
@@ -341,39 +364,56 @@ impl HostEnd {
         }
     }
 
+    /// Asks whether the chip still knows of our session.
+    fn doubt(&mut self, now: u64, send: &mut impl FnMut(&[u8])) {
+        self.phase = Phase::Doubting;
+        self.doubted = self.oldest;
+        self.put_question(Query::Hello, now, send);
+    }
+
+    /// A chip that answers is not silent, whatever was lost: attempts are counted again from here.
+    fn is_alive(&mut self, message: &Message<'_>) {
+        if !matches!(message, Message::Answer { .. } | Message::Outcome { .. } | Message::Expected { .. }) {
+            return;
+        }
+        if let Some((_, question)) = &mut self.question {
+            question.attempts = 1;
+        }
+        if let Some(Some(sent)) = slot(&mut self.window, self.oldest) {
+            sent.attempts = 1;
+        }
+    }
+
     fn take_answer(
         &mut self,
-        session: u16,
+        session: u32,
         answer: Answer<'_>,
         now: u64,
         send: &mut impl FnMut(&[u8]),
         incoming: &mut impl FnMut(Incoming<'_>),
     ) {
         match (self.phase, answer) {
-            (Phase::Asking, Answer::Session { .. }) => {
-                self.phase = Phase::Opening;
-                self.session = next_session(session);
-                self.put_question(Query::Open { previous: session }, now, send);
-            }
             (Phase::Opening, Answer::Session { .. }) if session == self.session => {
                 self.phase = Phase::Open;
                 incoming(Incoming::Opened);
             }
-            // Another host opened one in the meantime.
-            (Phase::Opening, Answer::Session { .. }) => {
-                self.session = next_session(session);
-                self.put_question(Query::Open { previous: session }, now, send);
+            // In the second case another host opened one in the meantime, or the chip was reset.
+            (Phase::Asking | Phase::Opening, Answer::Session { boot, .. }) => {
+                self.phase = Phase::Opening;
+                self.put_question(Query::Open { previous: session, boot }, now, send);
             }
-            (Phase::Doubting, Answer::Session { .. }) => {
-                self.forgotten = session != self.session;
+            (Phase::Doubting, Answer::Session { next, .. }) => {
+                // Another session, or an earlier state of ours, in which it does not know what it has answered.
+                self.forgotten = session != self.session || next.wrapping_sub(self.doubted) >> 31 == 1;
                 self.phase = Phase::Open;
             }
             (Phase::Open, answer) => incoming(Incoming::Answer(answer)),
-            (phase, _) => {
-                // No answer to what was asked: ask again.
-                let query = if phase == Phase::Opening { Query::Open { previous: session } } else { Query::Hello };
-                self.put_question(query, now, send);
+            // No answer to what was asked: begin again.
+            (Phase::Asking | Phase::Opening, _) => {
+                self.phase = Phase::Asking;
+                self.put_question(Query::Hello, now, send);
             }
+            (Phase::Closed | Phase::Doubting, _) => self.put_question(Query::Hello, now, send),
         }
     }
 
@@ -445,6 +485,7 @@ impl HostEnd {
             if question.attempts >= self.settings.attempts {
                 return Err(LinkError::Silent { answered, uncertain });
             }
+            question.attempts = question.attempts.saturating_add(1);
             question.again(now, &mut self.statistics, &mut send);
         }
         let oldest = self.oldest;
@@ -454,6 +495,8 @@ impl HostEnd {
             if sent.attempts >= self.settings.attempts {
                 return Err(LinkError::Silent { answered, uncertain });
             }
+            // Those behind it are sent again with it, but have not failed: the chip takes them in order.
+            sent.attempts = sent.attempts.saturating_add(1);
             self.send_again(oldest, now, &mut send);
         }
         Ok(())
@@ -483,11 +526,6 @@ impl HostEnd {
         transport.flush()?;
         Ok(ticked)
     }
-}
-
-/// A session's number is never 0: that is a chip's that knows of none.
-fn next_session(session: u16) -> u16 {
-    session.checked_add(1).unwrap_or(1)
 }
 
 fn slot(window: &mut [Option<Sent>; WINDOW], sequence: u32) -> Option<&mut Option<Sent>> {

@@ -46,7 +46,9 @@ pub enum Message<'a> {
     },
     /// Chip: something happened without a command.
     Event {
-        /// Counts events from 0 since power-up.
+        /// The chip's boot number, another one after each start.
+        boot: u32,
+        /// Counts events from 0 since the start.
         sequence: u32,
         /// What happened.
         event: Event,
@@ -62,7 +64,9 @@ pub enum Query {
     /// Open the session of this frame if the current one is `previous`.
     Open {
         /// The session that the host believes to be current.
-        previous: u16,
+        previous: u32,
+        /// The chip's boot number as the host knows it: a late copy opens nothing after a reset.
+        boot: u32,
     },
     /// Which model is in use?
     Model,
@@ -93,6 +97,8 @@ pub enum Answer<'a> {
     Session {
         /// The number of its next command.
         next: u32,
+        /// The chip's boot number.
+        boot: u32,
     },
     /// To [`Query::Model`].
     Model(ModelInfo),
@@ -186,6 +192,21 @@ pub enum Refusal {
     Unsupported,
     /// There is no such object.
     NoObject,
+    /// The model was not trained on touches with this contact pattern: not counted.
+    Pattern,
+    /// The contacts are further apart in time than in any touch that the model was trained on: not counted.
+    Spread,
+    /// The model needs the probe's pose, and the touch has none: not counted.
+    NoPose,
+    /// The model is over rows of features, not touches: not counted.
+    Features,
+}
+
+impl Refusal {
+    /// Whether it is a touch that was not counted because the model was not trained for it.
+    pub const fn is_of_a_touch(self) -> bool {
+        matches!(self, Self::Pattern | Self::Spread | Self::NoPose | Self::Features)
+    }
 }
 
 impl core::fmt::Display for Refusal {
@@ -198,6 +219,10 @@ impl core::fmt::Display for Refusal {
             Self::Invalid => "the chip cannot use it: check that it is a model of this version and small enough",
             Self::Unsupported => "the chip's program does not do that: flash another",
             Self::NoObject => "the chip's model has no such object",
+            Self::Pattern => "the model was not trained on touches with these contacts",
+            Self::Spread => "the contacts are further apart in time than in any touch that the model was trained on",
+            Self::NoPose => "the model needs the probe's pose, and the touch has none",
+            Self::Features => "the chip's model is over rows of features, not touches",
         })
     }
 }
@@ -221,6 +246,15 @@ pub enum Event {
         kind: FaultKind,
         /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
+    },
+    /// The chip cannot store its state any more: what follows is lost if it is reset. Sent once per start.
+    NotStored,
+    /// The chip's own fingers touched, and the touch was not counted.
+    Refused {
+        /// The touch.
+        touch: TouchMessage,
+        /// Why.
+        refusal: Refusal,
     },
 }
 
@@ -370,4 +404,8 @@ pub struct Statistics {
     pub early: u32,
     /// Commands of another session.
     pub foreign: u32,
+    /// Touches that were not counted because the model was not trained for them.
+    pub refused: u32,
+    /// Commands whose effect could not be stored: a reset forgets it.
+    pub unstored: u32,
 }

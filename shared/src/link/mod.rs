@@ -3,7 +3,7 @@
 //! # Frames
 //!
 //! ```text
-//! COBS( version u8 │ session u16 LE │ message, postcard │ CRC-32 LE of all before ) 0x00
+//! COBS( version u8 │ session u32 LE │ message, postcard │ CRC-32 LE of all before ) 0x00
 //! ```
 //!
 //! At most [`FRAME_MAX`] bytes on the line. A frame that does not decode, is too long or fails its checksum is counted
@@ -25,7 +25,10 @@
 //! way and repeats those that stay without an outcome. So a command is executed once, whatever the line loses, duplicates,
 //! garbles or delays; and as the chip's [`Progress`] can be stored with its evidence, that holds through a power cut.
 //!
-//! Opening names the session that the host believes to be current, so that a late copy of an opening cannot open again.
+//! A session's number is a random number of the host's, so that two hosts never believe that the same session is theirs.
+//! Opening names the session that the host believes to be current and the chip's boot number, so that a late copy of an
+//! opening cannot open again. A boot number also comes with every event: events are counted from the chip's start, and
+//! the host notices a start even if the event that announces it was lost.
 //!
 //! [`DeviceEnd`] and [`HostEnd`] do this without a transport or a clock: bytes go in, bytes come out. Over an
 //! [`embedded_io`] transport: [`DeviceEnd::serve`] and [`HostEnd::exchange`].
@@ -36,7 +39,7 @@ mod host;
 mod message;
 
 pub use crate::checksum::checksum;
-pub use device::{Device, DeviceEnd, Progress};
+pub use device::{Device, DeviceEnd, NotStored, Progress};
 pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
 pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
 pub use message::{

@@ -26,6 +26,8 @@ struct Notebook {
     announced: (u32, u32),
     model: Vec<u8>,
     stored: Option<(Vec<Touch>, Progress)>,
+    /// Nothing more can be stored.
+    full: bool,
 }
 
 impl Device for Notebook {
@@ -84,8 +86,12 @@ impl Device for Notebook {
         Ok((self.model.len() as u32, count))
     }
 
-    fn store(&mut self, progress: &Progress) {
+    fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
+        if self.full {
+            return Err(NotStored);
+        }
         self.stored = Some((self.touches.clone(), progress.clone()));
+        Ok(())
     }
 }
 
@@ -158,6 +164,7 @@ struct Rig {
     answers: Vec<std::string::String>,
     events: Vec<(Event, u32)>,
     opened: bool,
+    boot: u32,
 }
 
 impl Rig {
@@ -168,7 +175,7 @@ impl Rig {
     fn with_attempts(attempts: u32, faults: Faults, seed: u64) -> Self {
         let mut rig = Self {
             host: HostEnd::new(HostSettings { retry: 20_000, attempts }),
-            chip: DeviceEnd::new(Progress::NONE),
+            chip: DeviceEnd::new(Progress::NONE, 1),
             notebook: Notebook::default(),
             down: Line::new(faults, seed),
             up: Line::new(faults, seed ^ 0x5555),
@@ -177,14 +184,15 @@ impl Rig {
             answers: Vec::new(),
             events: Vec::new(),
             opened: false,
+            boot: 1,
         };
-        rig.host.connect(0, |frame| rig.down.send(frame, 0));
+        rig.host.connect(1, 0, |frame| rig.down.send(frame, 0));
         rig.until(|rig| rig.opened);
         rig
     }
 
     fn step(&mut self) -> Result<(), LinkError> {
-        let Self { host, chip, notebook, down, up, now, outcomes, answers, events, opened } = self;
+        let Self { host, chip, notebook, down, up, now, outcomes, answers, events, opened, .. } = self;
         *now += 1_000;
         for bytes in down.arrived(*now) {
             chip.receive(&bytes, notebook, |frame| up.send(frame, *now));
@@ -329,7 +337,8 @@ fn a_chip_that_stored_its_progress_goes_on_after_power_cuts_with_nothing_lost_or
             // Whatever was on its way to the chip, in it, and from it is gone.
             let (touches, progress) = rig.notebook.stored.clone().unwrap();
             rig.notebook.touches = touches;
-            rig.chip = DeviceEnd::new(progress);
+            rig.boot += 1;
+            rig.chip = DeviceEnd::new(progress, rig.boot);
             rig.down.under_way.clear();
             rig.up.under_way.clear();
         }
@@ -342,7 +351,7 @@ fn a_chip_that_stored_its_progress_goes_on_after_power_cuts_with_nothing_lost_or
 fn a_chip_that_forgot_the_session_is_reported_with_the_touches_lost() {
     let mut rig = Rig::new(CLEAN, 1);
     rig.send_touches(0..5);
-    rig.chip = DeviceEnd::new(Progress::NONE);
+    rig.chip = DeviceEnd::new(Progress::NONE, 2);
     rig.notebook = Notebook::default();
     rig.command(Command::Touch { touch: (&touch(5)).into(), detail: false });
     let error = (0..1_000).find_map(|_| rig.step().err()).unwrap();
@@ -367,12 +376,13 @@ fn a_second_host_opens_a_session_of_its_own_and_late_copies_open_none() {
     let mut rig = Rig::new(CLEAN, 1);
     rig.send_touches(0..3);
     let old_opening = {
-        let frame = Frame { session: 1, message: Message::Query { tag: 9, query: Query::Open { previous: 0 } } };
+        let frame =
+            Frame { session: 1, message: Message::Query { tag: 9, query: Query::Open { previous: 0, boot: 1 } } };
         encode(&frame, &mut [0; FRAME_MAX]).to_vec()
     };
     rig.opened = false;
     let now = rig.now;
-    rig.host.connect(now, |frame| rig.down.send(frame, now));
+    rig.host.connect(2, now, |frame| rig.down.send(frame, now));
     rig.until(|rig| rig.opened);
     rig.send_touches(3..5);
     let before = rig.chip.progress().clone();
@@ -402,18 +412,148 @@ fn events_say_how_many_before_them_were_lost() {
 }
 
 #[test]
+fn a_chip_that_starts_again_loses_no_event_although_its_announcement_was_lost() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let fault = Event::Fault { kind: FaultKind::Bouncing, finger: 2 };
+    let mut late = Vec::new();
+    for number in 0..50 {
+        let event = if number == 0 { Event::Started } else { fault };
+        let (up, now) = (&mut rig.up, rig.now);
+        rig.chip.tell(event, |frame| {
+            late = frame.to_vec();
+            up.send(frame, now);
+        });
+        rig.step().unwrap();
+    }
+    assert_eq!(rig.events.len(), 50);
+    // After the reset Started and the first fault are lost.
+    rig.chip = DeviceEnd::new(Progress::NONE, 2);
+    rig.chip.tell(Event::Started, |_| ());
+    rig.chip.tell(fault, |_| ());
+    for _ in 0..49 {
+        let (up, now) = (&mut rig.up, rig.now);
+        rig.chip.tell(fault, |frame| up.send(frame, now));
+        rig.step().unwrap();
+    }
+    assert_eq!(rig.events.len(), 99, "nothing counts as repeated");
+    assert_eq!(rig.events[50], (fault, 2));
+    assert!(rig.events[51..].iter().all(|event| *event == (fault, 0)));
+    assert_eq!((rig.host.statistics().missed_events, rig.host.statistics().repeated), (2, 0));
+    // A late copy from before the reset is neither new nor a loss.
+    rig.up.send(&late, rig.now);
+    rig.step().unwrap();
+    assert_eq!((rig.events.len(), rig.host.statistics().missed_events), (99, 2));
+    assert_eq!(rig.host.statistics().repeated, 1);
+}
+
+/// Lets a host and a chip talk without delay; the outcomes that the host took.
+fn talk(host: &mut HostEnd, sent: &mut Vec<Vec<u8>>, chip: &mut DeviceEnd, notebook: &mut Notebook) -> usize {
+    let mut outcomes = 0;
+    while !sent.is_empty() {
+        let mut answers = Vec::new();
+        for frame in std::mem::take(sent) {
+            chip.receive(&frame, notebook, |frame| answers.push(frame.to_vec()));
+        }
+        for frame in answers {
+            let count = |incoming: Incoming<'_>| outcomes += usize::from(matches!(incoming, Incoming::Outcome { .. }));
+            host.receive(&frame, 0, |frame| sent.push(frame.to_vec()), count);
+        }
+    }
+    outcomes
+}
+
+#[test]
+fn two_hosts_that_saw_the_same_session_do_not_take_each_others_outcomes() {
+    let (mut chip, mut notebook) = (DeviceEnd::new(Progress::NONE, 1), Notebook::default());
+    // Both ask for the current session before either opens its own.
+    let mut hosts = [0x1234_5678, 0x9abc_def0].map(|session| {
+        let mut host = HostEnd::new(HostSettings::default());
+        let mut sent = Vec::new();
+        host.connect(session, 0, |frame| sent.push(frame.to_vec()));
+        let mut answers = Vec::new();
+        for frame in std::mem::take(&mut sent) {
+            chip.receive(&frame, &mut notebook, |frame| answers.push(frame.to_vec()));
+        }
+        for frame in answers {
+            host.receive(&frame, 0, |frame| sent.push(frame.to_vec()), |_| ());
+        }
+        (host, sent)
+    });
+    for (host, sent) in &mut hosts {
+        talk(host, sent, &mut chip, &mut notebook);
+        assert!(host.is_idle());
+    }
+    assert_eq!(chip.progress().session(), 0x9abc_def0);
+    for (number, (host, sent)) in hosts.iter_mut().enumerate() {
+        let touch = Command::Touch { touch: (&touch(7)).into(), detail: false };
+        host.submit(touch, 0, |frame| sent.push(frame.to_vec())).unwrap();
+        assert_eq!(talk(host, sent, &mut chip, &mut notebook), number);
+    }
+    assert_eq!(notebook.touches.len(), 1);
+    let error = hosts[0].0.tick(0, |_| ()).unwrap_err();
+    assert_eq!(error, LinkError::Forgotten { answered: 0, uncertain: 1 });
+}
+
+#[test]
+fn a_late_copy_of_an_opening_opens_nothing_on_a_chip_that_was_reset_and_kept_nothing() {
+    let open = Frame { session: 7, message: Message::Query { tag: 1, query: Query::Open { previous: 0, boot: 1 } } };
+    let mut out = [0; FRAME_MAX];
+    let bytes = encode(&open, &mut out);
+    for (boot, session) in [(1, 7), (2, 0)] {
+        let mut chip = DeviceEnd::new(Progress::NONE, boot);
+        chip.receive(bytes, &mut Notebook::default(), |_| ());
+        assert_eq!(chip.progress().session(), session);
+    }
+}
+
+#[test]
+fn a_bad_line_is_not_called_silent_with_the_default_number_of_attempts() {
+    let attempts = HostSettings::default().attempts;
+    let faults = Faults { byte_lost: 0.001, byte_changed: 0.001, frame_lost: 0.15, frame_doubled: 0.1, delay: 10_000 };
+    for seed in 0..4 {
+        let mut rig = Rig::with_attempts(attempts, faults, seed);
+        rig.send_touches(0..1_000);
+        rig.assert_exactly_once(1_000);
+    }
+}
+
+#[test]
+fn a_chip_in_an_earlier_state_of_the_session_is_reported_as_forgetful_and_not_as_silent() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..5);
+    let (touches, progress) = rig.notebook.stored.clone().unwrap();
+    rig.send_touches(5..20);
+    rig.notebook.touches = touches;
+    rig.chip = DeviceEnd::new(progress, 2);
+    rig.command(Command::Touch { touch: (&touch(20)).into(), detail: false });
+    let error = (0..1_000).find_map(|_| rig.step().err()).unwrap();
+    assert_eq!(error, LinkError::Forgotten { answered: 20, uncertain: 1 });
+}
+
+#[test]
+fn a_state_that_could_not_be_stored_is_reported_once_and_counted() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..3);
+    rig.notebook.full = true;
+    rig.send_touches(3..8);
+    rig.assert_exactly_once(8);
+    assert_eq!(rig.events, [(Event::NotStored, 0)]);
+    assert_eq!(rig.chip.statistics().unstored, 5);
+}
+
+#[test]
 fn frames_of_another_version_are_not_read() {
     let mut out = [0; FRAME_MAX];
     let bytes = encode(&Frame { session: 7, message: Message::Expected { sequence: 1 } }, &mut out).to_vec();
     assert!(decode(&bytes)[0].is_ok());
-    // Version 2 with a valid checksum.
-    let mut plain = vec![2, 7, 0, 4, 1];
+    // Version 3 with a valid checksum.
+    let mut plain = vec![3, 7, 0, 0, 0, 4, 1];
     let checksum = crate::format::checksum(&plain);
     plain.extend(checksum.to_le_bytes());
     let mut encoded = [0; 32];
     let length = cobs::encode(&plain, &mut encoded);
     encoded[length] = 0;
-    assert_eq!(decode(&encoded[..=length]), [Err(FrameError::Version(2))]);
+    assert_eq!(decode(&encoded[..=length]), [Err(FrameError::Version(3))]);
 }
 
 #[test]
@@ -426,21 +566,24 @@ fn golden_frames_pin_the_format() {
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
             &[
-                0, 3, 1, 2, 3, 2, 1, 3, 172, 2, 6, 240, 162, 4, 1, 1, 2, 2, 2, 3, 3, 255, 255, 1, 1, 7, 1, 1, 34, 44,
-                22, 85, 0,
+                0, 3, 2, 2, 1, 1, 3, 2, 1, 3, 172, 2, 6, 240, 162, 4, 1, 1, 2, 2, 2, 3, 3, 255, 255, 1, 1, 7, 1, 1,
+                139, 169, 130, 211, 0,
             ],
         ),
         (
             Message::Outcome { sequence: 200, outcome: Outcome::Verdict(verdict) },
-            &[0, 3, 1, 2, 26, 3, 200, 1, 1, 1, 4, 4, 17, 1, 8, 7, 6, 5, 4, 3, 2, 1, 4, 3, 2, 1, 183, 169, 111, 213, 0],
+            &[
+                0, 3, 2, 2, 1, 1, 26, 3, 200, 1, 1, 1, 4, 4, 17, 1, 8, 7, 6, 5, 4, 3, 2, 1, 4, 3, 2, 1, 89, 6, 221, 48,
+                0,
+            ],
         ),
         (
-            Message::Query { tag: 5, query: Query::Open { previous: 513 } },
-            &[0, 3, 1, 2, 1, 9, 5, 1, 129, 4, 200, 57, 254, 45, 0],
+            Message::Query { tag: 5, query: Query::Open { previous: 513, boot: 7 } },
+            &[0, 3, 2, 2, 1, 1, 1, 10, 5, 1, 129, 4, 7, 21, 17, 189, 93, 0],
         ),
         (
             Message::Answer { tag: 5, answer: Answer::Name("spoon") },
-            &[0, 3, 1, 2, 14, 1, 5, 2, 5, 115, 112, 111, 111, 110, 213, 36, 124, 254, 0],
+            &[0, 3, 2, 2, 1, 1, 14, 1, 5, 2, 5, 115, 112, 111, 111, 110, 53, 31, 233, 22, 0],
         ),
     ];
     for (message, golden) in frames {
@@ -464,7 +607,7 @@ fn the_longest_messages_fit_into_a_frame() {
     ];
     for message in longest {
         let mut out = [0; FRAME_MAX];
-        let frame = Frame { session: u16::MAX, message };
+        let frame = Frame { session: u32::MAX, message };
         let bytes = encode(&frame, &mut out).to_vec();
         let mut decoder = Decoder::new();
         let decoded: Vec<_> =
@@ -508,21 +651,21 @@ proptest! {
     #[test]
     fn no_bytes_make_an_end_panic(bytes in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>(), 0..8_u8], 0..600)) {
         let mut host = HostEnd::new(HostSettings::default());
-        host.connect(0, |_| ());
+        host.connect(1, 0, |_| ());
         host.receive(&bytes, 1, |_| (), |_| ());
-        let mut chip = DeviceEnd::new(Progress::NONE);
+        let mut chip = DeviceEnd::new(Progress::NONE, 1);
         chip.receive(&bytes, &mut Notebook::default(), |_| ());
     }
 
     #[test]
     fn whole_frames_of_any_content_make_no_end_panic(messages in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 1..20)) {
-        let mut chip = DeviceEnd::new(Progress::NONE);
+        let mut chip = DeviceEnd::new(Progress::NONE, 1);
         let mut host = HostEnd::new(HostSettings::default());
-        host.connect(0, |_| ());
+        host.connect(1, 0, |_| ());
         let mut notebook = Notebook::default();
         let count = messages.len();
         for message in messages {
-            let mut plain = vec![VERSION, 0, 0];
+            let mut plain = vec![VERSION, 0, 0, 0, 0];
             plain.extend(message);
             let checksum = crate::format::checksum(&plain);
             plain.extend(checksum.to_le_bytes());

@@ -117,7 +117,7 @@ fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
     let evidence = [1_i64; 10];
     cost!(meter, "station: detail for parity", || Detail::new(black_box(5), black_box(&evidence)));
     cost!(meter, "station: a touch", || station.touch(black_box(touch), false));
-    let mut end = DeviceEnd::new(Progress::NONE);
+    let mut end = DeviceEnd::new(Progress::NONE, 0);
     let mut sequence = 0;
     for (name, detail) in [("without detail", false), ("with detail", true)] {
         let mut by_link = || {
@@ -145,8 +145,9 @@ fn whole(meter: &mut Meter, touch: &Touch) {
         second.fill(0);
         let memory = Memory { built_in: MODEL, models: [&mut [], &mut []], records: [first, second] };
         let mut wire = Wire { touch, touches, sequence: 0, frame: [0; FRAME_MAX], at: 0, length: 0 };
-        match serve::<OBJECTS, _>(memory, &mut wire) {
+        match serve::<OBJECTS, _>(memory, 0, &mut wire) {
             Ok(()) => wire.sequence,
+            Err(_) => fail(),
         }
     };
     let stack = meter::stack(|| run(2));

@@ -14,7 +14,7 @@ use palpate_firmware::chip::{self, Interrupt};
 use palpate_firmware::pins::{Pin, PlayedClock, Player};
 use palpate_firmware::uart::{Port, Uart};
 use palpate_onboard::Model;
-use palpate_onboard::effector::{Active, Edge, Effector, Fault, Fingers, Settings, Watcher, drain};
+use palpate_onboard::effector::{Active, Edge, Effector, Fault, Fingers, Scale, Settings, Watcher, drain};
 use palpate_onboard::station::Station;
 use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Progress, TouchMessage};
 
@@ -26,7 +26,6 @@ const OBJECTS: usize = 16;
 struct Interrupted {
     watcher: Watcher<Pin, Pin, Pin>,
     edges: Producer<'static, Edge>,
-    fault: Option<Fault>,
 }
 
 static INTERRUPTED: Mutex<RefCell<Option<Interrupted>>> = Mutex::new(RefCell::new(None));
@@ -40,13 +39,13 @@ fn main() -> ! {
     let mut uart = Uart::take(Port::Link);
     let mut player = Player::new();
     let mut station = Station::<OBJECTS>::new(&model);
-    let mut end = DeviceEnd::new(Progress::NONE);
-    let mut effector = Effector::new(Settings::default());
+    let mut end = DeviceEnd::new(Progress::NONE, chip::count_start());
+    let mut effector = Effector::new(Settings::default().for_model(&model, &Scale::IDENTITY));
 
     let Some(queue) = cortex_m::singleton!(: Queue<Edge, 64> = Queue::new()) else { palpate_firmware::fail() };
-    let (edges, mut received) = queue.split();
-    let watcher = Watcher::new(Fingers::new(Pin(0), Pin(1), Pin(2), Active::High));
-    critical_section::with(|cs| INTERRUPTED.replace(cs, Some(Interrupted { watcher, edges, fault: None })));
+    let (mut edges, mut received) = queue.split();
+    let watcher = Watcher::start(Fingers::new(Pin(0), Pin(1), Pin(2), Active::High), &PlayedClock, &mut edges);
+    critical_section::with(|cs| INTERRUPTED.replace(cs, Some(Interrupted { watcher, edges })));
     chip::unmask(chip::PIN_CHANGED);
     end.tell(Event::Started, |frame| send(&mut uart, frame));
 
@@ -58,15 +57,20 @@ fn main() -> ! {
             let mut answer = |frame: &[u8]| send(&mut uart, frame);
             end.receive(buffer.get(..count).unwrap_or_default(), &mut station, &mut answer);
         }
-        let unreadable = critical_section::with(|cs| INTERRUPTED.borrow_ref_mut(cs).as_mut()?.fault.take());
+        while let Some(fault) = pin_fault() {
+            effector.report(fault);
+        }
         let event = match drain(&mut effector, &mut received, &PlayedClock) {
-            Ok(Some(touch)) => station.push(&touch, true).map(|verdict| {
-                if verdict.decision != Decision::Undecided {
-                    station.reset();
+            Ok(Some(touch)) => Some(match station.push(&touch, true) {
+                Ok(verdict) => {
+                    if verdict.decision != Decision::Undecided {
+                        station.reset();
+                    }
+                    Event::Touch { touch: TouchMessage::from(&touch), verdict }
                 }
-                Event::Touch { touch: TouchMessage::from(&touch), verdict }
+                Err(refusal) => Event::Refused { touch: TouchMessage::from(&touch), refusal },
             }),
-            Ok(None) => unreadable.map(Event::from),
+            Ok(None) => None,
             Err(fault) => Some(fault.into()),
         };
         match event {
@@ -84,14 +88,21 @@ fn send(uart: &mut Uart, frame: &[u8]) {
     }
 }
 
+/// A pin that cannot be read; edges that did not fit into the queue are offered again.
+fn pin_fault() -> Option<Fault> {
+    critical_section::with(|cs| {
+        let mut interrupted = INTERRUPTED.borrow_ref_mut(cs);
+        let Interrupted { watcher, edges } = interrupted.as_mut()?;
+        watcher.service(&PlayedClock, edges)
+    })
+}
+
 /// One of the three pins has changed.
 fn pin_changed() {
     critical_section::with(|cs| {
         let mut interrupted = INTERRUPTED.borrow_ref_mut(cs);
-        let Some(Interrupted { watcher, edges, fault }) = interrupted.as_mut() else { return };
-        if let Err(unreadable) = watcher.interrupt(&PlayedClock, edges) {
-            *fault = Some(unreadable);
-        }
+        let Some(Interrupted { watcher, edges }) = interrupted.as_mut() else { return };
+        watcher.interrupt(&PlayedClock, edges);
     });
 }
 

@@ -23,9 +23,9 @@ fn main() -> ! {
     let (second_record, rest) = rest.split_at_mut(record);
     let (first_model, second_model) = rest.split_at_mut(rest.len() / 8 * 4);
     let memory = Memory { built_in: &[], models: [first_model, second_model], records: [first_record, second_record] };
-    match serve::<OBJECTS, _>(memory, &mut uart) {
+    match serve::<OBJECTS, _>(memory, 0, &mut uart) {
         // The UART has no end.
-        Ok(()) => palpate_firmware::fail(),
+        Ok(()) | Err(_) => palpate_firmware::fail(),
     }
 }
 

@@ -20,7 +20,7 @@ fn main() -> ! {
         if let Ok(recognizer) = &mut Recognizer::<10>::new(model, stopping) {
             loop {
                 let touch = Touch::from_micros(black_box([0, 1, 2]));
-                if black_box(recognizer.push(&touch)) != Verdict::Undecided {
+                if black_box(recognizer.push(&touch)) != Ok(Verdict::Undecided) {
                     recognizer.reset();
                 }
             }

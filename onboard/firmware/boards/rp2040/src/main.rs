@@ -65,7 +65,6 @@ struct Interrupted {
     watcher: Watcher<Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>>,
     edges: Producer<'static, Edge>,
     clock: Micros,
-    fault: Option<Fault>,
 }
 
 static INTERRUPTED: Mutex<RefCell<Option<Interrupted>>> = Mutex::new(RefCell::new(None));
@@ -85,6 +84,9 @@ fn run() -> Option<core::convert::Infallible> {
     let mut pac = pac::Peripherals::take()?;
     let mut watchdog = hal::Watchdog::new(pac.WATCHDOG);
     let resets = &mut pac.RESETS;
+    // Another number after each start: the ring oscillator's noise.
+    let noise = hal::rosc::RingOscillator::new(pac.ROSC).initialize();
+    let boot = (0..32).fold(0, |bits, _| bits << 1 | u32::from(noise.get_random_bit()));
     let clocks = hal::clocks::init_clocks_and_plls(
         CRYSTAL_HZ,
         pac.XOSC,
@@ -112,11 +114,11 @@ fn run() -> Option<core::convert::Infallible> {
     };
     let scale = Scale::new(MODEL_PROBE, PROBE)?;
     let mut station = Station::<OBJECTS>::new(&model);
-    let mut end = DeviceEnd::new(Progress::NONE);
-    let mut effector = Effector::new(Settings::default());
+    let mut end = DeviceEnd::new(Progress::NONE, boot);
+    let mut effector = Effector::new(Settings::default().for_model(&model, &scale));
 
     let queue = cortex_m::singleton!(: Queue<Edge, 64> = Queue::new())?;
-    let (edges, mut received) = queue.split();
+    let (mut edges, mut received) = queue.split();
     let switches: (Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>) =
         (pins.gpio2.reconfigure(), pins.gpio3.reconfigure(), pins.gpio4.reconfigure());
     for kind in [Interrupt::EdgeLow, Interrupt::EdgeHigh] {
@@ -124,8 +126,9 @@ fn run() -> Option<core::convert::Infallible> {
         switches.1.set_interrupt_enabled(kind, true);
         switches.2.set_interrupt_enabled(kind, true);
     }
-    let watcher = Watcher::new(Fingers::new(switches.0, switches.1, switches.2, Active::Low));
-    let interrupted = Interrupted { watcher, edges, clock, fault: None };
+    let fingers = Fingers::new(switches.0, switches.1, switches.2, Active::Low);
+    let watcher = Watcher::start(fingers, &clock, &mut edges);
+    let interrupted = Interrupted { watcher, edges, clock };
     critical_section::with(|cs| INTERRUPTED.replace(cs, Some(interrupted)));
     unmask_pins();
     end.tell(Event::Started, |frame| send(&mut uart, frame));
@@ -137,21 +140,26 @@ fn run() -> Option<core::convert::Infallible> {
             let bytes = buffer.get(..count).unwrap_or_default();
             end.receive(bytes, &mut station, |frame| send(&mut uart, frame));
         }
-        let unreadable = critical_section::with(|cs| INTERRUPTED.borrow_ref_mut(cs).as_mut()?.fault.take());
+        while let Some(fault) = pin_fault() {
+            effector.report(fault);
+        }
         let event = match drain(&mut effector, &mut received, &clock) {
             Ok(Some(touch)) => {
                 let touch = scale.apply(&touch);
-                station.push(&touch, true).map(|verdict| {
-                    let recognized = matches!(verdict.decision, Decision::Recognized(_));
-                    // The LED's pin cannot fail.
-                    let _ = led.set_state(recognized.into());
-                    if verdict.decision != Decision::Undecided {
-                        station.reset();
+                Some(match station.push(&touch, true) {
+                    Ok(verdict) => {
+                        let recognized = matches!(verdict.decision, Decision::Recognized(_));
+                        // The LED's pin cannot fail.
+                        let _ = led.set_state(recognized.into());
+                        if verdict.decision != Decision::Undecided {
+                            station.reset();
+                        }
+                        Event::Touch { touch: TouchMessage::from(&touch), verdict }
                     }
-                    Event::Touch { touch: TouchMessage::from(&touch), verdict }
+                    Err(refusal) => Event::Refused { touch: TouchMessage::from(&touch), refusal },
                 })
             }
-            Ok(None) => unreadable.map(Event::from),
+            Ok(None) => None,
             Err(fault) => Some(fault.into()),
         };
         if let Some(event) = event {
@@ -171,12 +179,21 @@ fn unmask_pins() {
     unsafe { pac::NVIC::unmask(pac::Interrupt::IO_IRQ_BANK0) };
 }
 
+/// A pin that cannot be read; edges that did not fit into the queue are offered again.
+fn pin_fault() -> Option<Fault> {
+    critical_section::with(|cs| {
+        let mut interrupted = INTERRUPTED.borrow_ref_mut(cs);
+        let Interrupted { watcher, edges, clock } = interrupted.as_mut()?;
+        watcher.service(clock, edges)
+    })
+}
+
 /// One of the switches has opened or closed.
 #[interrupt]
 fn IO_IRQ_BANK0() {
     critical_section::with(|cs| {
         let mut interrupted = INTERRUPTED.borrow_ref_mut(cs);
-        let Some(Interrupted { watcher, edges, clock, fault }) = interrupted.as_mut() else { return };
+        let Some(Interrupted { watcher, edges, clock }) = interrupted.as_mut() else { return };
         // First the cause, then the levels: an edge in between comes back as an interrupt.
         let (first, middle, last) = watcher.pins();
         for kind in [Interrupt::EdgeLow, Interrupt::EdgeHigh] {
@@ -184,8 +201,6 @@ fn IO_IRQ_BANK0() {
             middle.clear_interrupt(kind);
             last.clear_interrupt(kind);
         }
-        if let Err(unreadable) = watcher.interrupt(clock, edges) {
-            *fault = Some(unreadable);
-        }
+        watcher.interrupt(clock, edges);
     });
 }

@@ -1,0 +1,76 @@
+//! What a model was not trained for, and so cannot take as evidence.
+
+use super::Model;
+use core::fmt;
+use palpate_shared::{ContactPattern, Touch};
+
+/// Why a touch is not evidence. It was not counted, and nothing has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Refused {
+    /// The model was not trained on touches with this contact pattern.
+    Pattern(ContactPattern),
+    /// The last contact came later after the first one than in any touch of the training.
+    Spread,
+    /// The model needs the probe's pose, and the touch has none.
+    NoPose,
+    /// The model is over rows of features, which touches cannot be turned into.
+    NeedsFeatures,
+    /// The model is over touches, and was given a row of features.
+    NeedsTouches,
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Pattern(ContactPattern::None) => {
+                "no finger touched, and the model was not trained on such approaches"
+            }
+            Self::Pattern(ContactPattern::Outer) => {
+                "only an outer finger touched, and the model was not trained on such touches"
+            }
+            Self::Pattern(ContactPattern::Middle) => {
+                "only the middle finger touched, and the model was not trained on such touches"
+            }
+            Self::Pattern(ContactPattern::OuterAndMiddle) => {
+                "only the middle and an outer finger touched, and the model was not trained on such touches"
+            }
+            Self::Pattern(ContactPattern::BothOuter) => {
+                "only the outer fingers touched, and the model was not trained on such touches"
+            }
+            Self::Pattern(ContactPattern::All) => {
+                "all three fingers touched, and the model was not trained on such touches"
+            }
+            Self::Spread => "the contacts are further apart in time than in any touch that the model was trained on",
+            Self::NoPose => "the model needs the probe's pose, and the touch has none",
+            Self::NeedsFeatures => "the model is over rows of features, not touches",
+            Self::NeedsTouches => "the model is over touches, not rows of features",
+        })
+    }
+}
+
+impl core::error::Error for Refused {}
+
+impl Model<'_> {
+    /// Whether a touch is one of those that the model was trained for.
+    ///
+    /// Cost: about 40 instructions. Cannot panic.
+    ///
+    /// # Errors
+    /// [`Refused`] says why it is not.
+    pub fn accepts(&self, touch: &Touch) -> Result<(), Refused> {
+        let trained = self.trained_touches();
+        let pattern = touch.pattern();
+        if self.descriptor().is_none() {
+            Err(Refused::NeedsFeatures)
+        } else if !trained.patterns.contains(pattern) {
+            Err(Refused::Pattern(pattern))
+        } else if touch.spread() > trained.largest_spread {
+            Err(Refused::Spread)
+        } else if trained.needs_pose && touch.pose().is_none() {
+            Err(Refused::NoPose)
+        } else {
+            Ok(())
+        }
+    }
+}
