@@ -135,16 +135,18 @@ fn compare_verdicts<const N: usize>(
         .map_err(|error| EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity })?;
     let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
     let mut full = FullRecognizer::new((0..ensemble.objects.len()).map(prior).collect(), stopping);
-    // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict.
+    // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict. Where hardly
+    // any touch is one that the model was trained for, there may never be a verdict.
+    let mut draws = 100 * u64::from(stopping.max_touches());
     while let Some(touch) = draw.next()
+        && draws > 0
         && (compiled.verdict() == Verdict::Undecided || full.verdict() == Verdict::Undecided)
     {
+        draws -= 1;
         // What the model was not trained for is not counted by either.
         let accepted = compiled.push(&touch).is_ok();
-        if full.verdict() == Verdict::Undecided {
-            if accepted {
-                full.push(&ensemble.margins(&touch));
-            }
+        if accepted && full.verdict() == Verdict::Undecided {
+            full.push(&ensemble.margins(&touch));
         }
     }
     Ok(match (compiled.verdict(), full.verdict()) {
