@@ -132,7 +132,7 @@ pub struct Tuned {
 /// Trains the family on eight tenths of the touches, chooses on one tenth, and measures the choice on the last.
 ///
 /// # Errors
-/// As [`crate::ensemble::train::train`], [`compile`] (but for layouts that an ensemble does not fit) and
+/// As [`crate::ensemble::train::train`], [`compile`](fn@crate::compile::compile) (but for layouts that an ensemble does not fit) and
 /// [`evaluate::evaluate`]; [`TuneProblem::NothingFits`] if no model is within the limits.
 pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Tuned> {
     let outer = folds::split(dataset, 0.2, settings.seed)?;
