@@ -6,14 +6,14 @@
 //!
 //! The argument is a directory that `palpate capture` wrote. Without it, two small meshes are touched.
 
-use palpate::capture::{self, capture};
+use palpate::capture::capture;
 use palpate::compile::{self, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::evaluate::parity::parity;
 use palpate::evaluate::{Candidate, Margins, Settings, evaluate};
 use palpate::mesh::{Mesh, Object};
 use palpate::onboard::Model;
-use palpate::touches::{Dataset, folds};
+use palpate::touches::{Dataset, Origin, folds};
 use std::error::Error;
 use std::path::Path;
 
@@ -51,6 +51,6 @@ fn example_touches() -> Result<Dataset, Box<dyn Error>> {
     egg.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.7);
     let objects = [("egg", egg), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh });
     let directory = tempfile::tempdir()?;
-    capture(&objects, &capture::Settings { touches: 2000, ..Default::default() }, directory.path(), &())?;
+    capture(&objects, &Origin { touches: 2000, ..Default::default() }.into(), directory.path(), &())?;
     Ok(Dataset::read(directory.path())?)
 }

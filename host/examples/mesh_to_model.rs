@@ -6,12 +6,12 @@
 //!
 //! Without arguments it makes two small meshes itself and writes the model to a temporary directory.
 
-use palpate::capture::{self, capture};
+use palpate::capture::capture;
 use palpate::compile::{self, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::error::Result;
 use palpate::mesh::{Mesh, Object, source};
-use palpate::touches::Dataset;
+use palpate::touches::{Dataset, Origin};
 use std::path::PathBuf;
 
 fn main() -> Result<()> {
@@ -24,7 +24,7 @@ fn main() -> Result<()> {
     let model = arguments.next().map_or_else(|| scratch.path().join("model.palpate"), PathBuf::from);
 
     // Touch each object with the virtual probe. The touches stay on disk: train on them as often as you like.
-    let settings = capture::Settings { touches: 2000, ..Default::default() };
+    let settings = Origin { touches: 2000, ..Default::default() }.into();
     let data = scratch.path().join("data");
     let summary = capture(&objects, &settings, &data, &())?;
     for object in &summary.objects {
@@ -40,7 +40,7 @@ fn main() -> Result<()> {
         model.display(),
         compiled.bytes.len(),
         ensemble.trees.len(),
-        compiled.instructions
+        compiled.instructions.m4f
     );
     Ok(())
 }

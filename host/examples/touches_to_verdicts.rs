@@ -12,7 +12,7 @@ use palpate::mesh::builtin;
 use palpate::onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate::probe::scene::Scene;
 use palpate::shared::Touch;
-use palpate::touches::text;
+use palpate::touches::{Origin, text};
 use std::error::Error;
 use std::path::Path;
 
@@ -53,11 +53,11 @@ fn recognize(bytes: &[u8], touches: impl Iterator<Item = palpate::Result<Touch>>
 
 /// Touches of the built-in objects `names`, each touched until the model in `models/` has surely decided.
 fn simulated(names: &[&str]) -> palpate::Result<Vec<Touch>> {
-    let settings = capture::Settings { seed: 2, ..Default::default() };
+    let origin = Origin { seed: 2, ..Default::default() };
     let mut all = Vec::new();
     for name in names {
-        let scene = Scene::new(&builtin::one(name)?.mesh, settings.length)?;
-        all.extend(capture::touches(&scene, name, &settings, 0..100)?);
+        let scene = Scene::new(&builtin::one(name)?.mesh, origin.length)?;
+        all.extend(capture::touches(&scene, name, &origin, 0..100)?);
     }
     Ok(all)
 }

@@ -15,7 +15,7 @@
 //! use palpate::mesh::{Mesh, Object};
 //! use palpate::onboard::{Model, Recognizer, Stopping, Verdict};
 //! use palpate::probe::scene::Scene;
-//! use palpate::touches::Dataset;
+//! use palpate::touches::{Dataset, Origin};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // Two objects. `palpate::mesh::source::objects` reads yours from files.
@@ -25,17 +25,17 @@
 //! let objects = [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh });
 //!
 //! // Touch each a thousand times, and train on the touches.
-//! let settings = capture::Settings { touches: 1000, ..Default::default() };
+//! let origin = Origin { touches: 1000, ..Default::default() };
 //! let directory = tempfile::tempdir()?;
-//! capture(&objects, &settings, directory.path(), &())?;
+//! capture(&objects, &origin.clone().into(), directory.path(), &())?;
 //! let ensemble = train(&Dataset::read(directory.path())?, &train::Settings::compact(), &())?;
 //!
 //! // Compile the trees to the bytes that a chip reads, and recognize with the code that runs there.
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = Model::new(&compiled.bytes)?;
 //! let mut recognizer = Recognizer::<2>::new(&model, Stopping::from_model(&model))?;
-//! let scene = Scene::new(&objects[0].mesh, settings.length)?;
-//! let unseen = capture::Settings { seed: 2, ..settings };
+//! let scene = Scene::new(&objects[0].mesh, origin.length)?;
+//! let unseen = Origin { seed: 2, ..origin };
 //! let mut verdict = Verdict::Undecided;
 //! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {
 //!     verdict = recognizer.push(&touch)?;

@@ -8,6 +8,7 @@ use rand::rngs::ChaCha8Rng;
 /// What random numbers are for. Each purpose has its own streams, so that drawing more for one changes no other, and
 /// what is drawn for two of them at the same seed is independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "some purposes are the report's"))]
 pub(crate) enum Purpose {
     /// Which touches train and which test.
     Folds,

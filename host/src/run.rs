@@ -232,10 +232,7 @@ impl Trial {
         let train_seconds = began.elapsed().as_secs_f64();
         progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
-        let compile = compile::Settings {
-            error_rate: settings.error_rate,
-            ..compile::Settings::default()
-        };
+        let compile = compile::Settings { error_rate: settings.error_rate, ..compile::Settings::default() };
         let compiled = compile::compile(&ensemble, &compile)?;
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
@@ -261,7 +258,7 @@ impl Trial {
             model_bytes: compiled.bytes.len(),
             layout: compiled.layout.name().into(),
             leaf: compile.leaf.name().into(),
-            fixed_touches: if curve.most() == 0 { None } else { curve.touches_to_error(settings.error_rate) },
+            fixed_touches: curve.touches_to_error(settings.error_rate),
             followed_to: curve.most(),
             evaluation,
             parity,

@@ -30,7 +30,7 @@ fn touches_to_verdicts_recognizes_what_is_touched() {
     let printed = run("touches_to_verdicts");
     let verdicts: Vec<&str> = printed.lines().filter_map(|line| line.split(" after ").next()).collect();
     let right = |name| verdicts.iter().filter(|verdict| **verdict == name).count();
-    assert!(right("bowl") >= 1 && right("wristwatch") >= 10, "{printed}");
+    assert!(right("bowl") >= 5 && right("wristwatch") >= 5, "{printed}");
 }
 
 #[test]

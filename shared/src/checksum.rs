@@ -52,7 +52,7 @@ mod tests {
     fn the_checksum_is_the_one_of_the_crc_catalog() {
         const CATALOG: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
         assert_eq!(checksum(b"123456789"), 0xcbf4_3926);
-        let bytes: std::vec::Vec<u8> = (0..1_000_u32).map(|i| (i * i >> 3) as u8).collect();
+        let bytes: std::vec::Vec<u8> = (0..1_000_u32).map(|i| ((i * i) >> 3) as u8).collect();
         for length in 0..bytes.len() {
             assert_eq!(checksum(&bytes[..length]), CATALOG.checksum(&bytes[..length]), "{length} bytes");
         }

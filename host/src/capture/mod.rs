@@ -54,7 +54,7 @@ pub struct Settings {
     pub add: bool,
     /// Replace the data set in the directory, whatever it holds. Takes precedence over `resume` and `add`.
     pub force: bool,
-    /// How many threads to use; all that the machine has by default.
+    /// How many threads to use, at most 256; by default as many as the machine has.
     pub threads: Option<usize>,
 }
 
@@ -171,7 +171,7 @@ mod tests {
     use crate::error::Problem;
     use crate::mesh::Mesh;
     use crate::probe::approach::Probe;
-    use crate::touches::{Dataset, Entry, Format, Listing, Shard};
+    use crate::touches::{Dataset, Entry, Listing, Shard};
     use std::collections::BTreeMap;
 
     fn objects() -> Vec<Object> {
@@ -533,7 +533,7 @@ mod tests {
     #[test]
     fn the_listing_states_the_true_size_and_checksum_of_parquet_files() {
         let directory = tempfile::tempdir().unwrap();
-        let settings = with(Origin { format: Format::Parquet, ..origin(200) });
+        let settings = with(Origin { format: crate::touches::Format::Parquet, ..origin(200) });
         capture(&objects(), &settings, directory.path(), &()).unwrap();
         for entry in Listing::read(directory.path()).unwrap().unwrap().objects {
             let path = directory.path().join(format!("{}.parquet", entry.name));

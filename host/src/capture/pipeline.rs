@@ -19,6 +19,9 @@ const CHUNK: u64 = 256;
 /// How many chunks a producer may be ahead.
 const AHEAD: usize = 8;
 
+/// The most producers, however many are asked for: what they may be ahead together stays a few megabytes.
+const MOST_THREADS: usize = 256;
+
 /// What a producer hands to the writer.
 struct Chunk {
     text: String,
@@ -38,20 +41,30 @@ pub(super) fn run(
     let jobs: Vec<(usize, Range<u64>)> = (0..samplers.len()).map(|object| (object, rest(object))).collect();
     progress.begin("touching", Some(total * samplers.len() as u64));
     // More threads than chunks would have nothing to do.
-    let threads = settings.threads().min(chunks(&jobs).count()).max(1);
+    let threads = settings.threads().min(MOST_THREADS).min(chunks(&jobs).take(MOST_THREADS).count()).max(1);
     std::thread::scope(|scope| {
         let mut channels = Vec::with_capacity(threads);
+        let (go, started) = bounded(threads);
         for producer in 0..threads {
             let (sender, receiver) = bounded(AHEAD);
             let chunks = chunks(&jobs).skip(producer).step_by(threads);
-            let work = move || produce(chunks, samplers, settings, &sender, progress);
-            // A system that is out of threads must not end in a panic. The threads that did start find their channels
-            // closed and end.
+            let started = started.clone();
+            let work = move || {
+                if started.recv().is_ok() {
+                    produce(chunks, samplers, settings, &sender, progress);
+                }
+            };
+            // A system that is out of threads must not end in a panic. The threads that did start end without having
+            // worked: nobody tells them to go.
             std::thread::Builder::new().spawn_scoped(scope, work).map_err(|error| {
                 let message = error.to_string();
                 CaptureProblem::Threads { asked: threads, started: producer, message }
             })?;
             channels.push(receiver);
+        }
+        for _ in 0..threads {
+            // There is room for all, and a receiver here.
+            _ = go.send(());
         }
         let mut turns = (0..threads).cycle();
         let mut summaries = Vec::with_capacity(samplers.len());
@@ -91,7 +104,7 @@ fn chunks(jobs: &[(usize, Range<u64>)]) -> impl Iterator<Item = (usize, Range<u6
     jobs.iter().flat_map(|(object, samples)| split(samples).map(|part| (*object, part)))
 }
 
-/// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is gone.
+/// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is started.
 fn produce(
     chunks: impl Iterator<Item = (usize, Range<u64>)>,
     samplers: &[Sampler<'_>],

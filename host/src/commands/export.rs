@@ -9,9 +9,9 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Leaves:
-  i16   two bytes per value: verdicts as the full model's (the default)
-  i8    one byte per value: half the size, margins within a few hundredths of a nat
-  f32   four bytes per value, added as the trainer adds them: margins bit for bit
+  i16  two bytes per value: verdicts as the full model's (the default)
+  i8   one byte per value: half the size, margins within hundredths of a nat
+  f32  four bytes per value, added as the trainer adds them: the same margins
 
 Instructions per touch are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
 

@@ -1,6 +1,6 @@
 use super::export::instructions;
 use palpate::Result;
-use palpate::chip::emulated::Chip;
+use palpate::chip::instructions::Chip;
 use palpate::compile::{self, CompiledModel, Core, Instructions, Memory};
 use palpate::output;
 use palpate_onboard::{Model, Stopping};

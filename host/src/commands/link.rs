@@ -7,7 +7,6 @@ use palpate::compile::CompiledModel;
 use palpate::error::ChipProblem;
 use palpate::output::{print, print_json};
 use palpate::progress::Progress;
-use palpate::touches::Dataset;
 use palpate::{Error, Result};
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;

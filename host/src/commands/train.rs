@@ -4,15 +4,15 @@ use palpate::ensemble::StatedProbe;
 use palpate::ensemble::train::{self, Engine, Settings};
 use palpate::output;
 use palpate_shared::Descriptor;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Presets:
-  compact    trees whose leaves hold a value for each object, on curvature: small and accurate
-  paper      the published method: 100 rounds of one tree per object, on contact times
+  compact  small and accurate: leaves hold a value per object; uses curvature
+  paper    the published method: one tree per object and round, on contact times
 
 The ensemble states the probe that the data set was captured with; models exported from it do as well.
 

@@ -1,9 +1,10 @@
-use super::numbers::share;
 use super::export::features;
 use super::inspect::core;
+use super::numbers::share;
 use super::progress::Bar;
 use palpate::Result;
 use palpate::compile::Core;
+use palpate::ensemble::StatedProbe;
 use palpate::output;
 use palpate::tune::{self, Row, Settings, Tuned};
 use palpate_shared::Descriptor;

@@ -262,9 +262,11 @@ fn expected_steps(splits: &[u8], length: usize, left: &impl Fn(&[u8]) -> usize) 
 mod tests {
     use super::*;
 
-    /// What `onboard/README.md` states that emulation counts: trees, their depth, values of a leaf, leaf type, axes, and
-    /// instructions on each processor.
-    const COUNTED: [(u32, u8, Option<u8>, LeafType, usize, [u64; 2]); 5] = [
+    /// Trees, their depth, the object of a leaf if it has one value, leaf type, axes, and instructions on each processor.
+    type Counted = (u32, u8, Option<u8>, LeafType, usize, [u64; 2]);
+
+    /// What `onboard/README.md` states that emulation counts.
+    const COUNTED: [Counted; 5] = [
         (1_000, 6, Some(0), LeafType::I16, 3, [61_898, 80_242]),
         (100, 6, None, LeafType::I16, 2, [9_405, 13_739]),
         (100, 6, None, LeafType::I8, 2, [8_974, 13_604]),

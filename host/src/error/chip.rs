@@ -88,12 +88,6 @@ pub enum ChipProblem {
         /// The first that differs.
         first: String,
     },
-    /// A line of touches is wrong.
-    #[error("{what}")]
-    NotATouch {
-        /// What is wrong with it.
-        what: String,
-    },
     /// A line of a journal is wrong.
     #[error("not an entry of a journal: {reason}")]
     NotAnEntry {
@@ -172,7 +166,6 @@ impl ChipProblem {
             Self::ModelRefused(_) => "Load another model; the chip still uses the one it had.",
             Self::OtherModel { .. } => "Load the model into the chip first.",
             Self::Differs { .. } => "Report this as a bug, with the model and the touches.",
-            Self::NotATouch { .. } => "Write three times in seconds, - for a missing contact.",
             Self::NotAnEntry { .. } => "Give a journal that `palpate link` wrote.",
             Self::NoEmulator => "Install it: apt-get install qemu-system-arm, brew install qemu.",
             Self::NoImage { .. } => "Build it: cd onboard/firmware && cargo build --release.",

@@ -45,7 +45,7 @@ pub enum EvaluateProblem {
     },
     /// A contact time is longer than an object can make it.
     #[error(
-        "a finger touched {seconds} s after the first, but no object of the model's scale takes longer than {longest:.2} s at its speed of {speed} units per second"
+        "a finger touched {seconds:.1} s after the first, but no object of the model's scale takes longer than {longest:.2} s at its speed of {speed} units per second"
     )]
     TimeTooLong {
         /// Seconds after the first contact.

@@ -168,56 +168,6 @@ pub enum Error {
         /// What.
         problem: Problem,
     },
-    /// A line of a text file is wrong.
-    #[error("{}:{line}: {what}. {fix}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: u64,
-        /// What is wrong, without a full stop.
-        what: String,
-        /// What to do, as a sentence.
-        fix: String,
-    },
-    /// A byte of a binary file is wrong.
-    #[error("{}: byte {offset}: {what}. {fix}", path.display())]
-    Byte {
-        /// The file.
-        path: PathBuf,
-        /// The offset, counted from 0.
-        offset: u64,
-        /// What is wrong, without a full stop.
-        what: String,
-        /// What to do, as a sentence.
-        fix: String,
-    },
-    /// A file or directory as a whole is wrong.
-    #[error("{}: {what}. {fix}", path.display())]
-    File {
-        /// The file or directory.
-        path: PathBuf,
-        /// What is wrong, without a full stop.
-        what: String,
-        /// What to do, as a sentence.
-        fix: String,
-    },
-    /// The data is wrong, wherever it came from.
-    #[error("{what}. {fix}")]
-    Data {
-        /// What is wrong, without a full stop.
-        what: String,
-        /// What to do, as a sentence.
-        fix: String,
-    },
-    /// An argument is wrong: exit code 2 instead of 1.
-    #[error("{what}. {fix}")]
-    Argument {
-        /// What is wrong, without a full stop.
-        what: String,
-        /// What to do, as a sentence.
-        fix: String,
-    },
     /// The caller cancelled the work through its [`Progress`](crate::progress::Progress).
     #[error("cancelled")]
     Cancelled,
@@ -285,35 +235,9 @@ impl Error {
         Self::Io { path: path.as_ref().into(), action, source, fix: format!("{fix}.") }
     }
 
-    /// Line `line` (from 1) of `path` is wrong.
-    pub fn line(path: impl AsRef<Path>, line: u64, what: impl Into<String>, fix: impl Into<String>) -> Self {
-        Self::Line { path: path.as_ref().into(), line, what: what.into(), fix: fix.into() }
-    }
-
-    /// Byte `offset` (from 0) of `path` is wrong.
-    pub fn byte(path: impl AsRef<Path>, offset: u64, what: impl Into<String>, fix: impl Into<String>) -> Self {
-        Self::Byte { path: path.as_ref().into(), offset, what: what.into(), fix: fix.into() }
-    }
-
-    /// The file or directory `path` is wrong as a whole.
-    pub fn file(path: impl AsRef<Path>, what: impl Into<String>, fix: impl Into<String>) -> Self {
-        Self::File { path: path.as_ref().into(), what: what.into(), fix: fix.into() }
-    }
-
-    /// Data that has no file is wrong.
-    pub fn data(what: impl Into<String>, fix: impl Into<String>) -> Self {
-        Self::Data { what: what.into(), fix: fix.into() }
-    }
-
-    /// An argument is wrong.
-    pub fn argument(what: impl Into<String>, fix: impl Into<String>) -> Self {
-        Self::Argument { what: what.into(), fix: fix.into() }
-    }
-
     /// Says which file wrong data came from; other errors stay as they are.
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         match self {
-            Self::Data { what, fix } => Self::file(path, what, fix),
             Self::At { place: Place::Nowhere, problem } => Self::at(Place::file(path), problem),
             other => other,
         }
@@ -322,7 +246,7 @@ impl Error {
     /// The program's exit code: 1 for bad input, 2 for bad arguments, 0 when the reader of stdout went away.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Argument { .. } | Self::At { problem: Problem::Setting { .. }, .. } => 2,
+            Self::At { problem: Problem::Setting { .. }, .. } => 2,
             Self::Closed => 0,
             _ => 1,
         }

@@ -23,13 +23,13 @@ pub struct Confidence {
 }
 
 impl Margins<'_> {
-    /// Accuracy after 1 to `most` touches, over `groups` groups drawn for each object.
+    /// Accuracy after 1 to `most` touches, over `groups` groups drawn for each object. With a `most` of 0 it is empty.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting): `groups` if there are none, `at` if `most` is 0 or an object
-    /// has fewer touches.
+    /// [`Problem::Setting`](crate::error::Problem::Setting): `groups` if there are none, `at` if an object has fewer
+    /// touches.
     pub fn curve(&self, most: usize, groups: usize, seed: u64) -> Result<Curve> {
-        self.check(most, groups)?;
+        self.check(most.max(1), groups)?;
         let correct = (0..self.tested.len()).map(|position| {
             let group = |mut correct: Vec<usize>, group| {
                 self.follow(position, group, most, seed, |touches, evidence| {
@@ -47,7 +47,7 @@ impl Margins<'_> {
     /// How often each tested object (rows) was taken for each known one (columns) after `touches` touches.
     ///
     /// # Errors
-    /// As [`Margins::curve`].
+    /// As [`Margins::curve`], and `at` if `touches` is 0.
     pub fn confusion(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Vec<usize>>> {
         self.check(touches, groups)?;
         let row = |position| {
@@ -61,7 +61,7 @@ impl Margins<'_> {
     /// How sure the model was after `touches` touches, for each group of each object; for calibration.
     ///
     /// # Errors
-    /// As [`Margins::curve`].
+    /// As [`Margins::curve`], and `at` if `touches` is 0.
     pub fn confidences(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Confidence>> {
         self.check(touches, groups)?;
         let unit = self.unit();
@@ -143,12 +143,13 @@ impl Curve {
     }
 
     /// The smallest number of touches from which on accuracy stays at or above one less `error_rate`, if there is one.
+    /// An empty curve has none.
     pub fn touches_to_error(&self, error_rate: f64) -> Option<usize> {
         let fails = |touches: &usize| self.accuracy(*touches).value < 1.0 - error_rate;
         match (1..=self.most()).rev().find(fails) {
             Some(last) if last == self.most() => None,
             Some(last) => Some(last + 1),
-            None => Some(1),
+            None => (self.most() > 0).then_some(1),
         }
     }
 }

@@ -101,7 +101,7 @@ pub struct Evaluation {
 /// [`Problem::Setting`](crate::error::Problem::Setting): `at` if a number of touches is 0 or more than an object has,
 /// `groups` if there are none, `error_rate` and `max_touches` if they are out of their ranges.
 pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation> {
-    let most = settings.at.iter().copied().max().unwrap_or(1);
+    let most = settings.at.iter().copied().max().unwrap_or(0);
     let curve = margins.curve(most, settings.groups, settings.seed)?;
     if settings.at.contains(&0) {
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));

@@ -259,7 +259,8 @@ impl<R: BufRead> Read for FacesOnly<'_, R> {
     }
 }
 
-/// Writes a mesh as OBJ: `v` and `f` lines from which [`read`] gives the same mesh bit for bit.
+/// Writes a mesh as OBJ: `v` and `f` lines from which [`read`] gives the same triangles, coordinates bit for bit (vertices
+/// in the order in which the triangles use them).
 ///
 /// # Errors
 /// Those of `out`.

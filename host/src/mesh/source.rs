@@ -4,6 +4,7 @@ use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::Object;
 use crate::mesh::builtin;
 use crate::mesh::obj;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +21,8 @@ use std::path::{Path, PathBuf};
 /// When a source does not exist, holds no OBJ file, or a file is not a usable mesh, and when two objects have the same
 /// name.
 pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
-    files(sources)?.into_iter().map(Source::read).collect()
+    let read: Vec<Result<Object>> = files(sources)?.into_par_iter().map(Source::read).collect();
+    read.into_iter().collect()
 }
 
 /// The only object of `source`, found as [`objects`](fn@objects) finds it.
@@ -35,11 +37,11 @@ pub fn object(source: &str) -> Result<Object> {
     }
 }
 
-/// An object whose file is not yet read.
-#[derive(Debug)]
+/// An object that is found, but not yet made or read.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// A built-in object.
-    BuiltIn(Object),
+    /// The built-in object of this name.
+    BuiltIn(&'static str),
     /// An object in a file.
     File {
         /// The object's name.
@@ -53,7 +55,7 @@ impl Source {
     /// The object's name.
     pub fn name(&self) -> &str {
         match self {
-            Self::BuiltIn(object) => &object.name,
+            Self::BuiltIn(name) => name,
             Self::File { name, .. } => name,
         }
     }
@@ -61,16 +63,16 @@ impl Source {
     /// The object itself.
     ///
     /// # Errors
-    /// As [`obj::read`].
+    /// As [`obj::read`] and [`builtin::one`].
     pub fn read(self) -> Result<Object> {
         match self {
-            Self::BuiltIn(object) => Ok(object),
+            Self::BuiltIn(name) => builtin::one(name),
             Self::File { name, path } => Ok(Object { mesh: obj::read(&path)?, name }),
         }
     }
 }
 
-/// The objects of all `sources` as [`objects`](fn@objects) finds them, without reading their files; sorted by name.
+/// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.
 ///
 /// # Errors
 /// As [`objects`](fn@objects), except for what is wrong inside a file.
@@ -79,11 +81,13 @@ pub fn files(sources: &[String]) -> Result<Vec<Source>> {
     let mut found = BTreeMap::new();
     for source in sources {
         if source == "builtin" {
-            for object in builtin::all()? {
-                insert(&mut found, object.name.clone(), Source::BuiltIn(object))?;
+            for name in builtin::names() {
+                insert(&mut found, name.into(), Source::BuiltIn(name))?;
             }
-        } else if builtin::names().contains(&source.as_str()) && !Path::new(source).exists() {
-            insert(&mut found, source.clone(), Source::BuiltIn(builtin::one(source)?))?;
+        } else if let Some(name) = builtin::names().into_iter().find(|name| name == source)
+            && !Path::new(source).exists()
+        {
+            insert(&mut found, name.into(), Source::BuiltIn(name))?;
         } else {
             let path = Path::new(source);
             let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
@@ -189,6 +193,7 @@ mod tests {
         assert_eq!(names(&[one, two]), ["a cup", "fork", "spoon"]);
     }
 
+    #[cfg(feature = "objects")]
     #[test]
     fn a_built_in_object_is_found_by_its_name_unless_a_file_has_it() {
         assert_eq!(names(&["mouse".into(), "bowl".into()]), ["bowl", "mouse"]);
@@ -225,6 +230,7 @@ mod tests {
         assert!(matches!(error.problem(), Some(Problem::Mesh(MeshProblem::NoSuchSource { .. }))), "{error:?}");
     }
 
+    #[cfg(feature = "objects")]
     #[test]
     fn a_misspelled_built_in_object_is_refused_with_the_names_of_all() {
         for error in
@@ -236,6 +242,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "objects")]
     #[test]
     fn several_objects_where_one_is_needed_are_refused_with_their_number() {
         let error = object("builtin").unwrap_err().to_string();

@@ -1,9 +1,9 @@
 //! Calibration: whether an object with a posterior of 90 % is the right one nine times in ten.
 
 use super::context::{Context, compiled, compiled_f32};
-use crate::compile;
 use super::limit::Large;
 use super::statistics::wilson;
+use crate::compile;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Confidence, Margins};
 use crate::page::axis::Axis;

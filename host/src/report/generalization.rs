@@ -1,8 +1,8 @@
 //! Generalization: recognizing a fork that was never touched by the touches of other forks.
 
 use super::context::{Context, compiled, touch};
-use crate::compile;
 use super::statistics::mean_deviation;
+use crate::compile;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::Object;

@@ -70,9 +70,7 @@ impl Instructions {
                 "Instructions on a Cortex-M0+, from contact times to margins, were {measured}; those on a Cortex-M4F are \
                  the compiler's estimate ({missing})."
             ),
-            (false, false) => format!(
-                "Instructions, from contact times to margins, are {m0_plus} ({missing})."
-            ),
+            (false, false) => format!("Instructions, from contact times to margins, are {m0_plus} ({missing})."),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The limit: the best that any classifier could do with the curvature descriptor, and how far each model is from it.
 
 use super::context::{Context, compiled, compiled_f32};
-use crate::compile;
 use super::density::density_model;
 use super::statistics::z95;
+use crate::compile;
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
 use crate::error::Result;

@@ -1,10 +1,10 @@
 //! Sequential recognition: how many touches it takes to be sure, and how often the verdict is wrong.
 
 use super::context::{Context, compiled, compiled_f32};
-use crate::compile;
 use super::limit::Large;
 use super::run_page::method_style;
 use super::statistics::quantile;
+use crate::compile;
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
 use crate::page::axis::{Axis, number};

@@ -96,8 +96,12 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Engine>> {
     };
     Ok(vec![
         fast("f32 after the f32 reject", &|scene, cast| decide::<SingleAfterReject>(scene, cast, probe.radius)),
-        fast("f64 after the f32 reject (used)", &|scene, cast| scene.first_contact(cast.origin, cast.direction, probe.radius)),
-        fast("f64 for each triangle of a leaf", &|scene, cast| decide::<DoubleWithoutReject>(scene, cast, probe.radius)),
+        fast("f64 after the f32 reject (used)", &|scene, cast| {
+            scene.first_contact(cast.origin, cast.direction, probe.radius)
+        }),
+        fast("f64 for each triangle of a leaf", &|scene, cast| {
+            decide::<DoubleWithoutReject>(scene, cast, probe.radius)
+        }),
         engine("f64 for every triangle, no tree", &truth, slow),
     ])
 }

@@ -376,7 +376,10 @@ mod tests {
     }
 
     /// Writes a file with other poses than touches can have.
-    fn with_poses(poses: &[(Option<[f32; 3]>, Option<[f32; 3]>)]) -> Result<Vec<Touch>> {
+    /// A direction and an alignment.
+    type Vectors = (Option<[f32; 3]>, Option<[f32; 3]>);
+
+    fn with_poses(poses: &[Vectors]) -> Result<Vec<Touch>> {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("cup.parquet");
         let file = File::create(&path).unwrap();

@@ -14,11 +14,13 @@ fn help(arguments: &[&str], columns: usize) -> String {
     stdout(command(arguments).env("COLUMNS", columns.to_string()).output().unwrap())
 }
 
-/// The lines between `Examples:` and the next empty line, and all others.
-fn examples(help: &str) -> (Vec<&str>, Vec<&str>) {
+/// The lines of lists after the options, such as `Examples:`, and all others.
+fn lists(help: &str) -> (Vec<&str>, Vec<&str>) {
     let mut inside = false;
     help.lines().partition(|line| {
-        inside = *line == "Examples:" || inside && !line.is_empty();
+        let is_heading = line.ends_with(':') && !line.starts_with(' ');
+        let is_claps_own = ["Arguments:", "Options:", "Commands:"].contains(line);
+        inside = is_heading && !is_claps_own || inside && !line.is_empty();
         inside
     })
 }
@@ -71,9 +73,9 @@ fn every_commands_help_wraps_well_at_80_and_at_120_columns() {
                 for line in help.lines().filter(|line| line.chars().count() > width) {
                     fault("too long", line);
                 }
-                let (shown, text) = examples(&help);
-                for line in shown.iter().filter(|line| !examples(&unwrapped).0.contains(line)) {
-                    fault("an example is wrapped", line);
+                let (shown, text) = lists(&help);
+                for line in shown.iter().filter(|line| !lists(&unwrapped).0.contains(line)) {
+                    fault("a list is wrapped", line);
                 }
                 if let Some(line) = ragged(&text, width) {
                     fault("ends early", line);

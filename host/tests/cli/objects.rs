@@ -1,6 +1,11 @@
 use crate::{command, listing, run, stderr, stdout};
 use palpate::mesh::facts::Facts;
-use palpate::mesh::{builtin, obj};
+use palpate::mesh::{Mesh, builtin, obj};
+
+/// The triangles' corners: a file that is read has its vertices in the order in which faces use them.
+fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
+    mesh.triangles.iter().map(|triangle| triangle.map(|i| mesh.vertices[i as usize])).collect()
+}
 
 #[test]
 fn an_object_is_written_as_a_closed_mesh_and_the_same_each_time() {
@@ -10,7 +15,7 @@ fn an_object_is_written_as_a_closed_mesh_and_the_same_each_time() {
     assert!(said.contains("bowl.obj: ") && said.contains(" triangles"), "{said}");
     assert_eq!(listing(&once), ["bowl.obj"]);
     let mesh = obj::read(&once.join("bowl.obj")).unwrap();
-    assert_eq!(mesh, builtin::one("bowl").unwrap().mesh);
+    assert!(corners(&mesh) == corners(&builtin::one("bowl").unwrap().mesh), "the file holds another bowl");
     assert!(Facts::of(&mesh).is_right_side_out());
     stdout(command(["objects", "--only", "bowl", "-o"]).arg(&again).output().unwrap());
     assert_eq!(std::fs::read(once.join("bowl.obj")).unwrap(), std::fs::read(again.join("bowl.obj")).unwrap());
@@ -28,7 +33,7 @@ fn varied_objects_and_a_picture_are_written_and_listed_as_json() {
         let mesh = obj::read(&directory.path().join(format!("{name}.obj"))).unwrap();
         assert_eq!(written[index]["name"], name);
         assert_eq!(written[index]["triangles"], mesh.triangles.len());
-        assert_eq!(mesh, builtin::varied(name, 7).unwrap().mesh);
+        assert!(corners(&mesh) == corners(&builtin::varied(name, 7).unwrap().mesh), "the file holds another {name}");
         assert!(!mesh.triangles.is_empty());
     }
     assert!(std::fs::read(&picture).unwrap().starts_with(b"\x89PNG"));

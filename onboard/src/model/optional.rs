@@ -5,7 +5,7 @@ use crate::layouts::Sections;
 use palpate_shared::format::{Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
-pub(super) fn find<'a>(mut sections: &'a [u8], tag: Tag) -> &'a [u8] {
+pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
     while let Some(Section { tag: found, content, .. }) = take_section(&mut sections) {
         if found == tag.code() {
             return content;

@@ -18,6 +18,7 @@ use palpate::probe::scene::Scene;
 use palpate::probe::sweep::narrow::{self, Motion, Triangle};
 use palpate::probe::sweep::precision::{self, DoubleWithoutReject, SingleAfterReject};
 use palpate::probe::sweep::{Surface, budget};
+use palpate::touches::Origin;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -263,7 +264,7 @@ fn growth() {
 
 fn real_objects() {
     let touches = if *QUICK { 200 } else { 21_000 };
-    let settings = Settings { touches, ..Settings::default() };
+    let settings: Settings = Origin { touches, ..Origin::default() }.into();
     println!("Ten real objects, {touches} full touches of each, all threads\n");
     let Some(directory) = shared("objects") else { return };
     let sources = [directory.to_string_lossy().into_owned()];

@@ -17,6 +17,7 @@ use palpate::Result;
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node, Output};
+use palpate::error::ReportProblem;
 use palpate::touches::Dataset;
 use palpate::touches::folds::{self, Split};
 use palpate_onboard::{Model, Recognizer, Stopping};
@@ -27,7 +28,7 @@ use std::path::{Path, PathBuf};
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args_os().skip(1).map(PathBuf::from);
-    let usage = || Error::argument("no directory to write to", "Usage: bench_models OUT [RUN].");
+    let usage = || Error::setting("output", "missing", "bench_models OUT [RUN]");
     let out = arguments.next().ok_or_else(usage)?;
     let run = arguments.next();
     let data = run.as_ref().map(|run| split(run)).transpose()?;
@@ -120,7 +121,7 @@ fn times(touch: &Touch) -> Vec<u8> {
 }
 
 fn expected(model: &[u8], touches: &[Touch]) -> Result<Vec<u8>> {
-    let wrong = |error: &dyn std::fmt::Display| Error::data(error.to_string(), "Report this as a bug.");
+    let wrong = |error: &dyn std::fmt::Display| Error::from(ReportProblem::Compiled { reason: error.to_string() });
     let model = Model::new(model).map_err(|error| wrong(&error))?;
     let mut recognizer = Recognizer::<10>::new(&model, Stopping::from_model(&model)).map_err(|error| wrong(&error))?;
     Ok(touches.iter().flat_map(|touch| identity::record(&model, &mut recognizer, touch)).collect())

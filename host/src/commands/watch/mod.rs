@@ -72,7 +72,7 @@ fn watch(arguments: &Arguments, port: &Port) -> Result<()> {
     };
     match steps {
         Some(steps) => {
-            let model = loaded.as_ref().map(|file| file.model()).transpose()?;
+            let model = loaded.as_ref().map(|file| file.model());
             stream(&mut connection, steps, &chip, model.as_ref(), &mut each)?;
         }
         None => loop {

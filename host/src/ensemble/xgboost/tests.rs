@@ -1,7 +1,7 @@
 use super::*;
-use palpate_shared::Descriptor;
 use crate::ensemble::train::{Settings, train};
 use crate::touches::synthetic;
+use palpate_shared::Descriptor;
 use serde_json::{Value, json};
 
 fn ensemble(multi_output: bool) -> Ensemble {
