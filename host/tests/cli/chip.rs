@@ -49,7 +49,7 @@ fn chip() -> String {
         let [mut c, mut d] = [(); 2].map(|()| vec![0; Memory::record_length(OBJECTS)]);
         let memory = Memory { built_in: &[], models: [&mut a, &mut b], records: [&mut c, &mut d] };
         // It ends with an error where the host hangs up in the middle of something.
-        let _ = serve::<OBJECTS, _>(memory, &mut Wire(stream));
+        let _ = serve::<OBJECTS, _>(memory, 0, &mut Wire(stream));
     })
 }
 
