@@ -2,19 +2,20 @@
 
 /// Which fingers touched, up to mirror image: fingers counted from the other end give the same pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
 pub enum ContactPattern {
     /// No finger: the approach touched nothing.
-    None,
+    None = 0,
     /// One of the two outer fingers alone.
-    Outer,
+    Outer = 1,
     /// The middle finger alone.
-    Middle,
+    Middle = 2,
     /// The middle finger and one outer finger.
-    OuterAndMiddle,
+    OuterAndMiddle = 3,
     /// Both outer fingers without the middle one.
-    BothOuter,
+    BothOuter = 4,
     /// All three: a full touch.
-    All,
+    All = 5,
 }
 
 impl ContactPattern {
@@ -26,26 +27,19 @@ impl ContactPattern {
     ///
     /// Cost: about ten instructions. Cannot fail.
     pub const fn of([first, middle, last]: [bool; 3]) -> Self {
-        match (first as u8 + last as u8, middle) {
-            (0, false) => Self::None,
-            (0, true) => Self::Middle,
-            (1, false) => Self::Outer,
-            (1, true) => Self::OuterAndMiddle,
-            (_, false) => Self::BothOuter,
-            (_, true) => Self::All,
+        match 2 * (first as u8 + last as u8) + middle as u8 {
+            0 => Self::None,
+            1 => Self::Middle,
+            2 => Self::Outer,
+            3 => Self::OuterAndMiddle,
+            4 => Self::BothOuter,
+            _ => Self::All,
         }
     }
 
     /// The code, which is also the feature `pattern`: the position in [`ContactPattern::ALL`].
     pub const fn code(self) -> u8 {
-        match self {
-            Self::None => 0,
-            Self::Outer => 1,
-            Self::Middle => 2,
-            Self::OuterAndMiddle => 3,
-            Self::BothOuter => 4,
-            Self::All => 5,
-        }
+        self as u8
     }
 
     /// The name in files and reports.

@@ -89,7 +89,8 @@ impl Touch {
 
     /// Microseconds between the first and the last contact; 0 with fewer than two contacts.
     pub fn spread(&self) -> u32 {
-        self.times.iter().filter_map(|time| time.micros()).max().unwrap_or(0)
+        // A missing contact is the largest number, and so 0 as one more.
+        self.times.map(|time| time.0.wrapping_add(1)).into_iter().fold(1, u32::max) - 1
     }
 
     /// Whether all three fingers touched.
