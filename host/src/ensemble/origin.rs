@@ -62,7 +62,7 @@ fn fingerprints(dataset: &Dataset) -> BTreeMap<String, u64> {
     dataset.objects.iter().map(fingerprint).collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
     use crate::touches::synthetic;

@@ -156,7 +156,7 @@ fn compare_verdicts<const N: usize>(
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
     use crate::compile::{self, compile};

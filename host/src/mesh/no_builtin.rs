@@ -8,12 +8,7 @@ pub(super) fn names() -> [&'static str; 0] {
     []
 }
 
-/// Not these objects.
-pub(super) fn all() -> Result<Vec<Object>> {
-    Err(absent("builtin"))
-}
-
-/// Not this object either.
+/// Not this object.
 pub(super) fn one(name: &str) -> Result<Object> {
     Err(absent(name))
 }

@@ -17,7 +17,7 @@
 
 mod read;
 mod schema;
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests;
 mod write;
 
