@@ -41,6 +41,7 @@ mod cost;
 mod forest;
 mod layout;
 mod model;
+mod parts;
 mod quantize;
 mod rounding;
 mod table;
@@ -129,7 +130,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     if candidates.iter().any(|(_, parts)| parts.margin_error == 0.0) {
         candidates.retain(|(_, parts)| parts.margin_error == 0.0);
     }
-    let mut best: Option<(u128, Layout, layout::Parts)> = None;
+    let mut best: Option<(u128, Layout, parts::Parts)> = None;
     for (layout, parts) in candidates {
         let bytes = parts.bytes() as u128;
         let cost = bytes * bytes * u128::from(parts.instructions.m4f);

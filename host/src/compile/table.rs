@@ -4,7 +4,7 @@ use super::axes::{cuts_bytes, width};
 use super::cells::Cells;
 use super::cost::{Instructions, Shape};
 use super::forest::Forest;
-use super::layout::Parts;
+use super::parts::Parts;
 use super::quantize::Scale;
 use super::rounding::round_up;
 use super::trees::Leaves;

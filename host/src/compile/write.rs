@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::forest::Forest;
-use super::layout::Parts;
+use super::parts::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
 use crate::error::{CompileProblem, Error, Result};
 use crate::probe::approach::Probe;

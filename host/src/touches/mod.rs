@@ -26,6 +26,7 @@
 //! # }
 //! ```
 
+mod checksum;
 mod dataset;
 pub mod folds;
 mod format;
@@ -39,8 +40,9 @@ mod shard;
 pub(crate) mod synthetic;
 pub mod text;
 
+pub(crate) use checksum::checksum;
+pub(crate) use dataset::files;
 pub use dataset::{Dataset, ObjectTouches, Warning};
-pub(crate) use dataset::{checksum, files};
 pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use origin::Origin;

@@ -3,7 +3,7 @@
 //! A line holds three contact times in seconds, a missing contact as `-`, and optionally the probe's direction and
 //! alignment (six numbers). Fields are separated by spaces or commas. The published data set has the same format.
 
-use super::dataset::Checked;
+use super::checksum::Checked;
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::to_q15;
 use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
