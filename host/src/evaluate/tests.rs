@@ -100,7 +100,9 @@ fn the_sequential_errors_stay_below_the_error_rate() {
 fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
     let bytes = compiled(&ensemble());
     let model = Model::new(&bytes).unwrap();
-    let touches = test_touches();
+    // Of full touches, which this model was trained for: it refuses others, and evaluation does not yet leave them out.
+    let mut touches = test_touches();
+    touches.objects.iter_mut().for_each(|object| object.touches.retain(palpate_shared::Touch::is_full));
     let margins = Margins::new(Candidate::Compiled(&model), &touches).unwrap();
     let settings = SequentialSettings { error_rate: 0.01, max_touches: Some(40), sequences: 50, seed: 1 };
     let sequential = margins.sequential(&settings).unwrap();
