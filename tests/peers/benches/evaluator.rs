@@ -191,7 +191,13 @@ fn random(settings: &train::Settings) -> Ensemble {
         (0..10 * settings.rounds).map(|index| tree(Output::One(index % 10))).collect()
     };
     let objects = (0..10).map(|object| object.to_string()).collect();
-    Ensemble { descriptor: settings.descriptor, objects, base_margins: vec![0.5; 10], trees, origin: Default::default() }
+    Ensemble {
+        descriptor: settings.descriptor,
+        objects,
+        base_margins: vec![0.5; 10],
+        trees,
+        origin: Default::default(),
+    }
 }
 
 /// The same margins from trees with one value a leaf.
