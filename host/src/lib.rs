@@ -115,6 +115,10 @@ pub mod report;
 #[cfg(feature = "cli")]
 pub mod run;
 
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod commands;
+
 pub use error::{Error, Result};
 pub use glam;
 pub use palpate_onboard as onboard;

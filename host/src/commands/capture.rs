@@ -1,13 +1,13 @@
 use super::numbers::count;
 use super::progress::Bar;
-use palpate::capture::{self, Settings, Summary};
-use palpate::error::{CaptureProblem, Problem, TouchesProblem};
-use palpate::mesh::facts::Facts;
-use palpate::mesh::source;
-use palpate::output;
-use palpate::probe::approach::Probe;
-use palpate::touches::{Format, Listing, Origin, Shard};
-use palpate::{Error, Result};
+use crate::capture::{self, Settings, Summary};
+use crate::error::{CaptureProblem, Problem, TouchesProblem};
+use crate::mesh::facts::Facts;
+use crate::mesh::source;
+use crate::output;
+use crate::probe::approach::Probe;
+use crate::touches::{Format, Listing, Origin, Shard};
+use crate::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -1,9 +1,9 @@
-use palpate::Error;
-use palpate::Result;
-use palpate::mesh::obj;
-use palpate::output;
-use palpate::probe::cast::{self, Agreement};
-use palpate::probe::scene::Scene;
+use crate::Error;
+use crate::Result;
+use crate::mesh::obj;
+use crate::output;
+use crate::probe::cast::{self, Agreement};
+use crate::probe::scene::Scene;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

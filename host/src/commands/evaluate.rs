@@ -1,11 +1,11 @@
 use super::numbers::share;
 use super::progress::Bar;
-use palpate::evaluate::model_file::ModelFile;
-use palpate::evaluate::{self, Evaluation, LEAST_GROUPS, Margins, Settings};
-use palpate::output;
-use palpate::progress::Progress;
-use palpate::touches::noise;
-use palpate::{Error, Result};
+use crate::evaluate::model_file::ModelFile;
+use crate::evaluate::{self, Evaluation, LEAST_GROUPS, Margins, Settings};
+use crate::output;
+use crate::progress::Progress;
+use crate::touches::noise;
+use crate::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

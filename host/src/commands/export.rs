@@ -1,8 +1,8 @@
 use super::numbers::share;
-use palpate::Result;
-use palpate::compile::{self, Instructions, Layout, Leaf, Settings};
-use palpate::ensemble::Ensemble;
-use palpate::output;
+use crate::Result;
+use crate::compile::{self, Instructions, Layout, Leaf, Settings};
+use crate::ensemble::Ensemble;
+use crate::output;
 use std::path::PathBuf;
 
 /// Compile an ensemble to the bytes that the chip reads.

@@ -1,8 +1,8 @@
 use super::export::instructions;
-use palpate::Result;
-use palpate::chip::instructions::Chip;
-use palpate::compile::{self, CompiledModel, Core, Instructions, Memory};
-use palpate::output;
+use crate::Result;
+use crate::chip::instructions::Chip;
+use crate::compile::{self, CompiledModel, Core, Instructions, Memory};
+use crate::output;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
 use palpate_shared::{Pose, Q15_ONE, Touch};

@@ -1,13 +1,13 @@
 use super::progress::Bar;
 use clap::ArgGroup;
-use palpate::chip::{
+use crate::chip::{
     ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
 };
-use palpate::compile::CompiledModel;
-use palpate::error::ChipProblem;
-use palpate::output::{print, print_json};
-use palpate::progress::Progress;
-use palpate::{Error, Result};
+use crate::compile::CompiledModel;
+use crate::error::ChipProblem;
+use crate::output::{print, print_json};
+use crate::progress::Progress;
+use crate::{Error, Result};
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;
 use std::ops::ControlFlow;

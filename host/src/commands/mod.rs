@@ -21,9 +21,9 @@ mod view;
 mod watch;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{Problem, TouchesProblem};
-use palpate::touches::{Dataset, Format, Listing};
-use palpate::{Error, Result};
+use crate::error::{Problem, TouchesProblem};
+use crate::touches::{Dataset, Format, Listing};
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -139,7 +139,7 @@ fn unwrapped(text: &str) -> String {
 }
 
 /// Runs the command that the arguments name, prints its error if it has one, and returns the exit code.
-pub(crate) fn run() -> ExitCode {
+pub fn main() -> ExitCode {
     let matches = cli().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let hint = cli.command.hint();

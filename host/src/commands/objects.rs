@@ -1,12 +1,12 @@
 //! `palpate objects`.
 
 use clap::builder::PossibleValuesParser;
-use palpate::Result;
-use palpate::mesh::Object;
-use palpate::mesh::builtin;
-use palpate::mesh::obj;
-use palpate::output;
-use palpate::page::render;
+use crate::Result;
+use crate::mesh::Object;
+use crate::mesh::builtin;
+use crate::mesh::obj;
+use crate::output;
+use crate::page::render;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

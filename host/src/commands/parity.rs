@@ -1,9 +1,9 @@
 use super::progress::Bar;
-use palpate::Result;
-use palpate::compile::CompiledModel;
-use palpate::ensemble::Ensemble;
-use palpate::evaluate::parity;
-use palpate::output;
+use crate::Result;
+use crate::compile::CompiledModel;
+use crate::ensemble::Ensemble;
+use crate::evaluate::parity;
+use crate::output;
 use std::path::PathBuf;
 
 /// Compare a compiled model with its ensemble.

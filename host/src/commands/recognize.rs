@@ -1,9 +1,9 @@
 use super::numbers::share;
-use palpate::Result;
-use palpate::compile::{self, CompiledModel};
-use palpate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
-use palpate::output;
-use palpate::touches::parse_touch;
+use crate::Result;
+use crate::compile::{self, CompiledModel};
+use crate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
+use crate::output;
+use crate::touches::parse_touch;
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
 use std::fs::File;

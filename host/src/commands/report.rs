@@ -1,8 +1,8 @@
 use super::progress::Bar;
 use super::shell;
-use palpate::Result;
-use palpate::output::{print, print_json, refuse_stdout};
-use palpate::report::{self, Existing, Settings};
+use crate::Result;
+use crate::output::{print, print_json, refuse_stdout};
+use crate::report::{self, Existing, Settings};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

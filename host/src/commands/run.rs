@@ -1,10 +1,10 @@
 use super::progress::Bar;
 use super::shell;
-use palpate::Result;
-use palpate::mesh::source;
-use palpate::output;
-use palpate::run;
-use palpate::touches::Origin;
+use crate::Result;
+use crate::mesh::source;
+use crate::output;
+use crate::run;
+use crate::touches::Origin;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

@@ -1,8 +1,8 @@
 use super::progress::Bar;
-use palpate::Result;
-use palpate::ensemble::StatedProbe;
-use palpate::ensemble::train::{self, Engine, Settings};
-use palpate::output;
+use crate::Result;
+use crate::ensemble::StatedProbe;
+use crate::ensemble::train::{self, Engine, Settings};
+use crate::output;
 use palpate_shared::Descriptor;
 use std::path::PathBuf;
 use std::time::Instant;

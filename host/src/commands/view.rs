@@ -1,8 +1,8 @@
-use palpate::Result;
-use palpate::mesh::source;
-use palpate::output;
-use palpate::probe::approach::Probe;
-use palpate::report::view;
+use crate::Result;
+use crate::mesh::source;
+use crate::output;
+use crate::probe::approach::Probe;
+use crate::report::view;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

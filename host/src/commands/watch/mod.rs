@@ -1,10 +1,10 @@
 mod screen;
 
 use super::link::ChipOptions;
-use palpate::Result;
-use palpate::chip::watch::{Follow, Status};
-use palpate::chip::{ChipModel, Connection, Entry, Port, Received, Update, probability, stream};
-use palpate::output::print;
+use crate::Result;
+use crate::chip::watch::{Follow, Status};
+use crate::chip::{ChipModel, Connection, Entry, Port, Received, Update, probability, stream};
+use crate::output::print;
 use screen::Screen;
 use std::io::IsTerminal;
 use std::ops::ControlFlow;

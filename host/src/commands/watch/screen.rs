@@ -3,8 +3,8 @@
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use crossterm::style::{ContentStyle, PrintStyledContent, StyledContent, Stylize};
 use crossterm::{cursor, execute, queue, terminal};
-use palpate::chip::watch::Status;
-use palpate::{Error, Result};
+use crate::chip::watch::Status;
+use crate::{Error, Result};
 use std::io::{Write, stdout};
 use std::iter::repeat_n;
 use std::time::{Duration, Instant};
@@ -219,7 +219,7 @@ fn clip(line: Vec<Text>, mut width: usize) -> Vec<Text> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::chip::Entry;
+    use crate::chip::Entry;
 
     fn status(objects: usize) -> Status {
         let mut status = Status::new("emulator");
