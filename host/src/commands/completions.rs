@@ -1,6 +1,6 @@
-use clap_complete::Shell;
 use crate::Result;
 use crate::output::print;
+use clap_complete::Shell;
 
 #[derive(clap::Args)]
 #[command(after_help = "\

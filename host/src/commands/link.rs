@@ -1,5 +1,4 @@
 use super::progress::Bar;
-use clap::ArgGroup;
 use crate::chip::{
     ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
 };
@@ -8,6 +7,7 @@ use crate::error::ChipProblem;
 use crate::output::{print, print_json};
 use crate::progress::Progress;
 use crate::{Error, Result};
+use clap::ArgGroup;
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;
 use std::ops::ControlFlow;

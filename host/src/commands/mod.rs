@@ -20,10 +20,10 @@ mod tune;
 mod view;
 mod watch;
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use crate::error::{Problem, TouchesProblem};
 use crate::touches::{Dataset, Format, Listing};
 use crate::{Error, Result};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

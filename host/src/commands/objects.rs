@@ -1,12 +1,12 @@
 //! `palpate objects`.
 
-use clap::builder::PossibleValuesParser;
 use crate::Result;
 use crate::mesh::Object;
 use crate::mesh::builtin;
 use crate::mesh::obj;
 use crate::output;
 use crate::page::render;
+use clap::builder::PossibleValuesParser;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -1,7 +1,7 @@
 //! Progress on stderr, where it is a terminal.
 
-use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use crate::progress::Progress;
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 

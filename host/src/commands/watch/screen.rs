@@ -1,10 +1,10 @@
 //! What is known of a chip, drawn in a terminal.
 
+use crate::chip::watch::Status;
+use crate::{Error, Result};
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use crossterm::style::{ContentStyle, PrintStyledContent, StyledContent, Stylize};
 use crossterm::{cursor, execute, queue, terminal};
-use crate::chip::watch::Status;
-use crate::{Error, Result};
 use std::io::{Write, stdout};
 use std::iter::repeat_n;
 use std::time::{Duration, Instant};
