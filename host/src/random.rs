@@ -22,6 +22,8 @@ pub(crate) enum Purpose {
     View,
     /// Casts by which the simulator is checked.
     Casts,
+    /// Groups and sequences of approaches that an evaluation draws.
+    Approaches,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -38,6 +40,7 @@ impl Purpose {
             Self::Sequences => Some(3),
             Self::View => Some(4),
             Self::Casts => Some(5),
+            Self::Approaches => Some(7),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }

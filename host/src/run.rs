@@ -244,6 +244,7 @@ impl Trial {
             &margins,
             &evaluate::Settings {
                 at: AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS).collect(),
+                at_approaches: Vec::new(),
                 groups: settings.groups,
                 error_rate: settings.error_rate,
                 max_touches: None,

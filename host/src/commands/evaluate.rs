@@ -1,7 +1,7 @@
 use super::numbers::share;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
-use crate::evaluate::{self, Evaluation, LEAST_GROUPS, Margins, Settings};
+use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings};
 use crate::output;
 use crate::progress::Progress;
 use crate::touches::noise;
@@ -16,6 +16,8 @@ The model is a compiled one (model.palpate), evaluated by the code that runs on 
 
 Evaluate on touches that the model was not trained on: capture them with another seed. An ensemble knows its training touches again; a compiled model does not.
 
+On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
+
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 
 Examples:
@@ -23,7 +25,9 @@ Examples:
   palpate evaluate model.palpate unseen
   palpate evaluate ensemble.json unseen --at 10,30 --json
   palpate evaluate model.palpate unseen --noise 5ms
-  palpate evaluate model.palpate unseen --confusion 20")]
+  palpate evaluate model.palpate unseen --confusion 20
+  palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
+  palpate evaluate model.palpate approaches --error-rate 0.02")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
@@ -97,6 +101,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
             at,
+            at_approaches: numbers_of_approaches(&margins, arguments.at.as_deref()),
             groups: arguments.groups,
             error_rate: arguments.error_rate,
             max_touches: arguments.max_touches,
@@ -141,8 +146,22 @@ fn numbers_of_touches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Result
     }
 }
 
+/// The numbers of approaches to give the accuracy after: those asked for, or the usual ones, as far as the approaches go.
+fn numbers_of_approaches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Vec<usize> {
+    match wanted {
+        Some(wanted) => wanted.to_vec(),
+        None => {
+            let few = |at: &usize| *at <= margins.fewest_approaches();
+            Settings::default().at_approaches.into_iter().filter(few).collect()
+        }
+    }
+}
+
 fn text(evaluated: &Evaluated) -> String {
     let mut text = table(&evaluated.evaluation);
+    if let Some(approaches) = &evaluated.evaluation.approaches {
+        text += &approaches_table(approaches, &evaluated.evaluation.patterns);
+    }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);
     }
@@ -211,6 +230,50 @@ fn table(evaluation: &Evaluation) -> String {
         sequential.max_touches,
         evaluation.groups,
         evaluation.touches,
+    );
+    text
+}
+
+/// What approaches come to: one row per object, one column per number of approaches; then the sequential figures.
+fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeMap<&str, f64>) -> String {
+    let names = approaches.per_object.keys().map(|name| name.chars().count());
+    let width = names.max().unwrap_or(0).max("approaches".len());
+    let sequential = &approaches.sequential;
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut text = format!("\n{:width$}", "approaches");
+    // Writing to a string cannot fail.
+    approaches.accuracy.keys().for_each(|at| _ = write!(text, " {at:>7}"));
+    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "undecided", "used");
+    let mut line = |name: &str, accuracy: Vec<f64>, [stop, wrong, undecided, used]: [f64; 4]| {
+        _ = write!(text, "{name:width$}");
+        accuracy.into_iter().for_each(|share| _ = write!(text, " {:>7}", percent(share)));
+        _ = writeln!(text, " {stop:>9.1} {:>9} {:>9} {:>9}", percent(wrong), percent(undecided), percent(used));
+    };
+    for (name, accuracy) in &approaches.per_object {
+        let of = |shares: &std::collections::BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        let stopping = [
+            of(&sequential.per_object),
+            of(&sequential.error_per_object),
+            of(&sequential.undecided_per_object),
+            of(&approaches.used_per_object),
+        ];
+        line(name, accuracy.values().copied().collect(), stopping);
+    }
+    let stopping = [sequential.mean_approaches, sequential.error, sequential.undecided, approaches.used];
+    line("all", approaches.accuracy.values().copied().collect(), stopping);
+    let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {}", percent(*share)));
+    _ = writeln!(
+        text,
+        "\nStopping at an error rate of {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
+         wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.",
+        sequential.error_rate,
+        sequential.mean_approaches,
+        sequential.mean_approaches_standard_error,
+        sequential.mean_touches,
+        100.0 * sequential.error,
+        100.0 * sequential.error_standard_error,
+        100.0 * sequential.undecided,
+        shares.collect::<Vec<_>>().join(", "),
     );
     text
 }

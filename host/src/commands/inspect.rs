@@ -4,8 +4,8 @@ use crate::chip::instructions::Chip;
 use crate::compile::{self, CompiledModel, Core, Instructions, Memory};
 use crate::output;
 use palpate_onboard::{Model, Stopping};
-use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
-use palpate_shared::{Pose, Q15_ONE, Touch};
+use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Length, TrainedNoise, TrainedProbe};
+use palpate_shared::{ContactPattern, Pose, Q15_ONE, Touch};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -53,6 +53,12 @@ struct Inspected<'a> {
     margin_error: f32,
     stopping: Defaults,
     probe: Probe,
+    /// The touches that are evidence.
+    touches: Touches,
+    /// The noise in the training; null if the model does not state it.
+    noise: Option<Noise>,
+    /// Share of each contact pattern among the approaches of the training; null if the model does not state it.
+    pattern: Option<BTreeMap<&'static str, f64>>,
     /// Per touch, estimated.
     instructions: Instructions,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -67,8 +73,76 @@ struct Defaults {
 
 #[derive(serde::Serialize)]
 struct Probe {
+    /// Radius of a finger; null if the model does not state its probe.
+    radius: Option<f32>,
     spacing: f32,
     speed: f32,
+    /// What lengths are measured in: "unit", a tenth of the object's longest side, or "mm".
+    unit: &'static str,
+    /// Whether the model states its probe; otherwise the published one is assumed.
+    stated: bool,
+}
+
+#[derive(serde::Serialize)]
+struct Touches {
+    /// "full", "contacts" or "all".
+    counted: &'static str,
+    patterns: Vec<&'static str>,
+    needs_pose: bool,
+    /// The largest time between the first and the last contact in microseconds; null if the model does not state it.
+    largest_spread: Option<u32>,
+}
+
+#[derive(serde::Serialize)]
+struct Noise {
+    /// Standard deviations of contact times in microseconds.
+    least: u32,
+    largest: u32,
+    /// The timer's resolution in microseconds; 0 for none.
+    timer: u32,
+    /// Standard deviation of the pose in degrees; 0 for none.
+    pose_degrees: f64,
+}
+
+/// The probe that a model states, or the one that its header assumes.
+fn probe(model: &Model<'_>) -> Probe {
+    match model.probe() {
+        Some(TrainedProbe { radius, spacing, speed, length }) => {
+            Probe { radius: Some(radius), spacing, speed, unit: length.name(), stated: true }
+        }
+        None => {
+            let header = model.header();
+            Probe {
+                radius: None,
+                spacing: header.spacing(),
+                speed: header.speed(),
+                unit: Length::Tenth.name(),
+                stated: false,
+            }
+        }
+    }
+}
+
+fn evidence(model: &Model<'_>) -> Touches {
+    let trained = model.trained_touches();
+    Touches {
+        counted: trained.counted.name(),
+        patterns: trained.patterns.iter().map(ContactPattern::name).collect(),
+        needs_pose: trained.needs_pose,
+        largest_spread: (trained.largest_spread < u32::MAX).then_some(trained.largest_spread),
+    }
+}
+
+fn noise(model: &Model<'_>) -> Option<Noise> {
+    let TrainedNoise { least, largest, timer, pose } = model.noise()?;
+    Some(Noise { least, largest, timer, pose_degrees: f64::from(pose) / 1000.0 })
+}
+
+fn pattern(model: &Model<'_>) -> Option<BTreeMap<&'static str, f64>> {
+    // Three digits: they are stored in steps of 1/65535.
+    let share = |share: u16| (f64::from(share) / 65.535).round() / 1000.0;
+    let shares = model.pattern_shares()?.0.map(share);
+    Some(ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(shares).collect())
 }
 
 /// What the model costs on a chip.
@@ -120,7 +194,10 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         unit: model.unit(),
         margin_error: model.margin_error(),
         stopping: Defaults { error_rate: significant(stopping.error_rate()), max_touches: stopping.max_touches() },
-        probe: Probe { spacing: header.spacing(), speed: header.speed() },
+        probe: probe(model),
+        touches: evidence(model),
+        noise: noise(model),
+        pattern: pattern(model),
         instructions: Instructions::of_model(model),
         chip: None,
     }
@@ -211,8 +288,41 @@ fn text(inspected: &Inspected<'_>) -> String {
     );
     line(
         "probe",
-        format!("spacing {} units, speed {} units per second", inspected.probe.spacing, inspected.probe.speed),
+        match &inspected.probe {
+            Probe { radius: Some(radius), spacing, speed, unit, .. } => {
+                let unit = if *unit == "unit" { "units" } else { unit };
+                format!("radius {radius}, spacing {spacing} {unit}, speed {speed} {unit} per second")
+            }
+            Probe { spacing, speed, .. } => {
+                format!("not stated; assumed: spacing {spacing} units, speed {speed} units per second")
+            }
+        },
     );
+    let Touches { counted, patterns, needs_pose, largest_spread } = &inspected.touches;
+    line(
+        "touches",
+        format!(
+            "{counted} ({}){}{}",
+            patterns.join(", "),
+            if *needs_pose { ", with a pose" } else { "" },
+            largest_spread.map_or(String::new(), |spread| format!(", within {:.3} s", f64::from(spread) / 1e6))
+        ),
+    );
+    if let Some(Noise { least, largest, timer, pose_degrees }) = &inspected.noise {
+        line(
+            "noise",
+            format!(
+                "{} to {} ms, a timer of {} ms, {pose_degrees}° of the pose",
+                f64::from(*least) / 1e3,
+                f64::from(*largest) / 1e3,
+                f64::from(*timer) / 1e3
+            ),
+        );
+    }
+    if let Some(pattern) = &inspected.pattern {
+        let shares = pattern.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
+        line("approaches", shares.collect::<Vec<_>>().join(", "));
+    }
     line("instructions", format!("{} (per touch, estimated)", instructions(inspected.instructions)));
     line("bytes", inspected.bytes.to_string());
     for (part, bytes) in &inspected.bytes_by_part {

@@ -3,7 +3,8 @@ use crate::Result;
 use crate::ensemble::StatedProbe;
 use crate::ensemble::train::{self, Engine, Settings};
 use crate::output;
-use palpate_shared::Descriptor;
+use palpate_shared::{Descriptor, Touch};
+use palpate_shared::format::Counted;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -14,12 +15,17 @@ Presets:
   compact  small and accurate: leaves hold a value per object; uses curvature
   paper    the published method: one tree per object and round, on contact times
 
+A data set of approaches also holds touches with one or two contacts, and approaches that touched nothing. Partial touches say which fingers touched and, where two did, how long one came after the other; a robot that uses them needs a fraction of the approaches. An approach that touched nothing is evidence only with --touches all: what it says depends on where the robot aims.
+
 The ensemble states the probe that the data set was captured with; models exported from it do as well.
 
 Examples:
   palpate train data -o ensemble.json
   palpate train data -o paper.json --preset paper
   palpate train data -o small.json --rounds 20 --depth 5
+  palpate capture builtin -o approaches --approaches --touches 60000
+  palpate train approaches -o contacts.json
+  palpate train approaches -o all.json --touches all
   palpate train data -o table.json --bins 64,16  for a small, very fast table
   palpate train data -o robust.json --noise 5ms")]
 pub(crate) struct Arguments {
@@ -34,6 +40,9 @@ pub(crate) struct Arguments {
     /// Which features a touch is turned into [default: the preset's]
     #[arg(long, value_parser = descriptor, value_name = "times|curvature|gravity|oriented")]
     descriptor: Option<Descriptor>,
+    /// Which touches are trained on, and so evidence: full ones, those with at least one contact, or every approach, also those that touched nothing [default: contacts where the data set holds approaches, else full; full for the paper's preset]
+    #[arg(long, value_enum)]
+    touches: Option<Touches>,
     /// What a leaf holds: a value for each object, or one value (and each object has its own trees) [default: the preset's]
     #[arg(long, value_enum)]
     leaves: Option<Leaves>,
@@ -79,6 +88,13 @@ enum Preset {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
+enum Touches {
+    Full,
+    Contacts,
+    All,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
 enum Leaves {
     Each,
     One,
@@ -94,7 +110,11 @@ enum Trainer {
 struct Trained {
     descriptor: &'static str,
     objects: usize,
+    /// Touches of the data set.
     touches: usize,
+    /// Those of them that are evidence.
+    used: usize,
+    counted: &'static str,
     trees: usize,
     splits: usize,
     leaves: usize,
@@ -112,14 +132,20 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     })?;
     let seconds = start.elapsed().as_secs_f64();
     ensemble.save(&arguments.output)?;
+    let evidence = ensemble.trained_touches();
+    let is_used = |touch: &&Touch| {
+        evidence.counted.patterns().contains(touch.pattern()) && (!evidence.needs_pose || touch.pose().is_some())
+    };
     let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
     let trees = ensemble.trees.len();
     // A binary tree has one leaf more than splits.
     let splits = (nodes - trees) / 2;
     let trained = Trained {
-        descriptor: settings.descriptor.name(),
+        descriptor: ensemble.descriptor.name(),
         objects: ensemble.objects.len(),
         touches: dataset.len(),
+        used: dataset.objects.iter().flat_map(|object| &object.touches).filter(is_used).count(),
+        counted: evidence.counted.name(),
         trees,
         splits,
         leaves: nodes - splits,
@@ -129,13 +155,20 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         return output::print_json_about(&arguments.output, &trained);
     }
     let text = format!(
-        "{}: {} trees, {} splits on {} of {} touches of {} objects, trained in {:.1} s\n",
+        "{}: {} trees, {} splits on {} of {} of {} {} of {} objects ({}), trained in {:.1} s\n",
         arguments.output.display(),
         trained.trees,
         trained.splits,
         trained.descriptor,
+        trained.used,
         trained.touches,
+        if dataset.holds_approaches() { "approaches" } else { "touches" },
         trained.objects,
+        match evidence.counted {
+            Counted::Full => "full touches",
+            Counted::Contacts => "those with a contact",
+            Counted::All => "all of them",
+        },
         trained.seconds
     );
     output::print_about(&arguments.output, &text)
@@ -149,6 +182,12 @@ impl Arguments {
         };
         Settings {
             descriptor: self.descriptor.unwrap_or(preset.descriptor),
+            counted: match self.touches {
+                None => preset.counted,
+                Some(Touches::Full) => Some(Counted::Full),
+                Some(Touches::Contacts) => Some(Counted::Contacts),
+                Some(Touches::All) => Some(Counted::All),
+            },
             multi_output: self.leaves.map_or(preset.multi_output, |leaves| matches!(leaves, Leaves::Each)),
             rounds: self.rounds.unwrap_or(preset.rounds),
             depth: self.depth.unwrap_or(preset.depth),

@@ -7,7 +7,7 @@ use crate::ensemble::{Ensemble, Node, Output};
 use crate::error::{CompileProblem, Error, Result};
 use crate::probe::approach::Probe;
 use palpate_onboard::Stopping;
-use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, checksum};
+use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, Trained, checksum};
 
 /// The model's bytes.
 pub(super) fn write(
@@ -23,11 +23,13 @@ pub(super) fn write(
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
     // Where nothing is known, the published probe.
     let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
+    let optional = optional(ensemble, forest);
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);
     let length = HeaderBuilder::default().bytes().len()
         + text.len()
+        + optional.len()
         + records
         + parts.cuts.len()
         + parts.nodes.len()
@@ -55,12 +57,14 @@ pub(super) fn write(
         .with_spacing(probe.spacing as f32)
         .with_speed(probe.speed as f32)
         .with_text_length(count(text.len())?)
+        .with_sections(count(optional.len())?)
         .with_ensemble(hash(ensemble))
         .with_cuts_length(count(parts.cuts.len())?)
         .with_nodes_length(count(parts.nodes.len())?)
         .with_leaves_length(count(parts.leaves.len())?);
     let mut bytes = header.bytes().to_vec();
     bytes.extend(text);
+    bytes.extend(optional);
     bytes.extend(parts.base.iter().chain(&priors).flat_map(|number| number.to_le_bytes()));
     bytes.extend(parts.axes.iter().flat_map(|axis| axis.to_bytes()));
     bytes.extend(&parts.cuts);
@@ -69,6 +73,23 @@ pub(super) fn write(
     bytes.extend(&parts.leaves);
     bytes.extend(checksum(&bytes).to_le_bytes());
     Ok(bytes)
+}
+
+/// What the model states about its training.
+fn optional(ensemble: &Ensemble, forest: &Forest<'_>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let origin = &ensemble.origin;
+    // Rows of features are no touches of any probe.
+    if forest.descriptor.is_some() {
+        let trained = Trained {
+            probe: origin.probe.map(|stated| stated.trained()),
+            touches: origin.trained.map(|trained| trained.touches),
+            noise: None,
+            shares: origin.trained.and_then(|trained| trained.pattern_shares()),
+        };
+        trained.write(|part| bytes.extend_from_slice(part));
+    }
+    bytes
 }
 
 /// The program's version and the objects' names, each with its length in a byte.

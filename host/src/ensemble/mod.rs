@@ -11,8 +11,9 @@ pub mod train;
 mod xgboost;
 
 pub(crate) use check::{MAX_OBJECTS, check_leaf};
-pub use origin::{Origin, StatedProbe};
+pub use origin::{Origin, StatedProbe, Trained};
 
+use palpate_shared::format::TrainedTouches;
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
 
 /// Boosted trees over a descriptor's features, with one margin for each object.
@@ -122,6 +123,13 @@ impl Ensemble {
     /// If the ensemble is one that [`Ensemble::check`] refuses.
     pub fn margins(&self, touch: &Touch) -> Vec<f32> {
         self.margins_of_features(&feature_row(self.descriptor, touch))
+    }
+
+    /// The touches that are evidence: those that the ensemble states; full touches, with a pose if the descriptor needs
+    /// one, where it states none. Every model compiled from it takes the same.
+    pub fn trained_touches(&self) -> TrainedTouches {
+        let unstated = TrainedTouches::full(self.descriptor.needs_pose());
+        self.origin.trained.map_or(unstated, |trained| trained.touches)
     }
 }
 

@@ -2,6 +2,8 @@
 
 use crate::probe::approach::Probe;
 use crate::touches::Dataset;
+use palpate_shared::format::{Counted, Length, PatternShares, TrainedProbe, TrainedTouches};
+use palpate_shared::{ContactPattern, Patterns};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -10,6 +12,8 @@ use std::collections::BTreeMap;
 pub struct Origin {
     /// The probe that made them, where the data set states it.
     pub probe: Option<StatedProbe>,
+    /// Which touches they were, and so which ones are evidence.
+    pub trained: Option<Trained>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
 }
@@ -29,15 +33,88 @@ impl StatedProbe {
     pub fn of(dataset: &Dataset) -> Option<Self> {
         dataset.origin.as_ref().map(|origin| Self { probe: origin.probe, length: origin.length })
     }
+
+    /// What a compiled model states.
+    pub(crate) fn trained(&self) -> TrainedProbe {
+        // Measures are stated in tenths of the longest side.
+        let unit = 10.0 / self.length;
+        let [radius, spacing, speed] =
+            [self.probe.radius, self.probe.spacing, self.probe.speed].map(|measure| (measure * unit) as f32);
+        TrainedProbe { radius, spacing, speed, length: Length::Tenth }
+    }
+}
+
+/// The touches that an ensemble was trained on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stated", into = "Stated")]
+pub struct Trained {
+    /// Patterns, the largest spread, and whether a pose is needed: what is evidence to every model made of the ensemble.
+    pub touches: TrainedTouches,
+    /// The share of each contact pattern among all approaches, in the order of the patterns' codes, each object weighted
+    /// equally; `None` if the data set holds no approaches.
+    pub shares: Option<[f64; 6]>,
+}
+
+impl Trained {
+    /// What the chip's model states of [`Trained::shares`].
+    pub(crate) fn pattern_shares(&self) -> Option<PatternShares> {
+        // `as` saturates.
+        self.shares.map(|shares| PatternShares(shares.map(|share| (share * 65_535.0).round() as u16)))
+    }
+}
+
+/// [`Trained`] in files.
+#[derive(Serialize, Deserialize)]
+struct Stated {
+    counted: String,
+    patterns: Vec<String>,
+    needs_pose: bool,
+    largest_spread: u32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    shares: Option<[f64; 6]>,
+}
+
+impl From<Trained> for Stated {
+    fn from(Trained { touches, shares }: Trained) -> Self {
+        Self {
+            counted: touches.counted.name().into(),
+            patterns: touches.patterns.iter().map(|pattern| pattern.name().into()).collect(),
+            needs_pose: touches.needs_pose,
+            largest_spread: touches.largest_spread,
+            shares,
+        }
+    }
+}
+
+impl TryFrom<Stated> for Trained {
+    type Error = String;
+
+    fn try_from(stated: Stated) -> Result<Self, String> {
+        let counted = Counted::ALL.iter().copied().find(|counted| counted.name() == stated.counted);
+        let counted = counted.ok_or_else(|| format!("{:?} is not full, contacts or all", stated.counted))?;
+        let pattern = |name: &String| {
+            let pattern = ContactPattern::ALL.into_iter().find(|pattern| pattern.name() == name);
+            pattern.filter(|pattern| counted.patterns().contains(*pattern)).ok_or_else(|| format!("pattern {name:?}"))
+        };
+        let patterns = stated.patterns.iter().map(pattern).collect::<Result<Patterns, _>>()?;
+        if patterns.is_empty() {
+            return Err("no pattern".into());
+        }
+        if let Some(share) = stated.shares.into_iter().flatten().find(|share| !(0.0..=1.0).contains(share)) {
+            return Err(format!("the share {share}"));
+        }
+        let Stated { needs_pose, largest_spread, shares, .. } = stated;
+        Ok(Self { touches: TrainedTouches { patterns, counted, needs_pose, largest_spread }, shares })
+    }
 }
 
 /// A fingerprint is made of this many touches at most.
 const FINGERPRINTED: usize = 16;
 
 impl Origin {
-    /// What touches say about themselves, and the probe that they were made with.
-    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
-        Self { probe, touches: fingerprints(dataset) }
+    /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
+    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
+        Self { probe, trained, touches: fingerprints(dataset) }
     }
 
     /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of the
@@ -70,7 +147,7 @@ mod tests {
     #[test]
     fn training_touches_are_known_again_and_others_are_not() {
         let trained = synthetic::dataset(&[100, 100, 100], 1);
-        let origin = Origin::new(&trained, None);
+        let origin = Origin::new(&trained, None, None);
         assert_eq!(origin.trained_on(&trained), ["object0", "object1", "object2"]);
         assert_eq!(origin.trained_on(&synthetic::dataset(&[30, 400, 100], 1)).len(), 3, "of the same capture");
         assert!(origin.trained_on(&synthetic::dataset(&[100, 100, 100], 2)).is_empty());

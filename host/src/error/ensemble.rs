@@ -1,6 +1,7 @@
 //! What can be wrong with ensembles, their files and their training.
 
 use palpate_shared::Descriptor;
+use palpate_shared::format::Counted;
 
 /// What can be wrong with ensembles, their files and their training.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -141,6 +142,14 @@ pub enum EnsembleProblem {
     NoTouches {
         /// The object.
         object: String,
+    },
+    /// An object has no touch of those that were asked for.
+    #[error("no touch of {object} is evidence: {}", none_of(*counted))]
+    NothingCounts {
+        /// Its name.
+        object: String,
+        /// Which touches were to be evidence.
+        counted: Counted,
     },
     /// The descriptor needs the probe's pose.
     #[error("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())]
@@ -331,8 +340,17 @@ impl EnsembleProblem {
             Self::OneObject => "Capture at least two.".into(),
             Self::TooManyObjects { .. } => "Leave some objects out of the data set.".into(),
             Self::NoTouches { .. } => "Capture it again.".into(),
+            Self::NothingCounts { .. } => "Capture more approaches, or train on touches with any contact.".into(),
             Self::NoPose { .. } => "Capture the touches with their pose, or use the descriptor curvature.".into(),
             Self::Trainer { .. } => "Report this as a bug, with the data.".into(),
         }
+    }
+}
+
+fn none_of(counted: Counted) -> &'static str {
+    match counted {
+        Counted::Full => "none has three contacts",
+        Counted::Contacts => "none has a contact",
+        Counted::All => "none has what the descriptor needs",
     }
 }

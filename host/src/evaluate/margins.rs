@@ -5,7 +5,8 @@ use crate::ensemble::{Ensemble, feature_row};
 use crate::error::{EvaluateProblem, Result};
 use crate::random::{self, Purpose};
 use crate::touches::Dataset;
-use palpate_onboard::Model;
+use palpate_onboard::{Model, Refused};
+use palpate_shared::format::TrainedTouches;
 use palpate_shared::{Descriptor, Touch};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -28,13 +29,19 @@ pub struct Margins<'m> {
     /// The data set's objects.
     pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
+    hold_approaches: bool,
+    shares: [f64; 6],
 }
 
 /// The margins of one object's test touches.
 pub(super) struct Tested<'m> {
     /// The object's index in the model.
     pub(super) object: usize,
+    /// How many touches are evidence to the model.
     pub(super) touches: usize,
+    /// For each touch of the data set its position among those that are evidence, if it is.
+    pub(super) approaches: Vec<Option<u32>>,
+    /// Of the touches that are evidence.
     pub(super) values: Values<'m>,
 }
 
@@ -53,6 +60,13 @@ impl Candidate<'_> {
         }
     }
 
+    fn trained_touches(&self) -> TrainedTouches {
+        match self {
+            Self::Full(ensemble) => ensemble.trained_touches(),
+            Self::Compiled(model) => model.trained_touches(),
+        }
+    }
+
     fn objects(&self) -> Vec<String> {
         match self {
             Self::Full(ensemble) => ensemble.objects.clone(),
@@ -62,7 +76,8 @@ impl Candidate<'_> {
 }
 
 impl<'m> Margins<'m> {
-    /// Computes the margins of all touches, on all threads. Every object of the data set must be known to the model; the
+    /// Computes the margins of all touches that are evidence to the model, on all threads; the others cost an approach
+    /// and change nothing. Every object of the data set must be known to the model; the
     /// model may know more.
     ///
     /// # Errors
@@ -71,6 +86,7 @@ impl<'m> Margins<'m> {
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let objects = candidate.objects();
         let descriptor = candidate.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
+        let trained = candidate.trained_touches();
         let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
             return Err(EvaluateProblem::NoPose { descriptor }.into());
@@ -78,11 +94,20 @@ impl<'m> Margins<'m> {
         let tested = dataset.objects.iter().map(|touched| {
             let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: objects.clone() };
             let object = objects.iter().position(|name| *name == touched.name).ok_or_else(unknown)?;
-            let values = values(candidate, descriptor, &touched.touches, objects.len());
-            Ok(Tested { object, touches: touched.touches.len(), values })
+            let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
+            let evidence: Vec<&Touch> = touched.touches.iter().filter(is_evidence).collect();
+            let mut position = 0..;
+            let approach = |touch| if is_evidence(&touch) { position.next() } else { None };
+            Ok(Tested {
+                object,
+                touches: evidence.len(),
+                approaches: touched.touches.iter().map(approach).collect(),
+                values: values(candidate, descriptor, &evidence, objects.len()),
+            })
         });
         let tested = tested.collect::<Result<_>>()?;
-        Ok(Self { candidate, descriptor, objects, tested, tested_names: dataset.names() })
+        let (hold_approaches, shares) = (dataset.holds_approaches(), dataset.shares());
+        Ok(Self { candidate, descriptor, objects, tested, tested_names: dataset.names(), hold_approaches, shares })
     }
 
     /// The model's descriptor.
@@ -100,12 +125,32 @@ impl<'m> Margins<'m> {
         &self.tested_names
     }
 
-    /// The touches of all tested objects together.
+    /// The touches of all tested objects together that are evidence to the model.
     pub fn touch_count(&self) -> usize {
         self.tested.iter().map(|tested| tested.touches).sum()
     }
 
-    /// The fewest touches that a tested object has: the longest group that can be drawn from each.
+    /// Whether the data set holds approaches.
+    pub fn hold_approaches(&self) -> bool {
+        self.hold_approaches
+    }
+
+    /// The share of each contact pattern in the data set, in the order of the patterns' codes.
+    pub fn shares(&self) -> [f64; 6] {
+        self.shares
+    }
+
+    /// All touches of all tested objects together, evidence or not: approaches, if the data set holds those.
+    pub fn approach_count(&self) -> usize {
+        self.tested.iter().map(|tested| tested.approaches.len()).sum()
+    }
+
+    /// The fewest approaches that a tested object has.
+    pub fn fewest_approaches(&self) -> usize {
+        self.tested.iter().map(|tested| tested.approaches.len()).min().unwrap_or(0)
+    }
+
+    /// The fewest touches that are evidence that a tested object has: the longest group that can be drawn from each.
     pub fn fewest_touches(&self) -> usize {
         self.tested.iter().map(|tested| tested.touches).min().unwrap_or(0)
     }
@@ -171,14 +216,14 @@ pub(super) fn row(touch: usize, objects: usize) -> Range<usize> {
     touch * objects..(touch + 1) * objects
 }
 
-fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[Touch], objects: usize) -> Values<'m> {
+fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touch], objects: usize) -> Values<'m> {
     match candidate {
         Candidate::Full(ensemble) => {
-            let margins = |touch| ensemble.margins_of_features(&feature_row(descriptor, touch));
+            let margins = |touch: &&Touch| ensemble.margins_of_features(&feature_row(descriptor, touch));
             Values::Full(touches.par_iter().flat_map_iter(margins).collect())
         }
         Candidate::Compiled(model) => {
-            let margins = |touch| {
+            let margins = |touch: &&Touch| {
                 let mut margins = vec![0; objects];
                 model.margins(touch, &mut margins);
                 margins

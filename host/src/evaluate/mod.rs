@@ -4,7 +4,10 @@
 //! each group drawn at random without replacement from one object's touches:
 //!
 //! - [`Curve`]: how often the object with the most evidence is the right one, after any fixed number of touches;
-//! - [`Sequential`]: touches pushed one after the other until the recognizer is sure.
+//! - [`Sequential`]: touches pushed one after the other until the recognizer is sure;
+//! - [`Approaches`]: the same counted in approaches, on a data set that holds those.
+//!
+//! A touch that the model was not trained for is no evidence: it costs an approach, and nothing else.
 //!
 //! A compiled model is evaluated by the onboard crate, the lines of code that run on the chip; an ensemble in f32 margins
 //! and f64 evidence, with the same stopping rule. The same seed draws the same groups for every model.
@@ -29,6 +32,7 @@
 //! # }
 //! ```
 
+mod approaches;
 mod curve;
 mod estimate;
 mod full;
@@ -39,12 +43,14 @@ mod sequential;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
+pub use approaches::{ApproachSequential, Approaches};
 pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 
 use crate::error::{Error, Result};
+use palpate_shared::ContactPattern;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -59,6 +65,8 @@ pub const LEAST_GROUPS: u64 = 200;
 pub struct Settings {
     /// Numbers of touches after which accuracy is wanted.
     pub at: Vec<usize>,
+    /// Numbers of approaches after which accuracy is wanted, where the data set holds approaches.
+    pub at_approaches: Vec<usize>,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
     /// The recognizer stops when the posterior passes one less this.
@@ -71,7 +79,8 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { at: vec![5, 10, 20, 30, 60], groups: 1000, error_rate: 0.01, max_touches: None, seed: 1 }
+        let (at, at_approaches) = (vec![5, 10, 20, 30, 60], vec![10, 20, 60]);
+        Self { at, at_approaches, groups: 1000, error_rate: 0.01, max_touches: None, seed: 1 }
     }
 }
 
@@ -81,7 +90,7 @@ impl Default for Settings {
 pub struct Evaluation {
     /// The model's descriptor.
     pub descriptor: &'static str,
-    /// Test touches, of all objects together.
+    /// Test touches, of all objects together, that are evidence to the model.
     pub touches: usize,
     /// Groups drawn for each object.
     pub groups: usize,
@@ -93,6 +102,12 @@ pub struct Evaluation {
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
     /// What the recognizer does that stops by itself.
     pub sequential: Sequential,
+    /// The same counted in approaches, where the data set holds those; touches that are no evidence to the model cost an
+    /// approach and change nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub approaches: Option<Approaches>,
+    /// Share of each contact pattern among the touches of the data set, each object weighted equally.
+    pub patterns: BTreeMap<&'static str, f64>,
 }
 
 /// Evaluates a model on test touches.
@@ -106,12 +121,14 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     if settings.at.contains(&0) {
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
     }
-    let sequential = margins.sequential(&SequentialSettings {
+    let stopping = SequentialSettings {
         error_rate: settings.error_rate,
         max_touches: settings.max_touches,
         sequences: settings.groups,
         seed: settings.seed,
-    })?;
+    };
+    let sequential = margins.sequential(&stopping)?;
+    let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));
     let per_object = |(position, name): (usize, &String)| {
         let accuracy = |&touches: &usize| (touches, curve.object_accuracy(position, touches).value);
@@ -125,5 +142,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
         accuracy_standard_error: settings.at.iter().map(accuracy).map(|(at, e)| (at, e.standard_error)).collect(),
         per_object: margins.tested_names().iter().enumerate().map(per_object).collect(),
         sequential,
+        approaches: approaches.transpose()?,
+        patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
     })
 }

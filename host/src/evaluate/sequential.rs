@@ -56,8 +56,10 @@ pub struct Sequential {
 /// How a sequence ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outcome {
-    /// Touches used.
+    /// Touches used that were evidence.
     pub touches: usize,
+    /// Approaches used: these touches, and those in between that were no evidence.
+    pub approaches: usize,
     /// The object recognized (its index in the model), or none where the recognizer gave up.
     pub recognized: Option<usize>,
 }
@@ -69,15 +71,8 @@ impl Margins<'_> {
     /// [`Problem::Setting`](crate::error::Problem::Setting) if there are no sequences, or the error rate or the limit of
     /// touches is out of its range.
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
-        let SequentialSettings { error_rate, max_touches, sequences, seed } = *settings;
-        if sequences == 0 {
-            return Err(Error::setting("groups", 0, "at least 1"));
-        }
-        let own = match self.candidate {
-            Candidate::Full(_) => MAX_TOUCHES,
-            Candidate::Compiled(model) => Stopping::from_model(model).max_touches(),
-        };
-        let stopping = compile::stopping(error_rate, max_touches.unwrap_or(own))?;
+        let SequentialSettings { error_rate, sequences, seed, .. } = *settings;
+        let stopping = self.stopping(settings)?;
         let outcomes: Vec<Vec<Outcome>> =
             (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
         let shares = |hit: &dyn Fn(usize, &Outcome) -> bool| -> Vec<Estimate> {
@@ -112,27 +107,51 @@ impl Margins<'_> {
     }
 
     fn outcomes(&self, position: usize, stopping: Stopping, sequences: usize, seed: u64) -> Vec<Outcome> {
-        let tested = &self.tested[position];
-        let objects = self.objects().len();
-        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(tested.touches);
+        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(self.tested[position].touches);
         let run = |sequence| {
             let touches = self.draw(position, sequence, limit, seed).into_iter();
-            match &tested.values {
-                Values::Compiled(model, values) => {
-                    let rows = touches.map(|touch| &values[row(touch, objects)]);
-                    match objects {
-                        0..=16 => onboard::<16>(model, stopping, rows),
-                        17..=64 => onboard::<64>(model, stopping, rows),
-                        _ => onboard::<256>(model, stopping, rows),
-                    }
-                }
-                Values::Full(values) => {
-                    let mut recognizer = FullRecognizer::new(self.prior(), stopping);
-                    until_sure(touches.map(|touch| recognizer.push(&values[row(touch, objects)])))
-                }
-            }
+            // A position is below the number of a file's lines.
+            self.outcome(position, stopping, touches.map(|touch| u32::try_from(touch).ok()))
         };
         (0..sequences).into_par_iter().map(run).collect()
+    }
+
+    /// When to stop.
+    pub(super) fn stopping(&self, settings: &SequentialSettings) -> Result<Stopping> {
+        if settings.sequences == 0 {
+            return Err(Error::setting("groups", 0, "at least 1"));
+        }
+        let own = match self.candidate {
+            Candidate::Full(_) => MAX_TOUCHES,
+            Candidate::Compiled(model) => Stopping::from_model(model).max_touches(),
+        };
+        compile::stopping(settings.error_rate, settings.max_touches.unwrap_or(own))
+    }
+
+    /// How a sequence of approaches of a tested object ends: each the position of a touch among those that are evidence,
+    /// or none.
+    pub(super) fn outcome(
+        &self,
+        position: usize,
+        stopping: Stopping,
+        approaches: impl Iterator<Item = Option<u32>>,
+    ) -> Outcome {
+        let objects = self.objects().len();
+        match &self.tested[position].values {
+            Values::Compiled(model, values) => {
+                let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
+                match objects {
+                    0..=16 => onboard::<16>(model, stopping, rows),
+                    17..=64 => onboard::<64>(model, stopping, rows),
+                    _ => onboard::<256>(model, stopping, rows),
+                }
+            }
+            Values::Full(values) => {
+                let mut recognizer = FullRecognizer::new(self.prior(), stopping);
+                let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
+                until_sure(rows.map(|margins| margins.map(|margins| recognizer.push(margins))))
+            }
+        }
     }
 }
 
@@ -140,23 +159,29 @@ impl Margins<'_> {
 fn onboard<'r, const N: usize>(
     model: &Model<'_>,
     stopping: Stopping,
-    rows: impl Iterator<Item = &'r [i32]>,
+    rows: impl Iterator<Item = Option<&'r [i32]>>,
 ) -> Outcome {
     let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
         // Room was made for at least as many objects as the model has.
-        return Outcome { touches: 0, recognized: None };
+        return Outcome { touches: 0, approaches: 0, recognized: None };
     };
-    until_sure(rows.map(|margins| recognizer.push_margins(margins)))
+    until_sure(rows.map(|margins| margins.map(|margins| recognizer.push_margins(margins))))
 }
 
-/// Counts touches up to the first verdict.
-fn until_sure(verdicts: impl Iterator<Item = Verdict>) -> Outcome {
-    let mut touches = 0;
+/// Counts approaches, and touches that are evidence, up to the first verdict.
+fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
+    let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None };
     for verdict in verdicts {
-        touches += 1;
-        if let Verdict::Recognized { object, .. } = verdict {
-            return Outcome { touches, recognized: Some(object.into()) };
+        outcome.approaches += 1;
+        outcome.touches += usize::from(verdict.is_some());
+        match verdict {
+            None | Some(Verdict::Undecided) => {}
+            Some(Verdict::Recognized { object, .. }) => {
+                outcome.recognized = Some(object.into());
+                break;
+            }
+            Some(Verdict::Unknown) => break,
         }
     }
-    Outcome { touches, recognized: None }
+    outcome
 }

@@ -106,6 +106,25 @@ impl Dataset {
         self.origin.as_ref().map(|origin| &origin.probe)
     }
 
+    /// Whether every approach is kept, also those that were not full touches: what the origin says or, without one,
+    /// whether any touch is partial.
+    pub fn holds_approaches(&self) -> bool {
+        let any_partial = || self.objects.iter().flat_map(|object| &object.touches).any(|touch| !touch.is_full());
+        self.origin.as_ref().map_or_else(any_partial, |origin| origin.approaches)
+    }
+
+    /// The share of each contact pattern among all touches, in the order of the patterns' codes, each object weighted
+    /// equally.
+    pub fn shares(&self) -> [f64; 6] {
+        let mut shares = [0.0; 6];
+        for touches in self.objects.iter().map(|object| &object.touches) {
+            for touch in touches {
+                shares[usize::from(touch.pattern().code())] += 1.0 / (touches.len() * self.objects.len()) as f64;
+            }
+        }
+        shares
+    }
+
     /// The objects' names, sorted.
     pub fn names(&self) -> Vec<String> {
         self.objects.iter().map(|object| object.name.clone()).collect()

@@ -238,6 +238,7 @@ fn evaluation(settings: &Settings, touches: &Dataset) -> evaluate::Settings {
     let fewest = touches.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
     evaluate::Settings {
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),
+        at_approaches: [10, 20, 60].into_iter().filter(|&at| at <= fewest).collect(),
         groups: settings.groups,
         error_rate: settings.error_rate,
         max_touches: None,

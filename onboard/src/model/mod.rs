@@ -13,7 +13,7 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
+    HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
     take_section,
 };
 
@@ -137,6 +137,11 @@ impl<'a> Model<'a> {
     /// The noise in the training, if the model states it.
     pub fn noise(&self) -> Option<TrainedNoise> {
         TrainedNoise::from_bytes(optional::find(self.sections.optional, Tag::Noise))
+    }
+
+    /// How often each contact pattern occurred among the approaches of the training, if the model states it.
+    pub fn pattern_shares(&self) -> Option<PatternShares> {
+        PatternShares::from_bytes(optional::find(self.sections.optional, Tag::PatternShares))
     }
 
     /// The optional sections, in the order of their tags; also those that this crate does not know.

@@ -2,6 +2,7 @@
 
 use super::Model;
 use core::fmt;
+use palpate_shared::format::TrainedTouches;
 use palpate_shared::{ContactPattern, Touch};
 
 /// Why a touch is not evidence. It was not counted, and nothing has changed.
@@ -59,11 +60,23 @@ impl Model<'_> {
     /// # Errors
     /// [`Refused`] says why it is not.
     pub fn accepts(&self, touch: &Touch) -> Result<(), Refused> {
-        let trained = self.trained_touches();
+        match self.descriptor() {
+            None => Err(Refused::NeedsFeatures),
+            Some(_) => Refused::check(&self.trained_touches(), touch),
+        }
+    }
+}
+
+impl Refused {
+    /// Whether a model that was trained on such touches takes this one as evidence.
+    ///
+    /// Cost: about 30 instructions.
+    ///
+    /// # Errors
+    /// [`Refused`] says why it does not.
+    pub fn check(trained: &TrainedTouches, touch: &Touch) -> Result<(), Self> {
         let pattern = touch.pattern();
-        if self.descriptor().is_none() {
-            Err(Refused::NeedsFeatures)
-        } else if !trained.patterns.contains(pattern) {
+        if !trained.patterns.contains(pattern) {
             Err(Refused::Pattern(pattern))
         } else if touch.spread() > trained.largest_spread {
             Err(Refused::Spread)

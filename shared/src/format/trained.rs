@@ -24,6 +24,8 @@ pub enum Tag {
     Plan,
     /// Reserved: the features' names, for models over rows of features.
     FeatureNames,
+    /// [`PatternShares`].
+    PatternShares,
 }
 
 impl Tag {
@@ -38,6 +40,7 @@ impl Tag {
             Self::FitTest => 6,
             Self::Plan => 7,
             Self::FeatureNames => 8,
+            Self::PatternShares => 9,
         }
     }
 }
@@ -170,6 +173,31 @@ impl TrainedNoise {
     }
 }
 
+/// How often each contact pattern occurred among the approaches of the training: 12 bytes. Nothing on the chip uses it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PatternShares(
+    /// For each pattern, in the order of the codes, its share in units of 1/65535.
+    pub [u16; 6],
+);
+
+impl PatternShares {
+    /// Bytes of the section.
+    pub const LENGTH: usize = 12;
+
+    /// The section's content.
+    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
+        let mut bytes = [0; Self::LENGTH];
+        bytes.iter_mut().zip(self.0.into_iter().flat_map(u16::to_le_bytes)).for_each(|(to, from)| *to = from);
+        bytes
+    }
+
+    /// Reads a section; `None` if it is too short. Bytes after those that are known are ignored.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (shares, _) = bytes.as_chunks::<2>().0.split_first_chunk::<6>()?;
+        Some(Self(shares.map(u16::from_le_bytes)))
+    }
+}
+
 /// Everything that a model states about its training, to be written into it.
 ///
 /// ```
@@ -197,6 +225,8 @@ pub struct Trained {
     pub touches: Option<TrainedTouches>,
     /// The noise.
     pub noise: Option<TrainedNoise>,
+    /// The shares of the contact patterns.
+    pub shares: Option<PatternShares>,
 }
 
 impl Trained {
@@ -212,6 +242,9 @@ impl Trained {
         }
         if let Some(noise) = self.noise {
             write_section(Tag::Noise, false, &noise.to_bytes(), &mut put);
+        }
+        if let Some(shares) = self.shares {
+            write_section(Tag::PatternShares, false, &shares.to_bytes(), &mut put);
         }
     }
 }
@@ -271,15 +304,19 @@ mod tests {
 
     #[test]
     fn sections_are_read_back_as_written() {
-        let trained = Trained { probe: Some(PROBE), touches: Some(TOUCHES), noise: Some(NOISE) };
+        let trained = Trained { probe: Some(PROBE), touches: Some(TOUCHES), noise: Some(NOISE), shares: None };
         let mut bytes = Vec::new();
         trained.write(|part| bytes.extend_from_slice(part));
         write_section(Tag::FeatureNames, false, b"seven b", &mut |part| bytes.extend_from_slice(part));
+        let shares = PatternShares([9, 8, 7, 6, 5, 65_530]);
+        Trained { shares: Some(shares), ..Trained::default() }.write(|part| bytes.extend_from_slice(part));
         let mut rest = bytes.as_slice();
         let sections: Vec<Section> = core::iter::from_fn(|| take_section(&mut rest)).collect();
         assert!(rest.is_empty());
         let heads: Vec<_> = sections.iter().map(|s| (s.tag, s.must_understand, s.content.len())).collect();
-        assert_eq!(heads, [(1, false, 16), (2, true, 8), (3, false, 16), (8, false, 7)]);
+        assert_eq!(heads, [(1, false, 16), (2, true, 8), (3, false, 16), (8, false, 7), (9, false, 12)]);
+        assert_eq!(PatternShares::from_bytes(sections[4].content), Some(shares));
+        assert_eq!(PatternShares::from_bytes(&sections[4].content[..11]), None);
         assert_eq!(TrainedProbe::from_bytes(sections[0].content), Some(PROBE));
         assert_eq!(TrainedTouches::from_bytes(sections[1].content), Some(TOUCHES));
         assert_eq!(TrainedNoise::from_bytes(sections[2].content), Some(NOISE));

@@ -9,7 +9,7 @@
 //! once per touch instead of once.
 
 use crate::ensemble::check::check_names;
-use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Tree, feature_row};
+use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Trained, Tree, feature_row};
 use crate::error::{EnsembleProblem, Error, Result};
 use crate::progress::Progress;
 use crate::touches::Dataset;
@@ -19,7 +19,8 @@ use hessboost::data::DMatrix;
 use hessboost::model::BoostedModel;
 use hessboost::objective::Multiclass;
 use hessboost::prelude::{HessboostError, Objective, Trainer, TrainingParams, TreeMethod};
-use palpate_shared::{Descriptor, Touch};
+use palpate_shared::format::{Counted, TrainedTouches};
+use palpate_shared::{Descriptor, Patterns, Touch};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
@@ -43,8 +44,12 @@ pub enum Engine {
 /// How an ensemble is trained. Parameters have XGBoost's names and meanings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Which features a touch is turned into.
+    /// Which features a touch is turned into. With partial touches its form for those is used
+    /// ([`Descriptor::for_contacts`]), without them its form for full touches.
     pub descriptor: Descriptor,
+    /// Which touches are trained on, and so evidence; `None` takes those with a contact from a data set of approaches,
+    /// full ones from others.
+    pub counted: Option<Counted>,
     /// Whether a leaf holds one value for each object (one tree per round) or one value (one tree per object and round).
     pub multi_output: bool,
     /// Boosting rounds.
@@ -81,6 +86,7 @@ impl Settings {
     pub fn paper() -> Self {
         Self {
             descriptor: Descriptor::Times,
+            counted: Some(Counted::Full),
             multi_output: false,
             rounds: 100,
             depth: 6,
@@ -102,12 +108,26 @@ impl Settings {
     pub fn compact() -> Self {
         Self {
             descriptor: Descriptor::Curvature,
+            counted: None,
             multi_output: true,
             rounds: 30,
             min_child_weight: 30.0,
             leaf_bits: Some(16),
             ..Self::paper()
         }
+    }
+
+    /// The settings that [`train`] uses for `dataset`: which touches are evidence is decided, and the descriptor is the
+    /// form for those.
+    #[must_use]
+    pub fn resolved(&self, dataset: &Dataset) -> Self {
+        let usual = if dataset.holds_approaches() { Counted::Contacts } else { Counted::Full };
+        let counted = self.counted.unwrap_or(usual);
+        let descriptor = match counted {
+            Counted::Full => self.descriptor.for_full_touches(),
+            Counted::Contacts | Counted::All => self.descriptor.for_contacts().unwrap_or(self.descriptor),
+        };
+        Self { counted: Some(counted), descriptor, ..self.clone() }
     }
 }
 
@@ -119,9 +139,11 @@ impl Settings {
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
+    let settings = &settings.resolved(dataset);
     check(dataset, settings.descriptor)?;
     let parameters = parameters(settings, dataset.objects.len())?;
-    let rows = Rows::new(dataset, settings);
+    let evidence = Evidence::new(dataset, settings)?;
+    let rows = Rows::new(&evidence, settings);
     let mut ensemble = match settings.trainer {
         Engine::Hessboost => with_hessboost(rows, settings, &parameters, dataset.names(), progress)?,
         Engine::Xgboost => with_xgboost(&rows, settings, dataset.names(), progress)?,
@@ -129,7 +151,8 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     if let Some(bits) = settings.leaf_bits {
         round_leaves(&mut ensemble, bits);
     }
-    ensemble.origin = Origin::new(dataset, settings.probe);
+    let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
+    ensemble.origin = Origin::new(dataset, settings.probe, Some(trained));
     Ok(ensemble)
 }
 
@@ -269,6 +292,53 @@ fn refused(error: &HessboostError) -> Error {
     EnsembleProblem::Trainer { trainer: "hessboost", detail: error.to_string() }.into()
 }
 
+/// The touches of a data set that are evidence, noise added.
+struct Evidence<'d> {
+    objects: Vec<Cow<'d, [Touch]>>,
+    counted: Counted,
+    needs_pose: bool,
+}
+
+impl<'d> Evidence<'d> {
+    /// The touches that [`Settings::counted`] names, and that have a pose if the descriptor needs one.
+    ///
+    /// # Errors
+    /// [`EnsembleProblem::NothingCounts`] if an object has none.
+    fn new(dataset: &'d Dataset, settings: &Settings) -> Result<Self> {
+        let counted = settings.counted.unwrap_or(Counted::Full);
+        let needs_pose = settings.descriptor.needs_pose();
+        let counts = |touch: &Touch| {
+            counted.patterns().contains(touch.pattern()) && (touch.pose().is_some() || !needs_pose)
+        };
+        let objects = dataset.objects.iter().map(|object| {
+            let mut touches: Cow<'_, [Touch]> = if settings.noise > 0.0 {
+                noise::noisy(&object.name, &object.touches, settings.noise, settings.seed).into()
+            } else {
+                (&object.touches[..]).into()
+            };
+            if !touches.iter().all(counts) {
+                touches.to_mut().retain(counts);
+            }
+            match touches.len() {
+                0 => Err(EnsembleProblem::NothingCounts { object: object.name.clone(), counted }.into()),
+                _ => Ok(touches),
+            }
+        });
+        Ok(Self { objects: objects.collect::<Result<_>>()?, counted, needs_pose })
+    }
+
+    /// What the ensemble states of them.
+    fn trained(&self) -> TrainedTouches {
+        let touches = || self.objects.iter().flat_map(|touches| touches.iter());
+        TrainedTouches {
+            patterns: touches().map(Touch::pattern).collect::<Patterns>(),
+            counted: self.counted,
+            needs_pose: self.needs_pose,
+            largest_spread: touches().map(Touch::spread).max().unwrap_or(u32::MAX),
+        }
+    }
+}
+
 /// The training data as a trainer wants it: one row of features per touch, its object's position as label.
 pub(crate) struct Rows {
     pub(crate) features: Vec<f32>,
@@ -279,15 +349,11 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    pub(crate) fn new(dataset: &Dataset, settings: &Settings) -> Self {
-        let objects = &dataset.objects;
+    fn new(evidence: &Evidence<'_>, settings: &Settings) -> Self {
+        let objects = &evidence.objects;
+        let total = objects.iter().map(|touches| touches.len()).sum();
         let descriptor = settings.descriptor;
-        let features = objects.iter().flat_map(|object| {
-            let touches: Cow<'_, [Touch]> = if settings.noise > 0.0 {
-                noise::noisy(&object.name, &object.touches, settings.noise, settings.seed).into()
-            } else {
-                (&object.touches[..]).into()
-            };
+        let features = objects.iter().flat_map(|touches| {
             let rows: Vec<Vec<f32>> = touches.par_iter().map(|touch| feature_row(descriptor, touch)).collect();
             rows.into_iter().flatten()
         });
@@ -296,11 +362,11 @@ impl Rows {
             round_down(&mut features, column, descriptor.feature_count(), bins);
         }
         let per_touch = |value: fn(usize, usize, usize) -> f32| {
-            let (classes, total) = (objects.len(), dataset.len());
+            let classes = objects.len();
             let share = |(label, count)| std::iter::repeat_n(value(label, count * classes, total), count);
-            objects.iter().map(|object| object.touches.len()).enumerate().flat_map(share).collect::<Vec<f32>>()
+            objects.iter().map(|touches| touches.len()).enumerate().flat_map(share).collect::<Vec<f32>>()
         };
-        let equal = objects.windows(2).all(|pair| pair[0].touches.len() == pair[1].touches.len());
+        let equal = objects.windows(2).all(|pair| pair[0].len() == pair[1].len());
         Self {
             features,
             labels: per_touch(|label, _, _| label as f32),

@@ -11,7 +11,7 @@ fn quick() -> Settings {
 fn an_ensemble_predicts_what_its_trainer_predicts_bit_for_bit() {
     let dataset = synthetic::dataset(&[400, 300, 500], 1);
     for settings in [quick(), Settings { rounds: 5, ..Settings::paper() }] {
-        let rows = Rows::new(&dataset, &settings);
+        let rows = Rows::new(&Evidence::new(&dataset, &settings).unwrap(), &settings);
         let features = rows.features.clone();
         let data = rows.matrix().unwrap();
         let model = hessboost::training::train(&parameters(&settings, 3).unwrap(), &data, settings.rounds).unwrap();

@@ -72,6 +72,10 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         let expected = "a JSON object of radius, spacing, speed, tilt and length";
         parsed("palpate_probe", expected, text)
     });
+    let trained = attributes.get("palpate_trained").map(|text| {
+        let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
+        parsed("palpate_trained", expected, text)
+    });
     let touches = attributes.get("palpate_touches").map(|text| {
         let (name, expected) = ("palpate_touches", "a JSON object of hexadecimal numbers");
         let touches: BTreeMap<String, String> = parsed(name, expected, text)?;
@@ -81,7 +85,7 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         };
         touches.into_iter().map(number).collect()
     });
-    Ok(Origin { probe: probe.transpose()?, touches: touches.transpose()?.unwrap_or_default() })
+    Ok(Origin { probe: probe.transpose()?, trained: trained.transpose()?, touches: touches.transpose()?.unwrap_or_default() })
 }
 
 fn parsed<'t, T: serde::Deserialize<'t>>(

@@ -1,0 +1,217 @@
+//! Counted in approaches, which is what a robot pays for.
+
+use super::estimate::Estimate;
+use super::margins::{Margins, best};
+use super::sequential::{Outcome, SequentialSettings};
+use crate::error::{Error, Result};
+use crate::random::{self, Purpose};
+use rand::RngExt;
+use rand::rngs::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::{BTreeMap, HashMap};
+
+/// What a model does with approaches, drawn at random from those of an object. A touch that is no evidence to the model
+/// costs an approach and changes nothing. Each object is weighted equally.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Approaches {
+    /// Share of approaches that are evidence to the model.
+    pub used: f64,
+    /// The same for each object.
+    pub used_per_object: BTreeMap<String, f64>,
+    /// Accuracy after a number of approaches. A model that has no evidence yet has recognized nothing.
+    pub accuracy: BTreeMap<usize, f64>,
+    /// Standard error of [`Approaches::accuracy`].
+    pub accuracy_standard_error: BTreeMap<usize, f64>,
+    /// The same for each object.
+    pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
+    /// What the recognizer does that stops by itself.
+    pub sequential: ApproachSequential,
+}
+
+/// What a recognizer does with approaches that stops by itself. Each object is weighted equally.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ApproachSequential {
+    /// What it was asked to stay below.
+    pub error_rate: f64,
+    /// Touches that are evidence, after which it gave up.
+    pub max_touches: u32,
+    /// Approaches used on average, also where it gave up.
+    pub mean_approaches: f64,
+    /// Standard error of [`ApproachSequential::mean_approaches`].
+    pub mean_approaches_standard_error: f64,
+    /// Touches used on average that were evidence.
+    pub mean_touches: f64,
+    /// Share of sequences with a wrong verdict.
+    pub error: f64,
+    /// Standard error of [`ApproachSequential::error`].
+    pub error_standard_error: f64,
+    /// Share of sequences without a verdict.
+    pub undecided: f64,
+    /// Approaches used on average, for each object.
+    pub per_object: BTreeMap<String, f64>,
+    /// Share of sequences with a wrong verdict, for each object.
+    pub error_per_object: BTreeMap<String, f64>,
+    /// Share of sequences without a verdict, for each object.
+    pub undecided_per_object: BTreeMap<String, f64>,
+}
+
+impl Margins<'_> {
+    /// Accuracy after each of `at` approaches, over groups drawn for each object, and what a recognizer does that stops by
+    /// itself, over as many sequences.
+    ///
+    /// # Errors
+    /// [`Problem::Setting`](crate::error::Problem::Setting): `at` if an object has fewer approaches or a number is 0, and
+    /// as [`Margins::sequential`].
+    pub fn approaches(&self, at: &[usize], settings: &SequentialSettings) -> Result<Approaches> {
+        let stopping = self.stopping(settings)?;
+        let (groups, seed) = (settings.sequences, settings.seed);
+        let most = at.iter().copied().max().unwrap_or(0);
+        if at.contains(&0) {
+            return Err(Error::setting("at", 0, "numbers of approaches of at least 1"));
+        }
+        let few = |(tested, _): &(&super::margins::Tested<'_>, &String)| tested.approaches.len() < most;
+        if let Some((tested, name)) = self.tested.iter().zip(self.tested_names()).find(few) {
+            let allowed = format!("fewer approaches, or capture more: {name} has only {}", tested.approaches.len());
+            return Err(Error::setting("at", most, allowed));
+        }
+        let names = || self.tested_names().iter().cloned();
+        let positions = 0..self.tested.len();
+        let correct: Vec<Vec<Estimate>> =
+            positions.clone().map(|position| self.after(position, at, most, groups, seed)).collect();
+        let accuracy = |index: usize| Estimate::mean_of(correct.iter().map(|object| object[index]));
+        let by_number = |value: &dyn Fn(usize) -> f64| -> BTreeMap<usize, f64> {
+            at.iter().enumerate().map(|(index, &at)| (at, value(index))).collect()
+        };
+        let used = self.tested.iter().map(|tested| tested.touches as f64 / tested.approaches.len().max(1) as f64);
+        let used: Vec<f64> = used.collect();
+        let outcomes: Vec<Vec<Outcome>> = positions
+            .map(|position| {
+                let all = self.tested[position].approaches.len();
+                let run = |sequence| {
+                    let draws = Draws::new(all, self.tested_names()[position].as_str(), sequence, seed);
+                    self.outcome(position, stopping, draws.map(|draw| self.tested[position].approaches[draw]))
+                };
+                (0..groups).into_par_iter().map(run).collect()
+            })
+            .collect();
+        Ok(Approaches {
+            used: used.iter().sum::<f64>() / used.len().max(1) as f64,
+            used_per_object: names().zip(used).collect(),
+            accuracy: by_number(&|index| accuracy(index).value),
+            accuracy_standard_error: by_number(&|index| accuracy(index).standard_error),
+            per_object: names().zip(&correct).map(|(name, of)| (name, by_number(&|index| of[index].value))).collect(),
+            sequential: self.summary(&outcomes, settings.error_rate, stopping.max_touches()),
+        })
+    }
+
+    /// The share of groups that are recognized after each of `at` approaches.
+    fn after(&self, position: usize, at: &[usize], most: usize, groups: usize, seed: u64) -> Vec<Estimate> {
+        let tested = &self.tested[position];
+        let group = |mut correct: Vec<usize>, group| {
+            let (mut evidence, mut is_evidence) = (self.prior(), false);
+            let draws = Draws::new(tested.approaches.len(), &self.tested_names()[position], group, seed);
+            for (index, draw) in draws.take(most).enumerate() {
+                if let Some(touch) = tested.approaches[draw] {
+                    tested.add(touch as usize, &mut evidence);
+                    is_evidence = true;
+                }
+                for (count, _) in correct.iter_mut().zip(at).filter(|(_, at)| **at == index + 1) {
+                    *count += usize::from(is_evidence && best(&evidence) == tested.object);
+                }
+            }
+            correct
+        };
+        let none = || vec![0; at.len()];
+        let add = |a: Vec<usize>, b: Vec<usize>| a.iter().zip(b).map(|(a, b)| a + b).collect();
+        let correct: Vec<usize> = (0..groups).into_par_iter().fold(none, group).reduce(none, add);
+        correct.into_iter().map(|correct| Estimate::share(correct, groups)).collect()
+    }
+
+    fn summary(&self, outcomes: &[Vec<Outcome>], error_rate: f64, max_touches: u32) -> ApproachSequential {
+        let mean = |number: &dyn Fn(&Outcome) -> f64| -> Vec<Estimate> {
+            outcomes.iter().map(|outcomes| Estimate::mean(outcomes.iter().map(number))).collect()
+        };
+        let share = |hit: &dyn Fn(usize, &Outcome) -> bool| -> Vec<Estimate> {
+            let share = |(position, outcomes): (usize, &Vec<Outcome>)| {
+                Estimate::share(outcomes.iter().filter(|outcome| hit(position, outcome)).count(), outcomes.len())
+            };
+            outcomes.iter().enumerate().map(share).collect()
+        };
+        let right = |position: usize| self.tested[position].object;
+        let approaches = mean(&|outcome| outcome.approaches as f64);
+        let touches = mean(&|outcome| outcome.touches as f64);
+        let errors = share(&|position, outcome| outcome.recognized.is_some_and(|object| object != right(position)));
+        let undecideds = share(&|_, outcome| outcome.recognized.is_none());
+        let per_object = |estimates: &[Estimate]| {
+            self.tested_names().iter().cloned().zip(estimates.iter().map(|estimate| estimate.value)).collect()
+        };
+        let [mean_approaches, mean_touches, error, undecided] = [&approaches, &touches, &errors, &undecideds]
+            .map(|estimates| Estimate::mean_of(estimates.iter().copied()));
+        ApproachSequential {
+            error_rate,
+            max_touches,
+            mean_approaches: mean_approaches.value,
+            mean_approaches_standard_error: mean_approaches.standard_error,
+            mean_touches: mean_touches.value,
+            error: error.value,
+            error_standard_error: error.standard_error,
+            undecided: undecided.value,
+            per_object: per_object(&approaches),
+            error_per_object: per_object(&errors),
+            undecided_per_object: per_object(&undecideds),
+        }
+    }
+}
+
+/// Numbers below a limit in random order, each once, drawn only as far as they are asked for: Fisher–Yates with the
+/// places that were swapped in a map.
+struct Draws {
+    moved: HashMap<usize, usize>,
+    next: usize,
+    all: usize,
+    random: ChaCha8Rng,
+}
+
+impl Draws {
+    fn new(all: usize, name: &str, group: usize, seed: u64) -> Self {
+        let group = u64::try_from(group).unwrap_or(u64::MAX);
+        let random = random::generator(seed, Purpose::Approaches, name, group);
+        Self { moved: HashMap::new(), next: 0, all, random }
+    }
+}
+
+impl Iterator for Draws {
+    type Item = usize;
+
+    fn next(&mut self) -> Option<usize> {
+        if self.next >= self.all {
+            return None;
+        }
+        let chosen = self.random.random_range(self.next..self.all);
+        let at_next = self.moved.remove(&self.next).unwrap_or(self.next);
+        let drawn = if chosen == self.next { at_next } else { self.moved.insert(chosen, at_next).unwrap_or(chosen) };
+        self.next += 1;
+        Some(drawn)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn draws_are_a_permutation_and_any_order_is_as_likely() {
+        let mut firsts = [0; 5];
+        for group in 0..5_000 {
+            let mut drawn: Vec<usize> = Draws::new(5, "cup", group, 1).collect();
+            firsts[drawn[0]] += 1;
+            firsts[drawn[4]] += 1;
+            drawn.sort_unstable();
+            assert_eq!(drawn, [0, 1, 2, 3, 4]);
+        }
+        // 2,000 expected, with a standard deviation of 40.
+        assert!(firsts.iter().all(|&count| (1_800..2_200).contains(&count)), "{firsts:?}");
+        assert_eq!(Draws::new(0, "cup", 0, 1).count(), 0);
+    }
+}
