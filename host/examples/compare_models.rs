@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => example_touches()?,
     };
     let split = folds::split(&dataset, 0.25, 1)?;
-    let settings = Settings { at: vec![1, 5, 10, 20], groups: 500, error_rate: 0.01, max_touches: None, seed: 1 };
+    let settings = Settings { at: vec![1, 5, 10, 20], groups: 500, ..Settings::default() };
     println!("{:10} {:>8} {:>28}   stops after", "method", "bytes", "accuracy at 1, 5, 10, 20");
     for (name, preset) in [("published", train::Settings::paper()), ("compact", train::Settings::compact())] {
         let ensemble = train(&split.train, &preset, &())?;
