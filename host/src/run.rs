@@ -5,7 +5,7 @@ use crate::compile::{self, Compiled};
 use crate::ensemble::{StatedProbe, train};
 use crate::error::{ReportProblem, Result};
 use crate::evaluate::parity::{self, Parity};
-use crate::evaluate::{self, Candidate, Curve, Evaluation, Margins};
+use crate::evaluate::{self, Approaches, Candidate, Curve, Evaluation, Margins, SequentialSettings};
 use crate::mesh::Object;
 use crate::output;
 use crate::page::document::Picture;
@@ -16,8 +16,9 @@ use crate::report::results;
 use crate::report::run_page::{RunMethod, RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use crate::touches::folds::{self, Split};
-use crate::touches::{Dataset, Listing};
+use crate::touches::{Dataset, Listing, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_shared::format::Counted;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -28,6 +29,8 @@ use std::time::Instant;
 const AT: [usize; 6] = [1, 5, 10, 20, 30, 60];
 /// Those of them that the table shows.
 const TABLE_AT: [usize; 2] = [10, 30];
+/// Numbers of approaches after which accuracy is reported.
+const AT_APPROACHES: [usize; 3] = [10, 20, 60];
 /// The most touches that accuracy is followed to.
 const MOST: usize = 200;
 /// Random sequences whose verdicts are compared with the full model's.
@@ -35,8 +38,9 @@ const PARITY_SEQUENCES: usize = 10_000;
 /// The width and height of a picture in the page, in pixels.
 const PICTURE: u32 = 160;
 
-/// Files in the output directory besides `data/` and `summary.json`.
-const FILES: [&str; 5] = ["paper.json", "paper.palpate", "ensemble.json", "model.palpate", "report.html"];
+/// Files in the output directory besides `data/`, `approaches/` and `summary.json`.
+const FILES: [&str; 7] =
+    ["paper.json", "paper.palpate", "full.json", "full.palpate", "ensemble.json", "model.palpate", "report.html"];
 
 /// How to run.
 #[derive(Clone, Debug)]
@@ -47,6 +51,9 @@ pub struct Settings {
     pub replace: bool,
     /// How objects are touched.
     pub capture: capture::Settings,
+    /// How many approaches of each object are captured besides, each kept whatever it touched: the compact method is
+    /// trained on them, and all methods are tested on them.
+    pub approaches: u64,
     /// The share of touches that is kept from training, to test on.
     pub test_share: f64,
     /// Groups, and also sequences, drawn for each object.
@@ -63,6 +70,7 @@ impl Default for Settings {
             sources: vec!["builtin".into()],
             replace: false,
             capture: capture::Settings::default(),
+            approaches: 63_000,
             test_share: 0.1,
             groups: 1000,
             error_rate: 0.01,
@@ -82,15 +90,21 @@ pub struct Summary {
     pub command: String,
     /// Seed of all that is random.
     pub seed: u64,
-    /// The capture.
+    /// The capture of full touches.
     pub capture: capture::Summary,
-    /// Touches trained on and tested on, of all objects together.
+    /// The capture of approaches.
+    pub approach_capture: capture::Summary,
+    /// Full touches trained on and tested on, of all objects together.
     pub touches: Touches,
-    /// The published method.
+    /// The same of approaches.
+    pub approaches: Touches,
+    /// The published method: contact times of full touches.
     pub paper: Method,
-    /// The compact one.
+    /// The compact one on full touches: it waits for them.
+    pub full: Method,
+    /// The compact one on every approach with a contact: the model to use.
     pub ours: Method,
-    /// One sequence of test touches per object, as the compiled compact model recognizes it.
+    /// One sequence of test approaches per object, as the model to use recognizes it.
     pub recognized: Vec<Recognition>,
     /// The whole run.
     pub seconds: f64,
@@ -130,21 +144,24 @@ pub struct Method {
     pub parity: Parity,
 }
 
-/// A sequence of touches of one object, pushed until the verdict.
+/// A sequence of approaches to one object, pushed until the verdict.
 #[derive(Clone, Debug, Serialize)]
 pub struct Recognition {
     /// The object that was touched.
     pub touched: String,
     /// The object that was recognized; null if the recognizer stayed undecided.
     pub recognized: Option<String>,
-    /// Touches used.
+    /// Touches used that were evidence.
     pub touches: u32,
+    /// Approaches used.
+    pub approaches: usize,
     /// Posterior of the object with the most evidence.
     pub posterior: f64,
 }
 
-/// Runs all of it on `objects` and writes into `out`: `data/` (the touches), `paper.json`, `paper.palpate`,
-/// `ensemble.json`, `model.palpate`, `report.html` and, last, `summary.json`.
+/// Runs all of it on `objects` and writes into `out`: `data/` (full touches), `approaches/`, `paper.json`,
+/// `paper.palpate`, `full.json`, `full.palpate`, `ensemble.json`, `model.palpate`, `report.html` and, last,
+/// `summary.json`.
 ///
 /// # Errors
 /// [`ReportProblem::OtherResults`] if `out` holds results that were made from something else, unless
@@ -165,10 +182,25 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
     let seed = settings.capture.origin.seed;
     let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
+    // Of another seed, so that no test approach is one of the full touches that the others were trained on.
+    let origin = &settings.capture.origin;
+    let origin =
+        Origin { touches: settings.approaches, approaches: true, seed: seed.wrapping_add(1), ..origin.clone() };
+    let directory = out.join("approaches");
+    let force = settings.capture.force || settings.replace || Listing::read(&directory)?.as_ref().is_some_and(is_same);
+    let approach_settings = capture::Settings { origin, force, ..settings.capture.clone() };
+    let approached = capture::capture(objects, &approach_settings, &directory, progress)?;
+    let approaches = folds::split(&Dataset::read(&directory)?, settings.test_share, seed)?;
     let probe = Some(StatedProbe { probe: settings.capture.origin.probe, length: settings.capture.origin.length });
-    let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);
-    let paper = method("paper", "paper", train::Settings { seed, probe, ..train::Settings::paper() })?;
-    let ours = method("ours", "ensemble", train::Settings { seed, probe, ..train::Settings::compact() })?;
+    let method =
+        |name, files, preset, split| Trial::new(name, files, preset, split, &approaches.test, settings, out, progress);
+    let compact = train::Settings { seed, probe, ..train::Settings::compact() };
+    let full = train::Settings { counted: Some(Counted::Full), ..compact.clone() };
+    let contacts = train::Settings { counted: Some(Counted::Contacts), ..compact };
+    let paper =
+        method("the paper's method", "paper", train::Settings { seed, probe, ..train::Settings::paper() }, &split)?;
+    let full = method("ours on full touches", "full", full, &split)?;
+    let ours = method("ours on every contact", "ensemble", contacts, &approaches)?;
     let model = compile::open(&ours.compiled.bytes)?;
     let summary = Summary {
         made_from,
@@ -176,16 +208,28 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         command: settings.command.clone(),
         seed,
         capture: captured,
+        approach_capture: approached,
         touches: Touches { train: split.train.len(), test: split.test.len() },
-        recognized: split.test.objects.iter().map(|o| recognize(&model, &o.name, &o.touches)).collect::<Result<_>>()?,
+        approaches: Touches { train: approaches.train.len(), test: approaches.test.len() },
+        recognized: approaches
+            .test
+            .objects
+            .iter()
+            .map(|o| recognize(&model, &o.name, &o.touches))
+            .collect::<Result<_>>()?,
         paper: paper.method.clone(),
+        full: full.method.clone(),
         ours: ours.method.clone(),
         seconds: began.elapsed().as_secs_f64(),
     };
     let page = run_page(&RunResults {
         command: settings.command.clone(),
         pictures: pictures(objects, &summary.capture),
-        methods: vec![shown("paper", &paper), shown("ours", &ours)],
+        methods: vec![
+            shown("paper", &paper),
+            shown("ours on full touches", &full),
+            shown("ours on every contact", &ours),
+        ],
         table: table(&summary),
         note: note(&summary),
         facts: facts(&summary),
@@ -202,6 +246,7 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
         "sources": settings.sources,
         "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
         "capture": results::json("capture's settings", &settings.capture.origin)?,
+        "approaches": settings.approaches,
         "test_share": settings.test_share,
         "groups": settings.groups,
         "error_rate": settings.error_rate,
@@ -223,6 +268,7 @@ impl Trial {
         stem: &str,
         preset: train::Settings,
         split: &Split,
+        approaches: &Dataset,
         settings: &Settings,
         out: &Path,
         progress: &dyn Progress,
@@ -240,7 +286,7 @@ impl Trial {
         let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
-        let evaluation = evaluate::evaluate(
+        let mut evaluation = evaluate::evaluate(
             &margins,
             &evaluate::Settings {
                 at: AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS).collect(),
@@ -251,6 +297,12 @@ impl Trial {
                 seed,
             },
         )?;
+        let approached = Margins::new(Candidate::Compiled(&model), approaches)?;
+        let fewest_approaches = approached.fewest_approaches();
+        let at: Vec<usize> = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect();
+        let stopping =
+            SequentialSettings { error_rate: settings.error_rate, max_touches: None, sequences: settings.groups, seed };
+        evaluation.approaches = Some(approached.approaches(&at, &stopping)?);
         let curve = margins.curve(MOST.min(largest_group(fewest)), settings.groups, seed)?;
         let parity = parity::parity(&ensemble, &model, &split.test, PARITY_SEQUENCES, seed, progress)?;
         let method = Method {
@@ -276,12 +328,16 @@ fn model_path(out: &Path, stem: &str) -> PathBuf {
 fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]) -> Result<Recognition> {
     let mut recognizer = Recognizer::<256>::new(model, Stopping::from_model(model))
         .map_err(|_| ReportProblem::TooManyObjects { objects: model.object_count() })?;
-    let verdict =
-        touches.iter().filter_map(|touch| recognizer.push(touch).ok()).find(|verdict| *verdict != Verdict::Undecided);
+    let mut approaches = 0;
+    let mut push = |touch| {
+        approaches += 1;
+        recognizer.push(touch).ok().filter(|verdict| *verdict != Verdict::Undecided)
+    };
+    let verdict = touches.iter().find_map(&mut push);
     let best = recognizer.best();
     let recognized = matches!(verdict, Some(Verdict::Recognized { .. })).then(|| model.object_name(best).into());
     let posterior = recognizer.posterior(best).to_f64();
-    Ok(Recognition { touched: touched.into(), recognized, touches: recognizer.touches(), posterior })
+    Ok(Recognition { touched: touched.into(), recognized, touches: recognizer.touches(), approaches, posterior })
 }
 
 fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<Picture> {
@@ -319,11 +375,30 @@ fn shown(name: &str, Trial { curve, method, fewest, .. }: &Trial) -> RunMethod {
     }
 }
 
-/// The table that the program prints and the page shows: the paper's method and ours, side by side.
+/// The table that the program prints and the page shows: the paper's method, ours where it waits for full touches, and
+/// ours where every contact is evidence, side by side.
 fn table(summary: &Summary) -> Records {
-    let mut table = Records::new(["measure", "paper", "ours"]);
-    let both = |cell: &dyn Fn(&Method) -> Cell| [cell(&summary.paper), cell(&summary.ours)];
-    let mut row = |name: String, [paper, ours]: [Cell; 2]| table.push([Cell::Text(name), paper, ours]);
+    let mut table = Records::new(["measure", "paper, full touches", "ours, full touches", "ours, every contact"]);
+    let both = |cell: &dyn Fn(&Method) -> Cell| [&summary.paper, &summary.full, &summary.ours].map(cell);
+    let mut row = |name: String, [paper, full, ours]: [Cell; 3]| table.push([Cell::Text(name), paper, full, ours]);
+    let rate = 100.0 * summary.ours.evaluation.sequential.error_rate;
+    let approaches = |cell: &dyn Fn(&Approaches) -> Cell| {
+        both(&|method| method.evaluation.approaches.as_ref().map_or(Cell::Missing, cell))
+    };
+    row(
+        format!("approaches to a {rate} % error rate, stopping when sure"),
+        approaches(&|of| Cell::Spread(of.sequential.mean_approaches, of.sequential.mean_approaches_standard_error, 1)),
+    );
+    row("  wrong verdicts".into(), approaches(&|of| Cell::Percent(of.sequential.error, 2)));
+    row("  undecided when touches ran out".into(), approaches(&|of| Cell::Percent(of.sequential.undecided, 2)));
+    for at in AT_APPROACHES {
+        let cell = |of: &Approaches| match (of.accuracy.get(&at), of.accuracy_standard_error.get(&at)) {
+            (Some(&accuracy), Some(&error)) => Cell::PercentSpread(accuracy, error, 1),
+            _ => Cell::Missing,
+        };
+        row(format!("accuracy after {at} approaches"), approaches(&cell));
+    }
+    row("share of approaches that are evidence".into(), approaches(&|of| Cell::Percent(of.used, 1)));
     for at in TABLE_AT {
         let cell = |method: &Method| {
             let evaluation = &method.evaluation;
@@ -334,7 +409,6 @@ fn table(summary: &Summary) -> Records {
         };
         row(format!("accuracy after {at} touches"), both(&cell));
     }
-    let rate = 100.0 * summary.ours.evaluation.sequential.error_rate;
     row(
         format!("touches to a {rate} % error rate, stopping when sure"),
         both(&|m| {
@@ -356,12 +430,11 @@ fn table(summary: &Summary) -> Records {
     row("model bytes".into(), both(&|m| Cell::count(m.model_bytes)));
     row("trees".into(), both(&|m| Cell::count(m.trees)));
     row("training, seconds".into(), both(&|m| Cell::Number(m.train_seconds, 1)));
-    let capture = &summary.capture;
-    let same = |cell: Cell| [cell.clone(), cell];
-    row("capture, seconds".into(), same(Cell::Number(capture.seconds, 1)));
+    let captures = [&summary.capture, &summary.capture, &summary.approach_capture];
+    row("capture, seconds".into(), captures.map(|capture| Cell::Number(capture.seconds, 1)));
     row(
-        "touches captured per second".into(),
-        same(Cell::Number(capture.touches() as f64 / capture.seconds.max(1e-9), 0)),
+        "approaches captured per second".into(),
+        captures.map(|capture| Cell::Number(capture.approaches() as f64 / capture.seconds.max(1e-9), 0)),
     );
     row("largest margin error, nats".into(), both(&|m| Cell::Number(m.parity.max_margin_error, 5)));
     row("  bound that the model states".into(), both(&|m| Cell::Number(m.parity.stated_bound, 5)));
@@ -372,7 +445,7 @@ fn table(summary: &Summary) -> Records {
 /// What a missing accuracy means, if one is missing.
 fn note(summary: &Summary) -> String {
     let missing = |method: &Method| TABLE_AT.iter().any(|at| !method.evaluation.accuracy.contains_key(at));
-    if !missing(&summary.paper) && !missing(&summary.ours) {
+    if ![&summary.paper, &summary.full, &summary.ours].into_iter().any(missing) {
         return String::new();
     }
     format!(
@@ -402,27 +475,30 @@ pub fn text(summary: &Summary, out: &Path) -> String {
     let capture = &summary.capture;
     _ = writeln!(
         text,
-        "Touched {} objects {} times in {} approaches; trained on {} touches, tested on the other {}.\n",
+        "Touched {} objects {} times with all three fingers, in {} approaches, and approached them {} times more, keeping \
+         every approach. Tested on a tenth of each that training never saw.\n",
         capture.objects.len(),
         capture.touches(),
         capture.approaches(),
-        summary.touches.train,
-        summary.touches.test
+        summary.approach_capture.approaches(),
     );
     let width = summary.recognized.iter().map(|r| r.touched.chars().count()).max().unwrap_or(0);
     for recognition in &summary.recognized {
-        let Recognition { touched, recognized, touches, posterior } = recognition;
+        let Recognition { touched, recognized, touches: _, approaches, posterior } = recognition;
         _ = match recognized {
             Some(name) if name == touched => {
-                writeln!(text, "  {touched:width$}  recognized after {touches:>3} touches, posterior {posterior:.4}")
+                writeln!(
+                    text,
+                    "  {touched:width$}  recognized after {approaches:>3} approaches, posterior {posterior:.4}"
+                )
             }
             Some(name) => {
                 writeln!(
                     text,
-                    "  {touched:width$}  mistaken for {name} after {touches} touches, posterior {posterior:.4}"
+                    "  {touched:width$}  mistaken for {name} after {approaches} approaches, posterior {posterior:.4}"
                 )
             }
-            None => writeln!(text, "  {touched:width$}  undecided after {touches} touches"),
+            None => writeln!(text, "  {touched:width$}  undecided after {approaches} approaches"),
         };
     }
     let table = table(summary);
@@ -430,18 +506,20 @@ pub fn text(summary: &Summary, out: &Path) -> String {
         .chain(table.rows.iter().map(|row| row.iter().map(Cell::shown).collect()))
         .collect();
     let widths: Vec<usize> =
-        (0..3).map(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)).collect();
+        (0..4).map(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)).collect();
     _ = writeln!(text);
     for row in &rows {
         _ = writeln!(
             text,
-            "{:w0$}  {:>w1$}  {:>w2$}",
+            "{:w0$}  {:>w1$}  {:>w2$}  {:>w3$}",
             row[0],
             row[1],
             row[2],
+            row[3],
             w0 = widths[0],
             w1 = widths[1],
-            w2 = widths[2]
+            w2 = widths[2],
+            w3 = widths[3]
         );
     }
     let note = note(summary);
@@ -477,6 +555,7 @@ mod tests {
         Settings {
             sources: vec!["meshes".into()],
             capture: crate::touches::Origin { touches, ..Default::default() }.into(),
+            approaches: 3 * touches,
             groups: 50,
             command: "palpate run 'my meshes'".into(),
             ..Settings::default()
@@ -502,14 +581,18 @@ mod tests {
         // A tenth, 30 touches of each object, are tested on: one group of 30 can be drawn.
         let summary = run(&objects(), &settings(300), &out, &()).unwrap();
         assert_eq!((summary.touches.train, summary.touches.test), (810, 90));
-        let evaluation = &summary.ours.evaluation;
+        assert_eq!((summary.approaches.train, summary.approaches.test), (2_430, 270));
+        let evaluation = &summary.full.evaluation;
         assert_eq!(evaluation.accuracy.keys().copied().collect::<Vec<_>>(), [5, 10, 20]);
-        assert_eq!(summary.ours.followed_to, 28);
+        assert_eq!(summary.full.followed_to, 28);
         let text = text(&summary, &out);
-        assert_eq!(row(&text, "accuracy after 30 touches"), ["–", "–"]);
-        assert_eq!(row(&text, "accuracy after 10 touches").len(), 2);
-        let undecided = format!("{:.2}\u{a0}%", 100.0 * evaluation.sequential.undecided);
-        assert_eq!(row(&text, "undecided when touches ran out")[1], undecided);
+        assert_eq!(row(&text, "accuracy after 30 touches")[..2], ["–", "–"]);
+        assert_eq!(row(&text, "accuracy after 10 touches").len(), 3);
+        let approaches = row(&text, "approaches to a 1 % error rate, stopping when sure");
+        assert_eq!(approaches.len(), 3, "{text}");
+        assert!(summary.recognized.iter().all(|recognition| recognition.approaches >= recognition.touches as usize));
+        let undecided = evaluation.approaches.as_ref().unwrap().sequential.undecided;
+        assert_eq!(row(&text, "undecided when touches ran out")[1], format!("{:.2}\u{a0}%", 100.0 * undecided));
         assert!(text.contains("fewer than 300 distinct groups"), "{text}");
 
         let page = std::fs::read_to_string(out.join("report.html")).unwrap();
@@ -517,7 +600,8 @@ mod tests {
         assert!(page.contains("palpate run &#39;my meshes&#39;") || page.contains("palpate run 'my meshes'"));
         let written: serde_json::Value =
             serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
-        assert_eq!(written["ours"]["sequential"]["undecided"], serde_json::json!(evaluation.sequential.undecided));
+        assert_eq!(written["full"]["sequential"]["undecided"], serde_json::json!(evaluation.sequential.undecided));
+        assert_eq!(written["full"]["approaches"]["sequential"]["undecided"], serde_json::json!(undecided));
         for file in FILES {
             assert!(out.join(file).is_file(), "{file}");
         }

@@ -15,8 +15,9 @@ Examples:
   palpate run --touches 2000   a quick look
   palpate run --json | jq .ours.accuracy
 
-Written into the output directory: data/ (the touches), paper.json and ensemble.json (the full models), paper.palpate
-and model.palpate (the compiled ones), summary.json, report.html.")]
+Three methods are trained and compared: the published one, on the times of full touches; ours on full touches; and ours on every approach with at least one contact, which is the model to use.
+
+Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html.")]
 pub(crate) struct Arguments {
     /// What to touch: `builtin` or built-in objects' names, OBJ files, directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
@@ -27,6 +28,9 @@ pub(crate) struct Arguments {
     /// Touches of each object, a tenth of them to test on
     #[arg(long, value_name = "N", default_value_t = 21_000, value_parser = touches)]
     touches: u64,
+    /// Approaches to each object, all of them kept, a tenth of them to test on [default: three per touch]
+    #[arg(long, value_name = "N", value_parser = touches)]
+    approaches: Option<u64>,
     /// Seed of all that is random
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -40,24 +44,29 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     output::refuse_stdout(&arguments.out)?;
-    let Arguments { sources, out, touches, seed, force, json } = arguments;
+    let Arguments { sources, out, touches, approaches, seed, force, json } = arguments;
+    let approaches = approaches.unwrap_or_else(|| touches.saturating_mul(3));
     let objects = source::objects(&sources)?;
     if !json {
         // At once: the capture takes a while.
         output::print(&format!(
-            "Touching {} objects {touches} times each, then training, compiling and testing two methods. Results in {}\n",
+            "Touching {} objects {touches} times each with all three fingers, approaching each {approaches} times more, \
+             then training, compiling and testing three methods. Results in {}\n",
             objects.len(),
             out.display()
         ))?;
     }
     let settings = run::Settings {
         capture: Origin { touches, seed, ..Origin::default() }.into(),
+        approaches,
         replace: force,
         command: shell::command(["palpate", "run"].into_iter().chain(sources.iter().map(String::as_str)).chain([
             "-o",
             &out.to_string_lossy(),
             "--touches",
             &touches.to_string(),
+            "--approaches",
+            &approaches.to_string(),
             "--seed",
             &seed.to_string(),
         ])),

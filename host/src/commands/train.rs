@@ -3,8 +3,8 @@ use crate::Result;
 use crate::ensemble::StatedProbe;
 use crate::ensemble::train::{self, Engine, Settings};
 use crate::output;
-use palpate_shared::{Descriptor, Touch};
 use palpate_shared::format::Counted;
+use palpate_shared::{Descriptor, Touch};
 use std::path::PathBuf;
 use std::time::Instant;
 

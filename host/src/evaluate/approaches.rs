@@ -146,8 +146,8 @@ impl Margins<'_> {
         let per_object = |estimates: &[Estimate]| {
             self.tested_names().iter().cloned().zip(estimates.iter().map(|estimate| estimate.value)).collect()
         };
-        let [mean_approaches, mean_touches, error, undecided] = [&approaches, &touches, &errors, &undecideds]
-            .map(|estimates| Estimate::mean_of(estimates.iter().copied()));
+        let [mean_approaches, mean_touches, error, undecided] =
+            [&approaches, &touches, &errors, &undecideds].map(|estimates| Estimate::mean_of(estimates.iter().copied()));
         ApproachSequential {
             error_rate,
             max_touches,

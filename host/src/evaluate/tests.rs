@@ -7,6 +7,7 @@ use crate::touches::Dataset;
 use crate::touches::synthetic;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
+use palpate_shared::format::Counted;
 
 fn ensemble() -> Ensemble {
     let settings = train::Settings { rounds: 20, depth: 4, eta: 0.3, ..train::Settings::compact() };
@@ -217,4 +218,77 @@ fn what_cannot_be_evaluated_says_so() {
     let unknown = synthetic::dataset(&[9, 9, 9, 9], 1);
     let error = Margins::new(Candidate::Full(&ensemble), &unknown).err().unwrap();
     assert!(error.to_string().contains("does not know the object object3, only object0, object1, object2"), "{error}");
+}
+
+/// Every approach of `touches` to `full` holds a full touch, in no order that sequences know.
+fn with_missing_contacts(dataset: &Dataset, one_in: usize) -> Dataset {
+    let mut dataset = dataset.clone();
+    for object in &mut dataset.objects {
+        object.touches.retain(Touch::is_full);
+        for touch in object.touches.iter_mut().enumerate().filter(|(index, _)| index % one_in != 0).map(|(_, t)| t) {
+            let [first, second, _] = touch.times();
+            *touch = Touch::new([first, second, palpate_shared::ContactTime::MISSING]);
+        }
+    }
+    dataset
+}
+
+#[test]
+fn touches_that_a_model_does_not_use_cost_an_approach_and_change_nothing() {
+    let settings = train::Settings { rounds: 20, depth: 4, counted: Some(Counted::Full), ..train::Settings::compact() };
+    let ensemble = train::train(&synthetic::dataset(&[2_000, 2_000, 2_000], 1), &settings, &()).unwrap();
+    let bytes = compiled(&ensemble);
+    let model = Model::new(&bytes).unwrap();
+    let approaches = with_missing_contacts(&synthetic::dataset(&[3_000; 3], 2), 4);
+    let full: Vec<_> = approaches.objects.iter().map(|o| o.touches.iter().filter(|t| t.is_full()).count()).collect();
+    for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
+        let margins = Margins::new(candidate, &approaches).unwrap();
+        assert_eq!(margins.touch_count(), full.iter().sum::<usize>());
+        assert!(margins.approach_count() > 3 * margins.touch_count());
+        let evaluation = evaluate(&margins, &quick()).unwrap();
+        let of = evaluation.approaches.unwrap();
+        assert!((of.used - 0.25).abs() < 0.001, "{of:?}");
+        let sequential = &of.sequential;
+        // Three approaches in four change nothing; the touches that are evidence are as many as without the others.
+        let per_touch = sequential.mean_approaches / sequential.mean_touches;
+        assert!((3.7..4.3).contains(&per_touch), "{per_touch}");
+        let error = sequential.mean_approaches_standard_error + evaluation.sequential.mean_touches_standard_error;
+        assert!((sequential.mean_touches - evaluation.sequential.mean_touches).abs() < 3.0 * error, "{sequential:?}");
+        assert!(sequential.undecided < 0.05 && sequential.error < 0.03, "{sequential:?}");
+        assert_eq!(of.accuracy.keys().copied().collect::<Vec<_>>(), [10, 20, 60]);
+        assert!(of.accuracy[&10] < of.accuracy[&60] && of.accuracy[&20] < evaluation.accuracy[&20]);
+        assert!((evaluation.patterns["outer and middle"] - 0.75).abs() < 0.001);
+    }
+}
+
+#[test]
+fn a_dead_finger_ends_undecided_where_a_model_knows_full_touches_only() {
+    let settings = train::Settings { rounds: 20, depth: 4, counted: Some(Counted::Full), ..train::Settings::compact() };
+    let ensemble = train::train(&synthetic::dataset(&[2_000, 2_000, 2_000], 1), &settings, &()).unwrap();
+    let bytes = compiled(&ensemble);
+    let model = Model::new(&bytes).unwrap();
+    let dead = with_missing_contacts(&test_touches(), usize::MAX);
+    let mut dead = dead;
+    dead.objects.iter_mut().for_each(|object| _ = object.touches.remove(0));
+    let margins = Margins::new(Candidate::Compiled(&model), &dead).unwrap();
+    assert_eq!(margins.touch_count(), 0);
+    let evaluation = evaluate(&margins, &Settings { at: Vec::new(), ..quick() }).unwrap();
+    let of = evaluation.approaches.unwrap();
+    assert_eq!((of.sequential.undecided, of.sequential.error, of.sequential.mean_touches), (1.0, 0.0, 0.0));
+    assert_eq!(of.accuracy[&60], 0.0, "nothing is recognized without evidence");
+}
+
+#[test]
+fn every_contact_recognizes_in_fewer_approaches_than_full_touches_alone() {
+    let data = with_missing_contacts(&synthetic::dataset(&[4_000; 3], 1), 4);
+    let test = with_missing_contacts(&synthetic::dataset(&[2_000; 3], 2), 4);
+    let approaches = |counted| {
+        let settings = train::Settings { rounds: 20, depth: 4, counted: Some(counted), ..train::Settings::compact() };
+        let ensemble = train::train(&data, &settings, &()).unwrap();
+        let margins = Margins::new(Candidate::Full(&ensemble), &test).unwrap();
+        let of = evaluate(&margins, &quick()).unwrap().approaches.unwrap();
+        assert!(of.sequential.error < 0.03, "{of:?}");
+        of.sequential.mean_approaches
+    };
+    assert!(approaches(Counted::Contacts) < 0.9 * approaches(Counted::Full));
 }

@@ -50,7 +50,11 @@ pub(crate) fn run_page(results: &RunResults) -> Result<Page> {
     section.table(Table {
         id: "summary".into(),
         title: "The paper's method and ours".into(),
-        caption: format!("Both were trained on the same touches and tested on others. {}", results.note),
+        caption: format!(
+            "The first two wait for full touches and were trained on the same; the last takes every approach with at least \
+             one contact as evidence. All are tested on the same approaches, which none was trained on. {}",
+            results.note
+        ),
         command: results.command.clone(),
         data: results.table.clone(),
     });

@@ -101,13 +101,22 @@ pub struct Row {
     pub instructions_m0_plus: Option<u64>,
     /// Accuracy after 10 and 30 touches, as far as the held-out touches go.
     pub accuracy: BTreeMap<usize, f64>,
-    /// Touches until it stops, on average.
+    /// Touches that are evidence until it stops, on average.
     pub mean_touches: f64,
+    /// Approaches until it stops, on average, where the data set holds approaches.
+    pub mean_approaches: Option<f64>,
     /// Share of wrong verdicts when it stops by itself.
     pub error: f64,
     /// Whether no other model is at least as small, as fast (on the processor of the limit) and as quick to stop, and
     /// better in one of them.
     pub frontier: bool,
+}
+
+impl Row {
+    /// What a robot pays until a verdict: approaches, or touches where nothing else is known.
+    fn cost(&self) -> f64 {
+        self.mean_approaches.unwrap_or(self.mean_touches)
+    }
 }
 
 /// The outcome of tuning.
@@ -158,7 +167,8 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     let (_, ensemble, compiled) = &models[chosen];
     let (ensemble, model) = ((*ensemble).clone(), compiled.bytes.clone());
     let opened = compile::open(&model)?;
-    let test = evaluate::evaluate(&Margins::new(Candidate::Compiled(&opened), &test)?, &evaluation(settings, &test))?;
+    let margins = Margins::new(Candidate::Compiled(&opened), &test)?;
+    let test = evaluate::evaluate(&margins, &evaluation(settings, &margins))?;
     Ok(Tuned { unlimited, rows: models.into_iter().map(|(row, ..)| row).collect(), chosen, test, model, ensemble })
 }
 
@@ -219,7 +229,8 @@ fn measure(
     choose: &Dataset,
     settings: &Settings,
 ) -> Result<Row> {
-    let evaluation = evaluate::evaluate(&Margins::new(candidate, choose)?, &evaluation(settings, choose))?;
+    let margins = Margins::new(candidate, choose)?;
+    let evaluation = evaluate::evaluate(&margins, &evaluation(settings, &margins))?;
     Ok(Row {
         recipe: recipe.clone(),
         leaf: compiled.map(|(leaf, _)| leaf.name()),
@@ -229,16 +240,17 @@ fn measure(
         instructions_m0_plus: compiled.and_then(|(_, compiled)| compiled.instructions.m0_plus),
         accuracy: evaluation.accuracy,
         mean_touches: evaluation.sequential.mean_touches,
-        error: evaluation.sequential.error,
+        mean_approaches: evaluation.approaches.as_ref().map(|approaches| approaches.sequential.mean_approaches),
+        error: evaluation.approaches.map_or(evaluation.sequential.error, |approaches| approaches.sequential.error),
         frontier: false,
     })
 }
 
-fn evaluation(settings: &Settings, touches: &Dataset) -> evaluate::Settings {
-    let fewest = touches.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
+fn evaluation(settings: &Settings, margins: &Margins<'_>) -> evaluate::Settings {
+    let (fewest, approaches) = (margins.fewest_touches(), margins.fewest_approaches());
     evaluate::Settings {
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),
-        at_approaches: [10, 20, 60].into_iter().filter(|&at| at <= fewest).collect(),
+        at_approaches: [10, 20, 60].into_iter().filter(|&at| at <= approaches).collect(),
         groups: settings.groups,
         error_rate: settings.error_rate,
         max_touches: None,
@@ -248,7 +260,7 @@ fn evaluation(settings: &Settings, touches: &Dataset) -> evaluate::Settings {
 
 fn mark_frontier(models: &mut [Measured<'_>], core: Core) {
     let figures: Vec<_> =
-        models.iter().map(|(row, _, compiled)| (row.bytes, compiled.instructions.on(core), row.mean_touches)).collect();
+        models.iter().map(|(row, _, compiled)| (row.bytes, compiled.instructions.on(core), row.cost())).collect();
     for ((row, ..), own) in models.iter_mut().zip(&figures) {
         let beats = |other: &&(Option<usize>, Option<u64>, f64)| {
             other.0 <= own.0 && other.1 <= own.1 && other.2 <= own.2 && *other != own
@@ -270,7 +282,7 @@ fn choose_from(models: &[Measured<'_>], settings: &Settings) -> Result<usize> {
     let sound = |row: &Row| row.error <= settings.error_rate;
     let quickest = fitting()
         .filter(|(_, (row, ..))| sound(row))
-        .min_by(|(_, (a, ..)), (_, (b, ..))| a.mean_touches.total_cmp(&b.mean_touches));
+        .min_by(|(_, (a, ..)), (_, (b, ..))| a.cost().total_cmp(&b.cost()));
     let chosen = quickest.or_else(|| fitting().min_by(|(_, (a, ..)), (_, (b, ..))| a.error.total_cmp(&b.error)));
     match chosen {
         Some((index, _)) => Ok(index),

@@ -13,8 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
-    take_section,
+    HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Tag, TrainedNoise, TrainedProbe,
+    TrainedTouches, take_section,
 };
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).

@@ -64,7 +64,8 @@ pub struct Settings {
     /// more where contacts are missing.
     pub bins: usize,
     /// Bins of each feature, at quantiles, if they are to differ: values are rounded down to the lower edge of their bin
-    /// before training, so that no feature has more thresholds than that. For models that are compiled to a table.
+    /// before training, so that no feature has more thresholds than that. For models that are compiled to a table. One
+    /// number for each feature of the descriptor, or of its form for full touches.
     pub feature_bins: Option<Vec<usize>>,
     /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
     /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
@@ -127,7 +128,17 @@ impl Settings {
             Counted::Full => self.descriptor.for_full_touches(),
             Counted::Contacts | Counted::All => self.descriptor.for_contacts().unwrap_or(self.descriptor),
         };
-        Self { counted: Some(counted), descriptor, ..self.clone() }
+        // Bins of the form for full touches: the pattern keeps its six values, the pair gets as many as the slope.
+        let feature_bins = match self.feature_bins.as_deref() {
+            Some([curvature, slope, pose @ ..])
+                if descriptor.uses_partial_touches()
+                    && pose.len() + 2 == descriptor.for_full_touches().feature_count() =>
+            {
+                Some([&[8, *curvature, *slope, *slope], pose].concat())
+            }
+            bins => bins.map(<[usize]>::to_vec),
+        };
+        Self { counted: Some(counted), descriptor, feature_bins, ..self.clone() }
     }
 }
 
@@ -139,8 +150,8 @@ impl Settings {
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
-    let settings = &settings.resolved(dataset);
     check(dataset, settings.descriptor)?;
+    let settings = &settings.resolved(dataset);
     let parameters = parameters(settings, dataset.objects.len())?;
     let evidence = Evidence::new(dataset, settings)?;
     let rows = Rows::new(&evidence, settings);
@@ -307,9 +318,8 @@ impl<'d> Evidence<'d> {
     fn new(dataset: &'d Dataset, settings: &Settings) -> Result<Self> {
         let counted = settings.counted.unwrap_or(Counted::Full);
         let needs_pose = settings.descriptor.needs_pose();
-        let counts = |touch: &Touch| {
-            counted.patterns().contains(touch.pattern()) && (touch.pose().is_some() || !needs_pose)
-        };
+        let counts =
+            |touch: &Touch| counted.patterns().contains(touch.pattern()) && (touch.pose().is_some() || !needs_pose);
         let objects = dataset.objects.iter().map(|object| {
             let mut touches: Cow<'_, [Touch]> = if settings.noise > 0.0 {
                 noise::noisy(&object.name, &object.touches, settings.noise, settings.seed).into()

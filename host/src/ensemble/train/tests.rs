@@ -1,10 +1,11 @@
 use super::*;
 use crate::compile;
 use crate::error::{NameProblem, Problem};
-use crate::touches::synthetic;
+use crate::touches::{ObjectTouches, synthetic};
+use palpate_shared::ContactTime;
 
 fn quick() -> Settings {
-    Settings { rounds: 8, depth: 3, ..Settings::compact() }
+    Settings { rounds: 8, depth: 3, counted: Some(Counted::Full), ..Settings::compact() }
 }
 
 #[test]
@@ -261,4 +262,64 @@ fn rounding_moves_no_leaf_by_more_than_half_a_unit_and_uses_the_bits_it_was_give
             );
         }
     }
+}
+
+/// The approaches of two objects: every pattern occurs.
+fn approaches() -> Dataset {
+    let touch = |index: u32, bend: u32| {
+        let missing = |finger: u32| index >> finger & 1 == 1;
+        let times = [0, 1_000 + index % 7 * bend, 3_000 + index % 5 * 100].map(ContactTime::from_micros);
+        let mut fingers = 0..;
+        Touch::new(times.map(|time| if missing(fingers.next().unwrap()) { ContactTime::MISSING } else { time }))
+    };
+    let object = |name: &str, bend| ObjectTouches {
+        name: name.into(),
+        touches: (0..800).map(|index| touch(index, bend)).collect(),
+    };
+    Dataset::new(vec![object("cup", 100), object("fork", 400)])
+}
+
+#[test]
+fn approaches_are_trained_on_by_their_contacts_unless_full_touches_or_all_are_asked_for() {
+    let dataset = approaches();
+    assert!(dataset.holds_approaches());
+    let trained = |counted, descriptor| {
+        let settings = Settings { counted, descriptor, ..quick() };
+        train(&dataset, &settings, &()).unwrap()
+    };
+    for (counted, descriptor, expected, patterns) in [
+        (None, Descriptor::Curvature, Descriptor::ContactsCurvature, Patterns::CONTACTS),
+        (Some(Counted::All), Descriptor::Curvature, Descriptor::ContactsCurvature, Patterns::ALL),
+        (Some(Counted::Full), Descriptor::Curvature, Descriptor::Curvature, Patterns::FULL),
+        (Some(Counted::Full), Descriptor::ContactsCurvature, Descriptor::Curvature, Patterns::FULL),
+        (None, Descriptor::Times, Descriptor::Times, Patterns::CONTACTS),
+    ] {
+        let ensemble = trained(counted, descriptor);
+        assert_eq!(ensemble.descriptor, expected);
+        let stated = ensemble.trained_touches();
+        assert_eq!((stated.patterns, stated.needs_pose), (patterns, false), "{descriptor:?}");
+        assert!((3_000..=3_400).contains(&stated.largest_spread), "{stated:?}");
+        let shares = ensemble.origin.trained.unwrap().shares.unwrap();
+        assert_eq!(shares, [0.125, 0.25, 0.125, 0.25, 0.125, 0.125]);
+        // The file and every compiled model state the same.
+        let file = tempfile::NamedTempFile::new().unwrap();
+        ensemble.save(file.path()).unwrap();
+        assert_eq!(Ensemble::load(file.path()).unwrap(), ensemble);
+        let compiled = crate::compile::compile(&ensemble, &crate::compile::Settings::default()).unwrap();
+        let model = crate::compile::open(&compiled.bytes).unwrap();
+        assert_eq!(model.trained_touches(), stated);
+        assert_eq!(model.pattern_shares().unwrap().0, shares.map(|share| (share * 65_535.0).round() as u16));
+    }
+    // The paper's preset stays with full touches.
+    let paper = train(&dataset, &Settings { rounds: 2, ..Settings::paper() }, &()).unwrap();
+    assert_eq!(paper.trained_touches().patterns, Patterns::FULL);
+}
+
+#[test]
+fn an_object_without_a_touch_that_counts_is_named() {
+    let mut dataset = approaches();
+    dataset.objects[1].touches.retain(|touch| !touch.is_full());
+    let error = train(&dataset, &Settings { counted: Some(Counted::Full), ..quick() }, &()).unwrap_err();
+    let problem = EnsembleProblem::NothingCounts { object: "fork".into(), counted: Counted::Full };
+    assert_eq!(error.problem(), Some(&Problem::Ensemble(problem)), "{error}");
 }

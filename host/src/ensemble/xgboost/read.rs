@@ -85,7 +85,11 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         };
         touches.into_iter().map(number).collect()
     });
-    Ok(Origin { probe: probe.transpose()?, trained: trained.transpose()?, touches: touches.transpose()?.unwrap_or_default() })
+    Ok(Origin {
+        probe: probe.transpose()?,
+        trained: trained.transpose()?,
+        touches: touches.transpose()?.unwrap_or_default(),
+    })
 }
 
 fn parsed<'t, T: serde::Deserialize<'t>>(

@@ -2,10 +2,11 @@ use super::*;
 use crate::ensemble::train::{Settings, train};
 use crate::touches::synthetic;
 use palpate_shared::Descriptor;
+use palpate_shared::format::Counted;
 use serde_json::{Value, json};
 
 fn ensemble(multi_output: bool) -> Ensemble {
-    let settings = Settings { multi_output, rounds: 4, depth: 3, ..Settings::compact() };
+    let settings = Settings { multi_output, rounds: 4, depth: 3, counted: Some(Counted::Full), ..Settings::compact() };
     train(&synthetic::dataset(&[300, 200, 400], 1), &settings, &()).unwrap()
 }
 
