@@ -610,7 +610,8 @@ mod tests {
         let model = std::fs::read(out.join("model.palpate")).unwrap();
         let error = run(&objects()[..2], &settings(300), &out, &()).unwrap_err();
         assert!(matches!(error.problem(), Some(Problem::Report(ReportProblem::OtherResults { .. }))), "{error}");
-        let error = run(&objects(), &settings(200), &out, &()).unwrap_err().to_string();
+        let fewer = Settings { approaches: 900, ..settings(200) };
+        let error = run(&objects(), &fewer, &out, &()).unwrap_err().to_string();
         assert!(error.contains("summary.json: ") && error.contains("touches was 300, and is 200 now"), "{error}");
         assert_eq!(std::fs::read(out.join("model.palpate")).unwrap(), model);
         assert!(out.join("data/ball.txt").is_file());

@@ -29,7 +29,9 @@ impl Margins<'_> {
     /// [`Problem::Setting`](crate::error::Problem::Setting): `groups` if there are none, `at` if an object has fewer
     /// touches.
     pub fn curve(&self, most: usize, groups: usize, seed: u64) -> Result<Curve> {
-        self.check(most.max(1), groups)?;
+        if most > 0 || groups == 0 {
+            self.check(most, groups)?;
+        }
         let correct = (0..self.tested.len()).map(|position| {
             let group = |mut correct: Vec<usize>, group| {
                 self.follow(position, group, most, seed, |touches, evidence| {

@@ -118,9 +118,10 @@ impl Dataset {
     pub fn shares(&self) -> [f64; 6] {
         let mut shares = [0.0; 6];
         for touches in self.objects.iter().map(|object| &object.touches) {
-            for touch in touches {
-                shares[usize::from(touch.pattern().code())] += 1.0 / (touches.len() * self.objects.len()) as f64;
-            }
+            let mut counts = [0_usize; 6];
+            touches.iter().for_each(|touch| counts[usize::from(touch.pattern().code())] += 1);
+            let all = (touches.len() * self.objects.len()).max(1) as f64;
+            shares.iter_mut().zip(counts).for_each(|(share, count)| *share += count as f64 / all);
         }
         shares
     }

@@ -5,9 +5,30 @@ fn quick() -> Settings {
     Settings { groups: 60, max_bytes: Some(6_000), ..Settings::default() }
 }
 
+/// Full touches, waited for.
+fn full(mut dataset: Dataset) -> Dataset {
+    dataset.objects.iter_mut().for_each(|object| object.touches.retain(palpate_shared::Touch::is_full));
+    dataset
+}
+
+#[test]
+fn approaches_are_what_is_saved_where_the_data_set_holds_them() {
+    let tuned = tune(&synthetic::dataset(&[800, 800], 2), &Settings { max_bytes: None, ..quick() }, &()).unwrap();
+    let figures = |row: &Row| (row.bytes.unwrap(), row.instructions.unwrap(), row.mean_approaches.unwrap());
+    for row in &tuned.rows {
+        let (bytes, instructions, approaches) = figures(row);
+        let beaten = tuned.rows.iter().map(figures).any(|(b, i, a)| {
+            b <= bytes && i <= instructions && a <= approaches && (b < bytes || i < instructions || a < approaches)
+        });
+        assert_eq!(row.frontier, !beaten, "{row:?}");
+    }
+    assert_eq!(tuned.ensemble.descriptor, palpate_shared::Descriptor::ContactsCurvature);
+    assert!(tuned.test.approaches.is_some());
+}
+
 #[test]
 fn the_choice_fits_and_nothing_that_fits_stops_sooner() {
-    let dataset = synthetic::dataset(&[1_500, 1_500, 1_500], 1);
+    let dataset = full(synthetic::dataset(&[1_500, 1_500, 1_500], 1));
     let tuned = tune(&dataset, &Settings { max_instructions: Some(1_500), ..quick() }, &()).unwrap();
     let chosen = &tuned.rows[tuned.chosen];
     assert!(chosen.bytes <= Some(6_000) && chosen.instructions <= Some(1_500));
@@ -31,7 +52,8 @@ fn the_choice_fits_and_nothing_that_fits_stops_sooner() {
 
 #[test]
 fn the_frontier_holds_what_nothing_beats() {
-    let tuned = tune(&synthetic::dataset(&[800, 800], 2), &Settings { max_bytes: None, ..quick() }, &()).unwrap();
+    let dataset = full(synthetic::dataset(&[800, 800], 2));
+    let tuned = tune(&dataset, &Settings { max_bytes: None, ..quick() }, &()).unwrap();
     let figures = |row: &Row| (row.bytes.unwrap(), row.instructions.unwrap(), row.mean_touches);
     for row in &tuned.rows {
         let (bytes, instructions, touches) = figures(row);
