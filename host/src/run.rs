@@ -16,6 +16,7 @@ use crate::report::results;
 use crate::report::run_page::{RunMethod, RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use crate::touches::folds::{self, Split};
+use crate::touches::noise::Noise;
 use crate::touches::{Dataset, Listing};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use serde::Serialize;
@@ -47,6 +48,8 @@ pub struct Settings {
     pub replace: bool,
     /// How objects are touched.
     pub capture: capture::Settings,
+    /// What a real sensor adds: ours is trained for it, the paper's method is not, and both are tested with it.
+    pub noise: Noise,
     /// The share of touches that is kept from training, to test on.
     pub test_share: f64,
     /// Groups, and also sequences, drawn for each object.
@@ -63,6 +66,7 @@ impl Default for Settings {
             sources: vec!["builtin".into()],
             replace: false,
             capture: capture::Settings::default(),
+            noise: Noise::default(),
             test_share: 0.1,
             groups: 1000,
             error_rate: 0.01,
@@ -164,11 +168,17 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let captured =
         capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
     let seed = settings.capture.origin.seed;
-    let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
+    let mut split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
+    // Another seed than that of the training.
+    let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
     let probe = Some(StatedProbe { probe: settings.capture.origin.probe, length: settings.capture.origin.length });
-    let method = |name, files, preset| Trial::new(name, files, preset, &split, settings, out, progress);
+    let method = |name, files, preset| Trial::new(name, files, preset, (&split, robots), settings, out, progress);
     let paper = method("paper", "paper", train::Settings { seed, probe, ..train::Settings::paper() })?;
-    let ours = method("ours", "ensemble", train::Settings { seed, probe, ..train::Settings::compact() })?;
+    let ours = method(
+        "ours",
+        "ensemble",
+        train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() },
+    )?;
     let model = compile::open(&ours.compiled.bytes)?;
     let summary = Summary {
         made_from,
@@ -202,6 +212,7 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
         "sources": settings.sources,
         "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
         "capture": results::json("capture's settings", &settings.capture.origin)?,
+        "noise": results::json("the noise", &settings.noise)?,
         "test_share": settings.test_share,
         "groups": settings.groups,
         "error_rate": settings.error_rate,
@@ -222,7 +233,7 @@ impl Trial {
         name: &str,
         stem: &str,
         preset: train::Settings,
-        split: &Split,
+        (split, robots): (&Split, usize),
         settings: &Settings,
         out: &Path,
         progress: &dyn Progress,
@@ -237,7 +248,7 @@ impl Trial {
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
         let model = compile::open(&compiled.bytes)?;
-        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
+        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?.of_robots(robots);
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
         let evaluation = evaluate::evaluate(

@@ -7,6 +7,7 @@ mod evaluate;
 mod export;
 mod inspect;
 mod link;
+mod noise;
 mod numbers;
 mod objects;
 mod parity;

@@ -1,3 +1,4 @@
+use super::noise::NoiseArguments;
 use super::progress::Bar;
 use super::shell;
 use crate::Result;
@@ -5,6 +6,7 @@ use crate::mesh::source;
 use crate::output;
 use crate::run;
 use crate::touches::Origin;
+use crate::touches::noise::Noise;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -13,6 +15,8 @@ Examples:
   palpate run                  ten built-in objects; results in out/
   palpate run meshes/ -o mine  your own OBJ files
   palpate run --touches 2000   a quick look
+  palpate run --noise 0..5ms --timer 1ms
+                               trained for a real switch, and tested with one
   palpate run --json | jq .ours.accuracy
 
 Written into the output directory: data/ (the touches), paper.json and ensemble.json (the full models), paper.palpate
@@ -36,11 +40,13 @@ pub(crate) struct Arguments {
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    noise: NoiseArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     output::refuse_stdout(&arguments.out)?;
-    let Arguments { sources, out, touches, seed, force, json } = arguments;
+    let Arguments { sources, out, touches, seed, force, json, noise } = arguments;
     let objects = source::objects(&sources)?;
     if !json {
         // At once: the capture takes a while.
@@ -53,14 +59,14 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let settings = run::Settings {
         capture: Origin { touches, seed, ..Origin::default() }.into(),
         replace: force,
-        command: shell::command(["palpate", "run"].into_iter().chain(sources.iter().map(String::as_str)).chain([
-            "-o",
-            &out.to_string_lossy(),
-            "--touches",
-            &touches.to_string(),
-            "--seed",
-            &seed.to_string(),
-        ])),
+        command: shell::command(
+            ["palpate", "run"]
+                .into_iter()
+                .chain(sources.iter().map(String::as_str))
+                .chain(["-o", &out.to_string_lossy(), "--touches", &touches.to_string(), "--seed", &seed.to_string()])
+                .chain(noise.words().iter().map(String::as_str)),
+        ),
+        noise: noise.over(Noise::default()),
         sources: sources.clone(),
         ..run::Settings::default()
     };

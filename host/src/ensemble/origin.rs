@@ -2,6 +2,7 @@
 
 use crate::probe::approach::Probe;
 use crate::touches::Dataset;
+use crate::touches::noise::Noise;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -10,6 +11,8 @@ use std::collections::BTreeMap;
 pub struct Origin {
     /// The probe that made them, where the data set states it.
     pub probe: Option<StatedProbe>,
+    /// What was added to them in training; none also where that is not known.
+    pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
 }
@@ -37,7 +40,7 @@ const FINGERPRINTED: usize = 16;
 impl Origin {
     /// What touches say about themselves, and the probe that they were made with.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
-        Self { probe, touches: fingerprints(dataset) }
+        Self { probe, noise: None, touches: fingerprints(dataset) }
     }
 
     /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of the

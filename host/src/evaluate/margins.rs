@@ -28,6 +28,8 @@ pub struct Margins<'m> {
     /// The data set's objects.
     pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
+    /// How many robots made the touches, in turn.
+    robots: usize,
 }
 
 /// The margins of one object's test touches.
@@ -82,7 +84,14 @@ impl<'m> Margins<'m> {
             Ok(Tested { object, touches: touched.touches.len(), values })
         });
         let tested = tested.collect::<Result<_>>()?;
-        Ok(Self { candidate, descriptor, objects, tested, tested_names: dataset.names() })
+        Ok(Self { candidate, descriptor, objects, tested, tested_names: dataset.names(), robots: 1 })
+    }
+
+    /// The same where `robots` robots made the touches of each object in turn (touch i by robot i modulo `robots`): every
+    /// group and sequence is then of one robot's touches. 0 is taken as 1.
+    pub fn of_robots(mut self, robots: usize) -> Self {
+        self.robots = robots.max(1);
+        self
     }
 
     /// The model's descriptor.
@@ -107,7 +116,12 @@ impl<'m> Margins<'m> {
 
     /// The fewest touches that a tested object has: the longest group that can be drawn from each.
     pub fn fewest_touches(&self) -> usize {
-        self.tested.iter().map(|tested| tested.touches).min().unwrap_or(0)
+        (0..self.tested.len()).map(|position| self.most_touches(position)).min().unwrap_or(0)
+    }
+
+    /// The most touches that a group of a tested object can have.
+    pub(super) fn most_touches(&self, position: usize) -> usize {
+        self.tested[position].touches / self.robots
     }
 
     /// How many different groups of `touches` touches can be drawn from the object with the fewest, where that is below
@@ -144,10 +158,12 @@ impl<'m> Margins<'m> {
     }
 
     /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
-    pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> rand::seq::index::IndexVec {
+    pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> Vec<usize> {
+        let robot = group % self.robots;
         let group = u64::try_from(group).unwrap_or(u64::MAX);
         let mut random = random::generator(seed, Purpose::Groups, &self.tested_names[position], group);
-        rand::seq::index::sample(&mut random, self.tested[position].touches, count)
+        let drawn = rand::seq::index::sample(&mut random, self.most_touches(position), count);
+        drawn.into_iter().map(|touch| touch * self.robots + robot).collect()
     }
 }
 

@@ -114,7 +114,7 @@ impl Margins<'_> {
     fn outcomes(&self, position: usize, stopping: Stopping, sequences: usize, seed: u64) -> Vec<Outcome> {
         let tested = &self.tested[position];
         let objects = self.objects().len();
-        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(tested.touches);
+        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(self.most_touches(position));
         let run = |sequence| {
             let touches = self.draw(position, sequence, limit, seed).into_iter();
             match &tested.values {

@@ -26,7 +26,8 @@ fn an_ensemble_predicts_what_its_trainer_predicts_bit_for_bit() {
 #[test]
 fn threads_change_no_bit() {
     let dataset = synthetic::dataset(&[700, 900, 800], 2);
-    let with = |threads| train(&dataset, &Settings { threads, noise: 3_000.0, ..quick() }, &()).unwrap();
+    let with =
+        |threads| train(&dataset, &Settings { threads, noise: Noise::gaussian(3_000.0), ..quick() }, &()).unwrap();
     assert_eq!(with(Some(1)), with(Some(3)));
     assert_eq!(with(Some(1)), with(None));
 }
@@ -73,7 +74,7 @@ fn settings_out_of_range_are_refused_by_name() {
         (Settings { feature_bins: Some(vec![9]), ..quick() }, "bins"),
         (Settings { feature_bins: Some(vec![9, 1]), ..quick() }, "bins"),
         (Settings { leaf_bits: Some(3), ..quick() }, "leaf_bits"),
-        (Settings { noise: f64::INFINITY, ..quick() }, "noise"),
+        (Settings { noise: Noise::gaussian(f64::INFINITY), ..quick() }, "noise"),
         (Settings { threads: Some(0), ..quick() }, "threads"),
     ] {
         let error = train(&dataset, &settings, &()).unwrap_err();

@@ -28,6 +28,7 @@ use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::fmt;
 use std::str::FromStr;
 
 /// What is added to touches. Times are in microseconds, angles in degrees, shares between 0 and 1. The default adds
@@ -110,6 +111,33 @@ impl FromStr for Deviation {
             (Ok(least), Ok(largest)) if least <= largest => Ok(Self { least, largest }),
             _ => Err(problem()),
         }
+    }
+}
+
+/// What is added, in words: "noise of 0 to 10 ms, a timer of 1 ms".
+impl fmt::Display for Noise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ms = |micros: f64| micros / 1e3;
+        let percent = |share: f64| (1e6 * share).round() / 1e4;
+        let Deviation { least, largest } = self.deviation;
+        let mut parts = Vec::new();
+        if largest > 0.0 {
+            let range = if least == largest { String::new() } else { format!("{} to ", ms(least)) };
+            parts.push(format!("noise of {range}{} ms", ms(largest)));
+        }
+        let mut say = |is_there: bool, text: String| parts.extend(is_there.then_some(text));
+        say(self.timer > 0.0, format!("a timer of {} ms", ms(self.timer)));
+        say(self.debounce > 0.0, format!("bouncing of up to {} ms", ms(self.debounce)));
+        say(self.missed > 0.0, format!("{} % of contacts missed", percent(self.missed)));
+        for (finger, early) in (1..).zip(self.bent) {
+            say(early != 0.0, format!("finger {finger} early by {} ms", ms(early)));
+        }
+        say(self.speed != 1.0, format!("a speed of {} times the nominal one", self.speed));
+        say(self.speed_error > 0.0, format!("speed off by up to {} % per touch", percent(self.speed_error)));
+        say(self.speed_bias > 0.0, format!("speed off by up to {} % per robot", percent(self.speed_bias)));
+        say(self.pose > 0.0, format!("a pose turned by {}° per touch", self.pose));
+        say(self.pose_bias > 0.0, format!("a pose turned by {}° per robot", self.pose_bias));
+        f.write_str(&if parts.is_empty() { "no noise".into() } else { parts.join(", ") })
     }
 }
 

@@ -205,6 +205,19 @@ fn a_model_states_the_noise_that_it_was_trained_with() {
 }
 
 #[test]
+fn noise_is_said_in_words() {
+    assert_eq!(Noise::default().to_string(), "no noise");
+    assert_eq!(Noise::gaussian(5_000.0).to_string(), "noise of 5 ms");
+    let noise = Noise { deviation: "0..10ms".parse().unwrap(), timer: 500.0, missed: 0.02, ..Noise::default() };
+    assert_eq!(noise.to_string(), "noise of 0 to 10 ms, a timer of 0.5 ms, 2 % of contacts missed");
+    let noise = Noise { bent: [0.0, 3_000.0, 0.0], speed_bias: 0.05, pose: 5.0, ..Noise::default() };
+    assert_eq!(
+        noise.to_string(),
+        "finger 2 early by 3 ms, speed off by up to 5 % per robot, a pose turned by 5° per touch"
+    );
+}
+
+#[test]
 fn levels_and_ranges_are_read() {
     let range = |least, largest| Ok(Deviation { least, largest });
     assert_eq!("5ms".parse(), range(5_000.0, 5_000.0));
