@@ -171,7 +171,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let mut split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
     // Another seed than that of the training.
     let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
-    let probe = Some(StatedProbe { probe: settings.capture.origin.probe, length: settings.capture.origin.length });
+    let probe = Some(StatedProbe::from(&settings.capture.origin));
     let method = |name, files, preset| Trial::new(name, files, preset, (&split, robots), settings, out, progress);
     let paper = method("paper", "paper", train::Settings { seed, probe, ..train::Settings::paper() })?;
     let ours = method(
@@ -298,7 +298,7 @@ fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<Picture> {
     let captured_as = |name: &str| captured.objects.iter().find(|object| object.name == name);
     let picture = |object: &Object| Picture {
         name: object.name.clone(),
-        png: render::thumbnail(&object.mesh, PICTURE),
+        png: render::thumbnail(object.mesh(), PICTURE),
         line: captured_as(&object.name).map_or_else(String::new, |c| {
             format!("{:.1} % of approaches are full touches", 100.0 * c.touches as f64 / c.approaches.max(1) as f64)
         }),
@@ -478,7 +478,7 @@ mod tests {
             .map(|(name, sides)| {
                 let mut mesh = Mesh::globe(10);
                 mesh.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= sides[axis]));
-                Object { name: name.into(), mesh }
+                Object::new(name, mesh)
             })
             .to_vec()
     }

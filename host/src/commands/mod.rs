@@ -11,6 +11,7 @@ mod noise;
 mod numbers;
 mod objects;
 mod parity;
+mod probe;
 mod progress;
 mod recognize;
 mod report;

@@ -1,8 +1,8 @@
 use super::noise::NoiseArguments;
+use super::probe::SizeArguments;
 use super::progress::Bar;
 use super::shell;
 use crate::Result;
-use crate::mesh::source;
 use crate::output;
 use crate::run;
 use crate::touches::Origin;
@@ -17,6 +17,8 @@ Examples:
   palpate run --touches 2000   a quick look
   palpate run --noise 0..5ms --timer 1ms
                                trained for a real switch, and tested with one
+  palpate run meshes/ --true-size --unit mm --probe probe.toml
+                               objects as large as they are, and your probe
   palpate run --json | jq .ours.accuracy
 
 Written into the output directory: data/ (the touches), paper.json and ensemble.json (the full models), paper.palpate
@@ -41,13 +43,18 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    size: SizeArguments,
+    #[command(flatten)]
     noise: NoiseArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     output::refuse_stdout(&arguments.out)?;
-    let Arguments { sources, out, touches, seed, force, json, noise } = arguments;
-    let objects = source::objects(&sources)?;
+    let Arguments { sources, out, touches, seed, force, json, size, noise } = arguments;
+    let file = size.probe.read()?;
+    let origin = size.origin(Origin { touches, seed, ..Origin::default() })?;
+    super::probe::refuse_unstated(&size)?;
+    let objects = size.objects(&sources, seed)?;
     if !json {
         // At once: the capture takes a while.
         output::print(&format!(
@@ -57,16 +64,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         ))?;
     }
     let settings = run::Settings {
-        capture: Origin { touches, seed, ..Origin::default() }.into(),
+        capture: origin.into(),
         replace: force,
         command: shell::command(
             ["palpate", "run"]
                 .into_iter()
                 .chain(sources.iter().map(String::as_str))
                 .chain(["-o", &out.to_string_lossy(), "--touches", &touches.to_string(), "--seed", &seed.to_string()])
-                .chain(noise.words().iter().map(String::as_str)),
+                .chain(size.words().iter().chain(&noise.words()).map(String::as_str)),
         ),
-        noise: noise.over(Noise::default()),
+        noise: noise.over(file.map_or_else(Noise::default, |file| file.real)),
         sources: sources.clone(),
         ..run::Settings::default()
     };

@@ -1,10 +1,11 @@
 use super::noise::NoiseArguments;
+use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::Result;
-use crate::ensemble::StatedProbe;
 use crate::ensemble::train::{self, Engine, Settings};
 use crate::evaluate::{self, CostOfNoise};
 use crate::output;
+use crate::probe::file::ProbeFile;
 use crate::touches::noise::Noise;
 use palpate_shared::Descriptor;
 use std::path::PathBuf;
@@ -17,7 +18,9 @@ Presets:
   compact  small and accurate: leaves hold a value per object; uses curvature
   paper    the published method: one tree per object and round, on contact times
 
-The ensemble states the probe that the data set was captured with; models exported from it do as well.
+The ensemble states the probe that the data set was captured with; models exported from it do as well. With --probe, \
+the data set must have been captured with the probe of the file, and what the file says under [real] is added to the \
+touches.
 
 Examples:
   palpate train data -o ensemble.json
@@ -25,6 +28,7 @@ Examples:
   palpate train data -o small.json --rounds 20 --depth 5
   palpate train data -o table.json --bins 64,16  for a small, very fast table
   palpate train data -o robust.json --noise 0..10ms --timer 1ms
+  palpate train data -o real.json --probe probe.toml
   palpate train data -o turned.json --descriptor oriented --pose-noise 5deg")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
@@ -59,6 +63,8 @@ pub(crate) struct Arguments {
     /// Round leaves to multiples of a power of two that fit this many bits, so that a compiled model with leaves of that width is exact; 0 leaves them as they are [default: the preset's; compact 16, paper 0]
     #[arg(long, value_name = "BITS")]
     leaf_bits: Option<u32>,
+    #[command(flatten)]
+    probe: ProbeArguments,
     #[command(flatten)]
     noise: NoiseArguments,
     /// Seed of the noise
@@ -112,7 +118,9 @@ const SWITCH: f64 = 1_000.0;
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
     let dataset = super::dataset(&arguments.directory)?;
-    let settings = Settings { probe: StatedProbe::of(&dataset), ..arguments.settings() };
+    let file = arguments.probe.read()?;
+    let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
+    let settings = Settings { probe, ..arguments.settings(file.as_ref()) };
     let is_clean = settings.noise.is_none();
     let start = Instant::now();
     let ensemble = train::train(&dataset, &settings, &Bar::new()).map_err(|error| match error.exit_code() {
@@ -175,7 +183,7 @@ fn cost(trained: &Trained, is_clean: bool) -> String {
 }
 
 impl Arguments {
-    fn settings(&self) -> Settings {
+    fn settings(&self, probe: Option<&ProbeFile>) -> Settings {
         let preset = match self.preset {
             Preset::Compact => Settings::compact(),
             Preset::Paper => Settings::paper(),
@@ -190,7 +198,7 @@ impl Arguments {
             bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
             feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
             leaf_bits: self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-            noise: self.noise.over(preset.noise),
+            noise: self.noise.over(probe.map_or(preset.noise, |file| file.real)),
             seed: self.seed,
             threads: self.threads,
             probe: None,

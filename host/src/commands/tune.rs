@@ -2,10 +2,10 @@ use super::export::features;
 use super::inspect::core;
 use super::noise::NoiseArguments;
 use super::numbers::share;
+use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::Result;
 use crate::compile::Core;
-use crate::ensemble::StatedProbe;
 use crate::output;
 use crate::touches::noise::Noise;
 use crate::tune::{self, Row, Settings, Tuned};
@@ -58,6 +58,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    probe: ProbeArguments,
+    #[command(flatten)]
     noise: NoiseArguments,
 }
 
@@ -66,6 +68,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         output::refuse_input(path, super::files_of(&arguments.directory))?;
     }
     let dataset = super::dataset(&arguments.directory)?;
+    let file = arguments.probe.read()?;
     let tuned = tune::tune(
         &dataset,
         &Settings {
@@ -73,8 +76,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             max_bytes: arguments.max_bytes,
             max_instructions: arguments.max_instructions,
             core: arguments.chip,
-            probe: StatedProbe::of(&dataset),
-            noise: arguments.noise.over(Noise::default()),
+            probe: arguments.probe.of_dataset(file.as_ref(), &dataset)?,
+            noise: arguments.noise.over(file.map_or_else(Noise::default, |file| file.real)),
             error_rate: arguments.error_rate,
             groups: arguments.groups,
             seed: arguments.seed,

@@ -57,7 +57,7 @@ impl<'a> Context<'a> {
         progress: &'a dyn Progress,
     ) -> Result<Self> {
         let length = Origin::default().length;
-        let scenes = objects.par_iter().map(|object| Scene::new(&object.mesh, length)).collect::<Result<_>>()?;
+        let scenes = objects.par_iter().map(|object| Scene::new(object.mesh(), length)).collect::<Result<_>>()?;
         let (captured, first, models, kinds) = Default::default();
         Ok(Self { settings, objects, cache, progress, scenes, captured, first, models, kinds })
     }

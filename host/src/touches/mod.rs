@@ -46,5 +46,6 @@ pub use dataset::{Dataset, ObjectTouches, Warning};
 pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use origin::Origin;
+pub(crate) use origin::{tenth, unit};
 pub use shard::Shard;
 pub use text::{parse_touch, write_touch};

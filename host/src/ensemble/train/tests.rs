@@ -145,7 +145,7 @@ fn the_most_objects_that_can_be_trained_can_be_saved_loaded_and_compiled() {
 fn an_ensemble_states_the_probe_and_knows_its_touches_again_after_saving() {
     let dataset = synthetic::dataset(&[60, 60], 8);
     let probe = crate::probe::approach::Probe { spacing: 2.0, ..Default::default() };
-    let probe = Some(StatedProbe { probe, length: 12.5 });
+    let probe = Some(StatedProbe { probe, length: 12.5, ..StatedProbe::default() });
     let stated = train(&dataset, &Settings { probe, ..quick() }, &()).unwrap();
     let silent = train(&dataset, &quick(), &()).unwrap();
     assert_eq!(stated.trees, silent.trees);
