@@ -49,7 +49,7 @@ fn example_touches() -> Result<Dataset, Box<dyn Error>> {
     let globe = Mesh::globe(12);
     let mut egg = globe.clone();
     egg.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.7);
-    let objects = [("egg", egg), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh });
+    let objects = [("egg", egg), ("globe", globe)].map(|(name, mesh)| Object::new(name, mesh));
     let directory = tempfile::tempdir()?;
     capture(&objects, &Origin { touches: 2000, ..Default::default() }.into(), directory.path(), &())?;
     Ok(Dataset::read(directory.path())?)

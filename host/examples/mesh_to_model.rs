@@ -50,5 +50,5 @@ fn two_meshes() -> Vec<Object> {
     let globe = Mesh::globe(12);
     let mut disc = globe.clone();
     disc.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.1);
-    [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh }).into()
+    [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object::new(name, mesh)).into()
 }

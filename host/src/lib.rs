@@ -22,7 +22,7 @@
 //! let globe = Mesh::globe(12);
 //! let mut disc = globe.clone();
 //! disc.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.1);
-//! let objects = [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh });
+//! let objects = [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object::new(name, mesh));
 //!
 //! // Touch each a thousand times, and train on the touches.
 //! let origin = Origin { touches: 1000, ..Default::default() };
@@ -34,7 +34,7 @@
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = Model::new(&compiled.bytes)?;
 //! let mut recognizer = Recognizer::<2>::new(&model, Stopping::from_model(&model))?;
-//! let scene = Scene::new(&objects[0].mesh, origin.length)?;
+//! let scene = Scene::new(objects[0].mesh(), origin.length)?;
 //! let unseen = Origin { seed: 2, ..origin };
 //! let mut verdict = Verdict::Undecided;
 //! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {

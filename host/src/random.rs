@@ -12,8 +12,12 @@ use rand::rngs::ChaCha8Rng;
 pub(crate) enum Purpose {
     /// Which touches train and which test.
     Folds,
-    /// Noise on contact times.
+    /// Gaussian noise on contact times.
     Noise,
+    /// What else a sensor and a robot add to a touch.
+    Sensor,
+    /// What a robot adds to all of its touches.
+    Robot,
     /// Groups and sequences of touches that an evaluation draws.
     Groups,
     /// Sequences of touches on which two models are compared.
@@ -36,6 +40,8 @@ impl Purpose {
         match self {
             Self::Folds => None,
             Self::Noise => Some(1),
+            Self::Sensor => Some(7),
+            Self::Robot => Some(8),
             Self::Groups => Some(2),
             Self::Sequences => Some(3),
             Self::View => Some(4),
@@ -76,8 +82,8 @@ mod tests {
 
     #[test]
     fn folds_noise_and_groups_of_one_seed_share_no_stream() {
-        use Purpose::{Casts, Folds, Groups, Noise, Sequences, Synthetic, View};
-        let purposes = [Folds, Noise, Groups, Sequences, View, Casts, Synthetic];
+        use Purpose::{Casts, Folds, Groups, Noise, Robot, Sensor, Sequences, Synthetic, View};
+        let purposes = [Folds, Noise, Sensor, Robot, Groups, Sequences, View, Casts, Synthetic];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();
         assert_eq!(purposes.map(draw).into_iter().collect::<BTreeSet<_>>().len(), purposes.len());
     }

@@ -16,6 +16,7 @@ use crate::report::results;
 use crate::report::run_page::{RunMethod, RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use crate::touches::folds::{self, Split};
+use crate::touches::noise::Noise;
 use crate::touches::{Dataset, Listing, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::format::Counted;
@@ -54,6 +55,8 @@ pub struct Settings {
     /// How many approaches of each object are captured besides, each kept whatever it touched: the compact method is
     /// trained on them, and all methods are tested on them.
     pub approaches: u64,
+    /// What a real sensor adds: ours is trained for it, the paper's method is not, and both are tested with it.
+    pub noise: Noise,
     /// The share of touches that is kept from training, to test on.
     pub test_share: f64,
     /// Groups, and also sequences, drawn for each object.
@@ -71,6 +74,7 @@ impl Default for Settings {
             replace: false,
             capture: capture::Settings::default(),
             approaches: 63_000,
+            noise: Noise::default(),
             test_share: 0.1,
             groups: 1000,
             error_rate: 0.01,
@@ -181,7 +185,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let captured =
         capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
     let seed = settings.capture.origin.seed;
-    let split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
+    let mut split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
     // Of another seed, so that no test approach is one of the full touches that the others were trained on.
     let origin = &settings.capture.origin;
     let origin =
@@ -190,11 +194,14 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let force = settings.capture.force || settings.replace || Listing::read(&directory)?.as_ref().is_some_and(is_same);
     let approach_settings = capture::Settings { origin, force, ..settings.capture.clone() };
     let approached = capture::capture(objects, &approach_settings, &directory, progress)?;
-    let approaches = folds::split(&Dataset::read(&directory)?, settings.test_share, seed)?;
-    let probe = Some(StatedProbe { probe: settings.capture.origin.probe, length: settings.capture.origin.length });
-    let method =
-        |name, files, preset, split| Trial::new(name, files, preset, split, &approaches.test, settings, out, progress);
-    let compact = train::Settings { seed, probe, ..train::Settings::compact() };
+    let mut approaches = folds::split(&Dataset::read(&directory)?, settings.test_share, seed)?;
+    // Another seed than that of the training.
+    let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
+    evaluate::add_noise(&mut approaches.test, &settings.noise, seed.wrapping_add(1))?;
+    let probe = Some(StatedProbe::from(&settings.capture.origin));
+    let tested = Tested { approaches: &approaches.test, robots };
+    let method = |name, files, preset, split| Trial::new(name, files, preset, split, tested, settings, out, progress);
+    let compact = train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() };
     let full = train::Settings { counted: Some(Counted::Full), ..compact.clone() };
     let contacts = train::Settings { counted: Some(Counted::Contacts), ..compact };
     let paper =
@@ -247,10 +254,19 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
         "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
         "capture": results::json("capture's settings", &settings.capture.origin)?,
         "approaches": settings.approaches,
+        "noise": results::json("the noise", &settings.noise)?,
         "test_share": settings.test_share,
         "groups": settings.groups,
         "error_rate": settings.error_rate,
     }))
+}
+
+/// What all methods are tested on besides their own kind of touches.
+#[derive(Clone, Copy)]
+struct Tested<'d> {
+    approaches: &'d Dataset,
+    /// How many robots made the test touches, in turn.
+    robots: usize,
 }
 
 /// A method, trained, compiled and tested.
@@ -268,7 +284,7 @@ impl Trial {
         stem: &str,
         preset: train::Settings,
         split: &Split,
-        approaches: &Dataset,
+        tested: Tested<'_>,
         settings: &Settings,
         out: &Path,
         progress: &dyn Progress,
@@ -283,7 +299,7 @@ impl Trial {
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
         let model = compile::open(&compiled.bytes)?;
-        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
+        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?.of_robots(tested.robots);
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
         let mut evaluation = evaluate::evaluate(
@@ -297,7 +313,7 @@ impl Trial {
                 seed,
             },
         )?;
-        let approached = Margins::new(Candidate::Compiled(&model), approaches)?;
+        let approached = Margins::new(Candidate::Compiled(&model), tested.approaches)?.of_robots(tested.robots);
         let fewest_approaches = approached.fewest_approaches();
         let at: Vec<usize> = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect();
         let stopping =
@@ -344,7 +360,7 @@ fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<Picture> {
     let captured_as = |name: &str| captured.objects.iter().find(|object| object.name == name);
     let picture = |object: &Object| Picture {
         name: object.name.clone(),
-        png: render::thumbnail(&object.mesh, PICTURE),
+        png: render::thumbnail(object.mesh(), PICTURE),
         line: captured_as(&object.name).map_or_else(String::new, |c| {
             format!("{:.1} % of approaches are full touches", 100.0 * c.touches as f64 / c.approaches.max(1) as f64)
         }),
@@ -546,7 +562,7 @@ mod tests {
             .map(|(name, sides)| {
                 let mut mesh = Mesh::globe(10);
                 mesh.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= sides[axis]));
-                Object { name: name.into(), mesh }
+                Object::new(name, mesh)
             })
             .to_vec()
     }

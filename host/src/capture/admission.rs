@@ -14,9 +14,10 @@ pub(super) struct Admission {
 }
 
 /// Compares what is in a directory with what a capture would write, and refuses what would be lost.
-pub(super) fn admit(directory: &Path, settings: &Settings, names: &[String]) -> Result<Admission> {
+pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) -> Result<Admission> {
+    let names: Vec<String> = objects.iter().map(|entry| entry.name.clone()).collect();
     let refuse = |problem| Err(Error::at(Place::file(directory), problem));
-    let wanted = Listing::new(&settings.origin, names.iter().cloned());
+    let wanted = Listing { objects: objects.to_vec(), ..Listing::new(&settings.origin, []) };
     let found = match Listing::read(directory) {
         // What cannot be read cannot be compared.
         Err(Error::At { .. }) if settings.force => None,
@@ -38,7 +39,7 @@ pub(super) fn admit(directory: &Path, settings: &Settings, names: &[String]) -> 
     if !found.complete {
         return refuse(CaptureProblem::HoldsUnfinished { touches: touches(&found.objects), objects: found.names() });
     }
-    let differences = differences(&found.origin, &wanted.origin);
+    let differences = differences(&found, &wanted);
     if settings.add {
         if !differences.is_empty() {
             return refuse(CaptureProblem::AddsOtherSettings { differences });
@@ -67,7 +68,7 @@ fn resumed(directory: &Path, found: Listing, wanted: &Listing, add: bool) -> Res
     if found.palpate != wanted.palpate {
         return refuse(CaptureProblem::ResumesOtherVersion { found: found.palpate });
     }
-    let differences = differences(&found.origin, &wanted.origin);
+    let differences = differences(&found, &wanted);
     if !differences.is_empty() {
         return refuse(CaptureProblem::ResumesOtherSettings { differences });
     }
@@ -99,7 +100,33 @@ fn merged(found: Listing, wanted: &Listing) -> Listing {
 }
 
 /// Which settings differ, and how: "touches is 20 there and 30 here". Empty if none does.
-fn differences(there: &Origin, here: &Origin) -> String {
+fn differences(there: &Listing, here: &Listing) -> String {
+    let differences = [settings(&there.origin, &here.origin), meshes(there, here)].concat();
+    differences.join(", ")
+}
+
+/// What differs about the meshes of the same objects.
+fn meshes(there: &Listing, here: &Listing) -> Vec<String> {
+    let mut differences = Vec::new();
+    for (name, own) in here.objects.iter().map(|entry| (&entry.name, entry)) {
+        let Some(other) = there.objects.iter().find(|entry| entry.name == *name) else { continue };
+        let count = |entry: &Entry| entry.instances.len().max(1);
+        if own.instances.len() != other.instances.len() {
+            differences.push(format!("{name} has {} instances there and {} here", count(other), count(own)));
+        } else if own.instances != other.instances {
+            differences.push(format!("{name} has other instances there than here"));
+        }
+        if let (Some(own), Some(other)) = (own.millimeters, other.millimeters)
+            && own != other
+        {
+            differences.push(format!("a unit of {name}'s mesh is {other} mm there and {own} mm here"));
+        }
+    }
+    differences
+}
+
+/// Which settings differ, and how.
+fn settings(there: &Origin, here: &Origin) -> Vec<String> {
     let fields = |origin| match serde_json::to_value(origin) {
         Ok(serde_json::Value::Object(fields)) => fields,
         _ => serde_json::Map::new(),
@@ -107,7 +134,7 @@ fn differences(there: &Origin, here: &Origin) -> String {
     let (there, here) = (fields(there), fields(here));
     let different = there.iter().filter(|(name, value)| here.get(*name) != Some(value));
     let said = different.map(|(name, value)| format!("{name} is {value} there and {} here", here[name]));
-    said.collect::<Vec<_>>().join(", ")
+    said.collect()
 }
 
 fn touches(entries: &[Entry]) -> u64 {

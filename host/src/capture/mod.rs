@@ -31,11 +31,12 @@ mod sample;
 mod store;
 
 use crate::error::{CaptureProblem, Error, Result};
-use crate::mesh::Object;
+use crate::mesh::{Instance, Object};
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::Origin;
+use crate::touches::{Entry, Origin};
 use palpate_shared::Touch;
+use palpate_shared::format::Length;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::path::Path;
@@ -128,31 +129,52 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
     let start = Instant::now();
     let mut objects: Vec<&Object> = objects.iter().collect();
     objects.sort_by(|a, b| a.name.cmp(&b.name));
-    let scenes = scenes(&objects, settings.origin.length, progress)?;
+    let scenes = scenes(&objects, &settings.origin, progress)?;
     let samplers: Vec<Sampler<'_>> = objects
         .iter()
         .zip(&scenes)
-        .map(|(object, scene)| Sampler::new(scene, &object.name, &settings.origin))
+        .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, &settings.origin))
         .collect();
-    let names: Vec<String> = objects.iter().map(|object| object.name.clone()).collect();
-    let mut store = store::Store::open(directory, settings, &names)?;
+    let entries: Vec<Entry> = objects.iter().map(|object| entry(object, &settings.origin)).collect();
+    let mut store = store::Store::open(directory, settings, &entries)?;
     let objects = pipeline::run(&samplers, settings, &mut store, progress)?;
     store.finish()?;
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
 }
 
-/// The objects' scenes, built side by side.
-fn scenes(objects: &[&Object], length: f64, progress: &dyn Progress) -> Result<Vec<Scene>> {
-    let scene = |object: &&Object| {
+/// What the listing states about an object before it is touched.
+fn entry(object: &Object, origin: &Origin) -> Entry {
+    let has_several = object.instances().len() > 1;
+    Entry {
+        name: object.name.clone(),
+        instances: object.instances().filter(|_| has_several).map(|instance| instance.name.clone()).collect(),
+        millimeters: object.millimeters.filter(|_| origin.unit == Length::Millimeter),
+        ..Entry::default()
+    }
+}
+
+/// The scenes of each object's instances, built side by side.
+fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
+    let scene = |(object, instance): (&Object, &Instance)| {
         progress::check(progress)?;
-        Scene::new(&object.mesh, length).map_err(|error| match error {
+        let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
+        let length = origin.length_of(object, instance).ok_or_else(unknown)?;
+        // A mesh without extent is refused below, with a better reason.
+        if length > 0.0 {
+            origin.probe.check(length)?;
+        }
+        Scene::new(&instance.mesh, length).map_err(|error| match error {
             Error::At { problem, .. } => {
                 CaptureProblem::Object { name: object.name.clone(), problem: Box::new(problem) }.into()
             }
             other => other.in_file(&object.name),
         })
     };
-    objects.par_iter().map(scene).collect()
+    let of = |object: &&Object| {
+        let instances: Vec<&Instance> = object.instances().collect();
+        instances.into_par_iter().map(|instance| scene((object, instance))).collect()
+    };
+    objects.par_iter().map(of).collect()
 }
 
 /// The touches of one object with these sample numbers, in memory: the same that [`capture`] writes.
@@ -171,14 +193,14 @@ mod tests {
     use crate::error::Problem;
     use crate::mesh::Mesh;
     use crate::probe::approach::Probe;
-    use crate::touches::{Dataset, Entry, Listing, Shard};
+    use crate::touches::{Dataset, Listing, Shard};
     use std::collections::BTreeMap;
 
     fn objects() -> Vec<Object> {
         let globe = Mesh::globe(12);
         let mut disc = globe.clone();
         disc.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.1);
-        [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object { name: name.into(), mesh }).into()
+        [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object::new(name, mesh)).into()
     }
 
     fn origin(touches: u64) -> Origin {
@@ -224,7 +246,7 @@ mod tests {
         let one = files(&settings());
         let other = files(&with(Origin { seed: 2, ..origin(1500) }));
         assert_ne!(one["disc.txt"], other["disc.txt"]);
-        let scene = Scene::new(&objects()[0].mesh, 10.0).unwrap();
+        let scene = Scene::new(objects()[0].mesh(), 10.0).unwrap();
         let disc = touches(&scene, "disc", &origin(1500), 0..9).unwrap();
         assert_ne!(disc, touches(&scene, "disk", &origin(1500), 0..9).unwrap());
     }
@@ -257,7 +279,7 @@ mod tests {
         let summary = capture(&objects(), &settings, directory.path(), &()).unwrap();
         let dataset = Dataset::read(directory.path()).unwrap();
         for (object, read) in objects().iter().zip(&dataset.objects) {
-            let scene = Scene::new(&object.mesh, origin.length).unwrap();
+            let scene = Scene::new(object.mesh(), origin.length).unwrap();
             assert_eq!(read.touches, touches(&scene, &object.name, &origin, 0..1500).unwrap());
             assert!(read.touches.iter().all(|touch| touch.is_full() && touch.pose().is_some()));
         }
@@ -272,7 +294,7 @@ mod tests {
         // The early way out must lose or change no touch: drawn from one stream, the plain way finds the same.
         use rand::SeedableRng;
         for object in objects() {
-            let scene = Scene::new(&object.mesh, 10.0).unwrap();
+            let scene = Scene::new(object.mesh(), 10.0).unwrap();
             let (mut rng, probe) = (rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1), Probe::default());
             let mut full = 0;
             for _ in 0..20_000 {
@@ -293,7 +315,7 @@ mod tests {
         let whole = files(&settings());
         let mut listing: Listing = serde_json::from_str(&whole["dataset.json"]).unwrap();
         let objects = objects();
-        let scenes = scenes(&objects.iter().collect::<Vec<_>>(), 10.0, &()).unwrap();
+        let scenes = scenes(&objects.iter().collect::<Vec<_>>(), &Origin::default(), &()).unwrap();
         for (object, kept) in [(0, 0), (0, 1), (0, 777), (0, 1500), (1, 0), (1, 1499), (1, 1500)] {
             // As if it had been killed after a checkpoint at N touches of this object.
             let directory = tempfile::tempdir().unwrap();
@@ -301,7 +323,7 @@ mod tests {
             for (index, entry) in listing.objects.iter_mut().enumerate() {
                 let kept = [kept, if index < object { 1500 } else { 0 }][usize::from(index != object)];
                 let text = &whole[&format!("{}.txt", entry.name)];
-                let sampler = Sampler::new(&scenes[index], &entry.name, &listing.origin);
+                let sampler = Sampler::of_instances(&scenes[index], &entry.name, &listing.origin);
                 entry.crc32 = None;
                 entry.touches = kept;
                 entry.approaches = (0..kept).map(|sample| sampler.sample(sample).unwrap().1).sum();
@@ -323,7 +345,7 @@ mod tests {
     fn a_part_that_lost_what_was_checkpointed_is_not_resumed() {
         let directory = tempfile::tempdir().unwrap();
         let mut listing = Listing::new(&origin(1500), ["disc".into(), "globe".into()]);
-        listing.objects[0] = Entry { name: "disc".into(), touches: 9, approaches: 99, bytes: 252, crc32: None };
+        listing.objects[0] = Entry { name: "disc".into(), touches: 9, approaches: 99, bytes: 252, ..Entry::default() };
         listing.write(directory.path()).unwrap();
         let error = capture(&objects(), &Settings { resume: true, ..settings() }, directory.path(), &()).unwrap_err();
         assert!(error.to_string().contains("disc.part: shorter than the 252 bytes"), "{error}");
@@ -332,7 +354,7 @@ mod tests {
     #[test]
     fn an_object_that_three_fingers_cannot_touch_is_named() {
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let speck = Object { name: "speck".into(), mesh: Mesh { vertices, triangles: vec![[0, 1, 2]] } };
+        let speck = Object::new("speck", Mesh { vertices, triangles: vec![[0, 1, 2]] });
         let settings = with(Origin { length: 0.5, ..origin(1) });
         let directory = tempfile::tempdir().unwrap();
         let error = capture(&[speck], &settings, directory.path(), &()).unwrap_err().to_string();
@@ -373,7 +395,7 @@ mod tests {
     }
 
     fn globe_called(name: &str) -> Object {
-        Object { name: name.into(), mesh: Mesh::globe(6) }
+        Object::new(name, Mesh::globe(6))
     }
 
     #[test]
@@ -545,7 +567,7 @@ mod tests {
 
     #[test]
     fn a_mesh_that_makes_no_scene_is_named_once_with_one_remedy() {
-        let dot = Object { name: "dot".into(), mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0; 3]] } };
+        let dot = Object::new("dot", Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0; 3]] });
         let directory = tempfile::tempdir().unwrap();
         let error = capture(&[dot], &settings(), directory.path(), &()).unwrap_err().to_string();
         assert!(error.starts_with("dot: ") && !error.contains("..") && error.matches("dot").count() == 1, "{error}");

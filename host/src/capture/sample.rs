@@ -18,7 +18,8 @@ pub const MOST_ATTEMPTS: u64 = 1 << 22;
 /// Draws the samples of one object.
 #[derive(Debug)]
 pub struct Sampler<'a> {
-    scene: &'a Scene,
+    /// One for each instance.
+    scenes: &'a [Scene],
     name: &'a str,
     origin: &'a Origin,
     stream: u64,
@@ -27,8 +28,14 @@ pub struct Sampler<'a> {
 impl<'a> Sampler<'a> {
     /// The samples of the object with this scene and name, made as `origin` says.
     pub fn new(scene: &'a Scene, name: &'a str, origin: &'a Origin) -> Self {
+        Self::of_instances(std::slice::from_ref(scene), name, origin)
+    }
+
+    /// The samples of the object with these instances' scenes: sample i is of instance i modulo their number. Without a
+    /// scene there is no sample: [`sample`](Self::sample) finds the object untouchable.
+    pub fn of_instances(scenes: &'a [Scene], name: &'a str, origin: &'a Origin) -> Self {
         let stream = name.bytes().fold(mix(origin.seed), |hash, byte| mix(hash ^ u64::from(byte)));
-        Self { scene, name, origin, stream }
+        Self { scenes, name, origin, stream }
     }
 
     /// The object's name.
@@ -44,16 +51,20 @@ impl<'a> Sampler<'a> {
     pub fn sample(&self, index: u64) -> Result<(Touch, u64)> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
+        let untouchable = || CaptureProblem::Untouchable { name: self.name.into(), approaches: MOST_ATTEMPTS };
+        let turn = index % self.scenes.len().max(1) as u64;
+        let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn)).ok_or_else(untouchable)?;
+        let (bounds, clearance) = (scene.bounds(), self.origin.clearance(scene.bounds()));
         for attempts in 1..=MOST_ATTEMPTS {
-            let approach = Approach::draw(&mut rng, self.scene.bounds(), probe.tilt);
+            let approach = Approach::draw_from(&mut rng, bounds, probe.tilt, clearance);
             if self.origin.approaches {
-                return Ok((approach.touch(approach.distances(self.scene, probe), probe), attempts));
+                return Ok((approach.touch(approach.distances(scene, probe), probe), attempts));
             }
-            if let Some(distances) = approach.full_distances(self.scene, probe) {
+            if let Some(distances) = approach.full_distances(scene, probe) {
                 return Ok((approach.touch(distances.map(Some), probe), attempts));
             }
         }
-        Err(CaptureProblem::Untouchable { name: self.name.into(), approaches: MOST_ATTEMPTS }.into())
+        Err(untouchable().into())
     }
 
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {

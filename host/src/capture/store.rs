@@ -35,10 +35,10 @@ pub(super) struct Store {
 
 impl Store {
     /// Opens the directory for a capture of objects with these names, alone.
-    pub(super) fn open(directory: &Path, settings: &Settings, names: &[String]) -> Result<Self> {
+    pub(super) fn open(directory: &Path, settings: &Settings, objects: &[Entry]) -> Result<Self> {
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
         let lock = lock(directory)?;
-        let Admission { replaced, listing } = admit(directory, settings, names)?;
+        let Admission { replaced, listing } = admit(directory, settings, objects)?;
         output::remove_leftovers(directory)?;
         if let Some(replaced) = replaced {
             Listing { complete: false, ..replaced.clone() }.write(directory)?;
@@ -55,10 +55,10 @@ impl Store {
                 remove(&entry.file(directory, listing.origin.format))?;
             }
         }
-        let position = |name: &String| listing.objects.iter().position(|entry| entry.name == *name);
+        let position = |object: &Entry| listing.objects.iter().position(|entry| entry.name == object.name);
         Ok(Self {
             directory: directory.into(),
-            positions: names.iter().filter_map(position).collect(),
+            positions: objects.iter().filter_map(position).collect(),
             listing,
             samples,
             open: None,

@@ -1,9 +1,9 @@
 use super::numbers::count;
+use super::probe::SizeArguments;
 use super::progress::Bar;
 use crate::capture::{self, Settings, Summary};
 use crate::error::{CaptureProblem, Problem, TouchesProblem};
 use crate::mesh::facts::Facts;
-use crate::mesh::source;
 use crate::output;
 use crate::probe::approach::Probe;
 use crate::touches::{Format, Listing, Origin, Shard};
@@ -23,6 +23,10 @@ Examples:
   palpate capture jug.obj -o data --add           one more object, touched alike
   palpate capture meshes/ -o data --pose          with the probe's direction
   palpate capture meshes/ -o data --approaches    every approach, also misses
+  palpate capture meshes/ -o data --true-size --unit mm --probe probe.toml
+                                                  as large as they are
+  palpate capture meshes/ -o data --instances     a directory for each object
+  palpate capture builtin -o data --instances 20  twenty forks are a fork
   palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts
   palpate capture meshes/ -o data --resume        continue an interrupted one")]
 pub(crate) struct Arguments {
@@ -39,20 +43,22 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", value_parser = count)]
     seed: Option<u64>,
     /// The longest side of each object's bounding box, in units [default: 10]
-    #[arg(long, value_name = "UNITS")]
+    #[arg(long, value_name = "UNITS", conflicts_with = "true_size")]
     length: Option<f64>,
-    /// The fingers' radius, in units [default: 0.15]
+    /// The fingers' radius, in units, or at true size in millimeters [default: 0.15]
     #[arg(long, value_name = "UNITS")]
     radius: Option<f64>,
-    /// The distance between neighboring fingers, in units [default: 1.5]
+    /// The distance between neighboring fingers, in units or millimeters [default: 1.5]
     #[arg(long, value_name = "UNITS")]
     spacing: Option<f64>,
-    /// How fast the probe moves, in units per second [default: 10]
+    /// How fast the probe moves, in units or millimeters per second [default: 10]
     #[arg(long, value_name = "UNITS")]
     speed: Option<f64>,
     /// How far the row of fingers may be tilted to either side, in degrees [default: 10]
     #[arg(long, value_name = "DEGREES")]
     tilt: Option<f64>,
+    #[command(flatten)]
+    size: SizeArguments,
     /// Append the probe's direction and alignment to each line (six numbers)
     #[arg(long)]
     pose: bool,
@@ -92,10 +98,14 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         threads: arguments.threads,
     };
     settings.check()?;
-    let objects = source::objects(&arguments.sources)?;
-    for (object, complaint) in objects.iter().filter_map(|object| Some((object, Facts::of(&object.mesh).complaint()?)))
-    {
-        eprintln!("{}: {complaint}", object.name);
+    let objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
+    for object in &objects {
+        for instance in object.instances() {
+            if let Some(complaint) = Facts::of(&instance.mesh).complaint() {
+                let name = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
+                eprintln!("{}{name}: {complaint}", object.name);
+            }
+        }
     }
     let summary = capture::capture(&objects, &settings, &arguments.output, &Bar::new())?;
     if arguments.json { output::print_json(&summary) } else { output::print(&table(&summary)) }
@@ -105,8 +115,14 @@ impl Arguments {
     /// What the options say, and where they say nothing the defaults or, for objects to add, the data set.
     fn origin(&self) -> Result<Origin> {
         let there = if self.add { Listing::read(&self.output)? } else { None };
-        let base = there.map_or_else(Origin::default, |listing| listing.origin);
+        let base = self.size.origin(there.map_or_else(Origin::default, |listing| listing.origin))?;
+        let stated = [self.radius, self.spacing, self.speed].iter().all(Option::is_some);
+        if self.size.lacks_probe() && !stated && !self.add {
+            let allowed = "a file with unit = \"mm\", or give --radius, --spacing and --speed in millimeters";
+            return Err(Error::setting("probe", "not given", allowed));
+        }
         Ok(Origin {
+            unit: base.unit,
             touches: self.touches.unwrap_or(base.touches),
             seed: self.seed.unwrap_or(base.seed),
             length: self.length.unwrap_or(base.length),
@@ -141,6 +157,7 @@ pub(super) fn hint(error: &Error) -> Option<&'static str> {
         CaptureProblem::NotWritten { .. } => Some("To resume, repeat the command with --resume."),
         CaptureProblem::Untouchable { .. } => Some("See --radius, --spacing and --length."),
         CaptureProblem::Threads { .. } => Some("See --threads."),
+        CaptureProblem::NoTrueSize { .. } => Some("See --unit."),
         _ => None,
     }
 }

@@ -1,10 +1,11 @@
+use super::noise::NoiseArguments;
 use super::numbers::share;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
 use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings};
 use crate::output;
 use crate::progress::Progress;
-use crate::touches::noise;
+use crate::touches::noise::Noise;
 use crate::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -25,6 +26,7 @@ Examples:
   palpate evaluate model.palpate unseen
   palpate evaluate ensemble.json unseen --at 10,30 --json
   palpate evaluate model.palpate unseen --noise 5ms
+  palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
   palpate evaluate model.palpate unseen --confusion 20
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02")]
@@ -45,9 +47,6 @@ pub(crate) struct Arguments {
     /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
     max_touches: Option<u32>,
-    /// Add Gaussian noise to the contact times first: standard deviation, such as 5ms [default: none]
-    #[arg(long, value_parser = super::train::microseconds, value_name = "DURATION")]
-    noise: Option<f64>,
     /// Say as well how often each object was taken for each, after this many touches
     #[arg(long, value_name = "TOUCHES")]
     confusion: Option<usize>,
@@ -57,6 +56,8 @@ pub(crate) struct Arguments {
     /// Print the figures as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    noise: NoiseArguments,
 }
 
 /// An evaluation, and what was asked for beside it.
@@ -64,6 +65,8 @@ pub(crate) struct Arguments {
 struct Evaluated {
     #[serde(flatten)]
     evaluation: Evaluation,
+    /// Robots that made the touches in turn, each with its own bias.
+    robots: usize,
     /// Objects whose touches are those that the model was trained on.
     trained_on: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -89,15 +92,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
         ModelFile::Compiled(_) => Vec::new(),
     };
-    if let Some(deviation) = arguments.noise {
-        for object in &mut dataset.objects {
-            object.touches = noise::noisy(&object.name, &object.touches, deviation, arguments.seed);
-        }
-    }
+    let noise = arguments.noise.over(Noise::default());
+    let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
     let (evaluation, confusion) = file.with(|candidate| {
-        let margins = Margins::new(candidate, &dataset)?;
+        let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
             at,
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         Ok((evaluate::evaluate(&margins, &settings)?, confusion.transpose()?))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, trained_on, confusion };
+    let evaluated = Evaluated { evaluation, robots, trained_on, confusion };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -161,6 +161,10 @@ fn text(evaluated: &Evaluated) -> String {
     let mut text = table(&evaluated.evaluation);
     if let Some(approaches) = &evaluated.evaluation.approaches {
         text += &approaches_table(approaches, &evaluated.evaluation.patterns);
+    }
+    if evaluated.robots > 1 {
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
     }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);

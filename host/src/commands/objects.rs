@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 
 fn write(object: &Object, arguments: &Arguments) -> Result<Written> {
     let file = arguments.output.join(format!("{}.obj", object.name));
-    output::write_whole(&file, |out| obj::write(&object.mesh, out))?;
-    let (vertices, triangles) = (object.mesh.vertices.len(), object.mesh.triangles.len());
+    output::write_whole(&file, |out| obj::write(object.mesh(), out))?;
+    let (vertices, triangles) = (object.mesh().vertices.len(), object.mesh().triangles.len());
     Ok(Written { name: object.name.clone(), file, vertices, triangles })
 }

@@ -1,8 +1,10 @@
+use super::noise::NoiseArguments;
 use super::progress::Bar;
 use super::shell;
 use crate::Result;
 use crate::output::{print, print_json, refuse_stdout};
 use crate::report::{self, Existing, Settings};
+use crate::touches::noise::Noise;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -11,6 +13,7 @@ Examples:
   palpate report                    the built-in objects, in about ten minutes
   palpate report --quick -o quick   fewer touches, in half a minute
   palpate report meshes/ -o report  your own OBJ files
+  palpate report --noise 0..10ms    with our robust model trained for this noise
   palpate report --resume           continue an interrupted report")]
 pub(crate) struct Arguments {
     /// Where objects come from: `builtin` or a built-in object's name, an OBJ file, or a directory of OBJ files
@@ -37,14 +40,19 @@ pub(crate) struct Arguments {
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    noise: NoiseArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { sources, output, seed, quick, growth, resume, force, json } = arguments;
+    let Arguments { sources, output, seed, quick, growth, resume, force, json, noise } = arguments;
     refuse_stdout(&output)?;
-    let command = command(&sources, seed, quick, growth);
+    let command = command(&sources, seed, quick, growth, &noise);
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
-    let settings = Settings { command, growth: settings.growth || growth, ..settings };
+    let growth = settings.growth || growth;
+    let noise = if noise.is_given() { noise.over(Noise::default()) } else { settings.noise };
+    noise.check()?;
+    let settings = Settings { command, growth, noise, ..settings };
     let existing = Existing { resume, replace: force };
     let written = report::report(&settings, &output, existing, &Bar::new())?;
     if json {
@@ -56,10 +64,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 }
 
 /// The command that makes this report again, wherever it is written.
-fn command(sources: &[String], seed: u64, quick: bool, growth: bool) -> String {
+fn command(sources: &[String], seed: u64, quick: bool, growth: bool, noise: &NoiseArguments) -> String {
     let seed = seed.to_string();
     let words = ["palpate", "report"].into_iter().chain(sources.iter().map(String::as_str)).chain(["--seed", &seed]);
-    shell::command(words.chain(quick.then_some("--quick")).chain(growth.then_some("--growth")))
+    let noise = noise.words();
+    let switches = quick.then_some("--quick").into_iter().chain(growth.then_some("--growth"));
+    shell::command(words.chain(switches).chain(noise.iter().map(String::as_str)))
 }
 
 #[cfg(test)]
@@ -68,9 +78,12 @@ mod tests {
 
     #[test]
     fn the_command_of_a_report_makes_it_again() {
-        assert_eq!(command(&["builtin".into()], 1, false, false), "palpate report builtin --seed 1");
         assert_eq!(
-            command(&["my meshes".into(), "cup.obj".into()], 2, true, true),
+            command(&["builtin".into()], 1, false, false, &NoiseArguments::default()),
+            "palpate report builtin --seed 1"
+        );
+        assert_eq!(
+            command(&["my meshes".into(), "cup.obj".into()], 2, true, true, &NoiseArguments::default()),
             "palpate report 'my meshes' cup.obj --seed 2 --quick --growth"
         );
     }

@@ -1,10 +1,12 @@
+use super::noise::NoiseArguments;
+use super::probe::SizeArguments;
 use super::progress::Bar;
 use super::shell;
 use crate::Result;
-use crate::mesh::source;
 use crate::output;
 use crate::run;
 use crate::touches::Origin;
+use crate::touches::noise::Noise;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -13,6 +15,10 @@ Examples:
   palpate run                  ten built-in objects; results in out/
   palpate run meshes/ -o mine  your own OBJ files
   palpate run --touches 2000   a quick look
+  palpate run --noise 0..5ms --timer 1ms
+                               trained for a real switch, and tested with one
+  palpate run meshes/ --true-size --unit mm --probe probe.toml
+                               objects as large as they are, and your probe
   palpate run --json | jq .ours.accuracy
 
 Three methods are trained and compared: the published one, on the times of full touches; ours on full touches; and ours on every approach with at least one contact, which is the model to use.
@@ -40,13 +46,20 @@ pub(crate) struct Arguments {
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    size: SizeArguments,
+    #[command(flatten)]
+    noise: NoiseArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     output::refuse_stdout(&arguments.out)?;
-    let Arguments { sources, out, touches, approaches, seed, force, json } = arguments;
+    let Arguments { sources, out, touches, approaches, seed, force, json, size, noise } = arguments;
     let approaches = approaches.unwrap_or_else(|| touches.saturating_mul(3));
-    let objects = source::objects(&sources)?;
+    let file = size.probe.read()?;
+    let origin = size.origin(Origin { touches, seed, ..Origin::default() })?;
+    super::probe::refuse_unstated(&size)?;
+    let objects = size.objects(&sources, seed)?;
     if !json {
         // At once: the capture takes a while.
         output::print(&format!(
@@ -57,19 +70,18 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         ))?;
     }
     let settings = run::Settings {
-        capture: Origin { touches, seed, ..Origin::default() }.into(),
+        capture: origin.into(),
         approaches,
         replace: force,
-        command: shell::command(["palpate", "run"].into_iter().chain(sources.iter().map(String::as_str)).chain([
-            "-o",
-            &out.to_string_lossy(),
-            "--touches",
-            &touches.to_string(),
-            "--approaches",
-            &approaches.to_string(),
-            "--seed",
-            &seed.to_string(),
-        ])),
+        command: shell::command(
+            ["palpate", "run"]
+                .into_iter()
+                .chain(sources.iter().map(String::as_str))
+                .chain(["-o", &out.to_string_lossy(), "--touches", &touches.to_string()])
+                .chain(["--approaches", &approaches.to_string(), "--seed", &seed.to_string()])
+                .chain(size.words().iter().chain(&noise.words()).map(String::as_str)),
+        ),
+        noise: noise.over(file.map_or_else(Noise::default, |file| file.real)),
         sources: sources.clone(),
         ..run::Settings::default()
     };

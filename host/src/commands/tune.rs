@@ -1,11 +1,13 @@
 use super::export::features;
 use super::inspect::core;
+use super::noise::NoiseArguments;
 use super::numbers::share;
+use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::Result;
 use crate::compile::Core;
-use crate::ensemble::StatedProbe;
 use crate::output;
+use crate::touches::noise::Noise;
 use crate::tune::{self, Row, Settings, Tuned};
 use palpate_shared::Descriptor;
 use std::fmt::Write as _;
@@ -20,6 +22,7 @@ Examples:
   palpate tune data --max-bytes 16K -o model.palpate
   palpate tune data --max-bytes 16K --max-instructions 600 -o fast.palpate
   palpate tune data --max-instructions 2000 --chip m0+ -o m0.palpate
+  palpate tune data --noise 0..10ms --timer 1ms -o robust.palpate
   palpate tune data --json")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
@@ -54,6 +57,10 @@ pub(crate) struct Arguments {
     /// Print all models of the family, and the choice, as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    probe: ProbeArguments,
+    #[command(flatten)]
+    noise: NoiseArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
@@ -61,6 +68,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         output::refuse_input(path, super::files_of(&arguments.directory))?;
     }
     let dataset = super::dataset(&arguments.directory)?;
+    let file = arguments.probe.read()?;
     let tuned = tune::tune(
         &dataset,
         &Settings {
@@ -68,7 +76,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             max_bytes: arguments.max_bytes,
             max_instructions: arguments.max_instructions,
             core: arguments.chip,
-            probe: StatedProbe::of(&dataset),
+            probe: arguments.probe.of_dataset(file.as_ref(), &dataset)?,
+            noise: arguments.noise.over(file.map_or_else(Noise::default, |file| file.real)),
             error_rate: arguments.error_rate,
             groups: arguments.groups,
             seed: arguments.seed,

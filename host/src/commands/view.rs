@@ -1,8 +1,11 @@
+use super::probe::{SizeArguments, refuse_unstated};
 use crate::Result;
-use crate::mesh::source;
+use crate::error::CaptureProblem;
 use crate::output;
 use crate::probe::approach::Probe;
 use crate::report::view;
+use crate::touches::Origin;
+use glam::DVec3;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -12,6 +15,8 @@ Examples:
   palpate view cup.obj -o cup.html                your own mesh: right side out?
   palpate view fork -o fork.html --touches 60     more touches
   palpate view cup.obj -o cup.html --radius 0.05  with thinner fingers
+  palpate view cup.obj -o cup.html --true-size --unit mm --probe probe.toml
+                                                  as large as it is
 
 The page works in any browser, without a network. The inside of the surface is orange: a mesh that shows orange from
 outside is inside out, or has holes.")]
@@ -32,22 +37,37 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = view::Settings::default().seed)]
     seed: u64,
     /// The longest side of the object's bounding box, in units
-    #[arg(long, value_name = "UNITS", default_value_t = view::Settings::default().length)]
+    #[arg(long, value_name = "UNITS", default_value_t = view::Settings::default().length, conflicts_with = "true_size")]
     length: f64,
-    /// The fingers' radius, in units
-    #[arg(long, value_name = "UNITS", default_value_t = Probe::default().radius)]
-    radius: f64,
-    /// The distance between neighboring fingers, in units
-    #[arg(long, value_name = "UNITS", default_value_t = Probe::default().spacing)]
-    spacing: f64,
+    /// The fingers' radius, in units [default: the probe file's; 0.15]
+    #[arg(long, value_name = "UNITS")]
+    radius: Option<f64>,
+    /// The distance between neighboring fingers, in units [default: the probe file's; 1.5]
+    #[arg(long, value_name = "UNITS")]
+    spacing: Option<f64>,
+    #[command(flatten)]
+    size: SizeArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     output::refuse_input(&arguments.output, [&arguments.object])?;
-    let Arguments { touches, misses, seed, length, radius, spacing, .. } = arguments;
-    let probe = Probe { radius, spacing, ..Probe::default() };
-    let object = source::object(&arguments.object)?;
-    let page = view::page(&object, &view::Settings { touches, misses, seed, length, probe })?;
+    let Arguments { touches, misses, seed, length, radius, spacing, size, .. } = &arguments;
+    let origin = size.origin(Origin { length: *length, ..Origin::default() })?;
+    refuse_unstated(size)?;
+    let object = size.object(&arguments.object)?;
+    let [first, ..] = &object.instances().collect::<Vec<_>>()[..] else { unreachable!("an object has an instance") };
+    let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
+    let length = origin.length_of(&object, first).ok_or_else(unknown)?;
+    let probe = Probe {
+        radius: radius.unwrap_or(origin.probe.radius),
+        spacing: spacing.unwrap_or(origin.probe.spacing),
+        ..origin.probe
+    };
+    let clearance = Origin { probe, ..origin }.clearance([DVec3::ZERO, DVec3::splat(length)]);
+    let page = view::page(
+        &object,
+        &view::Settings { touches: *touches, misses: *misses, seed: *seed, length, clearance, probe },
+    )?;
     output::write_bytes(&arguments.output, page.as_bytes())?;
     output::print_about(&arguments.output, &format!("{}: open it in a browser\n", arguments.output.display()))
 }

@@ -186,7 +186,7 @@ fn a_model_states_the_probe_of_its_touches_and_the_published_one_only_where_none
     };
     assert_eq!(stated(&ensemble), (1.5, 10.0));
     let probe = Probe { spacing: 2.0, speed: 25.0, ..Probe::default() };
-    ensemble.origin.probe = Some(StatedProbe { probe, length: 10.0 });
+    ensemble.origin.probe = Some(StatedProbe { probe, ..StatedProbe::default() });
     assert_eq!(stated(&ensemble), (2.0, 25.0));
 }
 

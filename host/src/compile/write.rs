@@ -84,7 +84,7 @@ fn optional(ensemble: &Ensemble, forest: &Forest<'_>) -> Vec<u8> {
         let trained = Trained {
             probe: origin.probe.map(|stated| stated.trained()),
             touches: origin.trained.map(|trained| trained.touches),
-            noise: None,
+            noise: origin.noise.map(|noise| noise.trained()),
             shares: origin.trained.and_then(|trained| trained.pattern_shares()),
         };
         trained.write(|part| bytes.extend_from_slice(part));

@@ -1,7 +1,9 @@
 //! Where the touches that an ensemble was trained on came from.
 
+use crate::error::{ProbeProblem, Result};
 use crate::probe::approach::Probe;
-use crate::touches::Dataset;
+use crate::touches::noise::Noise;
+use crate::touches::{self, Dataset, tenth, unit};
 use palpate_shared::format::{Counted, Length, PatternShares, TrainedProbe, TrainedTouches};
 use palpate_shared::{ContactPattern, Patterns};
 use serde::{Deserialize, Serialize};
@@ -14,6 +16,8 @@ pub struct Origin {
     pub probe: Option<StatedProbe>,
     /// Which touches they were, and so which ones are evidence.
     pub trained: Option<Trained>,
+    /// What was added to them in training; none also where that is not known.
+    pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
 }
@@ -24,23 +28,67 @@ pub struct StatedProbe {
     /// The probe's measures.
     #[serde(flatten)]
     pub probe: Probe,
-    /// The longest side of an object's bounding box, in units.
+    /// What its lengths are measured in.
+    #[serde(default = "tenth", with = "unit")]
+    pub unit: Length,
+    /// The longest side of an object's bounding box, in units; of no meaning in millimeters.
     pub length: f64,
+}
+
+/// The probe that a model of unknown origin is for: the published one.
+impl Default for StatedProbe {
+    fn default() -> Self {
+        Self { probe: Probe::default(), unit: Length::Tenth, length: 10.0 }
+    }
 }
 
 impl StatedProbe {
     /// The probe that a data set states, if it states one.
     pub fn of(dataset: &Dataset) -> Option<Self> {
-        dataset.origin.as_ref().map(|origin| Self { probe: origin.probe, length: origin.length })
+        dataset.origin.as_ref().map(Self::from)
     }
 
-    /// What a compiled model states.
-    pub(crate) fn trained(&self) -> TrainedProbe {
-        // Measures are stated in tenths of the longest side.
-        let unit = 10.0 / self.length;
+    /// What a compiled model states about it. Units are made tenths of the longest side, whatever side objects were
+    /// scaled to.
+    pub fn trained(&self) -> TrainedProbe {
+        let scale = match self.unit {
+            Length::Tenth => 10.0 / self.length,
+            Length::Millimeter => 1.0,
+        };
         let [radius, spacing, speed] =
-            [self.probe.radius, self.probe.spacing, self.probe.speed].map(|measure| (measure * unit) as f32);
-        TrainedProbe { radius, spacing, speed, length: Length::Tenth }
+            [self.probe.radius, self.probe.spacing, self.probe.speed].map(|number| (number * scale) as f32);
+        TrainedProbe { radius, spacing, speed, length: self.unit }
+    }
+
+    /// Compares what two sides state, such as a data set and a model; `names` says who they are.
+    ///
+    /// # Errors
+    /// [`ProbeProblem::Differs`] if radius, spacing, nominal speed or scale differ. The tilt is not compared: it is how
+    /// approaches were drawn.
+    pub fn compare(names: [&str; 2], [one, other]: [TrainedProbe; 2]) -> Result<(), ProbeProblem> {
+        let differs = |a: f32, b: f32| (a - b).abs() > 1e-5 * a.abs().max(b.abs());
+        let mut differences = Vec::new();
+        if one.length != other.length {
+            differences.push(format!("unit {:?} and {:?}", one.length.name(), other.length.name()));
+        }
+        let numbers = [
+            ("radius", one.radius, other.radius),
+            ("spacing", one.spacing, other.spacing),
+            ("speed", one.speed, other.speed),
+        ];
+        let different = numbers.into_iter().filter(|(_, one, other)| differs(*one, *other));
+        differences.extend(different.map(|(name, one, other)| format!("{name} {one} and {other}")));
+        if differences.is_empty() {
+            return Ok(());
+        }
+        let [first, second] = names.map(str::to_owned);
+        Err(ProbeProblem::Differs { first, second, differences: differences.join(", ") })
+    }
+}
+
+impl From<&touches::Origin> for StatedProbe {
+    fn from(origin: &touches::Origin) -> Self {
+        Self { probe: origin.probe, unit: origin.unit, length: origin.length }
     }
 }
 
@@ -114,7 +162,7 @@ const FINGERPRINTED: usize = 16;
 impl Origin {
     /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
-        Self { probe, trained, touches: fingerprints(dataset) }
+        Self { probe, trained, noise: None, touches: fingerprints(dataset) }
     }
 
     /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of the

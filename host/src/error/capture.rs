@@ -15,6 +15,12 @@ pub enum CaptureProblem {
         /// What is wrong with it.
         problem: Box<Problem>,
     },
+    /// An object is to be touched at its true size, which is not known.
+    #[error("{name}: the unit of its mesh is not known, and so its true size is not")]
+    NoTrueSize {
+        /// The object.
+        name: String,
+    },
     /// An object cannot be touched with all fingers.
     #[error("{name}: none of {approaches} approaches touched with all three fingers")]
     Untouchable {
@@ -123,6 +129,7 @@ impl CaptureProblem {
             Self::Untouchable { .. } => {
                 "Leave the object out, or give a larger radius, a smaller spacing or a greater length."
             }
+            Self::NoTrueSize { .. } => "State the unit of the mesh: mm, cm, m or in.",
             Self::Busy => "Wait until it is done, or give another directory.",
             Self::HoldsOtherObjects { .. } => "Give another directory, add to these touches, or replace them.",
             Self::HoldsOtherSettings { .. } => "Give another directory, or replace these touches.",

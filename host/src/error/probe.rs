@@ -7,6 +7,22 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProbeProblem {
+    /// Two sides state different probes.
+    #[error("{first} and {second} state different probes: {differences}")]
+    Differs {
+        /// One side, such as "the model".
+        first: String,
+        /// The other.
+        second: String,
+        /// What differs: "radius 0.15 and 0.3".
+        differences: String,
+    },
+    /// A probe file is not TOML, or not a probe.
+    #[error("not a usable probe file: {message}")]
+    BadFile {
+        /// What is wrong.
+        message: String,
+    },
     /// A line of a file of casts has too few or too many fields.
     #[error("{fields} fields where a cast has 7, or 8 with a time")]
     CastFields {
@@ -31,6 +47,10 @@ impl ProbeProblem {
     /// What to do about it, as a sentence.
     pub fn fix(&self) -> String {
         match self {
+            Self::Differs { .. } => "Use both with the same probe: times mean something else with another.".into(),
+            Self::BadFile { .. } => {
+                "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, timer and [real].".into()
+            }
             Self::CastFields { .. } | Self::CastCoordinate { .. } | Self::CastTime { .. } => {
                 "Give set,ox,oy,oz,dx,dy,dz and, if known, t.".into()
             }

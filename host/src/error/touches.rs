@@ -164,6 +164,14 @@ pub enum TouchesProblem {
         /// The text.
         name: String,
     },
+    /// A text is no duration, angle or share.
+    #[error("{text:?} is not a quantity with its unit")]
+    BadQuantity {
+        /// The text.
+        text: String,
+        /// What to write, with an example.
+        example: &'static str,
+    },
     /// An object has too few touches to be divided.
     #[error("{name} has only {touches} touches, too few to split")]
     TooFew {
@@ -213,6 +221,7 @@ impl TouchesProblem {
             Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
+            Self::BadQuantity { example, .. } => return format!("Give {example}."),
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }
         .into()

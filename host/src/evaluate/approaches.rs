@@ -70,9 +70,9 @@ impl Margins<'_> {
         if at.contains(&0) {
             return Err(Error::setting("at", 0, "numbers of approaches of at least 1"));
         }
-        let few = |(tested, _): &(&super::margins::Tested<'_>, &String)| tested.approaches.len() < most;
-        if let Some((tested, name)) = self.tested.iter().zip(self.tested_names()).find(few) {
-            let allowed = format!("fewer approaches, or capture more: {name} has only {}", tested.approaches.len());
+        if let Some(position) = (0..self.tested.len()).find(|&position| self.most_approaches(position) < most) {
+            let (name, has) = (&self.tested_names()[position], self.most_approaches(position));
+            let allowed = format!("fewer approaches, or capture more: {name} has only {has}");
             return Err(Error::setting("at", most, allowed));
         }
         let names = || self.tested_names().iter().cloned();
@@ -87,10 +87,10 @@ impl Margins<'_> {
         let used: Vec<f64> = used.collect();
         let outcomes: Vec<Vec<Outcome>> = positions
             .map(|position| {
-                let all = self.tested[position].approaches.len();
+                let all = self.most_approaches(position);
                 let run = |sequence| {
                     let draws = Draws::new(all, self.tested_names()[position].as_str(), sequence, seed);
-                    self.outcome(position, stopping, draws.map(|draw| self.tested[position].approaches[draw]))
+                    self.outcome(position, stopping, draws.map(|draw| self.approach(position, sequence, draw)))
                 };
                 (0..groups).into_par_iter().map(run).collect()
             })
@@ -110,9 +110,9 @@ impl Margins<'_> {
         let tested = &self.tested[position];
         let group = |mut correct: Vec<usize>, group| {
             let (mut evidence, mut is_evidence) = (self.prior(), false);
-            let draws = Draws::new(tested.approaches.len(), &self.tested_names()[position], group, seed);
+            let draws = Draws::new(self.most_approaches(position), &self.tested_names()[position], group, seed);
             for (index, draw) in draws.take(most).enumerate() {
-                if let Some(touch) = tested.approaches[draw] {
+                if let Some(touch) = self.approach(position, group, draw) {
                     tested.add(touch as usize, &mut evidence);
                     is_evidence = true;
                 }

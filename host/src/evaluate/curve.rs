@@ -84,9 +84,10 @@ impl Margins<'_> {
         if most == 0 {
             return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
         }
-        match self.tested.iter().zip(self.tested_names()).find(|(tested, _)| tested.touches < most) {
-            Some((tested, name)) => {
-                let allowed = format!("fewer touches, or capture more: {name} has only {}", tested.touches);
+        let touches = (0..self.tested.len()).map(|position| self.most_touches(position));
+        match touches.zip(self.tested_names()).find(|(touches, _)| *touches < most) {
+            Some((touches, name)) => {
+                let allowed = format!("fewer touches, or capture more: {name} has only {touches}");
                 Err(Error::setting("at", most, allowed))
             }
             None => Ok(()),

@@ -31,6 +31,8 @@ pub struct Margins<'m> {
     tested_names: Vec<String>,
     hold_approaches: bool,
     shares: [f64; 6],
+    /// How many robots made the touches, in turn.
+    robots: usize,
 }
 
 /// The margins of one object's test touches.
@@ -41,6 +43,8 @@ pub(super) struct Tested<'m> {
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
     pub(super) approaches: Vec<Option<u32>>,
+    /// For each robot the positions of its touches that are evidence, among all that are.
+    evidence: Vec<Vec<u32>>,
     /// Of the touches that are evidence.
     pub(super) values: Values<'m>,
 }
@@ -102,12 +106,25 @@ impl<'m> Margins<'m> {
                 object,
                 touches: evidence.len(),
                 approaches: touched.touches.iter().map(approach).collect(),
+                evidence: Vec::new(),
                 values: values(candidate, descriptor, &evidence, objects.len()),
             })
         });
         let tested = tested.collect::<Result<_>>()?;
-        let (hold_approaches, shares) = (dataset.holds_approaches(), dataset.shares());
-        Ok(Self { candidate, descriptor, objects, tested, tested_names: dataset.names(), hold_approaches, shares })
+        let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
+        let margins = Self { candidate, descriptor, objects, tested, tested_names, hold_approaches, shares, robots: 1 };
+        Ok(margins.of_robots(1))
+    }
+
+    /// The same where `robots` robots made the touches of each object in turn (touch i by robot i modulo `robots`): every
+    /// group and sequence is then of one robot's touches. 0 is taken as 1.
+    pub fn of_robots(mut self, robots: usize) -> Self {
+        self.robots = robots.max(1);
+        for tested in &mut self.tested {
+            let of = |robot| tested.approaches.iter().skip(robot).step_by(self.robots).copied().flatten().collect();
+            tested.evidence = (0..self.robots).map(of).collect();
+        }
+        self
     }
 
     /// The model's descriptor.
@@ -145,14 +162,29 @@ impl<'m> Margins<'m> {
         self.tested.iter().map(|tested| tested.approaches.len()).sum()
     }
 
-    /// The fewest approaches that a tested object has.
+    /// The fewest approaches that one robot made of a tested object.
     pub fn fewest_approaches(&self) -> usize {
-        self.tested.iter().map(|tested| tested.approaches.len()).min().unwrap_or(0)
+        (0..self.tested.len()).map(|position| self.most_approaches(position)).min().unwrap_or(0)
+    }
+
+    /// The most approaches that a group of a tested object can have.
+    pub(super) fn most_approaches(&self, position: usize) -> usize {
+        self.tested[position].approaches.len() / self.robots
+    }
+
+    /// What the `draw`-th approach of the robot of group `group` is to the model.
+    pub(super) fn approach(&self, position: usize, group: usize, draw: usize) -> Option<u32> {
+        self.tested[position].approaches[draw * self.robots + group % self.robots]
     }
 
     /// The fewest touches that are evidence that a tested object has: the longest group that can be drawn from each.
     pub fn fewest_touches(&self) -> usize {
-        self.tested.iter().map(|tested| tested.touches).min().unwrap_or(0)
+        (0..self.tested.len()).map(|position| self.most_touches(position)).min().unwrap_or(0)
+    }
+
+    /// The most touches that a group of a tested object can have.
+    pub(super) fn most_touches(&self, position: usize) -> usize {
+        self.tested[position].evidence.iter().map(Vec::len).min().unwrap_or(0)
     }
 
     /// How many different groups of `touches` touches can be drawn from the object with the fewest, where that is below
@@ -189,10 +221,12 @@ impl<'m> Margins<'m> {
     }
 
     /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
-    pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> rand::seq::index::IndexVec {
+    pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> Vec<usize> {
+        let robot = group % self.robots;
         let group = u64::try_from(group).unwrap_or(u64::MAX);
         let mut random = random::generator(seed, Purpose::Groups, &self.tested_names[position], group);
-        rand::seq::index::sample(&mut random, self.tested[position].touches, count)
+        let drawn = rand::seq::index::sample(&mut random, self.most_touches(position), count);
+        drawn.into_iter().map(|touch| self.tested[position].evidence[robot][touch] as usize).collect()
     }
 }
 

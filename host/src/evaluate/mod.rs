@@ -33,20 +33,26 @@
 //! ```
 
 mod approaches;
+#[cfg(feature = "train")]
+mod cost_of_noise;
 mod curve;
 mod estimate;
 mod full;
 mod margins;
 pub mod model_file;
+mod noisy;
 pub mod parity;
 mod sequential;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
 pub use approaches::{ApproachSequential, Approaches};
+#[cfg(feature = "train")]
+pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
+pub use noisy::{ROBOTS, add_noise};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 
 use crate::error::{Error, Result};

@@ -107,7 +107,7 @@ impl Margins<'_> {
     }
 
     fn outcomes(&self, position: usize, stopping: Stopping, sequences: usize, seed: u64) -> Vec<Outcome> {
-        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(self.tested[position].touches);
+        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(self.most_touches(position));
         let run = |sequence| {
             let touches = self.draw(position, sequence, limit, seed).into_iter();
             // A position is below the number of a file's lines.

@@ -43,11 +43,56 @@ mod triangles;
 
 pub use triangles::Mesh;
 
-/// An object to recognize: a named mesh, one class of a model.
+/// An object to recognize: one class of a model. It has a name and one or more meshes, its instances: the cups that are
+/// all to be recognized as a cup.
 #[derive(Clone, Debug)]
 pub struct Object {
     /// Its name: the label of its touches and of its output in a model, and the stem of its files.
     pub name: String,
+    /// How many millimeters a unit of its meshes is, where that is known: what touching it at its true size needs.
+    pub millimeters: Option<f64>,
+    first: Instance,
+    others: Vec<Instance>,
+}
+
+/// One mesh of an object.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// What distinguishes it from the object's other instances.
+    pub name: String,
     /// Its mesh, in the units of its file.
     pub mesh: Mesh,
+}
+
+impl Object {
+    /// An object with one mesh of unknown units. Its instance has its name.
+    pub fn new(name: impl Into<String>, mesh: Mesh) -> Self {
+        let name = name.into();
+        let first = Instance { name: name.clone(), mesh };
+        Self { name, millimeters: None, first, others: Vec::new() }
+    }
+
+    /// An object with several meshes of unknown units; none if there is no instance.
+    pub fn of_instances(name: impl Into<String>, instances: Vec<Instance>) -> Option<Self> {
+        let mut instances = instances.into_iter();
+        let first = instances.next()?;
+        Some(Self { name: name.into(), millimeters: None, first, others: instances.collect() })
+    }
+
+    /// Its mesh, or that of its first instance.
+    pub fn mesh(&self) -> &Mesh {
+        &self.first.mesh
+    }
+
+    /// Its instances: at least one.
+    pub fn instances(&self) -> impl ExactSizeIterator<Item = &Instance> + Clone {
+        let count = 1 + self.others.len();
+        (0..count).map(|index| if index == 0 { &self.first } else { &self.others[index - 1] })
+    }
+
+    /// The longest side of an instance's bounding box in millimeters, where its units are known.
+    pub fn true_length(&self, instance: &Instance) -> Option<f64> {
+        let [low, high] = instance.mesh.bounds();
+        Some(f64::from((high - low).max_element()) * self.millimeters?)
+    }
 }

@@ -1,9 +1,9 @@
 //! Where objects come from: built in, an OBJ file, a directory of OBJ files.
 
 use crate::error::{Error, MeshProblem, Place, Result};
-use crate::mesh::Object;
 use crate::mesh::builtin;
 use crate::mesh::obj;
+use crate::mesh::{Instance, Object};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -49,6 +49,13 @@ pub enum Source {
         /// Its OBJ file.
         path: PathBuf,
     },
+    /// An object with a file for each instance.
+    Instances {
+        /// The object's name.
+        name: String,
+        /// The instances' names and OBJ files.
+        files: Vec<(String, PathBuf)>,
+    },
 }
 
 impl Source {
@@ -56,7 +63,7 @@ impl Source {
     pub fn name(&self) -> &str {
         match self {
             Self::BuiltIn(name) => name,
-            Self::File { name, .. } => name,
+            Self::File { name, .. } | Self::Instances { name, .. } => name,
         }
     }
 
@@ -67,9 +74,24 @@ impl Source {
     pub fn read(self) -> Result<Object> {
         match self {
             Self::BuiltIn(name) => builtin::one(name),
-            Self::File { name, path } => Ok(Object { mesh: obj::read(&path)?, name }),
+            Self::File { name, path } => Ok(Object::new(name, obj::read(&path)?)),
+            Self::Instances { name, files } => {
+                let read = |(name, path): (String, PathBuf)| Ok(Instance { name, mesh: obj::read(&path)? });
+                let instances = files.into_par_iter().map(read).collect::<Result<_>>()?;
+                Object::of_instances(name, instances).ok_or_else(|| MeshProblem::NoMeshes.into())
+            }
         }
     }
+}
+
+/// The objects of all `sources`, sorted by name, where a directory inside a directory is one object: the OBJ files that
+/// are found in it, subdirectories included, are its instances, named after their paths in it. Everything else is found
+/// as [`objects`](fn@objects) finds it.
+///
+/// # Errors
+/// As [`objects`](fn@objects).
+pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
+    found(sources, true)?.into_par_iter().map(Source::read).collect::<Vec<_>>().into_iter().collect()
 }
 
 /// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.
@@ -77,6 +99,10 @@ impl Source {
 /// # Errors
 /// As [`objects`](fn@objects), except for what is wrong inside a file.
 pub fn files(sources: &[String]) -> Result<Vec<Source>> {
+    found(sources, false)
+}
+
+fn found(sources: &[String], instances: bool) -> Result<Vec<Source>> {
     let mut paths = Vec::new();
     let mut found = BTreeMap::new();
     for source in sources {
@@ -100,9 +126,16 @@ pub fn files(sources: &[String]) -> Result<Vec<Source>> {
                 _ => Error::io(path, "read the mesh", error),
             })?;
             if metadata.is_dir() {
-                let before = paths.len();
-                search(path, LEVELS, &mut paths)?;
-                if paths.len() == before {
+                let before = paths.len() + found.len();
+                if instances {
+                    search(path, 0, &mut paths)?;
+                    for object in directories(path)? {
+                        insert(&mut found, object.name().into(), object)?;
+                    }
+                } else {
+                    search(path, LEVELS, &mut paths)?;
+                }
+                if paths.len() + found.len() == before {
                     return Err(Error::at(Place::file(path), MeshProblem::NoMeshes));
                 }
             } else {
@@ -129,6 +162,7 @@ fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) ->
     let place = |source: &Source| match source {
         Source::BuiltIn(_) => "builtin".into(),
         Source::File { path, .. } => path.clone(),
+        Source::Instances { files, .. } => files.first().map(|(_, path)| path.clone()).unwrap_or_default(),
     };
     if let Some(other) = found.get(&name) {
         return Err(MeshProblem::SameName { first: place(other), second: place(&source), name }.into());
@@ -152,6 +186,30 @@ fn search(directory: &Path, levels: usize, paths: &mut Vec<PathBuf>) -> Result<(
         }
     }
     Ok(())
+}
+
+/// The objects that the directories in `directory` stand for, one each.
+fn directories(directory: &Path) -> Result<Vec<Source>> {
+    let io = |error| Error::io(directory, "read the directory", error);
+    let mut objects = Vec::new();
+    for entry in std::fs::read_dir(directory).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        if !path.is_dir() {
+            continue;
+        }
+        let mut paths = Vec::new();
+        search(&path, LEVELS - 1, &mut paths)?;
+        if paths.is_empty() {
+            continue;
+        }
+        let name = |file: &Path| {
+            let inside = file.strip_prefix(&path).unwrap_or(file).with_extension("");
+            inside.to_string_lossy().replace('\\', "/")
+        };
+        let files = paths.iter().map(|file| (name(file), file.clone())).collect();
+        objects.push(Source::Instances { name: lossy(path.file_name()), files });
+    }
+    Ok(objects)
 }
 
 /// The category and the id of a file in ShapeNet's layout.
@@ -213,6 +271,26 @@ mod tests {
         assert_eq!(names(&[source]), ["bowl", "mug"]);
         let source = place(directory.path(), &["mug/3c/models/model_normalized.obj"]);
         assert_eq!(names(&[source]), ["bowl", "mug-1a", "mug-3c"]);
+    }
+
+    #[test]
+    fn a_directory_inside_a_directory_is_one_object_with_instances() {
+        let directory = tempfile::tempdir().unwrap();
+        let files =
+            ["cup/red.obj", "cup/blue.obj", "cup/far/green.obj", "fork/one.obj", "spoon.obj", "empty/notes.txt"];
+        let source = place(directory.path(), &files);
+        let objects = objects_of_instances(std::slice::from_ref(&source)).unwrap();
+        let found: Vec<(&str, Vec<&str>)> = objects
+            .iter()
+            .map(|object| (object.name.as_str(), object.instances().map(|one| one.name.as_str()).collect()))
+            .collect();
+        let cup = vec!["blue", "far/green", "red"];
+        assert_eq!(found, [("cup", cup), ("fork", vec!["one"]), ("spoon", vec!["spoon"])]);
+        // Without instances, each file is an object.
+        assert_eq!(names(std::slice::from_ref(&source)), ["blue", "green", "one", "red", "spoon"]);
+        place(directory.path(), &["cup.obj"]);
+        let error = objects_of_instances(&[source]).unwrap_err().to_string();
+        assert!(error.contains("two objects are called cup"), "{error}");
     }
 
     #[test]

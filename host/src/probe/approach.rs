@@ -80,9 +80,14 @@ impl Approach {
     /// plus [`CLEARANCE`] from its center. Aim: uniform in the box; the middle finger moves from start to aim. Row:
     /// perpendicular to the motion, rolled uniformly about it, then tilted in the plane of row and motion by a uniform
     /// angle within ± `tilt` degrees.
-    pub fn draw(rng: &mut impl Rng, [low, high]: [DVec3; 2], tilt: f64) -> Self {
+    pub fn draw(rng: &mut impl Rng, bounds: [DVec3; 2], tilt: f64) -> Self {
+        Self::draw_from(rng, bounds, tilt, CLEARANCE)
+    }
+
+    /// The same with another clearance than [`CLEARANCE`].
+    pub fn draw_from(rng: &mut impl Rng, [low, high]: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
         let (center, side) = ((low + high) / 2.0, high - low);
-        let start = center + on_sphere(rng) * (side.length() / 2.0 + CLEARANCE);
+        let start = center + on_sphere(rng) * (side.length() / 2.0 + clearance);
         let aim = low + side * DVec3::new(unit(rng), unit(rng), unit(rng));
         let direction = (aim - start).normalize();
         let across = direction.any_orthonormal_vector();

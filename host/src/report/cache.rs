@@ -131,10 +131,10 @@ fn key(settings: &impl Serialize, objects: &[Object], surroundings: &Surrounding
     for object in objects {
         digest.update(&(object.name.len() as u64).to_le_bytes());
         digest.update(object.name.as_bytes());
-        digest.update(&(object.mesh.vertices.len() as u64).to_le_bytes());
-        object.mesh.vertices.iter().flatten().for_each(|c| digest.update(&c.to_le_bytes()));
-        digest.update(&(object.mesh.triangles.len() as u64).to_le_bytes());
-        object.mesh.triangles.iter().flatten().for_each(|i| digest.update(&i.to_le_bytes()));
+        digest.update(&(object.mesh().vertices.len() as u64).to_le_bytes());
+        object.mesh().vertices.iter().flatten().for_each(|c| digest.update(&c.to_le_bytes()));
+        digest.update(&(object.mesh().triangles.len() as u64).to_le_bytes());
+        object.mesh().triangles.iter().flatten().for_each(|i| digest.update(&i.to_le_bytes()));
     }
     Ok(digest.finalize())
 }
@@ -145,7 +145,7 @@ mod tests {
     use crate::mesh::Mesh;
 
     fn object(x: f32) -> Object {
-        Object { name: "fork".into(), mesh: Mesh { vertices: vec![[x, 0.0, 0.0]], triangles: vec![] } }
+        Object::new("fork", Mesh { vertices: vec![[x, 0.0, 0.0]], triangles: vec![] })
     }
 
     #[test]

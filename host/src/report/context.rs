@@ -46,7 +46,7 @@ pub(super) struct Models {
     pub(super) noise: Ensemble,
 }
 
-/// The noise that our models for noisy sensors are trained with, in microseconds.
+/// The noise that the paper's confusion matrices are for, in microseconds.
 pub(super) const NOISE: f64 = 5_000.0;
 
 impl<'a> Context<'a> {
@@ -57,7 +57,7 @@ impl<'a> Context<'a> {
         progress: &'a dyn Progress,
     ) -> Result<Self> {
         let length = Origin::default().length;
-        let scenes = objects.par_iter().map(|object| Scene::new(&object.mesh, length)).collect::<Result<_>>()?;
+        let scenes = objects.par_iter().map(|object| Scene::new(object.mesh(), length)).collect::<Result<_>>()?;
         let (captured, first, models, kinds) = Default::default();
         Ok(Self { settings, objects, cache, progress, scenes, captured, first, models, kinds })
     }
@@ -163,7 +163,7 @@ impl<'a> Context<'a> {
 
     /// How ours is trained for noise.
     pub(super) fn ours_for_noise(&self) -> train::Settings {
-        train::Settings { noise: NOISE, ..self.ours() }
+        train::Settings { noise: self.settings.noise, ..self.ours() }
     }
 
     /// The objects, ready to be touched.

@@ -84,7 +84,7 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
 fn touched(context: &Context, objects: &[Object], count: usize) -> Result<Dataset> {
     let length = Origin::default().length;
     let one = |object: &Object| {
-        let scene = Scene::new(&object.mesh, length)?;
+        let scene = Scene::new(object.mesh(), length)?;
         Ok(touch(&scene, &object.name, count, context.settings.seed, context.progress)?.0)
     };
     let mut objects: Vec<ObjectTouches> = objects.iter().map(one).collect::<Result<_>>()?;

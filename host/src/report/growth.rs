@@ -65,9 +65,7 @@ pub(super) fn measure(context: &Context) -> Result<Growth> {
         .iter()
         .enumerate()
         .flat_map(|(instance, kinds)| {
-            kinds
-                .iter()
-                .map(move |object| Object { name: format!("{}-{instance}", object.name), mesh: object.mesh.clone() })
+            kinds.iter().map(move |object| Object::new(format!("{}-{instance}", object.name), object.mesh().clone()))
         })
         .collect();
     let grown = settings.growth_objects.iter().map(|&count| objects_cost(context, &all[..count]));
@@ -80,7 +78,7 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let length = Origin::default().length;
     let began = Instant::now();
     let touched = objects.iter().map(|object| {
-        let scene = Scene::new(&object.mesh, length)?;
+        let scene = Scene::new(object.mesh(), length)?;
         Ok(touch(&scene, &object.name, settings.growth_touches, settings.seed, context.progress)?.0)
     });
     let mut data = Dataset::new(touched.collect::<Result<_>>()?);

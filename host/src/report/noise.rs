@@ -6,14 +6,14 @@ use super::statistics::{mean_deviation, savitzky_golay, wilson};
 use crate::compile;
 use crate::ensemble::train;
 use crate::error::Result;
-use crate::evaluate::{Candidate, Margins};
+use crate::evaluate::{Candidate, Margins, add_noise};
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use crate::touches::folds::Split;
-use crate::touches::noise;
+use crate::touches::noise::{self, Noise};
 use crate::touches::{Dataset, ObjectTouches};
 use plotters::style::RGBColor;
 use serde::{Deserialize, Serialize};
@@ -30,6 +30,25 @@ pub(super) struct Fold {
     pub(super) accuracy: Vec<Vec<Vec<f64>>>,
     /// For each of [`METHODS`]: the confusion matrix after ten touches at 5 ms.
     pub(super) confusion: Vec<Vec<Vec<usize>>>,
+    /// For each of [`METHODS`], for each of [`kinds`]: accuracy after ten touches.
+    pub(super) kinds: Vec<Vec<f64>>,
+}
+
+/// What else a sensor, a timer or a robot does, one at a time and then together.
+fn kinds() -> [Noise; 9] {
+    let none = Noise::default();
+    let timer = 1_000.0;
+    [
+        none,
+        Noise { timer, ..none },
+        Noise { debounce: 2_000.0, ..none },
+        Noise { missed: 0.02, ..none },
+        Noise { bent: [3_000.0, 0.0, 0.0], ..none },
+        Noise { speed_error: 0.05, ..none },
+        Noise { speed_bias: 0.01, ..none },
+        Noise { speed_bias: 0.1, ..none },
+        Noise { debounce: 2_000.0, timer, speed_bias: 0.02, ..Noise::gaussian(1_000.0) },
+    ]
 }
 
 /// Tests on noisy touches.
@@ -58,7 +77,11 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
     let compiled = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes, compiled(&models.noise)?.bytes];
     let models = [compile::open(&compiled[0])?, compile::open(&compiled[1])?, compile::open(&compiled[2])?];
     let candidates = models.each_ref().map(Candidate::Compiled);
-    let mut result = Fold { accuracy: vec![Vec::new(); METHODS.len()], confusion: vec![Vec::new(); METHODS.len()] };
+    let mut result = Fold {
+        accuracy: vec![Vec::new(); METHODS.len()],
+        confusion: vec![Vec::new(); METHODS.len()],
+        kinds: vec![Vec::new(); METHODS.len()],
+    };
     // Noise that no training saw: training uses the seed itself.
     let seed = settings.seed.wrapping_add(1_000 + fold as u64);
     for deviation in settings.deviations() {
@@ -72,6 +95,15 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
             if (deviation - NOISE / 1e3).abs() < 0.01 {
                 result.confusion[method] = confusion;
             }
+        }
+    }
+    for kind in kinds() {
+        context.check()?;
+        let mut test = split.test.clone();
+        let robots = add_noise(&mut test, &kind, seed)?;
+        for (method, candidate) in candidates.into_iter().enumerate() {
+            let margins = Margins::new(candidate, &test)?.of_robots(robots);
+            result.kinds[method].push(margins.curve(10, settings.many_groups, seed)?.accuracy(10).value);
         }
     }
     // The quick levels leave 5 ms out.
@@ -127,9 +159,10 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     section.text(format!(
         "Gaussian noise was added to each contact time independently, then the earliest time subtracted, so that the \
          first contact is 0 again. {} and {} were trained on clean touches, as in the paper; the third was trained on \
-         touches with noise of 5 ms. {} test touches per object and fold, {} folds.",
+         touches with {}. {} test touches per object and fold, {} folds.",
         "The paper's method",
         "ours",
+        context.settings.noise,
         context.settings.touches / context.settings.folds,
         folds.len()
     ));
@@ -137,7 +170,31 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     section.figure(overall(context, folds)?);
     section.figure(objects(context, folds)?);
     section.figure(confusions(context, folds)?);
+    section.table(Table {
+        id: "noise-kinds".into(),
+        title: "Accuracy after ten touches under other noise".into(),
+        caption:
+            "What else a sensor, a timer or a robot does, one at a time and then together. What is off per robot is \
+                  the same for all touches of a group."
+                .into(),
+        command: context.settings.command.clone(),
+        data: other_kinds(folds),
+    });
     Ok(section)
+}
+
+/// Accuracy under other noise than Gaussian, one row for each kind.
+fn other_kinds(folds: &[Fold]) -> Records {
+    let mut table = Records::new(std::iter::once("what is added").chain(METHODS));
+    for (row, kind) in kinds().into_iter().enumerate() {
+        let accuracy = |method: usize| {
+            let (mean, deviation) =
+                mean_deviation(&folds.iter().map(|fold| fold.kinds[method][row]).collect::<Vec<_>>());
+            if folds.len() > 1 { Cell::PercentSpread(mean, deviation, 1) } else { Cell::Percent(mean, 1) }
+        };
+        table.push(std::iter::once(Cell::Text(kind.to_string())).chain((0..METHODS.len()).map(accuracy)));
+    }
+    table
 }
 
 fn signal(context: &Context) -> Result<Figure> {

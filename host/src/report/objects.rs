@@ -18,7 +18,7 @@ pub(super) fn section(context: &Context) -> Result<Section> {
     let touches = context.settings.touches;
     let pictures = context.objects.iter().zip(&captured.approaches).map(|(object, &approaches)| {
         let line = format!("{:.1} % of approaches are full touches", 100.0 * touches as f64 / approaches.max(1) as f64);
-        Picture { name: object.name.clone(), png: render::thumbnail(&object.mesh, 240), line }
+        Picture { name: object.name.clone(), png: render::thumbnail(object.mesh(), 240), line }
     });
     section.blocks.push(Block::Pictures(pictures.collect()));
     section.figure(densities(context)?);
@@ -26,7 +26,7 @@ pub(super) fn section(context: &Context) -> Result<Section> {
     for (object, &approaches) in context.objects.iter().zip(&captured.approaches) {
         data.push([
             object.name.as_str().into(),
-            Cell::count(object.mesh.triangles.len()),
+            Cell::count(object.mesh().triangles.len()),
             Cell::count(touches),
             Cell::count(approaches),
             Cell::Percent(touches as f64 / approaches.max(1) as f64, 1),

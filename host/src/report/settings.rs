@@ -1,5 +1,6 @@
 //! How much of everything a report measures.
 
+use crate::touches::noise::Noise;
 use serde::{Deserialize, Serialize};
 
 /// What a report is made with. A change of any of these but the command starts it from the beginning.
@@ -29,6 +30,8 @@ pub struct Settings {
     pub many_groups: usize,
     /// Noise levels from 0 to 10 ms, evenly spaced.
     pub noise_levels: usize,
+    /// The noise that our model for noisy sensors is trained with.
+    pub noise: Noise,
     /// Folds of the noise figures.
     pub noise_folds: usize,
     /// Full touches captured of each object, to estimate the limit.
@@ -69,6 +72,7 @@ impl Settings {
             groups: 10,
             many_groups: 300,
             noise_levels: 41,
+            noise: Noise::gaussian(5_000.0),
             noise_folds: 10,
             limit_touches: 300_000,
             limit_rounds: 80,

@@ -33,6 +33,12 @@ pub struct Entry {
     /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's complete file. Version 0.1.0 wrote none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crc32: Option<u32>,
+    /// The names of its instances, if it has several: sample i is of instance i modulo their number.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub instances: Vec<String>,
+    /// How many millimeters a unit of its meshes is, if it was touched at its true size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub millimeters: Option<f64>,
 }
 
 impl Listing {

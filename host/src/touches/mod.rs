@@ -5,7 +5,7 @@
 //! [`Listing`]: which objects there are, how many touches of each, their files' checksums, and how the touches were made
 //! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe.
 //!
-//! [`noise`] adds what a real sensor adds; [`folds`] divides touches into some to train on and others to test on.
+//! [`noise`] adds what a real sensor, timer and robot add; [`folds`] divides touches into some to train on and others to test on.
 //!
 //! ```
 //! use palpate::touches::{Dataset, folds};
@@ -46,5 +46,6 @@ pub use dataset::{Dataset, ObjectTouches, Warning};
 pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use origin::Origin;
+pub(crate) use origin::{tenth, unit};
 pub use shard::Shard;
 pub use text::{parse_touch, write_touch};

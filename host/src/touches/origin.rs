@@ -2,7 +2,10 @@
 
 use super::{Format, Shard};
 use crate::error::{Error, Result};
-use crate::probe::approach::Probe;
+use crate::mesh::{Instance, Object};
+use crate::probe::approach::{CLEARANCE, Probe};
+use glam::DVec3;
+use palpate_shared::format::Length;
 use std::ops::Range;
 
 /// How the touches of a data set were made. The same origin and mesh give the same touches. The default is the published
@@ -14,7 +17,11 @@ pub struct Origin {
     pub touches: u64,
     /// The seed of all that is random.
     pub seed: u64,
-    /// The longest side of an object's bounding box, in units.
+    /// What the probe's lengths are measured in: units, with every object scaled to `length`, or millimeters, with objects
+    /// at their true size. Before version 0.3.0, always units.
+    #[serde(default = "tenth", with = "unit")]
+    pub unit: Length,
+    /// The longest side of an object's bounding box, in units; of no meaning at true size.
     pub length: f64,
     /// The probe's measures.
     pub probe: Probe,
@@ -33,6 +40,7 @@ impl Default for Origin {
         Self {
             touches: 21_000,
             seed: 1,
+            unit: Length::Tenth,
             length: 10.0,
             probe: Probe::default(),
             pose: false,
@@ -55,7 +63,29 @@ impl Origin {
         if !self.format.is_built_in() {
             return Err(Error::setting("format", self.format.name(), "text, or build with the feature parquet"));
         }
-        self.probe.check(self.length)
+        match self.unit {
+            Length::Tenth => self.probe.check(self.length),
+            // Each object is checked when its size is known.
+            Length::Millimeter => self.probe.check(1.0),
+        }
+    }
+
+    /// The longest side that an instance's bounding box is scaled to; none if it is to have its true size and that is not
+    /// known.
+    pub fn length_of(&self, object: &Object, instance: &Instance) -> Option<f64> {
+        match self.unit {
+            Length::Tenth => Some(self.length),
+            Length::Millimeter => object.true_length(instance),
+        }
+    }
+
+    /// How far outside the sphere about a bounding box an approach starts: at true size half of the longest side, as
+    /// where objects are 10 units long, and at least as far as a tilted probe reaches.
+    pub fn clearance(&self, [low, high]: [DVec3; 2]) -> f64 {
+        match self.unit {
+            Length::Tenth => CLEARANCE,
+            Length::Millimeter => ((high - low).max_element() / 2.0).max(self.probe.spacing + self.probe.radius),
+        }
     }
 
     /// The samples of each object: the shard's part of all.
@@ -66,5 +96,27 @@ impl Origin {
     /// Whether the pose is written.
     pub fn writes_pose(&self) -> bool {
         self.pose || self.format == Format::Parquet
+    }
+}
+
+/// The unit of data sets and ensembles that state none.
+pub(crate) fn tenth() -> Length {
+    Length::Tenth
+}
+
+/// A unit of length by its name, `unit` or `mm`.
+pub(crate) mod unit {
+    use palpate_shared::format::Length;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature is serde's")]
+    pub(crate) fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(unit.name())
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Length, D::Error> {
+        let name = std::borrow::Cow::<str>::deserialize(deserializer)?;
+        let named = Length::ALL.iter().copied().find(|unit| unit.name() == name);
+        named.ok_or_else(|| D::Error::custom(format!("unit {name:?}, where \"unit\" or \"mm\" is expected")))
     }
 }

@@ -27,7 +27,12 @@ pub(super) fn train(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Vec<(Recipe, Ensemble)>> {
-    let base = train::Settings { descriptor: settings.descriptor, probe: settings.probe, ..train::Settings::compact() };
+    let base = train::Settings {
+        descriptor: settings.descriptor,
+        probe: settings.probe,
+        noise: settings.noise,
+        ..train::Settings::compact()
+    };
     let tables: &[[usize; 2]] = if settings.descriptor.feature_count() == 2 { &TABLES } else { &[] };
     progress.begin("trainings", Some((1 + TREES.len() + tables.len()) as u64));
     let mut family = Vec::new();

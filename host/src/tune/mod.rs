@@ -30,6 +30,7 @@ use crate::evaluate::{self, Candidate, Evaluation, Margins};
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use crate::touches::folds;
+use crate::touches::noise::Noise;
 use palpate_shared::Descriptor;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -47,6 +48,8 @@ pub struct Settings {
     pub core: Core,
     /// The probe that made the touches, to be stated by the model.
     pub probe: Option<StatedProbe>,
+    /// What is added to the touches, in training as well as where models are measured.
+    pub noise: Noise,
     /// The error rate that recognizers stop at.
     pub error_rate: f64,
     /// Groups, and sequences, drawn for each object.
@@ -63,6 +66,7 @@ impl Default for Settings {
             max_instructions: None,
             core: Core::M4F,
             probe: None,
+            noise: Noise::default(),
             error_rate: 0.01,
             groups: 1000,
             seed: 1,
@@ -146,7 +150,12 @@ pub struct Tuned {
 pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Tuned> {
     let outer = folds::split(dataset, 0.2, settings.seed)?;
     let held_out = folds::split(&outer.test, 0.5, settings.seed)?;
-    let (choose, test) = (held_out.train, held_out.test);
+    let (mut choose, mut test) = (held_out.train, held_out.test);
+    // Other seeds than that of the training.
+    let robots = [(&mut choose, 1), (&mut test, 2)]
+        .map(|(part, other)| evaluate::add_noise(part, &settings.noise, settings.seed.wrapping_add(other)));
+    let [choose_robots, test_robots] = robots;
+    let (choose, test) = ((choose, choose_robots?), (test, test_robots?));
     let family = family::train(&outer.train, settings, progress)?;
     progress.begin("measuring", Some(family.len() as u64));
     let mut models = Vec::new();
@@ -167,10 +176,12 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     let (_, ensemble, compiled) = &models[chosen];
     let (ensemble, model) = ((*ensemble).clone(), compiled.bytes.clone());
     let opened = compile::open(&model)?;
-    let margins = Margins::new(Candidate::Compiled(&opened), &test)?;
-    let test = evaluate::evaluate(&margins, &evaluation(settings, &margins))?;
+    let test = evaluated(Candidate::Compiled(&opened), &test, settings)?;
     Ok(Tuned { unlimited, rows: models.into_iter().map(|(row, ..)| row).collect(), chosen, test, model, ensemble })
 }
+
+/// Touches that are held out, and how many robots made them.
+type Held = (Dataset, usize);
 
 type Measured<'e> = (Row, &'e Ensemble, Compiled);
 
@@ -179,7 +190,7 @@ type Measured<'e> = (Row, &'e Ensemble, Compiled);
 fn compiled_models<'e>(
     recipe: &Recipe,
     ensemble: &'e Ensemble,
-    choose: &Dataset,
+    choose: &Held,
     settings: &Settings,
 ) -> Result<Vec<Measured<'e>>> {
     let mut models: Vec<Measured<'e>> = Vec::new();
@@ -226,11 +237,10 @@ fn measure(
     candidate: Candidate<'_>,
     recipe: &Recipe,
     compiled: Option<(Leaf, &Compiled)>,
-    choose: &Dataset,
+    choose: &Held,
     settings: &Settings,
 ) -> Result<Row> {
-    let margins = Margins::new(candidate, choose)?;
-    let evaluation = evaluate::evaluate(&margins, &evaluation(settings, &margins))?;
+    let evaluation = evaluated(candidate, choose, settings)?;
     Ok(Row {
         recipe: recipe.clone(),
         leaf: compiled.map(|(leaf, _)| leaf.name()),
@@ -246,16 +256,18 @@ fn measure(
     })
 }
 
-fn evaluation(settings: &Settings, margins: &Margins<'_>) -> evaluate::Settings {
+fn evaluated(candidate: Candidate<'_>, (touches, robots): &Held, settings: &Settings) -> Result<Evaluation> {
+    let margins = Margins::new(candidate, touches)?.of_robots(*robots);
     let (fewest, approaches) = (margins.fewest_touches(), margins.fewest_approaches());
-    evaluate::Settings {
+    let settings = evaluate::Settings {
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),
         at_approaches: [10, 20, 60].into_iter().filter(|&at| at <= approaches).collect(),
         groups: settings.groups,
         error_rate: settings.error_rate,
         max_touches: None,
         seed: settings.seed,
-    }
+    };
+    evaluate::evaluate(&margins, &settings)
 }
 
 fn mark_frontier(models: &mut [Measured<'_>], core: Core) {

@@ -74,6 +74,71 @@ fn an_ensemble_and_its_compiled_model_evaluate_side_by_side() {
 }
 
 #[test]
+fn noise_of_every_kind_is_added_to_the_touches_that_are_evaluated() {
+    let directory = set_up();
+    let at = directory.path();
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "5"]);
+    let evaluate = ["evaluate", "ensemble.json", "data", "--at", "10", "--groups", "100", "--json"];
+    let accuracy = |more: &[&str]| -> (f64, u64) {
+        let figures: Value = serde_json::from_str(&succeeds(at, &[&evaluate[..], more].concat())).unwrap();
+        (figures["accuracy"]["10"].as_f64().unwrap(), figures["robots"].as_u64().unwrap())
+    };
+    let (clean, robots) = accuracy(&[]);
+    assert_eq!(robots, 1);
+    for more in [
+        &["--noise", "0..400ms"][..],
+        &["--timer", "200ms"],
+        &["--debounce", "400ms"],
+        &["--bent", "2:150ms"],
+        &["--speed-error", "90%"],
+    ] {
+        assert!(accuracy(more).0 < clean, "{more:?}: {clean}");
+    }
+    fails(at, &[&evaluate[..], &["--missed", "200%"]].concat(), 2, "--missed is 2. Use a share from 0 to 1.");
+    fails(at, &[&evaluate[..], &["--bent", "9:1ms"]].concat(), 2, "such as 1:3ms");
+    fails(at, &[&evaluate[..], &["--noise", "5"]].concat(), 2, "such as 0..10ms");
+}
+
+#[test]
+fn training_says_what_a_millisecond_of_noise_would_cost() {
+    let directory = set_up();
+    let at = directory.path();
+    let text = succeeds(at, &["train", "data", "-o", "clean.json", "--rounds", "5"]);
+    assert!(text.contains("1 ms of noise on contact times would cost") && text.contains("--noise 1ms"), "{text}");
+    let json = succeeds(at, &["train", "data", "-o", "clean.json", "--rounds", "5", "--json"]);
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert!(json["cost_of_noise"]["clean"].as_f64() > Some(0.5) && json["cost_of_noise"]["touches"] == 10, "{json}");
+    let text = succeeds(at, &["train", "data", "-o", "robust.json", "--rounds", "5", "--noise", "0..10ms"]);
+    assert!(!text.contains("would cost"), "{text}");
+    for object in ["bowl", "fork"] {
+        let path = at.join(format!("data/{object}.txt"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.lines().take(99).map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+    }
+    let text = succeeds(at, &["train", "data", "-o", "small.json", "--rounds", "5"]);
+    assert!(text.contains("was not measured: an object has fewer than 100 touches"), "{text}");
+}
+
+#[test]
+fn an_ensemble_states_the_noise_that_it_was_trained_with() {
+    let directory = set_up();
+    let at = directory.path();
+    let attribute = |more: &[&str]| -> Value {
+        succeeds(at, &[&["train", "data", "-o", "ensemble.json", "--rounds", "3"], more].concat());
+        let json: Value = serde_json::from_slice(&std::fs::read(at.join("ensemble.json")).unwrap()).unwrap();
+        match json["learner"]["attributes"]["palpate_noise"].as_str() {
+            Some(text) => serde_json::from_str(text).unwrap(),
+            None => Value::Null,
+        }
+    };
+    assert_eq!(attribute(&[]), Value::Null);
+    let noise = attribute(&["--noise", "0..10ms", "--timer", "1ms"]);
+    assert_eq!((&noise["deviation"]["largest"], &noise["timer"]), (&10_000.0.into(), &1_000.0.into()));
+    // The model that it is compiled to is read again.
+    succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
+}
+
+#[test]
 fn training_twice_writes_the_same_bytes_whatever_the_threads() {
     let directory = set_up();
     let read = |name| std::fs::read(directory.path().join(name)).unwrap();
@@ -86,7 +151,8 @@ fn training_twice_writes_the_same_bytes_whatever_the_threads() {
 #[test]
 fn tuning_writes_a_model_within_the_limit() {
     let directory = set_up();
-    let tune = ["tune", "data", "--max-bytes", "2K", "--groups", "20", "-o", "tuned.palpate", "--json"];
+    let tune =
+        ["tune", "data", "--max-bytes", "2K", "--groups", "20", "-o", "tuned.palpate", "--noise", "1ms", "--json"];
     let tuned: Value = serde_json::from_str(&succeeds(directory.path(), &tune)).unwrap();
     let chosen = usize::try_from(tuned["chosen"].as_u64().unwrap()).unwrap();
     let bytes = std::fs::metadata(directory.path().join("tuned.palpate")).unwrap().len();

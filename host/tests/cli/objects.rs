@@ -15,7 +15,7 @@ fn an_object_is_written_as_a_closed_mesh_and_the_same_each_time() {
     assert!(said.contains("bowl.obj: ") && said.contains(" triangles"), "{said}");
     assert_eq!(listing(&once), ["bowl.obj"]);
     let mesh = obj::read(&once.join("bowl.obj")).unwrap();
-    assert!(corners(&mesh) == corners(&builtin::one("bowl").unwrap().mesh), "the file holds another bowl");
+    assert!(corners(&mesh) == corners(builtin::one("bowl").unwrap().mesh()), "the file holds another bowl");
     assert!(Facts::of(&mesh).is_right_side_out());
     stdout(command(["objects", "--only", "bowl", "-o"]).arg(&again).output().unwrap());
     assert_eq!(std::fs::read(once.join("bowl.obj")).unwrap(), std::fs::read(again.join("bowl.obj")).unwrap());
@@ -33,7 +33,7 @@ fn varied_objects_and_a_picture_are_written_and_listed_as_json() {
         let mesh = obj::read(&directory.path().join(format!("{name}.obj"))).unwrap();
         assert_eq!(written[index]["name"], name);
         assert_eq!(written[index]["triangles"], mesh.triangles.len());
-        assert!(corners(&mesh) == corners(&builtin::varied(name, 7).unwrap().mesh), "the file holds another {name}");
+        assert!(corners(&mesh) == corners(builtin::varied(name, 7).unwrap().mesh()), "the file holds another {name}");
         assert!(!mesh.triangles.is_empty());
     }
     assert!(std::fs::read(&picture).unwrap().starts_with(b"\x89PNG"));

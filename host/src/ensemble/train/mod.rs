@@ -13,7 +13,7 @@ use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, 
 use crate::error::{EnsembleProblem, Error, Result};
 use crate::progress::Progress;
 use crate::touches::Dataset;
-use crate::touches::noise;
+use crate::touches::noise::Noise;
 use hessboost::config::MultiStrategy;
 use hessboost::data::DMatrix;
 use hessboost::model::BoostedModel;
@@ -70,8 +70,8 @@ pub struct Settings {
     /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
     /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
     pub leaf_bits: Option<u32>,
-    /// Standard deviation in microseconds of the Gaussian noise that is added to contact times before training.
-    pub noise: f64,
+    /// What is added to the touches before training, every touch made by a robot of its own.
+    pub noise: Noise,
     /// Seed of the noise.
     pub seed: u64,
     /// Threads, or all of the machine's; the ensemble is the same for any number.
@@ -96,7 +96,7 @@ impl Settings {
             bins: 256,
             feature_bins: None,
             leaf_bits: None,
-            noise: 0.0,
+            noise: Noise::default(),
             seed: 1,
             threads: None,
             trainer: Engine::Hessboost,
@@ -163,7 +163,8 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
         round_leaves(&mut ensemble, bits);
     }
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
-    ensemble.origin = Origin::new(dataset, settings.probe, Some(trained));
+    let noise = (!settings.noise.is_none()).then_some(settings.noise);
+    ensemble.origin = Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) };
     Ok(ensemble)
 }
 
@@ -247,7 +248,7 @@ fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
 
 /// The trainer's parameters for `objects` classes.
 fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
-    let Settings { rounds, depth, eta, min_child_weight, bins, noise, .. } = *settings;
+    let Settings { rounds, depth, eta, min_child_weight, bins, .. } = *settings;
     let bins_allowed = 2..=65_536;
     if !(1..=10_000).contains(&rounds) {
         return Err(Error::setting("rounds", rounds, "1 to 10000"));
@@ -273,9 +274,7 @@ fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
     if let Some(bits) = settings.leaf_bits.filter(|bits| !(4..=24).contains(bits)) {
         return Err(Error::setting("leaf_bits", bits, "4 to 24, or 0 to leave the leaves as they are"));
     }
-    if !(noise >= 0.0 && noise.is_finite()) {
-        return Err(Error::setting("noise", noise, "a duration of at least 0"));
-    }
+    settings.noise.check()?;
     if settings.threads == Some(0) {
         return Err(Error::setting("threads", 0, "at least 1"));
     }
@@ -321,10 +320,10 @@ impl<'d> Evidence<'d> {
         let counts =
             |touch: &Touch| counted.patterns().contains(touch.pattern()) && (touch.pose().is_some() || !needs_pose);
         let objects = dataset.objects.iter().map(|object| {
-            let mut touches: Cow<'_, [Touch]> = if settings.noise > 0.0 {
-                noise::noisy(&object.name, &object.touches, settings.noise, settings.seed).into()
-            } else {
+            let mut touches: Cow<'_, [Touch]> = if settings.noise.is_none() {
                 (&object.touches[..]).into()
+            } else {
+                settings.noise.add(&object.name, &object.touches, settings.seed).into()
             };
             if !touches.iter().all(counts) {
                 touches.to_mut().retain(counts);

@@ -27,7 +27,8 @@ fn an_ensemble_predicts_what_its_trainer_predicts_bit_for_bit() {
 #[test]
 fn threads_change_no_bit() {
     let dataset = synthetic::dataset(&[700, 900, 800], 2);
-    let with = |threads| train(&dataset, &Settings { threads, noise: 3_000.0, ..quick() }, &()).unwrap();
+    let with =
+        |threads| train(&dataset, &Settings { threads, noise: Noise::gaussian(3_000.0), ..quick() }, &()).unwrap();
     assert_eq!(with(Some(1)), with(Some(3)));
     assert_eq!(with(Some(1)), with(None));
 }
@@ -74,7 +75,7 @@ fn settings_out_of_range_are_refused_by_name() {
         (Settings { feature_bins: Some(vec![9]), ..quick() }, "bins"),
         (Settings { feature_bins: Some(vec![9, 1]), ..quick() }, "bins"),
         (Settings { leaf_bits: Some(3), ..quick() }, "leaf_bits"),
-        (Settings { noise: f64::INFINITY, ..quick() }, "noise"),
+        (Settings { noise: Noise::gaussian(f64::INFINITY), ..quick() }, "noise"),
         (Settings { threads: Some(0), ..quick() }, "threads"),
     ] {
         let error = train(&dataset, &settings, &()).unwrap_err();
@@ -145,7 +146,7 @@ fn the_most_objects_that_can_be_trained_can_be_saved_loaded_and_compiled() {
 fn an_ensemble_states_the_probe_and_knows_its_touches_again_after_saving() {
     let dataset = synthetic::dataset(&[60, 60], 8);
     let probe = crate::probe::approach::Probe { spacing: 2.0, ..Default::default() };
-    let probe = Some(StatedProbe { probe, length: 12.5 });
+    let probe = Some(StatedProbe { probe, length: 12.5, ..StatedProbe::default() });
     let stated = train(&dataset, &Settings { probe, ..quick() }, &()).unwrap();
     let silent = train(&dataset, &quick(), &()).unwrap();
     assert_eq!(stated.trees, silent.trees);

@@ -85,9 +85,14 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         };
         touches.into_iter().map(number).collect()
     });
+    let noise = attributes.get("palpate_noise").map(|text| {
+        let expected = "a JSON object of what was added to the touches in training";
+        parsed("palpate_noise", expected, text)
+    });
     Ok(Origin {
         probe: probe.transpose()?,
         trained: trained.transpose()?,
+        noise: noise.transpose()?,
         touches: touches.transpose()?.unwrap_or_default(),
     })
 }

@@ -7,7 +7,7 @@
 //! ```
 //! # fn main() -> palpate::Result<()> {
 //! let bowl = palpate::mesh::builtin::one("bowl")?;
-//! assert!(palpate::mesh::facts::Facts::of(&bowl.mesh).is_right_side_out());
+//! assert!(palpate::mesh::facts::Facts::of(bowl.mesh()).is_right_side_out());
 //! # Ok(())
 //! # }
 //! ```
@@ -27,7 +27,7 @@ mod winebottle;
 mod wristwatch;
 
 use crate::error::{Error, MeshProblem, Result};
-use crate::mesh::Object;
+use crate::mesh::{Instance, Object};
 use contour::Form;
 use proportions::Proportions;
 use rayon::prelude::*;
@@ -48,6 +48,9 @@ const KINDS: [Kind; 10] = [
     ("wristwatch", wristwatch::form),
     ("winebottle", winebottle::form),
 ];
+
+/// The built-in objects are made in centimeters.
+const MILLIMETERS: f64 = 10.0;
 
 /// The names of the built-in objects, in the order of [`all`].
 pub fn names() -> [&'static str; 10] {
@@ -82,6 +85,26 @@ pub fn varied(name: &str, seed: u64) -> Result<Object> {
     make_one(&kind(name)?, Some(seed))
 }
 
+/// The kind `name` with `count` [`varied`] instances, which the seed chooses: other seeds give others. At least one is
+/// made.
+///
+/// # Errors
+/// As [`varied`].
+pub fn instances(name: &str, count: usize, seed: u64) -> Result<Object> {
+    let kind = kind(name)?;
+    // A large prime: no two of the seeds that anyone gives share an instance.
+    let first = seed.wrapping_mul(1_000_000_007);
+    let made: Vec<Instance> = (0..count.max(1) as u64)
+        .into_par_iter()
+        .map(|number| {
+            let seed = first.wrapping_add(number);
+            Ok(Instance { name: format!("varied-{seed}"), mesh: make_one(&kind, Some(seed))?.mesh().clone() })
+        })
+        .collect::<Result<_>>()?;
+    let object = Object::of_instances(name, made).ok_or(MeshProblem::NoMeshes)?;
+    Ok(Object { millimeters: Some(MILLIMETERS), ..object })
+}
+
 /// The objects `names`, in that order: canonical, or with a seed [`varied`].
 ///
 /// # Errors
@@ -98,7 +121,7 @@ fn make_all(kinds: &[Kind], seed: Option<u64>) -> Result<Vec<Object>> {
 fn make_one(&(name, form): &Kind, seed: Option<u64>) -> Result<Object> {
     let mut proportions = seed.map_or(Proportions::canonical(), Proportions::varied);
     match contour::mesh(&form(&mut proportions)) {
-        Some(mesh) => Ok(Object { name: name.into(), mesh }),
+        Some(mesh) => Ok(Object { millimeters: Some(MILLIMETERS), ..Object::new(name, mesh) }),
         None => Err(MeshProblem::NotMeshed { name: name.into(), seed }.into()),
     }
 }

@@ -30,7 +30,7 @@ pub fn sheet(objects: &[Object], width: u32) -> Vec<u8> {
     let mut picture = Picture::new(width, count.div_ceil(columns) * (cell + caption));
     for (i, object) in (0..).zip(objects) {
         let (left, top) = (i % columns * cell, i / columns * (cell + caption));
-        picture.draw(&raster::render(&object.mesh, cell, Viewpoint::three_quarter(&object.mesh)), left, top);
+        picture.draw(&raster::render(object.mesh(), cell, Viewpoint::three_quarter(object.mesh())), left, top);
         write(&mut picture, &object.name, left + cell / 2, top + cell);
     }
     picture.on_light_ground();

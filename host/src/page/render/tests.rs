@@ -11,7 +11,7 @@ fn decoded(png: &[u8]) -> (png::OutputInfo, Vec<u8>) {
 #[test]
 fn a_thumbnail_is_transparent_around_the_object_and_opaque_on_it() {
     let bowl = builtin::one("bowl").unwrap();
-    let (info, data) = decoded(&thumbnail(&bowl.mesh, 64));
+    let (info, data) = decoded(&thumbnail(bowl.mesh(), 64));
     assert_eq!((info.width, info.height, info.color_type), (64, 64, png::ColorType::Rgba));
     let alpha = |x: usize, y: usize| data[(y * 64 + x) * 4 + 3];
     assert_eq!(alpha(0, 0), 0);
@@ -57,6 +57,6 @@ fn meshes_without_extent_give_an_empty_picture_and_no_objects_an_empty_sheet() {
 #[test]
 fn thumbnails_are_small_enough_to_embed_ten_of_them_in_a_page() {
     let camera = builtin::one("camera").unwrap();
-    let bytes = thumbnail(&camera.mesh, 160).len();
+    let bytes = thumbnail(camera.mesh(), 160).len();
     assert!(bytes < 16_000, "{bytes} bytes");
 }

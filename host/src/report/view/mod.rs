@@ -9,7 +9,7 @@ use crate::mesh::Object;
 use crate::mesh::facts::Facts;
 use crate::page::html;
 use crate::page::scene::{self, Line, SimplifiedMesh};
-use crate::probe::approach::{Approach, FINGERS, Probe};
+use crate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};
 use glam::DVec3;
@@ -26,6 +26,8 @@ pub struct Settings {
     pub seed: u64,
     /// The longest side of the object's bounding box, in units.
     pub length: f64,
+    /// How far outside the sphere about the bounding box approaches start, in units.
+    pub clearance: f64,
     /// The probe.
     pub probe: Probe,
 }
@@ -33,7 +35,7 @@ pub struct Settings {
 /// Two dozen touches and a dozen misses of the published probe.
 impl Default for Settings {
     fn default() -> Self {
-        Self { touches: 24, misses: 12, seed: 1, length: 10.0, probe: Probe::default() }
+        Self { touches: 24, misses: 12, seed: 1, length: 10.0, clearance: CLEARANCE, probe: Probe::default() }
     }
 }
 
@@ -47,9 +49,9 @@ const MOST_APPROACHES: u64 = 200_000;
 /// As [`Scene::new`] and [`Probe::check`].
 pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     settings.probe.check(settings.length)?;
-    let scene = Scene::new(&object.mesh, settings.length)?;
-    let facts = Facts::of(&object.mesh);
-    let mesh = SimplifiedMesh::new(&object.mesh, settings.length);
+    let scene = Scene::new(object.mesh(), settings.length)?;
+    let facts = Facts::of(object.mesh());
+    let mesh = SimplifiedMesh::new(object.mesh(), settings.length);
     let shown_triangles = mesh.triangles.len();
     let drawn = draw(&scene, settings);
     let own = serde_json::json!({
@@ -113,7 +115,7 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
     let (mut touches, mut misses) = (Vec::new(), Vec::new());
     let (mut tried, mut full) = (0, 0);
     while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < settings.misses) {
-        let approach = Approach::draw(&mut rng, scene.bounds(), settings.probe.tilt);
+        let approach = Approach::draw_from(&mut rng, scene.bounds(), settings.probe.tilt, settings.clearance);
         let distances = approach.distances(scene, &settings.probe);
         let times = approach.touch(distances, &settings.probe).times();
         let drawn = Drawn {

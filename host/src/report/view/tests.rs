@@ -6,7 +6,7 @@ use base64::engine::general_purpose::STANDARD;
 use std::collections::HashMap;
 
 fn object(name: &str, mesh: Mesh) -> Object {
-    Object { name: name.into(), mesh }
+    Object::new(name, mesh)
 }
 
 fn cube() -> Mesh {

@@ -1,0 +1,71 @@
+//! Test touches with noise.
+
+use crate::error::Result;
+use crate::touches::Dataset;
+use crate::touches::noise::Noise;
+
+/// The most robots whose biases are drawn.
+pub const ROBOTS: usize = 20;
+
+/// The touches of each object that a robot makes at least, where there are enough.
+const LEAST: usize = 250;
+
+/// Adds noise to test touches and returns how many robots made them in turn, for
+/// [`Margins::of_robots`](super::Margins::of_robots): one, unless the noise has a bias. Touches that no noise changes stay
+/// as they are.
+///
+/// # Errors
+/// As [`Noise::check`].
+pub fn add_noise(dataset: &mut Dataset, noise: &Noise, seed: u64) -> Result<usize> {
+    noise.check()?;
+    let fewest = dataset.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
+    let robots = if noise.has_bias() { (fewest / LEAST).clamp(1, ROBOTS) } else { 1 };
+    if !noise.is_none() {
+        for object in &mut dataset.objects {
+            object.touches = noise.add_by_robots(&object.name, &object.touches, seed, robots);
+        }
+    }
+    Ok(robots)
+}
+
+#[cfg(all(test, feature = "train"))]
+mod tests {
+    use super::*;
+    use crate::ensemble::train::{Settings, train};
+    use crate::evaluate::{Candidate, Margins};
+    use crate::touches::synthetic;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_group_is_of_one_robots_touches() {
+        let mut dataset = synthetic::dataset(&[1_000, 760], 1);
+        let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
+        let noise = Noise { speed_bias: 0.05, ..Noise::default() };
+        let robots = add_noise(&mut dataset, &noise, 1).unwrap();
+        assert_eq!(robots, 3);
+        let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap().of_robots(robots);
+        assert_eq!(margins.fewest_touches(), 253);
+        for (position, touches) in [(0, 1_000), (1, 760)] {
+            let mut seen = BTreeSet::new();
+            for group in 0..30 {
+                let drawn: Vec<usize> = margins.draw(position, group, 100, 1).into_iter().collect();
+                assert!(drawn.iter().all(|touch| touch % robots == group % robots && *touch < touches));
+                assert_eq!(drawn.iter().collect::<BTreeSet<_>>().len(), 100);
+                seen.insert(drawn[0] % robots);
+            }
+            assert_eq!(seen.len(), robots);
+        }
+        assert!(margins.curve(254, 10, 1).is_err());
+    }
+
+    #[test]
+    fn without_a_bias_nothing_is_divided_and_no_noise_changes_nothing() {
+        let clean = synthetic::dataset(&[1_000, 1_000], 1);
+        let mut noisy = clean.clone();
+        assert_eq!(add_noise(&mut noisy, &Noise::default(), 1).unwrap(), 1);
+        assert_eq!(noisy, clean);
+        assert_eq!(add_noise(&mut noisy, &Noise::gaussian(1_000.0), 1).unwrap(), 1);
+        assert_ne!(noisy, clean);
+        assert!(add_noise(&mut noisy, &Noise::gaussian(-1.0), 1).is_err());
+    }
+}

@@ -1,0 +1,340 @@
+//! What a real sensor, timer and robot add to touches.
+//!
+//! [`Noise`] describes it, for training as well as for testing. What differs from touch to touch is noise; what is the
+//! same for all touches of one robot is a bias.
+//!
+//! ```
+//! use palpate::touches::noise::{Deviation, Noise};
+//! use palpate_shared::Touch;
+//!
+//! let noise = Noise { deviation: "0..10ms".parse()?, timer: 1_000.0, ..Noise::default() };
+//! let noisy = noise.add("fork", &[Touch::from_micros([0, 12_345, 30_000])], 1);
+//! // The first contact is 0 again, and the timer counts whole milliseconds.
+//! assert!(noisy[0].times().iter().all(|time| time.micros().is_some_and(|micros| micros % 1_000 == 0)));
+//! assert_eq!(Deviation::from(5_000.0).largest, 5_000.0);
+//! # Ok::<_, palpate::error::TouchesProblem>(())
+//! ```
+
+pub mod quantity;
+#[cfg(test)]
+mod tests;
+
+use crate::error::{Error, Result, TouchesProblem};
+use crate::probe::approach::{FINGERS, to_q15};
+use crate::random::{self, Purpose};
+use glam::DVec3;
+use palpate_shared::format::TrainedNoise;
+use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
+use rand::RngExt;
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::fmt;
+use std::str::FromStr;
+
+/// What is added to touches. Times are in microseconds, angles in degrees, shares between 0 and 1. The default adds
+/// nothing.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Noise {
+    /// Gaussian noise of every contact time: its standard deviation, or a range that each touch draws it from.
+    pub deviation: Deviation,
+    /// The timer's resolution: times are rounded down to multiples of it, counted from a phase of the touch's own. 0 for
+    /// none.
+    pub timer: f64,
+    /// What a bouncing switch adds to every contact time: uniform from 0 to this.
+    pub debounce: f64,
+    /// The probability that a contact is missed.
+    pub missed: f64,
+    /// How much earlier each finger touches than it should: a bent finger.
+    pub bent: [f64; FINGERS],
+    /// The probe's speed over the nominal one.
+    pub speed: f64,
+    /// How far the speed of a touch may be off, as a share of it, to either side.
+    pub speed_error: f64,
+    /// How far the speed of a robot may be off, the same through all of its touches.
+    pub speed_bias: f64,
+    /// The standard deviation of the angle by which the pose of a touch is turned about a random axis.
+    pub pose: f64,
+    /// The same for a robot: every pose of its touches is turned alike.
+    pub pose_bias: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self {
+            deviation: Deviation::default(),
+            timer: 0.0,
+            debounce: 0.0,
+            missed: 0.0,
+            bent: [0.0; FINGERS],
+            speed: 1.0,
+            speed_error: 0.0,
+            speed_bias: 0.0,
+            pose: 0.0,
+            pose_bias: 0.0,
+        }
+    }
+}
+
+/// A standard deviation in microseconds, or a range of them that each touch draws one from, uniformly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Deviation {
+    /// The least.
+    pub least: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+impl From<f64> for Deviation {
+    fn from(deviation: f64) -> Self {
+        Self { least: deviation, largest: deviation }
+    }
+}
+
+/// `5ms`, or a range as `0..10ms`.
+impl FromStr for Deviation {
+    type Err = TouchesProblem;
+
+    fn from_str(text: &str) -> Result<Self, TouchesProblem> {
+        let problem = || TouchesProblem::BadQuantity {
+            text: text.into(),
+            example: "a duration such as 5ms, or a range such as 0..10ms",
+        };
+        let Some((least, largest)) = text.split_once("..") else {
+            return quantity::duration(text).map(Self::from).map_err(|_| problem());
+        };
+        // The first number may go without a unit: it has that of the second.
+        let unit = largest.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
+        let least = quantity::duration(least).or_else(|_| quantity::duration(&format!("{least}{unit}")));
+        match (least, quantity::duration(largest)) {
+            (Ok(least), Ok(largest)) if least <= largest => Ok(Self { least, largest }),
+            _ => Err(problem()),
+        }
+    }
+}
+
+/// What is added, in words: "noise of 0 to 10 ms, a timer of 1 ms".
+impl fmt::Display for Noise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ms = |micros: f64| micros / 1e3;
+        let percent = |share: f64| (1e6 * share).round() / 1e4;
+        let Deviation { least, largest } = self.deviation;
+        let mut parts = Vec::new();
+        if largest > 0.0 {
+            let range = if least == largest { String::new() } else { format!("{} to ", ms(least)) };
+            parts.push(format!("noise of {range}{} ms", ms(largest)));
+        }
+        let mut say = |is_there: bool, text: String| parts.extend(is_there.then_some(text));
+        say(self.timer > 0.0, format!("a timer of {} ms", ms(self.timer)));
+        say(self.debounce > 0.0, format!("bouncing of up to {} ms", ms(self.debounce)));
+        say(self.missed > 0.0, format!("{} % of contacts missed", percent(self.missed)));
+        for (finger, early) in (1..).zip(self.bent) {
+            say(early != 0.0, format!("finger {finger} early by {} ms", ms(early)));
+        }
+        say(self.speed != 1.0, format!("a speed of {} times the nominal one", self.speed));
+        say(self.speed_error > 0.0, format!("speed off by up to {} % per touch", percent(self.speed_error)));
+        say(self.speed_bias > 0.0, format!("speed off by up to {} % per robot", percent(self.speed_bias)));
+        say(self.pose > 0.0, format!("a pose turned by {}° per touch", self.pose));
+        say(self.pose_bias > 0.0, format!("a pose turned by {}° per robot", self.pose_bias));
+        f.write_str(&if parts.is_empty() { "no noise".into() } else { parts.join(", ") })
+    }
+}
+
+impl Noise {
+    /// Gaussian noise of one standard deviation, in microseconds, and nothing else.
+    pub fn gaussian(deviation: f64) -> Self {
+        Self { deviation: deviation.into(), ..Self::default() }
+    }
+
+    /// Whether it changes no touch.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether something is the same through all touches of a robot, so that touches of several robots must not be
+    /// mixed in a sequence.
+    pub fn has_bias(&self) -> bool {
+        self.speed_bias > 0.0 || self.pose_bias > 0.0
+    }
+
+    /// Whether it can turn a contact into a missing one.
+    pub fn misses(&self) -> bool {
+        self.missed > 0.0
+    }
+
+    /// What a compiled model states about it. A robot's bias counts as noise of the pose: in training, every touch is
+    /// made by a robot of its own.
+    pub fn trained(&self) -> TrainedNoise {
+        let whole = |number: f64| number.round().clamp(0.0, f64::from(u32::MAX)) as u32;
+        TrainedNoise {
+            least: whole(self.deviation.least),
+            largest: whole(self.deviation.largest),
+            timer: whole(self.timer),
+            pose: whole(1e3 * self.pose.hypot(self.pose_bias)),
+        }
+    }
+
+    /// Refuses noise that cannot be.
+    ///
+    /// # Errors
+    /// [`Problem::Setting`](crate::error::Problem::Setting) that names the field, `noise` for the deviation.
+    pub fn check(&self) -> Result<()> {
+        let Deviation { least, largest } = self.deviation;
+        if !(0.0 <= least && least <= largest && largest.is_finite()) {
+            let value = if least == largest { least.to_string() } else { format!("{least}..{largest}") };
+            return Err(Error::setting("noise", value, "a duration of at least 0"));
+        }
+        for (name, value) in [("timer", self.timer), ("debounce", self.debounce)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::setting(name, value, "a duration of at least 0"));
+            }
+        }
+        if let Some(bent) = self.bent.iter().find(|bent| !bent.is_finite()) {
+            return Err(Error::setting("bent", bent, "a duration"));
+        }
+        if !(0.0..=1.0).contains(&self.missed) {
+            return Err(Error::setting("missed", self.missed, "a share from 0 to 1"));
+        }
+        if !(self.speed > 0.0 && self.speed.is_finite()) {
+            return Err(Error::setting("speed", self.speed, "a number greater than 0"));
+        }
+        for (name, value) in [("speed_error", self.speed_error), ("speed_bias", self.speed_bias)] {
+            if !(0.0..=0.9).contains(&value) {
+                return Err(Error::setting(name, value, "a share from 0 to 0.9"));
+            }
+        }
+        for (name, value) in [("pose_noise", self.pose), ("pose_bias", self.pose_bias)] {
+            if !(0.0..=180.0).contains(&value) {
+                return Err(Error::setting(name, value, "degrees from 0 to 180"));
+            }
+        }
+        Ok(())
+    }
+
+    /// `touches` of the object `name` with this noise, every touch made by a robot of its own: for training, and for
+    /// noise without a bias.
+    ///
+    /// Then the earliest time is subtracted, so that the first contact is 0 again, and times are rounded to whole
+    /// microseconds, as in the published evaluation. What is missing stays missing. The result is a pure function of
+    /// noise, seed, name, and each touch with its position. Noise that [`check`](Self::check) refuses gives touches
+    /// without meaning.
+    pub fn add(&self, name: &str, touches: &[Touch], seed: u64) -> Vec<Touch> {
+        self.by(name, touches, seed, |index| index)
+    }
+
+    /// The same with touches of `robots` robots in turn: touch i is made by robot i modulo `robots`, and a robot's bias
+    /// is the same for every object. 0 is taken as 1.
+    pub fn add_by_robots(&self, name: &str, touches: &[Touch], seed: u64, robots: usize) -> Vec<Touch> {
+        self.by(name, touches, seed, |index| index % robots.max(1) as u64)
+    }
+
+    fn by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
+        // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
+        // version 0.1.0, and no other setting changes it.
+        let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
+        let is_gaussian = Self { deviation: self.deviation.least.into(), ..Self::default() } == *self;
+        let one = |(touch, index): (&Touch, u64)| {
+            let normal: [f64; FINGERS] = std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
+            if is_gaussian {
+                return timed(touch, |finger, time| time + self.deviation.least * normal[finger]);
+            }
+            let own = Draw::new(&mut random::generator(seed, Purpose::Sensor, name, index));
+            let robot =
+                self.has_bias().then(|| Draw::new(&mut random::generator(seed, Purpose::Robot, "", robot(index))));
+            self.one(touch, normal, &own, &robot.unwrap_or_default())
+        };
+        touches.iter().zip(0..).map(one).collect()
+    }
+
+    fn one(&self, touch: &Touch, normal: [f64; FINGERS], own: &Draw, robot: &Draw) -> Touch {
+        let Deviation { least, largest } = self.deviation;
+        let deviation = least + (largest - least) * own.level;
+        let speed = self.speed * (1.0 + self.speed_error * own.speed) * (1.0 + self.speed_bias * robot.speed);
+        let noisy = missed(touch, own.missed.map(|chance| chance < self.missed));
+        let noisy = timed(&noisy, |finger, time| {
+            let sensed =
+                time / speed - self.bent[finger] + deviation * normal[finger] + self.debounce * own.debounce[finger];
+            if self.timer > 0.0 { ((sensed / self.timer + own.phase).floor()) * self.timer } else { sensed }
+        });
+        match noisy.pose() {
+            Some(pose) if self.pose > 0.0 || self.pose_bias > 0.0 => {
+                let angle = |degrees: f64| degrees.to_radians();
+                let turn = |vector| robot.turn(own.turn(vector, angle(self.pose)), angle(self.pose_bias));
+                noisy.with_pose(Pose {
+                    direction: turned(pose.direction, turn),
+                    alignment: turned(pose.alignment, turn),
+                })
+            }
+            _ => noisy,
+        }
+    }
+}
+
+/// The random numbers of one touch, or of one robot. All of them are drawn, whichever are used, so that no setting
+/// changes what another one does.
+#[derive(Default)]
+struct Draw {
+    /// Uniform from 0 to 1: where in the range of deviations.
+    level: f64,
+    /// Uniform from −1 to 1.
+    speed: f64,
+    /// Uniform from 0 to 1: of a step of the timer.
+    phase: f64,
+    debounce: [f64; FINGERS],
+    missed: [f64; FINGERS],
+    /// The axis of the turn, a unit vector, and its angle as a standard normal number.
+    axis: DVec3,
+    angle: f64,
+}
+
+impl Draw {
+    fn new(random: &mut ChaCha8Rng) -> Self {
+        let level = random.random();
+        let speed = 2.0 * random.random::<f64>() - 1.0;
+        let phase = random.random();
+        let (debounce, missed) = (random.random(), random.random());
+        let [x, y, z, angle]: [f64; 4] = std::array::from_fn(|_| StandardNormal.sample(random));
+        Self { level, speed, phase, debounce, missed, axis: DVec3::new(x, y, z).normalize_or(DVec3::Z), angle }
+    }
+
+    /// The vector, turned about the axis by an angle of this standard deviation, in radians.
+    fn turn(&self, vector: DVec3, deviation: f64) -> DVec3 {
+        let (sin, cos) = libm::sincos(self.angle * deviation);
+        let along = self.axis * self.axis.dot(vector);
+        along + (vector - along) * cos + self.axis.cross(vector) * sin
+    }
+}
+
+fn turned(vector: [i16; 3], turn: impl Fn(DVec3) -> DVec3) -> [i16; 3] {
+    let vector = DVec3::from_array(vector.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE)));
+    turn(vector).to_array().map(to_q15)
+}
+
+/// The touch without the contacts of these fingers.
+fn missed(touch: &Touch, missed: [bool; FINGERS]) -> Touch {
+    let mut times = touch.times();
+    times.iter_mut().zip(missed).filter(|(_, missed)| *missed).for_each(|(time, _)| *time = ContactTime::MISSING);
+    let left = Touch::new(times);
+    touch.pose().map_or(left, |pose| left.with_pose(pose))
+}
+
+/// The touch with other contact times, in microseconds: the earliest becomes 0.
+fn timed(touch: &Touch, change: impl Fn(usize, f64) -> f64) -> Touch {
+    let times = touch.times();
+    let changed: [Option<f64>; FINGERS] =
+        std::array::from_fn(|finger| times[finger].micros().map(|micros| change(finger, f64::from(micros))));
+    let earliest = changed.into_iter().flatten().fold(f64::INFINITY, f64::min);
+    // A difference of two times fits: u32::MAX itself is the missing contact, so the largest time is one less.
+    let shifted = changed.map(|time| match time {
+        Some(time) => ContactTime::from_micros((time - earliest).round().min(f64::from(u32::MAX - 1)) as u32),
+        None => ContactTime::MISSING,
+    });
+    let noisy = Touch::new(shifted);
+    touch.pose().map_or(noisy, |pose| noisy.with_pose(pose))
+}
+
+/// `touches` with Gaussian noise of `deviation` microseconds: [`Noise::gaussian`].
+pub fn noisy(name: &str, touches: &[Touch], deviation: f64, seed: u64) -> Vec<Touch> {
+    Noise::gaussian(deviation).add(name, touches, seed)
+}
