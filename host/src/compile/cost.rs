@@ -64,6 +64,7 @@ impl Instructions {
         // The order of sections that FORMAT.md gives.
         let groups_start = HEADER_LENGTH
             + length(header.text_length())
+            + length(header.optional_length())
             + 8 * objects
             + Axis::LENGTH * axes
             + length(header.cuts_length());

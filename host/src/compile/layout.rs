@@ -21,8 +21,8 @@ pub(super) fn candidates(
     leaf: LeafType,
     wanted: Option<Layout>,
 ) -> Result<Vec<(Layout, Parts)>> {
-    let mut layouts =
-        wanted.map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid, Layout::Patterns], |layout| vec![layout]);
+    let mut layouts = wanted
+        .map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid, Layout::Patterns], |layout| vec![layout]);
     if !trees::fits_narrow(forest, axes) {
         layouts.iter_mut().filter(|layout| **layout == Layout::Compact).for_each(|layout| *layout = Layout::Wide);
     }
