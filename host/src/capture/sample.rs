@@ -7,6 +7,7 @@ use crate::error::{CaptureProblem, Result};
 use crate::probe::approach::Approach;
 use crate::probe::scene::Scene;
 use crate::touches::Origin;
+use glam::DVec3;
 use palpate_shared::Touch;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -21,6 +22,8 @@ pub struct Sampler<'a> {
     scene: &'a Scene,
     name: &'a str,
     origin: &'a Origin,
+    /// The box in which approaches aim.
+    target: [DVec3; 2],
     stream: u64,
 }
 
@@ -28,7 +31,7 @@ impl<'a> Sampler<'a> {
     /// The samples of the object with this scene and name, made as `origin` says.
     pub fn new(scene: &'a Scene, name: &'a str, origin: &'a Origin) -> Self {
         let stream = name.bytes().fold(mix(origin.seed), |hash, byte| mix(hash ^ u64::from(byte)));
-        Self { scene, name, origin, stream }
+        Self { scene, name, origin, target: origin.aim.target(scene), stream }
     }
 
     /// The object's name.
@@ -45,7 +48,7 @@ impl<'a> Sampler<'a> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
         for attempts in 1..=MOST_ATTEMPTS {
-            let approach = Approach::draw(&mut rng, self.scene.bounds(), probe.tilt);
+            let approach = Approach::draw_at(&mut rng, self.scene.bounds(), self.target, probe.tilt);
             if self.origin.approaches {
                 return Ok((approach.touch(approach.distances(self.scene, probe), probe), attempts));
             }

@@ -39,7 +39,7 @@ pub mod cast;
 pub mod scene;
 pub mod sweep;
 
-pub use approach::{Approach, Probe};
+pub use approach::{Aim, Approach, Probe};
 pub use scene::Scene;
 
 /// The vectors in this room's signatures: [`DVec3`](glam::DVec3) for positions and directions, in units.

@@ -2,7 +2,7 @@
 
 use super::{Format, Shard};
 use crate::error::{Error, Result};
-use crate::probe::approach::Probe;
+use crate::probe::approach::{Aim, Probe};
 use std::ops::Range;
 
 /// How the touches of a data set were made. The same origin and mesh give the same touches. The default is the published
@@ -18,6 +18,9 @@ pub struct Origin {
     pub length: f64,
     /// The probe's measures.
     pub probe: Probe,
+    /// Where approaches aim.
+    #[serde(default, skip_serializing_if = "Aim::is_box")]
+    pub aim: Aim,
     /// Whether the probe's direction and alignment are written too.
     pub pose: bool,
     /// Whether every approach is kept, not only full touches: sample i is then approach i.
@@ -35,6 +38,7 @@ impl Default for Origin {
             seed: 1,
             length: 10.0,
             probe: Probe::default(),
+            aim: Aim::Box,
             pose: false,
             approaches: false,
             format: Format::Text,
