@@ -163,7 +163,7 @@ fn table(design: &Design) -> String {
     line(&mut text, "", &design.published);
     _ = write!(
         text,
-        "\n* the best: {}. Approaches are to {} % wrong or missing verdicts; > where these were not reached.\n\
+        "\n* the best: {}. Approaches are to {} % wrong verdicts; > where more were wrong or missing.\n\
          Assumed: {} units per second, Gaussian noise of {} ms on contact times; evidence: {}, {}.\n",
         report::design::described(best).to_lowercase(),
         100.0 * design.error_rate,

@@ -55,7 +55,8 @@ fn approaches(trial: &Trial) -> String {
     if trial.reached {
         number(trial.approaches, 1)
     } else {
-        format!("more than {} (still {} % errors)", number(trial.approaches, 0), number(100.0 * trial.error, 1))
+        let [error, undecided] = [trial.error, trial.undecided].map(|share| number(100.0 * share, 1));
+        format!("more than {} ({error} % wrong, {undecided} % undecided)", number(trial.approaches, 0))
     }
 }
 
@@ -65,7 +66,7 @@ fn assumed(design: &Design) -> String {
         "Every probe touched the objects {} times each in the simulator at {} units per second, with Gaussian noise of {} \
          ms on every contact time. A model of the descriptor {} was trained on these approaches and tested on as many \
          others; evidence are {}. The stopping rule was varied until {} % of the verdicts on the test approaches were \
-         wrong or missing.",
+         wrong.",
         design.best.trained_on,
         design.best.probe.speed,
         design.noise / 1e3,
@@ -80,7 +81,7 @@ fn assumed(design: &Design) -> String {
 }
 
 /// Columns of a table of trials.
-const COLUMNS: [&str; 13] = [
+const COLUMNS: [&str; 14] = [
     "round",
     "spacing",
     "radius",
@@ -88,6 +89,7 @@ const COLUMNS: [&str; 13] = [
     "aim",
     "approaches",
     "errors",
+    "undecided",
     "none",
     "outer",
     "middle",
@@ -102,7 +104,8 @@ fn row(name: &str, trial: &Trial) -> Vec<Cell> {
     let approaches = Cell::Spread(trial.approaches, trial.approaches_standard_error, 1);
     let mut row = vec![name.into(), Cell::Number(probe.spacing, 2), Cell::Number(probe.radius, 2)];
     row.extend([Cell::Number(probe.tilt, 0), trial.aim.name().into(), approaches, Cell::Percent(trial.error, 2)]);
-    row.extend(COLUMNS[7..].iter().map(|pattern| match trial.patterns.get(pattern) {
+    row.push(Cell::Percent(trial.undecided, 2));
+    row.extend(COLUMNS[8..].iter().map(|pattern| match trial.patterns.get(pattern) {
         Some(&share) => Cell::Percent(share, 1),
         None => Cell::Missing,
     }));
@@ -117,8 +120,8 @@ fn compared(design: &Design, command: &str) -> Table {
         id: "best".into(),
         title: "The best probe and the published one".into(),
         caption:
-            "Approaches to a verdict on average, with the standard error of the drawing of sequences; the share of \
-                  wrong and missing verdicts; the share of approaches with each contact pattern."
+            "Approaches to a verdict on average, with the standard error of the drawing of sequences; the shares of \
+                  wrong verdicts and of sequences without one; the share of approaches with each contact pattern."
                 .into(),
         command: command.into(),
         data,

@@ -1,8 +1,7 @@
 //! Which probe to build: the spacing, radius and tilt, and the aim of approaches, that need the fewest approaches.
 //!
 //! Every probe tried touches the objects anew in the simulator; a model is trained on these approaches and tested on
-//! others, with the stopping rule set so that the share of wrong and missing verdicts is the one asked for. What counts
-//! is how many approaches that takes on average. The search narrows down: a coarse grid with a quarter of the approaches
+//! others, with the stopping rule set so that the share of wrong verdicts is the one asked for. What counts is how many approaches that takes on average. The search narrows down: a coarse grid with a quarter of the approaches
 //! per object; the best of it and what lies between them with half; and, with all of them, every spacing at the best
 //! radius, tilt and aim.
 //!
@@ -144,10 +143,12 @@ pub struct Trial {
     pub approaches: f64,
     /// Standard error of [`Trial::approaches`], from the drawing of sequences.
     pub approaches_standard_error: f64,
-    /// Whether the share of wrong and missing verdicts came down to the error rate asked for.
+    /// Whether no more verdicts than asked for were wrong, and no more than that missing after all test approaches.
     pub reached: bool,
-    /// The share of wrong and missing verdicts.
+    /// The share of wrong verdicts.
     pub error: f64,
+    /// The share of sequences that used up the test approaches without a verdict.
+    pub undecided: f64,
     /// The posterior at which the recognizer stopped is one less this.
     pub threshold: f64,
     /// Approaches to a verdict on average, for each object.
@@ -159,7 +160,7 @@ pub struct Trial {
 impl Trial {
     /// What is better: to reach the error rate at all, then fewer approaches.
     fn rank(&self) -> (bool, f64) {
-        if self.reached { (false, self.approaches) } else { (true, self.error) }
+        if self.reached { (false, self.approaches) } else { (true, self.error + self.undecided) }
     }
 }
 
@@ -334,15 +335,15 @@ impl Search<'_> {
         let margins = Margins::new(Candidate::Full(&ensemble), &test)?;
         let (threshold, stopped) = self.at_the_rate(&margins)?;
         let sequential = stopped.sequential;
-        let error = sequential.error + sequential.undecided;
         Ok(Trial {
             probe,
             aim,
             trained_on: approaches,
             approaches: sequential.mean_approaches,
             approaches_standard_error: sequential.mean_approaches_standard_error,
-            reached: error <= settings.error_rate,
-            error,
+            reached: sequential.error.max(sequential.undecided) <= settings.error_rate,
+            error: sequential.error,
+            undecided: sequential.undecided,
             threshold,
             per_object: sequential.per_object,
             patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
@@ -366,8 +367,8 @@ impl Search<'_> {
         Ok(Dataset { origin: Some(origin), ..Dataset::new(objects) })
     }
 
-    /// The loosest stopping threshold with at most the error rate asked for, and what it achieves; the strictest, if none
-    /// has.
+    /// The loosest stopping threshold with at most the error rate asked for in wrong verdicts, and what it achieves; the
+    /// strictest, if none has.
     fn at_the_rate(&self, margins: &Margins<'_>) -> Result<(f64, Approaches)> {
         let Settings { error_rate, sequences, seed, .. } = *self.settings;
         let stopped = |log_odds: f64| {
@@ -377,22 +378,18 @@ impl Search<'_> {
                 SequentialSettings { error_rate: threshold, max_touches: Some(MAX_TOUCHES), sequences, seed };
             Ok::<_, Error>((threshold, margins.approaches(&[], &settings)?))
         };
-        let is_met = |(_, found): &(f64, Approaches)| found.sequential.error + found.sequential.undecided <= error_rate;
         let [mut strict, mut loose] = ODDS;
-        let mut best = stopped(strict)?;
-        if !is_met(&best) {
-            return Ok(best);
-        }
+        let mut best = None;
         for _ in 0..HALVINGS {
             let middle = (strict + loose) / 2.0;
             let found = stopped(middle)?;
-            if is_met(&found) {
-                (strict, best) = (middle, found);
+            if found.1.sequential.error <= error_rate {
+                (strict, best) = (middle, Some(found));
             } else {
                 loose = middle;
             }
         }
-        Ok(best)
+        best.map_or_else(|| stopped(strict), Ok)
     }
 }
 
