@@ -33,9 +33,9 @@ fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
 }
 
 fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
-    let layouts = [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)];
+    let layouts = std::iter::once(None).chain(Layout::ALL.iter().copied().map(Some));
     let settings = |layout| Settings { leaf, layout, ..Settings::default() };
-    layouts.into_iter().filter_map(|layout| compile(ensemble, &settings(layout)).ok()).collect()
+    layouts.filter_map(|layout| compile(ensemble, &settings(layout)).ok()).collect()
 }
 
 /// The same trees over this many f32 features, as an imported model has them.
@@ -89,7 +89,7 @@ proptest! {
         let mut first = vec![0; shape.objects];
         let mut other = first.clone();
         let trees: Vec<Model> = models.iter().map(|compiled| Model::new(&compiled.bytes).unwrap()).collect();
-        let trees: Vec<&Model> = trees.iter().filter(|model| model.layout() != Layout::Grid).collect();
+        let trees: Vec<&Model> = trees.iter().filter(|model| !matches!(model.layout(), Layout::Grid | Layout::Patterns)).collect();
         for touch in random::touches(100, seed) {
             trees[0].margins(&touch, &mut first);
             for model in &trees {

@@ -2,7 +2,7 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
-use palpate_onboard::Model;
+use palpate_onboard::{Model, ModelError};
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
 /// Two trees over curvature: κ < 1000.5 (missing left), then slope < -3 (missing right) on the right; and one split.
@@ -27,9 +27,27 @@ fn ensemble() -> Ensemble {
     }
 }
 
+/// Two trees over contact patterns: pattern < 3, then κ < 1000.5 (missing left) on the right; and pair < 70000 (missing
+/// right).
+fn over_patterns() -> Ensemble {
+    let split =
+        |feature, threshold, missing_left, left, right| Node::Split { feature, threshold, missing_left, left, right };
+    let leaf = |a: f32, b: f32| Node::Leaf(vec![a, b]);
+    let first = vec![
+        split(0, 3.0, true, 1, 2),
+        leaf(1.0, -1.0),
+        split(1, 1000.5, true, 3, 4),
+        leaf(0.5, 0.25),
+        leaf(-0.5, 0.0),
+    ];
+    let second = vec![split(3, 70000.0, false, 1, 2), leaf(0.125, 0.0), leaf(-0.125, 0.0625)];
+    let trees = [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect();
+    Ensemble { descriptor: Descriptor::ContactsCurvature, trees, ..ensemble() }
+}
+
 /// Compiles with the version and the ensemble's hash, which may change with a release, set to zero.
-fn body(leaf: Leaf, layout: Layout) -> String {
-    let compiled = compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap();
+fn body(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> String {
+    let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap();
     let version = env!("CARGO_PKG_VERSION");
     let text = 96;
     assert_eq!(&compiled.bytes[text + 1..text + 1 + version.len()], version.as_bytes());
@@ -50,8 +68,53 @@ fn the_header_is_pinned() {
 
 #[test]
 fn the_sections_of_every_layout_are_pinned() {
-    let bodies = SECTIONS.map(|(leaf, layout, _)| body(leaf, layout));
+    let bodies = SECTIONS.map(|(leaf, layout, _)| body(&ensemble(), leaf, layout));
     assert_eq!(bodies, SECTIONS.map(|(.., expected)| expected));
+}
+
+#[test]
+fn the_sections_of_tables_by_contact_pattern_are_pinned_and_read_as_worked_out_by_hand() {
+    assert_eq!(body(&over_patterns(), Leaf::I8, Layout::Patterns), PATTERNS);
+    let settings = Settings { leaf: Leaf::I8, layout: Some(Layout::Patterns), ..Settings::default() };
+    let compiled = compile(&over_patterns(), &settings).unwrap();
+    let model = Model::new(&compiled.bytes).unwrap();
+    let (some, missing) = (ContactTime::from_micros, ContactTime::MISSING);
+    for (times, expected) in [
+        ([missing; 3], [1.375, -1.4375]),
+        ([some(0), missing, missing], [1.375, -1.4375]),
+        ([missing, some(0), missing], [1.375, -1.4375]),
+        // pair = 69999, then 70000.
+        ([some(0), some(69_999), missing], [1.125, -0.25]),
+        ([missing, some(70_000), some(0)], [0.875, -0.1875]),
+        ([some(5), missing, some(0)], [0.875, -0.1875]),
+        // κ = 1000, then 1001.
+        ([some(1_000), some(0), some(0)], [0.875, -0.1875]),
+        ([some(1_000), some(0), some(1)], [-0.125, -0.4375]),
+    ] {
+        let mut margins = [0; 2];
+        assert!(model.margins(&Touch::new(times), &mut margins));
+        assert_eq!(margins.map(|margin| f64::from(margin) * f64::from(model.unit())), expected, "{times:?}");
+    }
+}
+
+#[test]
+fn tables_by_contact_pattern_with_other_axes_are_refused() {
+    let settings = Settings { leaf: Leaf::I8, layout: Some(Layout::Patterns), ..Settings::default() };
+    let compiled = compile(&over_patterns(), &settings).unwrap().bytes;
+    let axes = compiled.windows(4).position(|axis| axis == [1, 1, 4, 1]).unwrap();
+    let refused = |change: &dyn Fn(&mut Vec<u8>)| {
+        let mut bytes = compiled.clone();
+        change(&mut bytes);
+        bytes.truncate(bytes.len() - 4);
+        bytes.extend(palpate_shared::format::checksum(&bytes).to_le_bytes());
+        Model::new(&bytes).map(|_| ()).unwrap_err()
+    };
+    // Axes of other features, or in another order; another descriptor with as many features.
+    assert_eq!(refused(&|bytes| bytes[axes] = 2), ModelError::Section { offset: axes });
+    assert_eq!(refused(&|bytes| bytes[axes + 4] = 3), ModelError::Section { offset: axes });
+    assert_eq!(refused(&|bytes| bytes[12] = Descriptor::Gravity.code()), ModelError::Section { offset: axes });
+    // A layout that no release knows.
+    assert_eq!(refused(&|bytes| bytes[6] = 5), ModelError::Field { offset: 6 });
 }
 
 #[test]
@@ -103,6 +166,8 @@ const HEADER: [&str; 6] = [
     "00 00 20 41 0c 00 00 00 00 00 00 00 00 00 00 00",
     "0c 00 00 00 0c 00 00 00 0c 00 00 00 00 00 00 00",
 ];
+
+const PATTERNS: &str = "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 01 04 01 02 01 02 00 03 01 04 01 e9 03 00 00 70 11 01 00 d8 24 d8 24 d8 24 c8 70 b8 74 b8 74 b8 74 78 64";
 
 const SECTIONS: [(Leaf, Layout, &str); 5] = [
     (

@@ -56,7 +56,8 @@ impl<'a> Sampler<'a> {
         let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn)).ok_or_else(untouchable)?;
         let (bounds, clearance) = (scene.bounds(), self.origin.clearance(scene.bounds()));
         for attempts in 1..=MOST_ATTEMPTS {
-            let approach = Approach::draw_from(&mut rng, bounds, probe.tilt, clearance);
+            let target = self.origin.aim.target(scene);
+            let approach = Approach::draw_at(&mut rng, bounds, target, probe.tilt, clearance);
             if self.origin.approaches {
                 return Ok((approach.touch(approach.distances(scene, probe), probe), attempts));
             }

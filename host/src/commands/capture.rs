@@ -5,7 +5,7 @@ use crate::capture::{self, Settings, Summary};
 use crate::error::{CaptureProblem, Problem, TouchesProblem};
 use crate::mesh::facts::Facts;
 use crate::output;
-use crate::probe::approach::Probe;
+use crate::probe::approach::{Aim, Probe};
 use crate::touches::{Format, Listing, Origin, Shard};
 use crate::{Error, Result};
 use std::fmt::Write as _;
@@ -59,6 +59,9 @@ pub(crate) struct Arguments {
     tilt: Option<f64>,
     #[command(flatten)]
     size: SizeArguments,
+    /// Where approaches aim: anywhere in the bounding box, in its middle (half the sides), or near the surface's center of mass (a quarter of the sides), such as --aim middle [default: box]
+    #[arg(long, value_name = "box|middle|mass", value_parser = aim)]
+    aim: Option<Aim>,
     /// Append the probe's direction and alignment to each line (six numbers)
     #[arg(long)]
     pose: bool,
@@ -132,12 +135,17 @@ impl Arguments {
                 speed: self.speed.unwrap_or(base.probe.speed),
                 tilt: self.tilt.unwrap_or(base.probe.tilt),
             },
+            aim: self.aim.unwrap_or(base.aim),
             pose: self.pose || base.pose,
             approaches: self.approaches || base.approaches,
             format: self.format.unwrap_or(base.format),
             shard: self.shard.unwrap_or(base.shard),
         })
     }
+}
+
+pub(super) fn aim(name: &str) -> Result<Aim, String> {
+    Aim::from_name(name).ok_or_else(|| "use one of box, middle, mass".to_owned())
 }
 
 /// An option's value; what is wrong with it, with what to do.

@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_parser = leaf, default_value = "i16", value_name = "i8|i16|f32")]
     leaf: Leaf,
     /// How trees are laid out; auto weighs size and speed
-    #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid")]
+    #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid|wide|patterns")]
     layout: LayoutChoice,
     /// The error rate, such as 0.05 or 5%, at which recognizers stop unless told otherwise
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
@@ -123,5 +123,7 @@ fn layout(name: &str) -> Result<LayoutChoice, String> {
         return Ok(LayoutChoice(None));
     }
     let layout = Layout::ALL.iter().copied().find(|layout| layout.name() == name);
-    layout.map(|layout| LayoutChoice(Some(layout))).ok_or_else(|| "use one of auto, compact, complete, grid".to_owned())
+    layout
+        .map(|layout| LayoutChoice(Some(layout)))
+        .ok_or_else(|| "use one of auto, compact, complete, grid, wide, patterns".to_owned())
 }

@@ -3,6 +3,7 @@
 mod capture;
 mod cast;
 mod completions;
+mod design;
 mod evaluate;
 mod export;
 mod inspect;
@@ -70,6 +71,8 @@ commands! {
     Evaluate => evaluate,
     /// Find the best model that fits a chip
     Tune => tune,
+    /// Find out which probe to build for your objects
+    Probe => design,
     /// Compare a compiled model with its ensemble
     Parity => parity,
     /// Remake the whole evaluation: every figure, the limit, speed against error
@@ -166,7 +169,11 @@ fn message(error: &Error, command: &str) -> String {
     };
     let option = name.replace('_', "-");
     let cli = cli();
-    let mut arguments = cli.find_subcommand(command).into_iter().flat_map(|command| command.get_arguments());
+    // The command's own options, and those of the commands below it.
+    let named = cli.find_subcommand(command).into_iter();
+    let mut arguments = named
+        .flat_map(|command| std::iter::once(command).chain(command.get_subcommands()))
+        .flat_map(|command| command.get_arguments());
     if arguments.any(|argument| argument.get_long() == Some(&option)) {
         return format!("{place}--{option} is {value}. {}", problem.fix());
     }
@@ -213,6 +220,9 @@ mod tests {
         let error = Error::setting("max_touches", 0, "1 to 1000");
         assert_eq!(message(&error, "recognize"), "--max-touches is 0. Use 1 to 1000.");
         assert_eq!(error.exit_code(), 2);
+        let error = Error::setting("spacing", 9, "less");
+        assert_eq!(message(&error, "probe"), "--spacing is 9. Use less.");
+        let error = Error::setting("max_touches", 0, "1 to 1000");
         // No option of this name, and no command: the setting's own name.
         assert_eq!(message(&error, "view"), "max_touches is 0. Use 1 to 1000.");
         assert_eq!(message(&error, ""), "max_touches is 0. Use 1 to 1000.");

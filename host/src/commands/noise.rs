@@ -96,7 +96,7 @@ fn quantity_of<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result
     said(text.parse())
 }
 
-fn duration(text: &str) -> Result<f64, String> {
+pub(super) fn duration(text: &str) -> Result<f64, String> {
     said(quantity::duration(text))
 }
 

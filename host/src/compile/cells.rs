@@ -2,12 +2,14 @@
 //!
 //! Between its thresholds an ensemble is constant. Over two features that leaves some ten thousand cells at most, few
 //! enough to compute its margins for every possible touch: the grid layout stores them, and the worst error of a margin
-//! is the largest in any cell. The three times of a touch are no more than two dimensions, since the earliest is always 0.
+//! is the largest in any cell. The three times of a touch are no more than two dimensions, since the earliest is always 0,
+//! and a contact pattern leaves at most two differences of them: the layout patterns stores a table for each.
 
 use super::axes::visit;
 use super::forest::{Branch, Forest};
-use palpate_shared::Descriptor;
+use palpate_shared::{ContactPattern, Descriptor};
 use std::collections::{BTreeMap, BTreeSet};
+use std::mem::take;
 use std::ops::{AddAssign, Range};
 
 /// Cells times trees that are visited; beyond, the worst case is bounded instead of found.
@@ -22,6 +24,9 @@ pub(super) struct Cells {
     pub(super) dimensions: Vec<(u8, Vec<i32>)>,
     /// Boxes of places; a touch falls into one of them.
     planes: Vec<Vec<Range<usize>>>,
+    /// Whether each plane is of a contact pattern, in the order of their codes, and the dimensions are all of the
+    /// features of contacts-curvature.
+    by_pattern: bool,
 }
 
 /// The places along a dimension that lead to a leaf.
@@ -42,6 +47,11 @@ impl Cells {
         }
         let mut dimensions: Vec<(u8, Vec<i32>)> =
             features.into_iter().map(|(feature, cuts)| (feature, cuts.into_iter().collect())).collect();
+        let by_pattern = forest.descriptor == Some(Descriptor::ContactsCurvature);
+        if by_pattern {
+            let mut cuts = |feature| dimensions.iter_mut().find(|(of, _)| *of == feature).map(|(_, cuts)| take(cuts));
+            dimensions = (0..4).map(|feature| (feature, cuts(feature).unwrap_or_default())).collect();
+        }
         while dimensions.len() < 2 {
             dimensions.push((0, Vec::new()));
         }
@@ -57,14 +67,17 @@ impl Cells {
                 planes.push(plane);
             }
         }
-        let cells = Self { dimensions, planes };
+        if by_pattern {
+            planes = ContactPattern::ALL.map(|pattern| plane(pattern, &dimensions)).into();
+        }
+        let cells = Self { dimensions, planes, by_pattern };
         let count = cells.count().filter(|&count| count <= MAX_CELLS)?;
         let trees: usize = (0..forest.objects()).map(|object| forest.trees_of(object).count()).sum();
         (count.checked_mul(trees)? <= MAX_WORK).then_some(cells)
     }
 
     /// How many cells there are.
-    fn count(&self) -> Option<usize> {
+    pub(super) fn count(&self) -> Option<usize> {
         let lengths = self.planes.iter().map(|plane| plane.iter().try_fold(1_usize, |n, r| n.checked_mul(r.len())));
         lengths.sum()
     }
@@ -72,6 +85,11 @@ impl Cells {
     /// Whether all cells make up one table of two dimensions.
     pub(super) fn is_table(&self) -> bool {
         self.dimensions.len() == 2
+    }
+
+    /// Whether there is a table for each contact pattern.
+    pub(super) fn is_by_pattern(&self) -> bool {
+        self.by_pattern
     }
 
     /// Sums over an object's trees, in their order, in every cell: `start`, and `value` of each leaf that is reached,
@@ -117,6 +135,25 @@ impl Cells {
         self.leaves(&split.right, spans, see);
         spans[dimension] = Span { places: start..end, missing: whole.missing };
     }
+}
+
+/// The places of the touches with a contact pattern, in the dimensions pattern, κ, slope and pair: a difference of times
+/// exists with the patterns that have it, and with no other.
+fn plane(pattern: ContactPattern, dimensions: &[(u8, Vec<i32>)]) -> Vec<Range<usize>> {
+    let code = i32::from(pattern.code());
+    let is_there = match pattern {
+        ContactPattern::None | ContactPattern::Outer | ContactPattern::Middle => [false; 3],
+        ContactPattern::OuterAndMiddle => [false, false, true],
+        ContactPattern::BothOuter => [false, true, false],
+        ContactPattern::All => [true, true, false],
+    };
+    let (patterns, differences) = (&dimensions[0].1, &dimensions[1..]);
+    let place = patterns.partition_point(|&cut| cut <= code);
+    let places = differences.iter().zip(is_there).map(|((_, cuts), is_there)| {
+        let missing = cuts.len() + 1;
+        if is_there { 0..missing } else { missing..missing + 1 }
+    });
+    std::iter::once(place..place + 1).chain(places).collect()
 }
 
 /// Adds `value` to the cells of a plane that lie within all spans.

@@ -21,8 +21,8 @@ pub(super) fn candidates(
     leaf: LeafType,
     wanted: Option<Layout>,
 ) -> Result<Vec<(Layout, Parts)>> {
-    let mut layouts =
-        wanted.map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid], |layout| vec![layout]);
+    let mut layouts = wanted
+        .map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid, Layout::Patterns], |layout| vec![layout]);
     if !trees::fits_narrow(forest, axes) {
         layouts.iter_mut().filter(|layout| **layout == Layout::Compact).for_each(|layout| *layout = Layout::Wide);
     }
@@ -43,6 +43,7 @@ pub(super) fn candidates(
             Layout::Compact => walked(&|runs, leaves| trees::compact(forest, axes, runs, leaves)),
             Layout::Wide => walked(&|runs, leaves| trees::wide(forest, runs, leaves)),
             Layout::Grid => cells.and_then(|cells| table::grid(forest, cells, leaf)),
+            Layout::Patterns => cells.and_then(|cells| table::patterns(forest, cells, leaf)),
         };
         match parts {
             Some(parts) => candidates.push((layout, parts)),

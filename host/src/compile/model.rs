@@ -114,7 +114,8 @@ pub fn longest_time(model: &Model<'_>) -> f64 {
 fn thresholds(model: &Model<'_>) -> Vec<i32> {
     let header = model.header();
     let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-    let axes_start = HEADER_LENGTH + length(header.text_length()) + 8 * model.object_count();
+    let base_start = HEADER_LENGTH + length(header.text_length()) + length(header.optional_length());
+    let axes_start = base_start + 8 * model.object_count();
     let cuts_start = axes_start + Axis::LENGTH * usize::from(header.axes());
     let section = |start: usize, end: usize| model.bytes().get(start..end).unwrap_or_default();
     let mut cuts = section(cuts_start, cuts_start + length(header.cuts_length()));

@@ -1,4 +1,4 @@
-//! The layout without trees: a table of margins over two features.
+//! The layouts without trees: a table of margins over two features, or one for each contact pattern.
 
 use super::axes::{cuts_bytes, width};
 use super::cells::Cells;
@@ -15,10 +15,27 @@ const MAX_TABLE: usize = 1 << 24;
 
 /// The table of a forest, if it is one of two features and small enough.
 pub(super) fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option<Parts> {
+    if cells.is_table() { table(forest, cells, &cells.dimensions, Layout::Grid, leaf) } else { None }
+}
+
+/// The tables of a forest over contact patterns, if they are small enough.
+pub(super) fn patterns(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option<Parts> {
+    // Which table it is takes no axis: it is the pattern's own.
+    let dimensions = cells.dimensions.get(1..).filter(|_| cells.is_by_pattern())?;
+    table(forest, cells, dimensions, Layout::Patterns, leaf)
+}
+
+/// All cells one after the other, and an axis for each of the dimensions.
+fn table(
+    forest: &Forest<'_>,
+    cells: &Cells,
+    dimensions: &[(u8, Vec<i32>)],
+    layout: Layout,
+    leaf: LeafType,
+) -> Option<Parts> {
     let objects = forest.objects();
-    let sides: Vec<usize> = cells.dimensions.iter().map(|(_, cuts)| cuts.len() + 2).collect();
-    let table: usize = sides.iter().product::<usize>() * objects * leaf.size();
-    if !cells.is_table() || sides.iter().any(|&side| side > 257) || table > MAX_TABLE {
+    let count = cells.count()?;
+    if dimensions.iter().any(|(_, cuts)| cuts.len() > 255) || count * objects * leaf.size() > MAX_TABLE {
         return None;
     }
     let sums: Vec<Vec<f32>> =
@@ -26,7 +43,7 @@ pub(super) fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option
     let scale = Scale::for_table(&sums, leaf)?;
     let mut leaves = Leaves::new(leaf, &scale);
     let mut worst = if leaf == LeafType::F32 { f64::from(scale.unit) / 2.0 } else { 0.0 };
-    for cell in 0..sides.iter().product() {
+    for cell in 0..count {
         for sum in &sums {
             leaves.push(&[sum[cell]], 0);
             if leaf != LeafType::F32 {
@@ -35,8 +52,8 @@ pub(super) fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option
             }
         }
     }
-    let (axes, cuts) = axes(cells);
-    let shape = Shape { layout: Layout::Grid, leaf, objects, axes: axes.len(), groups: &[], nodes: &[] };
+    let (axes, cuts) = axes(dimensions);
+    let shape = Shape { layout, leaf, objects, axes: axes.len(), groups: &[], nodes: &[] };
     Some(Parts {
         instructions: Instructions::new(&shape),
         axes,
@@ -50,9 +67,9 @@ pub(super) fn grid(forest: &Forest<'_>, cells: &Cells, leaf: LeafType) -> Option
     })
 }
 
-fn axes(cells: &Cells) -> (Vec<Axis>, Vec<u8>) {
+fn axes(dimensions: &[(u8, Vec<i32>)]) -> (Vec<Axis>, Vec<u8>) {
     let mut bytes = Vec::new();
-    let axes = cells.dimensions.iter().map(|(feature, cuts)| {
+    let axes = dimensions.iter().map(|(feature, cuts)| {
         let axis =
             Axis { feature: *feature, columns: Columns::MissingLeft, width: width(cuts), count: cuts.len() as u8 };
         bytes.extend(cuts_bytes(axis, cuts));

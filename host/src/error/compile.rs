@@ -79,6 +79,9 @@ fn limit(layout: Layout) -> &'static str {
         Layout::Grid => {
             "it uses more than two features, has more than 255 thresholds of one, or its margins are too large for a byte"
         }
+        Layout::Patterns => {
+            "its descriptor is not contacts-curvature, it has more than 255 thresholds of a feature, or its margins are too large for a byte"
+        }
         Layout::Compact | Layout::Wide => "it has more thresholds than 65,536, or a tree with more splits than that",
     }
 }

@@ -17,6 +17,12 @@ pub enum TuneProblem {
     /// No model of the family fits any layout.
     #[error("no ensemble of the family could be compiled")]
     NothingCompiles,
+    /// There is nothing to distinguish.
+    #[error("a probe is searched for {objects} object(s), which leaves nothing to distinguish")]
+    FewObjects {
+        /// How many objects there are.
+        objects: usize,
+    },
 }
 
 impl TuneProblem {
@@ -24,6 +30,7 @@ impl TuneProblem {
     pub fn fix(&self) -> String {
         match self {
             Self::NothingFits { .. } => "Allow more bytes or more instructions.",
+            Self::FewObjects { .. } => "Give two or more objects.",
             Self::NothingCompiles => "Report this as a bug, with the data.",
         }
         .into()

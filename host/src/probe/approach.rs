@@ -64,6 +64,55 @@ impl Probe {
     }
 }
 
+/// Where approaches aim: what a robot must know about an object before it touches it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Aim {
+    /// Anywhere in the object's bounding box.
+    #[default]
+    Box,
+    /// In the middle of the bounding box: in the box of half its sides about its center.
+    Middle,
+    /// Near the surface's center of mass: in a box of a quarter of the bounding box's sides about it.
+    Mass,
+}
+
+impl Aim {
+    /// Every aim, the default first.
+    pub const ALL: [Self; 3] = [Self::Box, Self::Middle, Self::Mass];
+
+    /// The name in files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Middle => "middle",
+            Self::Mass => "mass",
+        }
+    }
+
+    /// The one with this [`name`](Self::name).
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|aim| aim.name() == name)
+    }
+
+    /// The box in which an approach to the scene aims: its lowest and highest corner, in units.
+    pub fn target(self, scene: &Scene) -> [DVec3; 2] {
+        let [low, high] = scene.bounds();
+        let (center, share) = match self {
+            Self::Box => return [low, high],
+            Self::Middle => ((low + high) / 2.0, 0.5),
+            Self::Mass => (scene.center_of_mass(), 0.25),
+        };
+        let half = (high - low) * (share / 2.0);
+        [center - half, center + half]
+    }
+
+    /// Whether this is the default, which files leave out.
+    pub(crate) fn is_box(&self) -> bool {
+        *self == Self::Box
+    }
+}
+
 /// Where the probe starts, in which direction it moves, and how its row of fingers is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approach {
@@ -81,14 +130,16 @@ impl Approach {
     /// perpendicular to the motion, rolled uniformly about it, then tilted in the plane of row and motion by a uniform
     /// angle within ± `tilt` degrees.
     pub fn draw(rng: &mut impl Rng, bounds: [DVec3; 2], tilt: f64) -> Self {
-        Self::draw_from(rng, bounds, tilt, CLEARANCE)
+        Self::draw_at(rng, bounds, bounds, tilt, CLEARANCE)
     }
 
-    /// The same with another clearance than [`CLEARANCE`].
-    pub fn draw_from(rng: &mut impl Rng, [low, high]: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
+    /// The same with the aim uniform in another box, such as [`Aim::target`] gives, and another clearance than
+    /// [`CLEARANCE`].
+    pub fn draw_at(rng: &mut impl Rng, [low, high]: [DVec3; 2], target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
         let (center, side) = ((low + high) / 2.0, high - low);
         let start = center + on_sphere(rng) * (side.length() / 2.0 + clearance);
-        let aim = low + side * DVec3::new(unit(rng), unit(rng), unit(rng));
+        let [low, high] = target;
+        let aim = low + (high - low) * DVec3::new(unit(rng), unit(rng), unit(rng));
         let direction = (aim - start).normalize();
         let across = direction.any_orthonormal_vector();
         let [roll_cos, roll_sin] = on_circle(rng);

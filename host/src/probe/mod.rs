@@ -42,7 +42,7 @@ pub mod file;
 pub mod scene;
 pub mod sweep;
 
-pub use approach::{Approach, Probe};
+pub use approach::{Aim, Approach, Probe};
 pub use scene::Scene;
 
 /// The vectors in this room's signatures: [`DVec3`](glam::DVec3) for positions and directions, in units.

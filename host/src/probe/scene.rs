@@ -58,6 +58,18 @@ impl Scene {
         self.bounds
     }
 
+    /// The center of mass of the surface, as if it were a shell of the same thickness everywhere. Cost: one pass over the
+    /// triangles.
+    pub fn center_of_mass(&self) -> DVec3 {
+        let add = |(sum, area): (DVec3, f64), [a, b, c]: Triangle| {
+            let twice = (b - a).cross(c - a).length();
+            (sum + (a + b + c) * (twice / 3.0), area + twice)
+        };
+        let (sum, area) = self.triangles().fold((DVec3::ZERO, 0.0), add);
+        let [low, high] = self.bounds;
+        if area > 0.0 { sum / area } else { (low + high) / 2.0 }
+    }
+
     /// The first time t ≥ 0 at which a sphere of this radius, centered at origin + t · direction, touches the object: 0
     /// when it starts in contact, none when it never touches. With a unit vector as direction, t is a distance in units.
     pub fn first_contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
@@ -98,6 +110,19 @@ mod tests {
         let scene = Scene::new(&Mesh { vertices, triangles: vec![[0, 1, 2]] }, 10.0).unwrap();
         assert_eq!(scene.bounds(), [DVec3::new(-2.5, -5.0, -0.625), DVec3::new(2.5, 5.0, 0.625)]);
         assert_eq!(scene.triangles().next().unwrap()[0], DVec3::new(-2.5, 5.0, -0.625));
+    }
+
+    #[test]
+    fn the_center_of_mass_weighs_triangles_by_their_area() {
+        // A large triangle and one of a quarter of its area.
+        let vertices =
+            vec![[0.0; 3], [6.0, 0.0, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 4.0], [3.0, 0.0, 4.0], [0.0, 3.0, 4.0]];
+        let scene = Scene::as_is(&Mesh { vertices, triangles: vec![[0, 1, 2], [3, 4, 5]] }).unwrap();
+        let expected = (DVec3::new(2.0, 2.0, 0.0) * 4.0 + DVec3::new(1.0, 1.0, 4.0)) / 5.0;
+        assert!(scene.center_of_mass().distance(expected) < 1e-12);
+        let flat =
+            Scene::as_is(&Mesh { vertices: vec![[0.0; 3], [2.0, 0.0, 0.0]], triangles: vec![[0, 1, 1]] }).unwrap();
+        assert_eq!(flat.center_of_mass(), DVec3::new(1.0, 0.0, 0.0));
     }
 
     #[test]

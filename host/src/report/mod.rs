@@ -10,6 +10,7 @@ mod context;
 mod cost;
 mod cross_validation;
 mod density;
+pub(crate) mod design;
 mod generalization;
 mod growth;
 mod instructions;

@@ -3,7 +3,7 @@
 use super::{Format, Shard};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
-use crate::probe::approach::{CLEARANCE, Probe};
+use crate::probe::approach::{Aim, CLEARANCE, Probe};
 use glam::DVec3;
 use palpate_shared::format::Length;
 use std::ops::Range;
@@ -25,6 +25,9 @@ pub struct Origin {
     pub length: f64,
     /// The probe's measures.
     pub probe: Probe,
+    /// Where approaches aim.
+    #[serde(default, skip_serializing_if = "Aim::is_box")]
+    pub aim: Aim,
     /// Whether the probe's direction and alignment are written too.
     pub pose: bool,
     /// Whether every approach is kept, not only full touches: sample i is then approach i.
@@ -43,6 +46,7 @@ impl Default for Origin {
             unit: Length::Tenth,
             length: 10.0,
             probe: Probe::default(),
+            aim: Aim::Box,
             pose: false,
             approaches: false,
             format: Format::Text,

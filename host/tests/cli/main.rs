@@ -4,6 +4,7 @@ mod capture;
 mod cast;
 mod chip;
 mod compiled;
+mod design;
 mod help;
 mod mesh;
 mod models;

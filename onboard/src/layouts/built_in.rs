@@ -9,6 +9,7 @@ pub(crate) const fn layout(layout: Layout) -> bool {
         Layout::Complete => cfg!(feature = "complete"),
         Layout::Grid => cfg!(feature = "grid"),
         Layout::Wide => cfg!(feature = "wide"),
+        Layout::Patterns => cfg!(feature = "patterns"),
     }
 }
 

@@ -29,6 +29,12 @@ pub(crate) fn look_up(model: &Sections<'_>, features: &[i32], margins: &mut [i32
         let place = if value == MISSING_FEATURE { count + 1 } else { rank_in(cuts, width, value).into() };
         cell = cell * (count + 2) + place;
     }
+    read(model, cell, margins);
+}
+
+/// The margins in a cell of a table, in units or as the bits of f32 values.
+#[inline(always)]
+pub(super) fn read(model: &Sections<'_>, cell: usize, margins: &mut [i32]) {
     let leaves = model.leaves.get(cell * margins.len() * model.leaf.size()..).unwrap_or_default();
     match model.leaf {
         LeafType::I8 if built_in::leaf(LeafType::I8) => {

@@ -4,6 +4,7 @@ pub(crate) mod built_in;
 pub(crate) mod complete;
 pub(crate) mod grid;
 pub(crate) mod leaves;
+pub(crate) mod patterns;
 pub(crate) mod preorder;
 pub(crate) mod ranks;
 mod sections;

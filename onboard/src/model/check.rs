@@ -2,7 +2,7 @@
 
 use super::optional;
 use crate::bytes::{ModelError, take};
-use crate::layouts::{Sections, built_in, complete, grid, preorder, ranks};
+use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
 use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, TrainedTouches};
 
 /// The largest shift of a group.
@@ -30,6 +30,11 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut Tra
     let mut leaves = model.leaves;
     if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
         let cells = grid::cells(model).ok_or(ModelError::Section { offset: model.offset(model.axes) })?;
+        section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
+        section(model.groups.is_empty(), model.groups)?;
+    }
+    if built_in::layout(Layout::Patterns) && model.layout == Layout::Patterns {
+        let cells = patterns::cells(model).ok_or(ModelError::Section { offset: model.offset(model.axes) })?;
         section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
         section(model.groups.is_empty(), model.groups)?;
     }

@@ -2,7 +2,7 @@
 
 use super::{Model, fixed};
 use crate::layouts::leaves::{BLOCK, Sum};
-use crate::layouts::{built_in, complete, grid, preorder, ranks};
+use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
 use palpate_shared::format::{Group, Layout};
 use palpate_shared::{Features, Touch};
 
@@ -50,6 +50,10 @@ impl Model<'_> {
         let margins = margins.get_mut(..self.object_count())?;
         if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
             grid::look_up(&self.sections, features, margins);
+            return Some(margins);
+        }
+        if built_in::layout(Layout::Patterns) && self.layout() == Layout::Patterns {
+            patterns::look_up(&self.sections, features, margins);
             return Some(margins);
         }
         // Without a shift (the first is the largest), and always in f32, margins start from their base.

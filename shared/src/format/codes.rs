@@ -44,6 +44,8 @@ codes! {
         Grid = 2, "grid";
         /// Splits in preorder, six bytes each: for what [`Layout::Compact`] cannot number.
         Wide = 3, "wide";
+        /// A table of margins for each contact pattern, over the features that it has: no walk at all.
+        Patterns = 4, "patterns";
     }
 }
 
@@ -121,6 +123,6 @@ mod tests {
         assert!(Key::ALL.iter().all(|&x| Key::from_code(x.code()) == Some(x)));
         assert!(Counted::ALL.iter().all(|&x| Counted::from_code(x.code()) == Some(x)));
         assert!(Length::ALL.iter().all(|&x| Length::from_code(x.code()) == Some(x)));
-        assert_eq!(Layout::from_code(4), None);
+        assert_eq!(Layout::from_code(5), None);
     }
 }

@@ -115,7 +115,8 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
     let (mut touches, mut misses) = (Vec::new(), Vec::new());
     let (mut tried, mut full) = (0, 0);
     while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < settings.misses) {
-        let approach = Approach::draw_from(&mut rng, scene.bounds(), settings.probe.tilt, settings.clearance);
+        let approach =
+            Approach::draw_at(&mut rng, scene.bounds(), scene.bounds(), settings.probe.tilt, settings.clearance);
         let distances = approach.distances(scene, &settings.probe);
         let times = approach.touch(distances, &settings.probe).times();
         let drawn = Drawn {

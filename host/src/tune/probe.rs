@@ -1,0 +1,525 @@
+//! Which probe to build: the spacing, radius and tilt, and the aim of approaches, that need the fewest approaches.
+//!
+//! Every probe tried touches the objects anew in the simulator; a model is trained on these approaches and tested on
+//! others, with the stopping rule set so that the share of wrong verdicts is the one asked for. What counts is how many approaches that takes on average. The search narrows down: a coarse grid with a quarter of the approaches
+//! per object; the best of it and what lies between them with half; and, with all of them, every spacing at the best
+//! radius, tilt and aim.
+//!
+//! ```no_run
+//! use palpate::mesh::builtin;
+//! use palpate::tune::probe::{self, design};
+//!
+//! # fn main() -> palpate::Result<()> {
+//! let objects = [builtin::one("bowl")?, builtin::one("mouse")?];
+//! let design = design(&objects, &probe::Settings::default(), &())?;
+//! println!("{}", design.toml());
+//! # Ok(())
+//! # }
+//! ```
+
+use crate::capture;
+use crate::ensemble::train;
+use crate::error::{CaptureProblem, Error, Result, TuneProblem};
+use crate::evaluate::{Approaches, Candidate, Margins, SequentialSettings};
+use crate::mesh::Object;
+use crate::probe::approach::{Aim, Probe};
+use crate::probe::scene::Scene;
+use crate::progress::{self, Progress};
+use crate::touches::noise::noisy;
+use crate::touches::{Dataset, ObjectTouches, Origin};
+use palpate_shared::format::Counted;
+use palpate_shared::{ContactPattern, Descriptor};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+/// Spacings of the coarse grid.
+const SPACINGS: usize = 5;
+/// The share of the coarse grid that goes on.
+const KEPT: usize = 10;
+/// A recognizer gives up after this many touches: later than any that is of use.
+const MAX_TOUCHES: u32 = 100_000;
+/// Halvings of the range of stopping thresholds.
+const HALVINGS: usize = 12;
+/// Logarithms of the odds between which the stopping threshold is searched.
+const ODDS: [f64; 2] = [-16.0, -0.05];
+
+/// What probes are searched, and how each is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Distances between neighboring fingers, in units (a tenth of the object's longest side).
+    pub spacing: RangeInclusive<f64>,
+    /// Radii of the fingers, in units.
+    pub radius: RangeInclusive<f64>,
+    /// Largest tilts of the row of fingers to either side, in degrees.
+    pub tilt: RangeInclusive<f64>,
+    /// Where approaches may aim, at least one.
+    pub aims: Vec<Aim>,
+    /// The probe's speed, in units per second.
+    pub speed: f64,
+    /// Standard deviation of the Gaussian noise of contact times, in microseconds, in training and testing.
+    pub noise: f64,
+    /// Which features a touch is turned into.
+    pub descriptor: Descriptor,
+    /// Which approaches are evidence.
+    pub counted: Counted,
+    /// The share of wrong verdicts that is asked for, above 0 and at most 0.25.
+    pub error_rate: f64,
+    /// Approaches per object to train on in the last round, and as many to test on; at least 100.
+    pub approaches: u64,
+    /// Sequences of approaches for each object.
+    pub sequences: usize,
+    /// Seed of all that is random.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            spacing: 0.5..=3.0,
+            radius: 0.1..=0.3,
+            tilt: 0.0..=20.0,
+            aims: Aim::ALL.into(),
+            speed: Probe::default().speed,
+            noise: 1_000.0,
+            descriptor: Descriptor::Curvature,
+            counted: Counted::Contacts,
+            error_rate: 0.01,
+            approaches: 8_000,
+            sequences: 300,
+            seed: 1,
+        }
+    }
+}
+
+impl Settings {
+    /// Refuses settings out of their ranges.
+    fn check(&self) -> Result<()> {
+        for (name, range) in [("spacing", &self.spacing), ("radius", &self.radius), ("tilt", &self.tilt)] {
+            let [low, high] = [*range.start(), *range.end()];
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                return Err(Error::setting(name, format!("{low}..{high}"), "the smaller number first, as in 0.5..3"));
+            }
+        }
+        if !(self.error_rate > 0.0 && self.error_rate <= 0.25) {
+            return Err(Error::setting("error_rate", self.error_rate, "a number above 0 and at most 0.25"));
+        }
+        if !(self.noise.is_finite() && self.noise >= 0.0) {
+            return Err(Error::setting("noise", self.noise, "a number of microseconds of at least 0"));
+        }
+        if self.approaches < 100 {
+            return Err(Error::setting("approaches", self.approaches, "100 or more"));
+        }
+        if self.sequences == 0 {
+            return Err(Error::setting("sequences", 0, "1 or more"));
+        }
+        if self.aims.is_empty() {
+            return Err(Error::setting("aims", "empty", "one or more of box, middle and mass"));
+        }
+        let corners = [(self.spacing.start(), self.radius.start()), (self.spacing.end(), self.radius.end())];
+        for (&spacing, &radius) in corners {
+            for tilt in [*self.tilt.start(), *self.tilt.end()] {
+                Probe { radius, spacing, speed: self.speed, tilt }.check(LENGTH)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The longest side of every object, in units.
+const LENGTH: f64 = 10.0;
+
+/// A probe that was tried, and what it achieved.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Trial {
+    /// The probe's measures, in units.
+    #[serde(flatten)]
+    pub probe: Probe,
+    /// Where its approaches aimed.
+    pub aim: Aim,
+    /// Approaches per object that a model was trained on; it was tested on as many others.
+    pub trained_on: u64,
+    /// Approaches to a verdict on average at the error rate asked for, or at the least that was reached.
+    pub approaches: f64,
+    /// Standard error of [`Trial::approaches`], from the drawing of sequences.
+    pub approaches_standard_error: f64,
+    /// Whether no more verdicts than asked for were wrong, and no more than that missing after all test approaches.
+    pub reached: bool,
+    /// The share of wrong verdicts.
+    pub error: f64,
+    /// The share of sequences that used up the test approaches without a verdict.
+    pub undecided: f64,
+    /// The posterior at which the recognizer stopped is one less this.
+    pub threshold: f64,
+    /// Approaches to a verdict on average, for each object.
+    pub per_object: BTreeMap<String, f64>,
+    /// The share of each contact pattern among the approaches, each object weighted equally.
+    pub patterns: BTreeMap<&'static str, f64>,
+}
+
+impl Trial {
+    /// What is better: to reach the error rate at all, then fewer approaches.
+    fn rank(&self) -> (bool, f64) {
+        if self.reached { (false, self.approaches) } else { (true, self.error + self.undecided) }
+    }
+}
+
+/// The outcome of a search.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Design {
+    /// The best probe.
+    pub best: Trial,
+    /// The published probe, measured in the same way.
+    pub published: Trial,
+    /// The trade-off: probes of every spacing with the best radius, tilt and aim, by spacing; the best is one of them.
+    pub by_spacing: Vec<Trial>,
+    /// All probes tried in the rounds before, the best of each round first.
+    pub rounds: Vec<Vec<Trial>>,
+    /// The error rate that was asked for.
+    pub error_rate: f64,
+    /// Standard deviation of the noise of contact times that was assumed, in microseconds.
+    pub noise: f64,
+    /// Which features a touch was turned into.
+    pub descriptor: &'static str,
+    /// Which approaches were evidence.
+    pub counted: &'static str,
+}
+
+impl Design {
+    /// The best probe as the text of a `probe.toml`.
+    pub fn toml(&self) -> String {
+        let Trial { probe, aim, approaches, .. } = &self.best;
+        let verdict = if self.best.reached { "" } else { "NOT REACHED: " };
+        format!(
+            "# Found by `palpate probe design`: {verdict}{approaches:.1} approaches to {} % errors,\n\
+             # aiming at: {} (`palpate capture --aim {}`). Assumed: noise of {} ms on contact times.\n\
+             # A unit is a tenth of the object's longest side.\n\
+             unit = \"unit\"\nradius = {:?}\nspacing = {:?}\nspeed = {:?}\ntilt = {:?}\n",
+            100.0 * self.error_rate,
+            aim.name(),
+            aim.name(),
+            self.noise / 1e3,
+            probe.radius,
+            probe.spacing,
+            probe.speed,
+            probe.tilt,
+        )
+    }
+}
+
+/// Searches for the probe that needs the fewest approaches on these objects. The same objects and settings give the same
+/// design on any number of threads. Progress is counted in probes tried.
+///
+/// # Errors
+/// [`Problem::Setting`](crate::error::Problem::Setting) for a setting out of its range; [`TuneProblem::FewObjects`] for
+/// fewer than two objects; an object that cannot be touched, by its name; as [`train::train`]; [`Error::Cancelled`] if
+/// `progress` cancels it.
+pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Design> {
+    settings.check()?;
+    if objects.len() < 2 {
+        return Err(TuneProblem::FewObjects { objects: objects.len() }.into());
+    }
+    let search = Search { objects: scenes(objects)?, settings, progress };
+    let coarse = search.coarse();
+    // The second round has what was kept, and at most two neighbors in each of three directions; the third the spacings.
+    progress.begin("trying probes", Some((coarse.len() + 2 * KEPT + SPACINGS) as u64));
+    let first = search.try_all(coarse, settings.approaches / 4)?;
+    let second = search.try_all(search.finer(&first), settings.approaches / 2)?;
+    let best = &second[0];
+    let mut spacings = steps(&settings.spacing, SPACINGS);
+    let nearest = neighbors(&spacings, best.probe.spacing);
+    spacings.extend(nearest);
+    spacings.push(best.probe.spacing);
+    spacings.sort_by(f64::total_cmp);
+    spacings.dedup();
+    let line = spacings.into_iter().map(|spacing| (Probe { spacing, ..best.probe }, best.aim)).collect();
+    let mut by_spacing = search.try_all(line, settings.approaches)?;
+    let best = by_spacing[0].clone();
+    by_spacing.sort_by(|a, b| a.probe.spacing.total_cmp(&b.probe.spacing));
+    let published = Probe { speed: settings.speed, ..Probe::default() };
+    let published = search.attempt(published, Aim::Box, settings.approaches)?;
+    Ok(Design {
+        best,
+        published,
+        by_spacing,
+        rounds: vec![first, second],
+        error_rate: settings.error_rate,
+        noise: settings.noise,
+        descriptor: settings.descriptor.name(),
+        counted: settings.counted.name(),
+    })
+}
+
+/// The objects, sorted by name, as scenes.
+fn scenes(objects: &[Object]) -> Result<Vec<(String, Scene)>> {
+    let scene = |object: &Object| match Scene::new(object.mesh(), LENGTH) {
+        Ok(scene) => Ok((object.name.clone(), scene)),
+        Err(Error::At { problem, .. }) => {
+            Err(CaptureProblem::Object { name: object.name.clone(), problem: Box::new(problem) }.into())
+        }
+        Err(other) => Err(other),
+    };
+    let mut scenes: Vec<(String, Scene)> = objects.iter().map(scene).collect::<Result<_>>()?;
+    scenes.sort_by(|a, b| a.0.cmp(&b.0));
+    Ok(scenes)
+}
+
+struct Search<'a> {
+    objects: Vec<(String, Scene)>,
+    settings: &'a Settings,
+    progress: &'a dyn Progress,
+}
+
+/// A probe, and where it aims.
+type Plan = (Probe, Aim);
+
+impl Search<'_> {
+    /// Every combination of a few spacings, the ends of the other ranges, and the aims.
+    fn coarse(&self) -> Vec<Plan> {
+        let settings = self.settings;
+        let mut plans = Vec::new();
+        for spacing in steps(&settings.spacing, SPACINGS) {
+            for radius in steps(&settings.radius, 2) {
+                for tilt in steps(&settings.tilt, 2) {
+                    let probe = Probe { radius, spacing, speed: settings.speed, tilt };
+                    plans.extend(settings.aims.iter().map(|&aim| (probe, aim)));
+                }
+            }
+        }
+        plans
+    }
+
+    /// The best of a round, and what lies between the best and its neighbors.
+    fn finer(&self, ranked: &[Trial]) -> Vec<Plan> {
+        let best = &ranked[0];
+        let Probe { spacing, radius, tilt, .. } = best.probe;
+        let spacings = neighbors(&steps(&self.settings.spacing, SPACINGS), spacing);
+        let radii = neighbors(&steps(&self.settings.radius, 2), radius);
+        let tilts = neighbors(&steps(&self.settings.tilt, 2), tilt);
+        let kept = ranked.iter().take(KEPT.min(ranked.len().div_ceil(2))).map(|trial| (trial.probe, trial.aim));
+        kept.chain(spacings.into_iter().map(|spacing| (Probe { spacing, ..best.probe }, best.aim)))
+            .chain(radii.into_iter().map(|radius| (Probe { radius, ..best.probe }, best.aim)))
+            .chain(tilts.into_iter().map(|tilt| (Probe { tilt, ..best.probe }, best.aim)))
+            .collect()
+    }
+
+    /// Tries probes, and ranks them, the best first.
+    fn try_all(&self, plans: Vec<Plan>, approaches: u64) -> Result<Vec<Trial>> {
+        let mut trials = Vec::with_capacity(plans.len());
+        for (probe, aim) in plans {
+            trials.push(self.attempt(probe, aim, approaches)?);
+            progress::advance(self.progress, 1)?;
+        }
+        trials.sort_by(|a: &Trial, b| {
+            let (a, b) = (a.rank(), b.rank());
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        Ok(trials)
+    }
+
+    /// Trains on the first approaches with a probe, and measures on the next.
+    fn attempt(&self, probe: Probe, aim: Aim, approaches: u64) -> Result<Trial> {
+        let settings = self.settings;
+        let [data, test] = [0, approaches].map(|start| self.touch(probe, aim, start..start + approaches));
+        let (data, test) = (data?, test?);
+        let recipe = train::Settings {
+            descriptor: settings.descriptor,
+            counted: Some(settings.counted),
+            rounds: 25,
+            depth: 5,
+            bins: 64,
+            leaf_bits: None,
+            ..train::Settings::compact()
+        };
+        let ensemble = train::train(&data, &recipe, &Quiet(self.progress))?;
+        let margins = Margins::new(Candidate::Full(&ensemble), &test)?;
+        let (threshold, stopped) = self.at_the_rate(&margins)?;
+        let sequential = stopped.sequential;
+        Ok(Trial {
+            probe,
+            aim,
+            trained_on: approaches,
+            approaches: sequential.mean_approaches,
+            approaches_standard_error: sequential.mean_approaches_standard_error,
+            reached: sequential.error.max(sequential.undecided) <= settings.error_rate,
+            error: sequential.error,
+            undecided: sequential.undecided,
+            threshold,
+            per_object: sequential.per_object,
+            patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
+        })
+    }
+
+    /// Approaches to every object in memory, with noise.
+    fn touch(&self, probe: Probe, aim: Aim, samples: std::ops::Range<u64>) -> Result<Dataset> {
+        let Settings { seed, noise, .. } = *self.settings;
+        let touches = samples.end - samples.start;
+        let origin =
+            Origin { touches, seed, length: LENGTH, probe, aim, pose: true, approaches: true, ..Origin::default() };
+        let touch = |(name, scene): &(String, Scene)| {
+            progress::check(self.progress)?;
+            let touches = capture::touches(scene, name, &origin, samples.clone())?;
+            // Other noise for other samples.
+            let touches = if noise > 0.0 { noisy(name, &touches, noise, seed ^ samples.start) } else { touches };
+            Ok(ObjectTouches { name: name.clone(), touches })
+        };
+        let objects = self.objects.iter().map(touch).collect::<Result<_>>()?;
+        Ok(Dataset { origin: Some(origin), ..Dataset::new(objects) })
+    }
+
+    /// The loosest stopping threshold with at most the error rate asked for in wrong verdicts, and what it achieves; the
+    /// strictest, if none has.
+    fn at_the_rate(&self, margins: &Margins<'_>) -> Result<(f64, Approaches)> {
+        let Settings { error_rate, sequences, seed, .. } = *self.settings;
+        let stopped = |log_odds: f64| {
+            progress::check(self.progress)?;
+            let threshold = 1.0 / (1.0 + (-log_odds).exp());
+            let settings =
+                SequentialSettings { error_rate: threshold, max_touches: Some(MAX_TOUCHES), sequences, seed };
+            Ok::<_, Error>((threshold, margins.approaches(&[], &settings)?))
+        };
+        let [mut strict, mut loose] = ODDS;
+        let mut best = None;
+        for _ in 0..HALVINGS {
+            let middle = (strict + loose) / 2.0;
+            let found = stopped(middle)?;
+            if found.1.sequential.error <= error_rate {
+                (strict, best) = (middle, Some(found));
+            } else {
+                loose = middle;
+            }
+        }
+        best.map_or_else(|| stopped(strict), Ok)
+    }
+}
+
+/// Up to `count` numbers from end to end, in equal ratios where the range is above 0, rounded to hundredths.
+fn steps(range: &RangeInclusive<f64>, count: usize) -> Vec<f64> {
+    let [low, high] = [*range.start(), *range.end()];
+    let step = |index: usize| {
+        let part = index as f64 / (count - 1) as f64;
+        match index {
+            0 => low,
+            last if last == count - 1 => high,
+            _ if low > 0.0 => hundredths(low * libm::pow(high / low, part)).clamp(low, high),
+            _ => hundredths(low + (high - low) * part).clamp(low, high),
+        }
+    };
+    let mut steps: Vec<f64> = (0..count).map(step).collect();
+    steps.dedup();
+    steps
+}
+
+/// The numbers halfway between one of `steps` and those beside it.
+fn neighbors(steps: &[f64], number: f64) -> Vec<f64> {
+    let halfway = |pair: &[f64]| {
+        let middle = if pair[0] > 0.0 { (pair[0] * pair[1]).sqrt() } else { (pair[0] + pair[1]) / 2.0 };
+        hundredths(middle).clamp(pair[0], pair[1])
+    };
+    let beside = steps.windows(2).filter(|pair| pair.contains(&number));
+    beside.map(halfway).filter(|middle| !steps.contains(middle)).collect()
+}
+
+fn hundredths(number: f64) -> f64 {
+    (number * 100.0).round() / 100.0
+}
+
+/// Passes on cancellation, and no stages of its own.
+struct Quiet<'a>(&'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Problem;
+    use crate::mesh::Mesh;
+
+    /// A globe and a disc: a row of fingers sees how much they bend, if it is wide enough for that to stand out of noise.
+    fn objects() -> Vec<Object> {
+        let globe = Mesh::globe(12);
+        let mut disc = globe.clone();
+        disc.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.1);
+        [("globe", globe), ("disc", disc)].map(|(name, mesh)| Object::new(name, mesh)).into()
+    }
+
+    fn settings() -> Settings {
+        Settings {
+            spacing: 0.05..=1.5,
+            radius: 0.15..=0.15,
+            tilt: 10.0..=10.0,
+            aims: vec![Aim::Box],
+            approaches: 800,
+            sequences: 100,
+            error_rate: 0.05,
+            noise: 10_000.0,
+            ..Settings::default()
+        }
+    }
+
+    #[test]
+    fn fingers_that_are_nearly_at_one_place_lose_against_a_wider_row() {
+        let design = design(&objects(), &settings(), &()).unwrap();
+        let narrow = &design.by_spacing[0];
+        assert_eq!(narrow.probe.spacing, 0.05);
+        assert!(design.best.reached && design.best.error <= 0.05);
+        assert!(design.best.probe.spacing > 0.3, "{:?}", design.best);
+        assert!(!narrow.reached || narrow.approaches > 1.5 * design.best.approaches, "{narrow:?} {:?}", design.best);
+        assert!(design.by_spacing.contains(&design.best));
+        assert!(design.by_spacing.is_sorted_by(|a, b| a.probe.spacing < b.probe.spacing));
+        assert!((design.best.patterns.values().sum::<f64>() - 1.0).abs() < 1e-9);
+        assert_eq!(design.best.per_object.keys().collect::<Vec<_>>(), ["disc", "globe"]);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_design_on_any_number_of_threads() {
+        let settings = Settings { spacing: 0.5..=1.0, approaches: 200, sequences: 30, ..settings() };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| design(&objects(), &settings, &()).unwrap())
+        };
+        let one = with(1);
+        assert_eq!(one, with(3));
+        assert_eq!(one.toml(), with(2).toml());
+        let other = Settings { seed: 2, ..settings.clone() };
+        assert_ne!(design(&objects(), &other, &()).unwrap(), one);
+    }
+
+    #[test]
+    fn steps_go_from_end_to_end_and_neighbors_lie_between_them() {
+        assert_eq!(steps(&(0.5..=3.0), 5), [0.5, 0.78, 1.22, 1.92, 3.0]);
+        assert_eq!(steps(&(0.0..=20.0), 2), [0.0, 20.0]);
+        assert_eq!(steps(&(0.15..=0.15), 5), [0.15]);
+        assert_eq!(neighbors(&[0.5, 1.0, 2.0], 1.0), [0.71, 1.41]);
+        assert_eq!(neighbors(&[0.0, 20.0], 20.0), [10.0]);
+        assert_eq!(neighbors(&[0.15], 0.15), [0.0; 0]);
+    }
+
+    #[test]
+    fn settings_out_of_range_are_refused_by_name() {
+        let base = settings();
+        #[expect(clippy::reversed_empty_ranges, reason = "that is what is wrong")]
+        let cases = [
+            ("spacing", Settings { spacing: 2.0..=1.0, ..base.clone() }),
+            ("radius", Settings { radius: 0.0..=1.0, ..base.clone() }),
+            ("tilt", Settings { tilt: 0.0..=90.0, ..base.clone() }),
+            ("speed", Settings { speed: 0.0, ..base.clone() }),
+            ("noise", Settings { noise: f64::NAN, ..base.clone() }),
+            ("error_rate", Settings { error_rate: 0.0, ..base.clone() }),
+            ("approaches", Settings { approaches: 99, ..base.clone() }),
+            ("sequences", Settings { sequences: 0, ..base.clone() }),
+            ("aims", Settings { aims: Vec::new(), ..base }),
+        ];
+        for (wrong, settings) in cases {
+            let error = design(&objects(), &settings, &()).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            assert!(matches!(error.problem(), Some(Problem::Setting { name, .. }) if *name == wrong), "{error}");
+        }
+        let error = design(&objects()[..1], &settings(), &()).unwrap_err();
+        assert_eq!(error.problem(), Some(&TuneProblem::FewObjects { objects: 1 }.into()));
+    }
+}
