@@ -8,6 +8,7 @@ mod stopping;
 
 pub use evidence::Posterior;
 pub use exponential::exp2_negative;
+pub(crate) use recognizer::State;
 pub use recognizer::{CapacityError, Recognizer, Verdict};
 pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;

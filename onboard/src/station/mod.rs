@@ -16,11 +16,16 @@
 //! continues from it: the host repeats what is not in it, and the link ensures that nothing is counted twice. That
 //! needs memory that keeps its content: battery-backed or FRAM, or RAM where resets but no power cuts are to be survived.
 
+mod flash;
 mod memory;
 mod record;
 mod serve;
 mod session;
+mod storage;
 
+pub use flash::{FlashError, FlashStorage, MappedFlash};
 pub use memory::Memory;
+pub use record::record_length;
 pub use serve::{ServeError, serve};
-pub use session::Station;
+pub use session::{RecordsTooShort, Station};
+pub use storage::{NoStorage, Place, Storage};

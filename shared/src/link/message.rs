@@ -200,6 +200,8 @@ pub enum Refusal {
     NoPose,
     /// The model is over rows of features, not touches: not counted.
     Features,
+    /// What arrived could not be written, or was being written when the power was cut.
+    Unwritable,
 }
 
 impl Refusal {
@@ -222,6 +224,7 @@ impl core::fmt::Display for Refusal {
             Self::Pattern => "the model was not trained on touches with these contacts",
             Self::Spread => "the contacts are further apart in time than in any touch that the model was trained on",
             Self::NoPose => "the model needs the probe's pose, and the touch has none",
+            Self::Unwritable => "the chip could not write it: load it again; its memory may be worn out",
             Self::Features => "the chip's model is over rows of features, not touches",
         })
     }
