@@ -11,8 +11,8 @@
 //! ```text
 //! polled:      pins ──► Fingers ──► Effector ──► touch or fault        (Probe::poll, at least once per millisecond)
 //!
-//! interrupts:  pins ──► Watcher ──► heapless queue ──► drain ──► Effector ──► touch or fault
-//!              └── in the interrupt ──┘             └──────── in the main loop ─────────┘
+//! interrupts:  pins ──► Watcher, with a queue ──► drain ──► Effector ──► touch or fault
+//!              └── in the interrupt ──┘       └──────── in the main loop ─────────┘
 //! ```
 //!
 //! A finger's contact time is the moment of its first closing edge, however long it bounces after that; polled, it is
@@ -34,7 +34,7 @@ mod settings;
 pub use calibration::{Calibration, CalibrationError};
 pub use driver::{Effector, State};
 pub use fault::Fault;
-pub use interrupt::{Watcher, drain};
+pub use interrupt::{Sensed, Watcher, drain};
 pub use pins::{Active, Fingers};
 pub use polled::Probe;
 pub use scale::{Geometry, Scale};
@@ -91,7 +91,8 @@ pub struct Edge {
     pub closed: bool,
     /// When, on the [`Clock`], in microseconds.
     pub at: u32,
-    /// Whether edges before this one were lost because the queue was full.
+    /// Whether edges before this one were lost because the queue was full, or
+    /// the interrupt was held off too long.
     pub after_loss: bool,
 }
 

@@ -240,6 +240,8 @@ pub enum Event {
     Touch {
         /// The touch.
         touch: TouchMessage,
+        /// Microseconds between the announcement of its pose and the end of the touch.
+        pose_age: Option<u32>,
         /// What is known after it.
         verdict: VerdictMessage,
     },
