@@ -219,7 +219,7 @@ fn respond(
             }
             let mut buffer = [0; CHUNK];
             let answer = answer(query, progress, statistics, boot, device, &mut buffer);
-            let message = Message::Answer { tag, answer };
+            let message = Message::Answer { asker: frame.session, tag, answer };
             send(encode(&Frame { session: progress.session, message }, &mut [0; FRAME_MAX]));
         }
         Message::Command { sequence, command } => {

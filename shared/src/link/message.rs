@@ -18,6 +18,8 @@ pub enum Message<'a> {
     },
     /// Chip: the answer to the question with this tag.
     Answer {
+        /// The session of the question's frame: that of the host that asked, whichever is open.
+        asker: u32,
         /// The question's number.
         tag: u8,
         /// The answer.
