@@ -8,6 +8,7 @@ use palpate_shared::Touch;
 
 /// What is known after a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// No object is sure enough yet.
     Undecided,

@@ -6,6 +6,7 @@ use palpate_shared::{ContactTime, Touch};
 
 /// Where the effector is in a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// All fingers are open; the next contact begins a touch.
     Waiting,

@@ -7,6 +7,7 @@ use palpate_shared::Touch;
 
 /// What the pins have to say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sensed {
     /// A switch has closed or opened.
     Edge(Edge),
@@ -41,6 +42,11 @@ impl<A: InputPin, B: InputPin, C: InputPin, const EDGES: usize> Watcher<A, B, C,
     /// The pins, to clear the interrupt's cause.
     pub const fn pins(&mut self) -> (&mut A, &mut B, &mut C) {
         self.fingers.pins()
+    }
+
+    /// The level of each pin when it was last read, for whoever waits for another: true is high.
+    pub const fn is_high(&self) -> [bool; 3] {
+        self.fingers.is_high()
     }
 
     /// Call it in the interrupt of any of the three pins, after clearing the interrupt's cause.

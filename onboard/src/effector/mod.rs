@@ -48,6 +48,7 @@ pub trait Clock {
 
 /// One of the probe's three fingers, in their order along the row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Finger {
     /// One end of the row.
     First,
@@ -84,6 +85,7 @@ impl core::fmt::Display for Finger {
 
 /// A switch closed or opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Edge {
     /// Which finger.
     pub finger: Finger,

@@ -61,6 +61,7 @@ impl Default for ProbeSettings {
 
 /// What happened in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Happened {
     /// Bytes came from the host and were dealt with.
     Heard,

@@ -178,6 +178,7 @@ pub enum Outcome {
 
 /// Why the chip refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Refusal {
     /// There is no model yet: load one.
@@ -267,6 +268,7 @@ pub enum Event {
 
 /// What can go wrong with a chip's own fingers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FaultKind {
     /// A finger stays closed.
@@ -328,6 +330,7 @@ impl From<&TouchMessage> for Touch {
 
 /// A verdict, and what it is based on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VerdictMessage {
     /// What is known.
     pub decision: Decision,
@@ -341,6 +344,7 @@ pub struct VerdictMessage {
 
 /// What is known after a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Decision {
     /// Nothing yet.
@@ -353,6 +357,7 @@ pub enum Decision {
 
 /// Enough to see whether two recognizers agree in every bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Detail {
     /// The posterior of the best object: u64 in Q56, little endian.
     pub posterior: [u8; 8],
