@@ -39,24 +39,37 @@
 //! | [`Model`], [`Recognizer`] | touches to verdicts |
 //! | [`station`] | touches, verdicts and models to and from a host, and what lasts through a power cut |
 //!
+//! | feature | what |
+//! |---|---|
+//! | `effector` | [`effector`] |
+//! | `link` | [`shared`]`::link`, and snapshots of a recognizer |
+//! | `station` | [`station`], with both of these |
+//! | `compact`, `complete`, `grid`, `wide` | layouts of trees that can be read |
+//! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
+//! | `defmt` | touches, verdicts, refusals and faults can be logged; the only one that is off by default |
+//!
 //! `no_std`, without a heap and without `unsafe`; once a model has been validated nothing here can panic.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
+// What only the station uses is small and has no feature of its own.
+#![cfg_attr(not(feature = "station"), allow(dead_code))]
 
 #[cfg(test)]
 extern crate std;
 
 mod bytes;
 mod decide;
+#[cfg(feature = "effector")]
 pub mod effector;
 mod layouts;
 mod model;
+#[cfg(feature = "station")]
 pub mod station;
 
 pub use bytes::{Aligned, ModelError};
-pub use decide::{
-    CapacityError, Posterior, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative,
-};
+pub use decide::{CapacityError, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
+#[cfg(feature = "link")]
+pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use model::{Model, Refused};
 pub use palpate_shared as shared;

@@ -31,6 +31,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 }
 
 /// The [`checksum`] of parts, one after another.
+#[cfg(feature = "link")]
 pub(crate) fn checksum_of<const N: usize>(parts: impl Iterator<Item = [u8; N]>) -> u32 {
     !parts.fold(!0, |sum, part| update(sum, &part))
 }

@@ -28,6 +28,7 @@ extern crate std;
 mod checksum;
 mod descriptor;
 pub mod format;
+#[cfg(feature = "link")]
 pub mod link;
 mod pattern;
 mod touch;

@@ -3,6 +3,7 @@
 /// Which fingers touched, up to mirror image: fingers counted from the other end give the same pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ContactPattern {
     /// No finger: the approach touched nothing.
     None = 0,

@@ -6,6 +6,7 @@ use crate::pattern::ContactPattern;
 ///
 /// Four bytes; every bit pattern is valid, so a touch can be read from a stream without a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ContactTime(u32);
 
 impl ContactTime {
@@ -35,6 +36,7 @@ pub const Q15_ONE: i16 = i16::MAX;
 
 /// Where the probe came from, in the object's frame: direction cosines in Q15 (-32767 to 32767).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pose {
     /// Unit vector of the probe's motion.
     pub direction: [i16; 3],
@@ -44,6 +46,7 @@ pub struct Pose {
 
 /// What an approach yields: three contact times, any of which may be missing, and the probe's pose where it is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Touch {
     times: [ContactTime; 3],
     pose: Option<Pose>,

@@ -240,7 +240,7 @@ fn edges_on_pins_become_the_hosts_verdicts() {
             if verdict.decision != Decision::Undecided {
                 host.reset();
             }
-            expected.push(Event::Touch { touch: TouchMessage::from(&measured), verdict });
+            expected.push(Event::Touch { touch: TouchMessage::from(&measured), pose_age: None, verdict });
         }
         // A finger that stays closed is a touch with two missing contacts, and stuck.
         recording.edge(2, true, now);
@@ -248,7 +248,7 @@ fn edges_on_pins_become_the_hosts_verdicts() {
         recording.wait(now.wrapping_add(6_000_000));
         let measured = Touch::new([u32::MAX, u32::MAX, 0].map(palpate_shared::ContactTime::from_micros));
         let verdict = host.push(&measured, true).unwrap();
-        expected.push(Event::Touch { touch: TouchMessage::from(&measured), verdict });
+        expected.push(Event::Touch { touch: TouchMessage::from(&measured), pose_age: None, verdict });
         expected.push(Event::Fault { kind: FaultKind::Stuck, finger: 2 });
 
         let heard = run_gpio(&build("gpio", target, Some(file.path())), machine, recording.bytes, expected.len());

@@ -17,6 +17,7 @@ const TRAINED: Trained = Trained {
         largest_spread: 1_000_000,
     }),
     noise: Some(TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 0 }),
+    shares: None,
 };
 
 /// A small model in each layout and leaf type, of either version.

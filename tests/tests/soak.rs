@@ -6,7 +6,7 @@ use palpate::chip::{Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
-use palpate_onboard::station::{Memory, serve};
+use palpate_onboard::station::{Memory, record_length, serve};
 use palpate_shared::Descriptor;
 use palpate_shared::link::HostSettings;
 use palpate_tests::random::{self, Shape};
@@ -55,9 +55,9 @@ fn the_chips_process() {
     let mut wire = Wire(TcpStream::connect(host).unwrap());
     wire.0.set_nodelay(true).unwrap();
     let [mut a, mut b] = [(); 2].map(|()| vec![0; 100_000]);
-    let [mut c, mut d] = [(); 2].map(|()| vec![0; Memory::record_length(OBJECTS)]);
-    let memory = Memory { built_in: &[], models: [&mut a, &mut b], records: [&mut c, &mut d] };
-    serve::<OBJECTS, _>(memory, 0, &mut wire).unwrap();
+    let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
+    let memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
+    serve::<OBJECTS, _, _>(&[], memory, 0, &mut wire).unwrap();
 }
 
 /// Resident memory of a process in bytes, where the system reports it.

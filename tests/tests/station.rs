@@ -1,24 +1,15 @@
 //! A chip's whole program at the end of a link: its verdicts are those of a recognizer, through loading,
 //! power cuts and torn records.
 
-use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate_onboard::station::{Memory, ServeError, serve};
-use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
+use palpate_onboard::station::{Memory, RecordsTooShort, ServeError, record_length, serve};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
-use palpate_shared::link::{
-    CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Payload,
-    Query, Refusal, checksum,
-};
+use palpate_shared::link::{Command, LinkError, Outcome, Payload, Query, Refusal};
 use palpate_shared::{ContactTime, Descriptor, Patterns, Pose, Touch};
+use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
-use rand::rngs::ChaCha8Rng;
-use rand::{Rng, RngExt, SeedableRng};
-use std::collections::VecDeque;
-use std::sync::atomic::{AtomicU32, Ordering};
-
-const OBJECTS: usize = 16;
+use rand::{Rng, RngExt};
 
 /// Most touches count; those without any contact, and those that spread too far, do not.
 const CONTACTS: Trained = Trained {
@@ -55,13 +46,13 @@ struct Chip {
 
 impl Chip {
     fn new(built_in: Vec<u8>) -> Self {
-        let record = vec![0xff; Memory::record_length(OBJECTS)];
+        let record = vec![0xff; record_length(OBJECTS)];
         Self { built_in, models: [vec![0; 20_000], vec![0; 20_000]], records: [record.clone(), record] }
     }
 
     fn run(&mut self, desk: &mut Desk) -> Result<(), PowerCut> {
         let Self { built_in, models: [a, b], records: [c, d] } = self;
-        match serve::<OBJECTS, _>(Memory { built_in, models: [a, b], records: [c, d] }, 0, desk) {
+        match serve::<OBJECTS, _, _>(built_in, Memory { models: [a, b], records: [c, d] }, 0, desk) {
             Ok(()) => Ok(()),
             Err(ServeError::Transport(cut)) => Err(cut),
             Err(error) => panic!("{error}"),
@@ -69,207 +60,8 @@ impl Chip {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct PowerCut;
-
-impl core::fmt::Display for PowerCut {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("power cut")
-    }
-}
-
-impl core::error::Error for PowerCut {}
-
-impl embedded_io::Error for PowerCut {
-    fn kind(&self) -> ErrorKind {
-        ErrorKind::Other
-    }
-}
-
-/// Something for the host to say.
-#[derive(Clone, Debug)]
-enum Step {
-    Do(Command<'static>),
-    Ask(Query),
-}
-
-/// The host with its script, as the chip's transport: what the chip reads is what the host has to say. One thread.
-struct Desk {
-    host: HostEnd,
-    script: VecDeque<Step>,
-    to_chip: VecDeque<u8>,
-    outcomes: Vec<Outcome>,
-    answers: Vec<String>,
-    open: bool,
-    now: u64,
-    rng: ChaCha8Rng,
-    /// Writes per power cut, on average; 0 for no cuts.
-    cut_every: u32,
-    /// The outcome of the last executed command had not been sent when the power was cut.
-    untold: bool,
-    newest: Option<u32>,
-    /// The session may end, and how it did.
-    may_fail: bool,
-    failed: Option<LinkError>,
-}
-
-impl Desk {
-    fn new(script: impl IntoIterator<Item = Step>, cut_every: u32) -> Self {
-        let mut desk = Self {
-            host: HostEnd::new(HostSettings { retry: 1_000, attempts: 1_000 }),
-            script: script.into_iter().collect(),
-            to_chip: VecDeque::new(),
-            outcomes: Vec::new(),
-            answers: Vec::new(),
-            open: false,
-            now: 0,
-            rng: ChaCha8Rng::seed_from_u64(1),
-            cut_every,
-            untold: false,
-            newest: None,
-            may_fail: false,
-            failed: None,
-        };
-        // Another host each time.
-        static SESSIONS: AtomicU32 = AtomicU32::new(1);
-        let session = SESSIONS.fetch_add(1, Ordering::Relaxed);
-        let Self { host, to_chip, .. } = &mut desk;
-        host.connect(session, 0, |bytes| to_chip.extend(bytes));
-        desk
-    }
-
-    fn talk(&mut self) {
-        let Self { host, script, to_chip, now, .. } = self;
-        while let Some(step) = script.front() {
-            let said = match step {
-                Step::Do(command) => host.submit(command.clone(), *now, |bytes| to_chip.extend(bytes)).is_some(),
-                Step::Ask(query) => host.is_idle() && host.ask(*query, *now, |bytes| to_chip.extend(bytes)),
-            };
-            if !said {
-                break;
-            }
-            script.pop_front();
-        }
-    }
-
-    fn is_done(&self) -> bool {
-        self.open && self.script.is_empty() && self.host.is_idle()
-    }
-}
-
-impl ErrorType for Desk {
-    type Error = PowerCut;
-}
-
-impl Read for Desk {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, PowerCut> {
-        for _ in 0..100_000 {
-            self.talk();
-            if self.is_done() {
-                return Ok(0);
-            }
-            if !self.to_chip.is_empty() {
-                let count = buffer.len().min(self.to_chip.len()).min(1 + self.rng.next_u32() as usize % 40);
-                buffer[..count].iter_mut().for_each(|byte| *byte = self.to_chip.pop_front().unwrap());
-                return Ok(count);
-            }
-            self.now += 100;
-            let Self { host, to_chip, now, .. } = self;
-            if let Err(error) = host.tick(*now, |bytes| to_chip.extend(bytes)) {
-                assert!(self.may_fail, "{error}");
-                self.failed = Some(error);
-                return Ok(0);
-            }
-        }
-        panic!("the script does not end: {:?}", self.host.statistics());
-    }
-}
-
-impl Write for Desk {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, PowerCut> {
-        let mut decoder = Decoder::new();
-        let outcome = buffer.iter().find_map(|&byte| match decoder.feed(byte) {
-            Some(Ok(frame)) => match frame.message {
-                Message::Outcome { sequence, .. } => Some(sequence),
-                _ => None,
-            },
-            _ => None,
-        });
-        let news = outcome.filter(|&sequence| self.newest.is_none_or(|newest| sequence > newest));
-        if self.cut_every > 0 && self.rng.random_ratio(1, self.cut_every) {
-            self.untold = news.is_some();
-            // What was on the line is gone; what is in the host is not.
-            self.to_chip.clear();
-            return Err(PowerCut);
-        }
-        self.newest = news.or(self.newest);
-        let Self { host, to_chip, outcomes, answers, open, now, .. } = self;
-        host.receive(
-            buffer,
-            *now,
-            |bytes| to_chip.extend(bytes),
-            |incoming| match incoming {
-                Incoming::Opened => *open = true,
-                Incoming::Outcome { outcome, .. } => outcomes.push(outcome),
-                Incoming::Answer(answer) => answers.push(format!("{answer:?}")),
-                Incoming::Event { .. } => {}
-            },
-        );
-        Ok(buffer.len())
-    }
-
-    fn flush(&mut self) -> Result<(), PowerCut> {
-        Ok(())
-    }
-}
-
 fn touches(count: usize) -> Vec<Touch> {
     random::touches(count, 3)
-}
-
-fn push(touch: &Touch) -> Step {
-    Step::Do(Command::Touch { touch: touch.into(), detail: true })
-}
-
-fn load(bytes: &'static [u8], payload: Payload) -> Vec<Step> {
-    let begin = Command::Begin { payload, length: bytes.len() as u32, checksum: checksum(bytes) };
-    let mut steps = vec![Step::Do(begin)];
-    for (i, bytes) in bytes.chunks(CHUNK).enumerate() {
-        steps.push(Step::Do(Command::Chunk { offset: (i * CHUNK) as u32, bytes }));
-    }
-    steps.push(Step::Do(Command::Commit));
-    steps
-}
-
-/// What a recognizer says to these touches.
-fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
-    let model = Model::new(bytes).unwrap();
-    let mut recognizer = Recognizer::<OBJECTS>::new(&model, Stopping::from_model(&model)).unwrap();
-    let verdict = |touch| {
-        let decision = match recognizer.push(touch) {
-            Ok(Verdict::Undecided) => Decision::Undecided,
-            Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
-            Ok(Verdict::Unknown) => Decision::Unknown,
-            Err(Refused::Pattern(_)) => return Outcome::Refused(Refusal::Pattern),
-            Err(Refused::Spread) => return Outcome::Refused(Refusal::Spread),
-            Err(refused) => panic!("{refused}"),
-        };
-        let best = recognizer.best();
-        let detail = Some(Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
-        let touches = recognizer.touches();
-        Outcome::Verdict(palpate_shared::link::VerdictMessage { decision, best: best as u8, touches, detail })
-    };
-    touches.iter().map(verdict).collect()
-}
-
-/// Outcomes of touches, counted or not.
-fn answers_to_touches(desk: &Desk) -> Vec<Outcome> {
-    let is_answer = |outcome: &&Outcome| match outcome {
-        Outcome::Verdict(_) => true,
-        Outcome::Refused(refusal) => refusal.is_of_a_touch(),
-        _ => false,
-    };
-    desk.outcomes.iter().filter(is_answer).copied().collect()
 }
 
 #[test]
@@ -383,12 +175,13 @@ fn a_snapshot_taken_over_the_link_goes_on_in_another_chip_and_not_under_another_
 #[test]
 fn places_for_records_that_are_too_short_are_refused_at_once() {
     let mut chip = Chip::new(model(1));
-    chip.records[1].truncate(Memory::record_length(8));
+    chip.records[1].truncate(record_length(8));
     let mut desk = Desk::new(touches(3).iter().map(push), 0);
     let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
-    let memory = Memory { built_in, models: [a, b], records: [c, d] };
-    let (needed, found) = (Memory::record_length(OBJECTS), Memory::record_length(8));
-    assert_eq!(serve::<OBJECTS, _>(memory, 0, &mut desk), Err(ServeError::Records { needed, found }));
+    let memory = Memory { models: [a, b], records: [c, d] };
+    let (needed, found) = (record_length(OBJECTS), record_length(8));
+    let too_short = ServeError::Records(RecordsTooShort { needed, found });
+    assert_eq!(serve::<OBJECTS, _, _>(built_in, memory, 0, &mut desk), Err(too_short));
     assert!(desk.outcomes.is_empty());
 }
 

@@ -112,7 +112,7 @@ impl Entry {
                 posteriors: posteriors.clone(),
                 at: at.as_secs_f64(),
             }),
-            Update::Event(Event::Touch { touch, verdict }, _) => {
+            Update::Event(Event::Touch { touch, verdict, .. }, _) => {
                 let touch = Update::Touch { touch: touch.into(), verdict: *verdict, decided: false, posteriors: None };
                 Self::of(&touch, chip, at)
             }

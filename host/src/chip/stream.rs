@@ -187,7 +187,7 @@ fn command(step: &Step) -> Command<'static> {
     }
 }
 
-fn sent(step: Step, mirror: Option<&mut Station<'_, '_, 256>>, chip: &ChipModel) -> Sent {
+fn sent(step: Step, mirror: Option<&mut Station<'_, 256>>, chip: &ChipModel) -> Sent {
     match step {
         Step::Object(name) => {
             if let Some(mirror) = mirror {

@@ -2,7 +2,7 @@
 
 use crate::compiled::Place;
 use crate::{command, json, run, stderr, stdout};
-use palpate_onboard::station::{Memory, serve};
+use palpate_onboard::station::{Memory, record_length, serve};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -46,10 +46,10 @@ fn chip() -> String {
     port(|stream| {
         stream.set_nodelay(true).unwrap();
         let [mut a, mut b] = [(); 2].map(|()| vec![0; 10_000]);
-        let [mut c, mut d] = [(); 2].map(|()| vec![0; Memory::record_length(OBJECTS)]);
-        let memory = Memory { built_in: &[], models: [&mut a, &mut b], records: [&mut c, &mut d] };
+        let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
+        let memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
         // It ends with an error where the host hangs up in the middle of something.
-        let _ = serve::<OBJECTS, _>(memory, 0, &mut Wire(stream));
+        let _ = serve::<OBJECTS, _, _>(&[], memory, 0, &mut Wire(stream));
     })
 }
 

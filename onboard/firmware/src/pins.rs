@@ -6,13 +6,15 @@
 //! little endian). The time counts as the clock's, the level is put into the port register, and the pin interrupt is
 //! pended, as a port does. Finger 3 is no edge: time passes.
 
-use crate::chip::PIN_CHANGED;
+use crate::chip::{self, PIN_CHANGED};
 use crate::uart::{Port, Uart};
+use core::cell::RefCell;
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
+use critical_section::Mutex;
 use embedded_hal::digital::{ErrorType, InputPin};
-use palpate_onboard::effector::Clock;
+use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 
 /// The port's levels, a bit a pin.
 static PORT: AtomicU32 = AtomicU32::new(0);
@@ -43,6 +45,34 @@ impl Clock for PlayedClock {
     fn micros(&self) -> u32 {
         TIME.load(Ordering::Relaxed)
     }
+}
+
+static WATCHER: Mutex<RefCell<Option<Watcher<Pin, Pin, Pin>>>> = Mutex::new(RefCell::new(None));
+
+/// Begins to watch the pins.
+pub fn watch() {
+    let fingers = Fingers::new(Pin(0), Pin(1), Pin(2), Active::High);
+    critical_section::with(|cs| WATCHER.replace(cs, Some(Watcher::start(fingers, &PlayedClock))));
+    chip::unmask(PIN_CHANGED);
+}
+
+/// The pin interrupt.
+pub fn changed() {
+    with(|watcher| watcher.interrupt(&PlayedClock));
+}
+
+/// What the pins have to say to the main loop.
+pub fn sense() -> Sensed {
+    with(|watcher| watcher.sense(&PlayedClock)).unwrap_or(Sensed::Nothing(0))
+}
+
+/// Whether they have nothing to say.
+pub fn is_idle() -> bool {
+    with(|watcher| watcher.is_idle()).unwrap_or(true)
+}
+
+fn with<T>(act: impl FnOnce(&mut Watcher<Pin, Pin, Pin>) -> T) -> Option<T> {
+    critical_section::with(|cs| WATCHER.borrow_ref_mut(cs).as_mut().map(act))
 }
 
 /// The host's hand on the pins.

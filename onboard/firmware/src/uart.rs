@@ -100,6 +100,18 @@ impl Uart {
         byte
     }
 
+    /// What was received, without waiting; how many bytes.
+    pub fn receive_all(&mut self, buffer: &mut [u8]) -> usize {
+        let mut count = 0;
+        while let Some(slot) = buffer.get_mut(count)
+            && let Some(byte) = self.receive()
+        {
+            *slot = byte;
+            count += 1;
+        }
+        count
+    }
+
     /// Whether a byte has been received.
     pub fn is_ready(&self) -> bool {
         self.received.ready()
@@ -116,13 +128,7 @@ impl Read for Uart {
             return Ok(0);
         }
         loop {
-            let mut count = 0;
-            while let Some(slot) = buffer.get_mut(count)
-                && let Some(byte) = self.receive()
-            {
-                *slot = byte;
-                count += 1;
-            }
+            let count = self.receive_all(buffer);
             if count > 0 {
                 return Ok(count);
             }

@@ -3,11 +3,15 @@
 mod evidence;
 mod exponential;
 mod recognizer;
+#[cfg(feature = "link")]
 mod snapshot;
 mod stopping;
 
 pub use evidence::Posterior;
 pub use exponential::exp2_negative;
+#[cfg(feature = "station")]
+pub(crate) use recognizer::State;
 pub use recognizer::{CapacityError, Recognizer, Verdict};
+#[cfg(feature = "link")]
 pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;

@@ -8,6 +8,7 @@ use palpate_shared::Touch;
 
 /// What is known after a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// No object is sure enough yet.
     Undecided,
@@ -42,10 +43,16 @@ impl core::error::Error for CapacityError {}
 
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
-/// State: 8 bytes per object, and 40.
+/// State: 8 bytes per object, and 40; and the model, which is copied: 68 bytes, not those that it is read from.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
-    model: &'m Model<'m>,
+    model: Model<'m>,
+    state: State<N>,
+}
+
+/// What a recognizer knows, without its model.
+#[derive(Clone, Debug)]
+pub(crate) struct State<const N: usize> {
     stopping: Stopping,
     /// Margins summed over touches, and the prior, in units of a margin.
     evidence: [i64; N],
@@ -58,14 +65,24 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     ///
     /// # Errors
     /// [`CapacityError`] when the model has more than `N` objects.
-    pub fn new(model: &'m Model<'m>, stopping: Stopping) -> Result<Self, CapacityError> {
+    pub fn new(model: &Model<'m>, stopping: Stopping) -> Result<Self, CapacityError> {
         let objects = model.object_count();
         if objects > N {
             return Err(CapacityError { objects, capacity: N });
         }
         let mut priors = model.priors().iter();
         let evidence = core::array::from_fn(|_| priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into()));
-        Ok(Self { model, stopping, evidence, touches: 0, verdict: Verdict::Undecided })
+        Ok(Self { model: *model, state: State { stopping, evidence, touches: 0, verdict: Verdict::Undecided } })
+    }
+
+    /// A recognizer that continues from a state under the same model.
+    pub(crate) const fn continued(model: Model<'m>, state: State<N>) -> Self {
+        Self { model, state }
+    }
+
+    /// What it knows, for [`Recognizer::continued`].
+    pub(crate) fn into_state(self) -> State<N> {
+        self.state
     }
 
     /// Takes in a touch.
@@ -104,12 +121,12 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// The verdict after the last touch.
     pub const fn verdict(&self) -> Verdict {
-        self.verdict
+        self.state.verdict
     }
 
     /// How many touches were taken in since the last [`reset`](Self::reset).
     pub const fn touches(&self) -> u32 {
-        self.touches
+        self.state.touches
     }
 
     /// The object with the most evidence; the first of several.
@@ -121,56 +138,82 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     ///
     /// Cost: an exponential for each object, and about 800 instructions.
     pub fn posterior(&self, object: usize) -> Posterior {
-        evidence::posterior(self.evidence(), object, self.unit())
+        self.state.posterior(&self.model, object)
     }
 
     /// The evidence for each object: margins summed over touches, and the prior, in [units](Model::unit).
     pub fn evidence(&self) -> &[i64] {
-        self.evidence.get(..self.model.object_count()).unwrap_or_default()
+        self.state.evidence(&self.model)
     }
 
     /// Forgets all touches, for the next object.
     pub fn reset(&mut self) {
         let mut priors = self.model.priors().iter();
-        for evidence in &mut self.evidence {
+        for evidence in &mut self.state.evidence {
             *evidence = priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into());
         }
-        self.touches = 0;
-        self.verdict = Verdict::Undecided;
+        self.state.touches = 0;
+        self.state.verdict = Verdict::Undecided;
     }
 
     /// The model.
-    pub const fn model(&self) -> &'m Model<'m> {
-        self.model
+    pub const fn model(&self) -> &Model<'m> {
+        &self.model
+    }
+
+    pub(crate) const fn state(&self) -> &State<N> {
+        &self.state
+    }
+
+    pub(crate) const fn state_mut(&mut self) -> &mut State<N> {
+        &mut self.state
+    }
+
+    fn add(&mut self, margins: &[i32]) -> Verdict {
+        if self.state.verdict != Verdict::Undecided {
+            return self.state.verdict;
+        }
+        for (evidence, &margin) in self.state.evidence.iter_mut().zip(margins) {
+            *evidence = evidence.saturating_add(i64::from(margin));
+        }
+        self.state.touches = self.state.touches.saturating_add(1);
+        let best = evidence::best(self.evidence());
+        if evidence::is_decided(self.evidence(), best, self.state.stopping.odds, unit(&self.model)) {
+            let object = u8::try_from(best.0).unwrap_or(u8::MAX);
+            self.state.verdict = Verdict::Recognized { object, touches: self.state.touches };
+        } else if self.state.touches >= self.state.stopping.max_touches {
+            self.state.verdict = Verdict::Unknown;
+        }
+        self.state.verdict
+    }
+}
+
+impl<const N: usize> State<N> {
+    pub(crate) fn evidence(&self, model: &Model<'_>) -> &[i64] {
+        self.evidence.get(..model.object_count()).unwrap_or_default()
+    }
+
+    pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
+        evidence::posterior(self.evidence(model), object, unit(model))
+    }
+
+    pub(crate) const fn touches(&self) -> u32 {
+        self.touches
+    }
+
+    pub(crate) const fn verdict(&self) -> Verdict {
+        self.verdict
     }
 
     /// Takes over the state of a snapshot.
-    pub(crate) const fn set_state(&mut self, evidence: [i64; N], touches: u32, verdict: Verdict) {
+    pub(crate) const fn set(&mut self, evidence: [i64; N], touches: u32, verdict: Verdict) {
         self.evidence = evidence;
         self.touches = touches;
         self.verdict = verdict;
     }
+}
 
-    fn add(&mut self, margins: &[i32]) -> Verdict {
-        if self.verdict != Verdict::Undecided {
-            return self.verdict;
-        }
-        for (evidence, &margin) in self.evidence.iter_mut().zip(margins) {
-            *evidence = evidence.saturating_add(i64::from(margin));
-        }
-        self.touches = self.touches.saturating_add(1);
-        let best = evidence::best(self.evidence());
-        if evidence::is_decided(self.evidence(), best, self.stopping.odds, self.unit()) {
-            let object = u8::try_from(best.0).unwrap_or(u8::MAX);
-            self.verdict = Verdict::Recognized { object, touches: self.touches };
-        } else if self.touches >= self.stopping.max_touches {
-            self.verdict = Verdict::Unknown;
-        }
-        self.verdict
-    }
-
-    fn unit(&self) -> Unit {
-        let header = self.model.header();
-        Unit { bits: header.unit_bits(), shift: header.unit_shift() }
-    }
+fn unit(model: &Model<'_>) -> Unit {
+    let header = model.header();
+    Unit { bits: header.unit_bits(), shift: header.unit_shift() }
 }

@@ -3,7 +3,8 @@
 //! The bytes are postcard's: the model's checksum, the number of touches, the verdict (0 undecided, 1 recognized,
 //! 2 unknown) and its object, then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
 
-use super::recognizer::{Recognizer, Verdict};
+use super::recognizer::{Recognizer, State, Verdict};
+use crate::Model;
 use core::fmt;
 use palpate_shared::format::checksum;
 
@@ -35,7 +36,7 @@ impl fmt::Display for SnapshotError {
 impl core::error::Error for SnapshotError {}
 
 /// Model, touches, verdict, object.
-type State = (u32, u32, u8, u8);
+type Head = (u32, u32, u8, u8);
 
 impl<const N: usize> Recognizer<'_, N> {
     /// Writes the state to the start of `buffer`, and gives the bytes that it took.
@@ -45,21 +46,7 @@ impl<const N: usize> Recognizer<'_, N> {
     /// # Errors
     /// [`SnapshotError::Short`].
     pub fn snapshot<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], SnapshotError> {
-        let (verdict, object) = match self.verdict() {
-            Verdict::Undecided => (0, 0),
-            Verdict::Recognized { object, .. } => (1, object),
-            Verdict::Unknown => (2, 0),
-        };
-        let state: State = (self.model().checksum(), self.touches(), verdict, object);
-        let mut length = postcard::to_slice(&state, buffer).map_err(|_| SnapshotError::Short)?.len();
-        for evidence in self.evidence() {
-            let rest = buffer.get_mut(length..).ok_or(SnapshotError::Short)?;
-            length += postcard::to_slice(evidence, rest).map_err(|_| SnapshotError::Short)?.len();
-        }
-        let sum = checksum(buffer.get(..length).ok_or(SnapshotError::Short)?);
-        let end = buffer.get_mut(length..).and_then(<[u8]>::first_chunk_mut).ok_or(SnapshotError::Short)?;
-        *end = sum.to_le_bytes();
-        buffer.get(..length + 4).ok_or(SnapshotError::Short)
+        self.state().snapshot(self.model(), buffer)
     }
 
     /// Takes over the state of a snapshot; what was touched before is forgotten. On an error nothing changes.
@@ -73,8 +60,8 @@ impl<const N: usize> Recognizer<'_, N> {
         if checksum(body) != u32::from_le_bytes(*sum) {
             return Err(SnapshotError::Damaged);
         }
-        let (state, mut rest): (State, _) = postcard::take_from_bytes(body).map_err(|_| SnapshotError::Damaged)?;
-        let (model, touches, verdict, object) = state;
+        let (head, mut rest): (Head, _) = postcard::take_from_bytes(body).map_err(|_| SnapshotError::Damaged)?;
+        let (model, touches, verdict, object) = head;
         if model != self.model().checksum() {
             return Err(SnapshotError::OtherModel);
         }
@@ -91,7 +78,28 @@ impl<const N: usize> Recognizer<'_, N> {
         if !rest.is_empty() {
             return Err(SnapshotError::Damaged);
         }
-        self.set_state(evidence, touches, verdict);
+        self.state_mut().set(evidence, touches, verdict);
         Ok(())
+    }
+}
+
+impl<const N: usize> State<N> {
+    /// Writes the state under its model to the start of `buffer`; see [`Recognizer::snapshot`].
+    pub(crate) fn snapshot<'b>(&self, model: &Model<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], SnapshotError> {
+        let (verdict, object) = match self.verdict() {
+            Verdict::Undecided => (0, 0),
+            Verdict::Recognized { object, .. } => (1, object),
+            Verdict::Unknown => (2, 0),
+        };
+        let head: Head = (model.checksum(), self.touches(), verdict, object);
+        let mut length = postcard::to_slice(&head, buffer).map_err(|_| SnapshotError::Short)?.len();
+        for evidence in self.evidence(model) {
+            let rest = buffer.get_mut(length..).ok_or(SnapshotError::Short)?;
+            length += postcard::to_slice(evidence, rest).map_err(|_| SnapshotError::Short)?.len();
+        }
+        let sum = checksum(buffer.get(..length).ok_or(SnapshotError::Short)?);
+        let end = buffer.get_mut(length..).and_then(<[u8]>::first_chunk_mut).ok_or(SnapshotError::Short)?;
+        *end = sum.to_le_bytes();
+        buffer.get(..length + 4).ok_or(SnapshotError::Short)
     }
 }

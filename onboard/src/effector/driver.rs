@@ -6,6 +6,7 @@ use palpate_shared::{ContactTime, Touch};
 
 /// Where the effector is in a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// All fingers are open; the next contact begins a touch.
     Waiting,
@@ -84,6 +85,17 @@ impl Effector {
         }
     }
 
+    /// Waits as these settings say from now on, also in a touch that is in progress.
+    pub fn set(&mut self, settings: Settings) {
+        self.settings = settings.in_range();
+    }
+
+    /// Microseconds from `now`, the time of the last [`Effector::poll`], until [`Effector::poll`] has something to do
+    /// without an edge; `None`: nothing before the next edge.
+    pub fn due(&self, now: u32) -> Option<u32> {
+        self.until_timer(now)
+    }
+
     /// Where the effector is in a touch, as of the last call.
     pub const fn state(&self) -> State {
         self.state
@@ -122,7 +134,7 @@ impl Effector {
         self.result()
     }
 
-    /// Takes in a fault that was seen elsewhere, as by [`Watcher::service`](super::Watcher::service):
+    /// Takes in a fault that was seen elsewhere, as by [`Watcher::sense`](super::Watcher::sense):
     /// [`Effector::poll`] reports it in its turn.
     pub fn report(&mut self, fault: Fault) {
         let faults = &mut self.faults;
@@ -152,9 +164,9 @@ impl Effector {
             return;
         };
         // While no timer runs any amount of time may have passed.
-        let mut left = if self.due(at).is_none() { now.wrapping_sub(at) } else { after(now, at) };
+        let mut left = if self.until_timer(at).is_none() { now.wrapping_sub(at) } else { after(now, at) };
         for _ in 0..MOST_TIMERS {
-            let Some(due) = self.due(at).filter(|&due| due <= left) else { break };
+            let Some(due) = self.until_timer(at).filter(|&due| due <= left) else { break };
             at = at.wrapping_add(due);
             left -= due;
             self.fire(at);
@@ -163,7 +175,7 @@ impl Effector {
     }
 
     /// Microseconds until the next timer runs out.
-    fn due(&self, now: u32) -> Option<u32> {
+    fn until_timer(&self, now: u32) -> Option<u32> {
         let settings = &self.settings;
         let fingers = self.fingers.iter().filter_map(|finger| finger.due(now, settings));
         let state = match self.state {

@@ -2,10 +2,12 @@
 
 use super::Finger;
 use core::fmt;
+#[cfg(feature = "link")]
 use palpate_shared::link::{Event, FaultKind};
 
 /// A fault of the effector, and which finger has it. The driver goes on: every other touch is still reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
     /// The finger has been closed for longer than [`Settings::stuck`](super::Settings::stuck). Reported once each time;
@@ -35,6 +37,7 @@ impl Fault {
 }
 
 /// As the link reports it.
+#[cfg(feature = "link")]
 impl From<Fault> for Event {
     fn from(fault: Fault) -> Self {
         let kind = match fault {

@@ -1,27 +1,41 @@
-//! Pins read in an interrupt, touches made in the main loop, a lock-free queue between them.
+//! Pins read in an interrupt, touches made in the main loop, a queue between them.
 
 use super::{Clock, Edge, Effector, Fault, Finger, Fingers};
 use embedded_hal::digital::InputPin;
-use heapless::spsc::{Consumer, Producer};
+use heapless::Deque;
 use palpate_shared::Touch;
 
-/// The interrupt's side: reads the pins and queues what changed.
+/// What the pins have to say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Sensed {
+    /// A switch has closed or opened.
+    Edge(Edge),
+    /// A pin cannot be read.
+    Fault(Fault),
+    /// Nothing more has happened until this time on the [`Clock`].
+    Nothing(u32),
+}
+
+/// The pins and a queue of their edges, shared by the pins' interrupt and the main loop, as in a
+/// `critical_section::Mutex<RefCell<Option<Watcher<…>>>>`.
 ///
-/// A queue of 64 holds 20 bounces of each finger; an edge takes 8 bytes.
+/// 64 edges are 20 bounces of each finger; an edge takes 8 bytes of RAM.
 #[derive(Debug)]
-pub struct Watcher<A, B, C> {
+pub struct Watcher<A, B, C, const EDGES: usize = 64> {
     fingers: Fingers<A, B, C>,
+    edges: Deque<Edge, EDGES>,
     /// An edge did not fit into the queue.
     lost: bool,
     /// Pins that could not be read, and that nobody has been told of.
     unreadable: [bool; 3],
 }
 
-impl<A: InputPin, B: InputPin, C: InputPin> Watcher<A, B, C> {
+impl<A: InputPin, B: InputPin, C: InputPin, const EDGES: usize> Watcher<A, B, C, EDGES> {
     /// Watches three pins. They are read at once, so that a switch that is closed already is seen.
-    pub fn start(fingers: Fingers<A, B, C>, clock: &impl Clock, queue: &mut Producer<'_, Edge>) -> Self {
-        let mut watcher = Self { fingers, lost: false, unreadable: [false; 3] };
-        watcher.interrupt(clock, queue);
+    pub fn start(fingers: Fingers<A, B, C>, clock: &impl Clock) -> Self {
+        let mut watcher = Self { fingers, edges: Deque::new(), lost: false, unreadable: [false; 3] };
+        watcher.interrupt(clock);
         watcher
     }
 
@@ -30,14 +44,19 @@ impl<A: InputPin, B: InputPin, C: InputPin> Watcher<A, B, C> {
         self.fingers.pins()
     }
 
+    /// The level of each pin when it was last read, for whoever waits for another: true is high.
+    pub const fn is_high(&self) -> [bool; 3] {
+        self.fingers.is_high()
+    }
+
     /// Call it in the interrupt of any of the three pins, after clearing the interrupt's cause.
     ///
     /// Cost: about 100 instructions and the reading of three pins; never waits.
-    pub fn interrupt(&mut self, clock: &impl Clock, queue: &mut Producer<'_, Edge>) {
-        let Self { fingers, lost, unreadable } = self;
+    pub fn interrupt(&mut self, clock: &impl Clock) {
+        let Self { fingers, edges, lost, unreadable } = self;
         // One at a time, so that none is missed where several cannot be read.
         while let Err(fault) = fingers.read(clock.micros(), |edge| {
-            let taken = queue.enqueue(Edge { after_loss: *lost, ..edge }).is_ok();
+            let taken = edges.push_back(Edge { after_loss: *lost, ..edge }).is_ok();
             *lost = !taken;
             taken
         }) {
@@ -47,32 +66,53 @@ impl<A: InputPin, B: InputPin, C: InputPin> Watcher<A, B, C> {
         }
     }
 
-    /// Call it in the main loop, before [`drain`] and with the pins' interrupt held off: an edge that did not fit into
-    /// the queue is offered again, and [`Effector::edge`] then says [`Fault::Overrun`]. Returns a pin's fault, which is
-    /// for [`Effector::report`]; call it until there is none.
-    pub fn service(&mut self, clock: &impl Clock, queue: &mut Producer<'_, Edge>) -> Option<Fault> {
-        if self.lost {
-            self.interrupt(clock, queue);
+    /// Call it instead of [`Watcher::interrupt`] where the interrupt was held off for longer than a contact time may be
+    /// wrong, as while flash is erased: a change that is found now has happened at a time that nobody knows, and
+    /// the touch is dropped with [`Fault::Overrun`].
+    pub fn interrupt_late(&mut self, clock: &impl Clock) {
+        let before = (self.edges.len(), self.lost);
+        self.lost = true;
+        self.interrupt(clock);
+        if self.edges.len() == before.0 {
+            // Nothing has changed, or nothing fits.
+            self.lost = before.1 || self.edges.is_full();
         }
-        Finger::ALL.into_iter().find(|finger| core::mem::take(finger.of(&mut self.unreadable))).map(Fault::Unreadable)
+    }
+
+    /// Whether no edge waits for the main loop: it may sleep.
+    pub fn is_idle(&self) -> bool {
+        self.edges.is_empty() && !self.lost
+    }
+
+    /// Call it in the main loop, with the pins' interrupt held off: what has happened, in its order. An edge that did not
+    /// fit into the queue is offered again, and [`Effector::edge`] then says [`Fault::Overrun`].
+    pub fn sense(&mut self, clock: &impl Clock) -> Sensed {
+        if self.lost && self.edges.is_empty() {
+            self.interrupt(clock);
+        }
+        if let Some(finger) = Finger::ALL.into_iter().find(|finger| core::mem::take(finger.of(&mut self.unreadable))) {
+            return Sensed::Fault(Fault::Unreadable(finger));
+        }
+        // With the interrupt held off no edge can come between the look and the clock.
+        self.edges.pop_front().map_or_else(|| Sensed::Nothing(clock.micros()), Sensed::Edge)
     }
 }
 
-/// The main loop's side: takes edges from the queue until there is a touch or a fault, or, when the queue is empty, lets
-/// the time pass. Call it until it returns `Ok(None)`, then sleep until the next interrupt or the next millisecond.
+/// The main loop's side: takes what `sense` says until there is a touch or a fault, or, when nothing more has happened, lets
+/// the time pass. Call it until it returns `Ok(None)`, then sleep until the next interrupt or until [`Effector::due`].
 ///
 /// # Errors
 /// A [`Fault`].
-pub fn drain(
-    effector: &mut Effector,
-    queue: &mut Consumer<'_, Edge>,
-    clock: &impl Clock,
-) -> Result<Option<Touch>, Fault> {
+pub fn drain(effector: &mut Effector, mut sense: impl FnMut() -> Sensed) -> Result<Option<Touch>, Fault> {
     loop {
-        // The time is read before the queue is found empty: an edge that comes in between is drained first, one that
-        // comes later is later.
-        let now = clock.micros();
-        let Some(edge) = queue.dequeue() else { return effector.poll(now) };
+        let edge = match sense() {
+            Sensed::Edge(edge) => edge,
+            Sensed::Fault(fault) => {
+                effector.report(fault);
+                continue;
+            }
+            Sensed::Nothing(now) => return effector.poll(now),
+        };
         match effector.edge(edge) {
             Ok(None) => {}
             outcome => return outcome,

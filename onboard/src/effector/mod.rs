@@ -11,8 +11,8 @@
 //! ```text
 //! polled:      pins ──► Fingers ──► Effector ──► touch or fault        (Probe::poll, at least once per millisecond)
 //!
-//! interrupts:  pins ──► Watcher ──► heapless queue ──► drain ──► Effector ──► touch or fault
-//!              └── in the interrupt ──┘             └──────── in the main loop ─────────┘
+//! interrupts:  pins ──► Watcher, with a queue ──► drain ──► Effector ──► touch or fault
+//!              └── in the interrupt ──┘       └──────── in the main loop ─────────┘
 //! ```
 //!
 //! A finger's contact time is the moment of its first closing edge, however long it bounces after that; polled, it is
@@ -34,7 +34,7 @@ mod settings;
 pub use calibration::{Calibration, CalibrationError};
 pub use driver::{Effector, State};
 pub use fault::Fault;
-pub use interrupt::{Watcher, drain};
+pub use interrupt::{Sensed, Watcher, drain};
 pub use pins::{Active, Fingers};
 pub use polled::Probe;
 pub use scale::{Geometry, Scale};
@@ -48,6 +48,7 @@ pub trait Clock {
 
 /// One of the probe's three fingers, in their order along the row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Finger {
     /// One end of the row.
     First,
@@ -84,6 +85,7 @@ impl core::fmt::Display for Finger {
 
 /// A switch closed or opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Edge {
     /// Which finger.
     pub finger: Finger,
@@ -91,7 +93,8 @@ pub struct Edge {
     pub closed: bool,
     /// When, on the [`Clock`], in microseconds.
     pub at: u32,
-    /// Whether edges before this one were lost because the queue was full.
+    /// Whether edges before this one were lost because the queue was full, or
+    /// the interrupt was held off too long.
     pub after_loss: bool,
 }
 

@@ -35,6 +35,13 @@ impl<A: InputPin, B: InputPin, C: InputPin> Fingers<A, B, C> {
         (&mut self.first, &mut self.middle, &mut self.last)
     }
 
+    /// The level of each pin when it was last read and its change taken: true is high.
+    pub(super) const fn is_high(&self) -> [bool; 3] {
+        let [a, b, c] = self.closed;
+        let active = matches!(self.active, Active::High);
+        [a == active, b == active, c == active]
+    }
+
     /// The pins again.
     pub fn into_pins(self) -> (A, B, C) {
         (self.first, self.middle, self.last)

@@ -2,7 +2,6 @@ use super::*;
 use core::cell::Cell;
 use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::digital::{Mock, State as Level, Transaction};
-use heapless::spsc::{Consumer, Producer, Queue};
 use palpate_shared::format::{HeaderBuilder, Trained, TrainedTouches, checksum};
 use palpate_shared::{ContactTime, Touch};
 use proptest::prelude::*;
@@ -227,15 +226,14 @@ fn fault_silent_names_the_finger_after_so_many_touches_without_it() {
 #[test]
 fn fault_overrun_drops_the_touch_whose_edges_were_lost() {
     let clock = TestClock::default();
-    let mut queue: Queue<Edge, 3> = Queue::new();
-    let (mut producer, mut consumer) = queue.split();
     let levels = [Cell::new(false), Cell::new(false), Cell::new(false)];
     let [a, b, c] = levels.each_ref().map(TestPin);
-    let mut watcher = Watcher::start(Fingers::new(a, b, c, Active::High), &clock, &mut producer);
+    let watcher = Watcher::<_, _, _, 3>::start(Fingers::new(a, b, c, Active::High), &clock);
+    let watcher = std::cell::RefCell::new(watcher);
     let mut effector = Effector::new(SETTINGS);
     let mut outcomes = Outcomes::new();
     let mut drain_all = |clock: &TestClock, outcomes: &mut Outcomes| {
-        while let Some(outcome) = drain(&mut effector, &mut consumer, clock).transpose() {
+        while let Some(outcome) = drain(&mut effector, || watcher.borrow_mut().sense(clock)).transpose() {
             outcomes.push(outcome);
         }
     };
@@ -243,66 +241,109 @@ fn fault_overrun_drops_the_touch_whose_edges_were_lost() {
     for time in [50_000, 51_000] {
         clock.0.set(time);
         levels.iter().for_each(|level| level.set(!level.get()));
-        watcher.interrupt(&clock, &mut producer);
+        watcher.borrow_mut().interrupt(&clock);
     }
     drain_all(&clock, &mut outcomes);
     clock.0.set(52_000);
     levels.iter().for_each(|level| level.set(!level.get()));
-    watcher.interrupt(&clock, &mut producer);
+    watcher.borrow_mut().interrupt(&clock);
     clock.0.set(1_000_000);
     drain_all(&clock, &mut outcomes);
     assert_eq!(outcomes, [Err(Fault::Overrun)]);
 }
 
-/// Three pins, the watcher's end of a queue of `N` − 1 edges, and what the main loop makes of them.
+/// Three pins, their watcher with a queue of `N` edges, and what the main loop makes of them.
 struct Board<'a, const N: usize> {
     levels: &'a [Cell<bool>; 3],
     clock: &'a TestClock,
-    producer: Producer<'a, Edge>,
-    consumer: Consumer<'a, Edge>,
-    watcher: Watcher<TestPin<'a>, TestPin<'a>, TestPin<'a>>,
+    watcher: Watcher<TestPin<'a>, TestPin<'a>, TestPin<'a>, N>,
     effector: Effector,
     outcomes: Outcomes,
 }
 
 impl<'a, const N: usize> Board<'a, N> {
-    fn start(levels: &'a [Cell<bool>; 3], clock: &'a TestClock, queue: &'a mut Queue<Edge, N>) -> Self {
-        let (mut producer, consumer) = queue.split();
+    fn start(levels: &'a [Cell<bool>; 3], clock: &'a TestClock) -> Self {
         let [a, b, c] = levels.each_ref().map(TestPin);
-        let watcher = Watcher::start(Fingers::new(a, b, c, Active::High), clock, &mut producer);
+        let watcher = Watcher::start(Fingers::new(a, b, c, Active::High), clock);
         let (effector, outcomes) = (Effector::new(SETTINGS), Outcomes::new());
-        Self { levels, clock, producer, consumer, watcher, effector, outcomes }
+        Self { levels, clock, watcher, effector, outcomes }
     }
 
-    /// Pins change, and interrupt.
-    fn set(&mut self, at: u32, changes: &[(Finger, bool)]) {
+    /// Pins change.
+    fn change(&mut self, at: u32, changes: &[(Finger, bool)]) {
         self.clock.0.set(at);
         for &(finger, closed) in changes {
             finger.of(&mut self.levels.each_ref()).set(closed);
         }
-        self.watcher.interrupt(self.clock, &mut self.producer);
+    }
+
+    /// Pins change, and interrupt.
+    fn set(&mut self, at: u32, changes: &[(Finger, bool)]) {
+        self.change(at, changes);
+        self.watcher.interrupt(self.clock);
     }
 
     /// The main loop, once.
     fn step(&mut self, at: u32) {
         self.clock.0.set(at);
-        loop {
-            while let Some(fault) = self.watcher.service(self.clock, &mut self.producer) {
-                self.effector.report(fault);
-            }
-            match drain(&mut self.effector, &mut self.consumer, self.clock).transpose() {
-                Some(outcome) => self.outcomes.push(outcome),
-                None => return,
-            }
+        let Self { watcher, effector, outcomes, clock, .. } = self;
+        while let Some(outcome) = drain(effector, || watcher.sense(*clock)).transpose() {
+            outcomes.push(outcome);
         }
     }
 }
 
 #[test]
+fn an_edge_found_after_the_interrupt_was_held_off_is_no_contact_time() {
+    let (levels, clock) = ([Cell::new(false), Cell::new(false), Cell::new(false)], TestClock::default());
+    let mut board = Board::<8>::start(&levels, &clock);
+    board.step(0);
+    board.step(50_000);
+    // Flash is erased: nothing changes, then a finger closes meanwhile.
+    board.watcher.interrupt_late(&clock);
+    board.set(100_000, &[(First, true)]);
+    board.change(120_000, &[(Middle, true)]);
+    clock.0.set(145_000);
+    board.watcher.interrupt_late(&clock);
+    board.set(150_000, &[(Last, true)]);
+    board.step(300_000);
+    board.set(400_000, &Finger::ALL.map(|finger| (finger, false)));
+    board.step(900_000);
+    assert_eq!(board.outcomes, [Err(Fault::Overrun)]);
+    // The next touch counts, also after a pause in which nothing changed.
+    board.watcher.interrupt_late(&clock);
+    board.set(1_000_000, &Finger::ALL.map(|finger| (finger, true)));
+    board.step(1_200_000);
+    assert_eq!(board.outcomes[1..], [Ok(Touch::from_micros([0; 3]))]);
+}
+
+#[test]
+fn the_time_until_something_is_due_is_the_time_until_something_happens() {
+    let clock = TestClock::default();
+    let levels = [Cell::new(false), Cell::new(false), Cell::new(false)];
+    let mut board = Board::<8>::start(&levels, &clock);
+    board.step(0);
+    board.step(50_000);
+    assert_eq!(board.effector.due(50_000), None);
+    board.set(100_000, &[(First, true)]);
+    board.step(100_000);
+    // Asleep in between, it sees the touch end in the same microsecond as one that never sleeps.
+    let mut now = 100_000;
+    while board.outcomes.is_empty() {
+        let due = board.effector.due(now).unwrap();
+        assert!(due > 0);
+        board.step(now + due - 1);
+        assert_eq!(board.outcomes.len(), 0);
+        now += due;
+        board.step(now);
+    }
+    assert_eq!(now, 500_000);
+}
+
+#[test]
 fn a_switch_that_is_closed_at_power_up_is_seen_before_any_interrupt_and_is_no_contact_of_a_later_touch() {
     let (levels, clock) = ([Cell::new(false), Cell::new(true), Cell::new(false)], TestClock::default());
-    let mut queue: Queue<Edge, 64> = Queue::new();
-    let mut board = Board::start(&levels, &clock, &mut queue);
+    let mut board = Board::<64>::start(&levels, &clock);
     board.step(0);
     board.step(1_000_000);
     // The first finger's interrupt must not read the middle one as touching at the same time.
@@ -317,8 +358,7 @@ fn a_switch_that_is_closed_at_power_up_is_seen_before_any_interrupt_and_is_no_co
 fn an_opening_that_did_not_fit_into_the_queue_is_read_again_without_another_interrupt() {
     let (levels, clock) = ([Cell::new(false), Cell::new(false), Cell::new(false)], TestClock::default());
     // Room for four edges.
-    let mut queue: Queue<Edge, 5> = Queue::new();
-    let mut board = Board::start(&levels, &clock, &mut queue);
+    let mut board = Board::<4>::start(&levels, &clock);
     board.step(0);
     board.step(50_000);
     board.set(100_000, &Finger::ALL.map(|finger| (finger, true)));
@@ -358,24 +398,19 @@ impl embedded_hal::digital::InputPin for BrokenPin {
 #[test]
 fn unreadable_pins_are_all_reported_although_a_touch_comes_at_the_same_time() {
     let clock = TestClock::default();
-    let mut queue: Queue<Edge, 8> = Queue::new();
-    let (mut producer, mut consumer) = queue.split();
     let level = Cell::new(false);
     let fingers = Fingers::new(TestPin(&level), BrokenPin, BrokenPin, Active::High);
-    let mut watcher = Watcher::start(fingers, &clock, &mut producer);
+    let mut watcher = Watcher::<_, _, _, 8>::start(fingers, &clock);
     let mut effector = Effector::new(SETTINGS);
     let mut outcomes = Outcomes::new();
-    outcomes.extend(drain(&mut effector, &mut consumer, &clock).transpose());
+    outcomes.extend(effector.poll(0).transpose());
     clock.0.set(100_000);
-    outcomes.extend(drain(&mut effector, &mut consumer, &clock).transpose());
+    outcomes.extend(effector.poll(100_000).transpose());
     level.set(true);
-    watcher.interrupt(&clock, &mut producer);
+    watcher.interrupt(&clock);
     clock.0.set(600_000);
     // Touch and faults are there at the same time.
-    while let Some(fault) = watcher.service(&clock, &mut producer) {
-        effector.report(fault);
-    }
-    while let Some(outcome) = drain(&mut effector, &mut consumer, &clock).transpose() {
+    while let Some(outcome) = drain(&mut effector, || watcher.sense(&clock)).transpose() {
         outcomes.push(outcome);
     }
     let alone = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]);
@@ -660,13 +695,11 @@ proptest! {
         let clock = TestClock::default();
         clock.0.set(start);
         let mut probe = { let [a, b, c] = levels.each_ref().map(TestPin); Probe::new(Fingers::new(a, b, c, Active::High), &clock, SETTINGS) };
-        let mut queue: Queue<Edge, 128> = Queue::new();
-        let (mut producer, mut consumer) = queue.split();
-        let mut watcher = { let [a, b, c] = levels.each_ref().map(TestPin); Watcher::start(Fingers::new(a, b, c, Active::High), &clock, &mut producer) };
+        let mut watcher = { let [a, b, c] = levels.each_ref().map(TestPin); Watcher::<_, _, _, 127>::start(Fingers::new(a, b, c, Active::High), &clock) };
         let mut effector = Effector::new(SETTINGS);
         let (mut polled, mut interrupted) = (Outcomes::new(), Outcomes::new());
         polled.extend(probe.poll().transpose());
-        interrupted.extend(drain(&mut effector, &mut consumer, &clock).transpose());
+        interrupted.extend(drain(&mut effector, || watcher.sense(&clock)).transpose());
         for (i, &(finger, closed, at)) in edges.iter().enumerate() {
             clock.0.set(start.wrapping_add(at));
             // What was due before the edge is handed over before the pin changes, as it is on a chip.
@@ -674,14 +707,14 @@ proptest! {
             let mut levels = levels.each_ref();
             finger.of(&mut levels).set(closed);
             for _ in 0..8 { polled.extend(probe.poll().transpose()); }
-            watcher.interrupt(&clock, &mut producer);
+            watcher.interrupt(&clock);
             if i % 3 == 0 {
-                while let Some(outcome) = drain(&mut effector, &mut consumer, &clock).transpose() { interrupted.push(outcome); }
+                while let Some(outcome) = drain(&mut effector, || watcher.sense(&clock)).transpose() { interrupted.push(outcome); }
             }
         }
         clock.0.set(start.wrapping_add(end));
         for _ in 0..8 { polled.extend(probe.poll().transpose()); }
-        while let Some(outcome) = drain(&mut effector, &mut consumer, &clock).transpose() { interrupted.push(outcome); }
+        while let Some(outcome) = drain(&mut effector, || watcher.sense(&clock)).transpose() { interrupted.push(outcome); }
         let touches = |outcomes: &Outcomes| outcomes.iter().flatten().copied().collect::<Vec<_>>();
         prop_assert_eq!(touches(&polled), touches(&interrupted));
     }

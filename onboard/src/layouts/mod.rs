@@ -9,4 +9,4 @@ pub(crate) mod preorder;
 pub(crate) mod ranks;
 mod sections;
 
-pub(crate) use sections::Sections;
+pub(crate) use sections::{Places, Sections};

@@ -20,7 +20,50 @@ pub(crate) struct Sections<'a> {
     pub(crate) leaf: LeafType,
 }
 
+/// The same as offsets, without the bytes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Places {
+    /// Where each part starts, in the order of the fields of [`Sections`], and where the last one ends.
+    starts: [usize; 8],
+    length: usize,
+    objects: u16,
+    layout: Layout,
+    leaf: LeafType,
+}
+
 impl<'a> Sections<'a> {
+    /// The offsets of the sections.
+    pub(crate) fn places(&self) -> Places {
+        let at = |section| self.offset(section);
+        let end = at(self.leaves) + self.leaves.len();
+        let starts = [self.optional, self.base, self.axes, self.cuts, self.groups, self.nodes, self.leaves].map(at);
+        let [a, b, c, d, e, f, g] = starts;
+        let (length, objects) = (self.bytes.len(), self.objects);
+        Places { starts: [a, b, c, d, e, f, g, end], length, objects, layout: self.layout, leaf: self.leaf }
+    }
+
+    /// The sections at these places of `bytes`, of which there have to be as many as there were.
+    pub(crate) fn at(bytes: &'a [u8], places: &Places) -> Option<Self> {
+        if bytes.len() != places.length {
+            return None;
+        }
+        let &Places { starts: [a, b, c, d, e, f, g, end], objects, layout, leaf, .. } = places;
+        // The priors stand between base and axes, and are as long as the base.
+        Some(Self {
+            bytes,
+            optional: bytes.get(a..b)?,
+            base: bytes.get(b..b + (c - b) / 2)?,
+            axes: bytes.get(c..d)?,
+            cuts: bytes.get(d..e)?,
+            groups: bytes.get(e..f)?,
+            nodes: bytes.get(f..g)?,
+            leaves: bytes.get(g..end)?,
+            objects,
+            layout,
+            leaf,
+        })
+    }
+
     /// The header.
     pub(crate) fn header(&self) -> Header<'a> {
         // Sections are only found in bytes that have a header.

@@ -7,6 +7,7 @@ use palpate_shared::{ContactPattern, Touch};
 
 /// Why a touch is not evidence. It was not counted, and nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Refused {
     /// The model was not trained on touches with this contact pattern.

@@ -1,20 +1,75 @@
-//! Where a chip keeps what has to last.
+//! Memory that is written like RAM and keeps its content.
 
-/// Where a chip keeps what has to last. Every slice may be empty: then the chip does without.
+use super::record::{self, Found};
+use super::storage::{Place, Storage};
+use core::sync::atomic::{Ordering, compiler_fence};
+use palpate_shared::link::NotStored;
+
+/// Memory that is written like RAM: battery-backed or FRAM, or RAM where resets but no power cuts are to be survived.
+/// Every slice may be empty: then the chip does without.
 #[derive(Debug)]
 pub struct Memory<'a> {
-    /// A model in flash, in use until another is loaded.
-    pub built_in: &'a [u8],
     /// Two places for models from the host: one in use, one being filled.
     pub models: [&'a mut [u8]; 2],
-    /// Two places for records, of [`Memory::record_length`] bytes each.
+    /// Two places for records, of [`record_length`](super::record_length) bytes each, written in turns.
     pub records: [&'a mut [u8]; 2],
 }
 
 impl Memory<'_> {
-    /// The most bytes that a record takes for models of up to `objects` objects.
-    pub const fn record_length(objects: usize) -> usize {
-        // Header; counter, model, source and staging; session; an outcome takes up to 26 bytes; the snapshot.
-        6 + 45 + 18 + 26 * palpate_shared::link::WINDOW + crate::SNAPSHOT_LENGTH + 10 * objects
+    fn found(&self) -> Option<Found<'_>> {
+        let [even, odd] = self.records.each_ref().map(|place| record::read(place));
+        match (even, odd) {
+            (Some(even), Some(odd)) if odd.is_newer_than(even.counter) => Some(odd),
+            (even, odd) => even.or(odd),
+        }
+    }
+}
+
+impl Storage for Memory<'_> {
+    fn room(&self) -> usize {
+        let [first, second] = &self.models;
+        first.len().min(second.len())
+    }
+
+    fn model(&self, place: Place) -> &[u8] {
+        let [first, second] = &self.models;
+        match place {
+            Place::First => first,
+            Place::Second => second,
+        }
+    }
+
+    fn write_model(&mut self, place: Place, offset: usize, bytes: &[u8]) -> Result<(), NotStored> {
+        let [first, second] = &mut self.models;
+        let all = match place {
+            Place::First => first,
+            Place::Second => second,
+        };
+        let end = offset.checked_add(bytes.len()).ok_or(NotStored)?;
+        all.get_mut(offset..end).ok_or(NotStored)?.copy_from_slice(bytes);
+        Ok(())
+    }
+
+    fn record_length(&self) -> usize {
+        let [even, odd] = self.records.each_ref().map(|place| place.len());
+        // One place alone cannot be written without a moment at which nothing is whole.
+        if even == 0 || odd == 0 { even.max(odd).min(1) } else { even.min(odd) }
+    }
+
+    fn newest(&self) -> Option<(u32, &[u8])> {
+        self.found().map(|found| (found.counter, found.record))
+    }
+
+    fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored> {
+        if self.record_length() == 0 {
+            return Ok(());
+        }
+        let counter = self.found().map_or(0, |found| found.counter).wrapping_add(1);
+        let [even, odd] = &mut self.records;
+        let place = if counter.is_multiple_of(2) { even } else { odd };
+        record::write(place, counter, fill).ok_or(NotStored)?;
+        // The power may go at any moment from here on: the writes must not be delayed.
+        compiler_fence(Ordering::SeqCst);
+        Ok(())
     }
 }

@@ -3,24 +3,41 @@
 //! ```text
 //! transport ──► DeviceEnd ──► Station ──► Recognizer
 //!                               │
-//!                               └──► Memory: two places for models, two for records
+//!                               └──► Storage: two places for models, and records
 //! ```
 //!
-//! [`serve`] is the whole program of a chip that recognizes touches from a host. A chip with fingers of its own pushes
-//! their touches into a [`Station`] and reports them to the host.
+//! | program | what |
+//! |---|---|
+//! | [`serve`] | a chip that recognizes touches from a host |
+//! | [`ProbeStation`] | a chip with fingers of its own, which also takes touches and models from a host |
 //!
 //! # Power cuts
 //!
-//! After every command the [`Station`] writes a record (evidence, progress of the link, which model is in use) into the
-//! older one of two places, with a counter and a checksum. Whenever the power goes, one of the two is whole, and the chip
-//! continues from it: the host repeats what is not in it, and the link ensures that nothing is counted twice. That
-//! needs memory that keeps its content: battery-backed or FRAM, or RAM where resets but no power cuts are to be survived.
+//! After every command, and every touch of its own, the [`Station`] stores a record (evidence, progress of the link, which
+//! model is in use), and only then says what came of it. Whenever the power goes, the chip continues from the newest
+//! record: the host repeats what is not in it, and the link ensures that nothing is counted twice. What cannot be
+//! stored is executed and reported.
+//!
+//! | storage | where |
+//! |---|---|
+//! | [`FlashStorage`] | NOR flash: a log that goes round its sectors, and two areas for models, read in place |
+//! | [`Memory`] | battery-backed RAM or FRAM, or RAM where resets but no power cuts are to be survived |
+//! | [`NoStorage`] | nothing is kept, no model can be loaded |
+//!
+//! A loaded model is written to the place that is not in use and checked there; the record that follows switches to it.
 
+mod flash;
 mod memory;
+mod probe;
 mod record;
 mod serve;
 mod session;
+mod storage;
 
+pub use flash::{FlashError, FlashStorage, MappedFlash};
 pub use memory::Memory;
+pub use probe::{Board, Happened, ProbeSettings, ProbeStation};
+pub use record::record_length;
 pub use serve::{ServeError, serve};
-pub use session::Station;
+pub use session::{RecordsTooShort, Station};
+pub use storage::{NoStorage, Place, Storage};

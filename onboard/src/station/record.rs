@@ -1,7 +1,7 @@
-//! What a chip remembers through a power cut.
+//! What a chip remembers through a power cut, and how a record is recognized among other bytes.
 
-use core::sync::atomic::{Ordering, compiler_fence};
-use palpate_shared::link::{NotStored, Payload, Progress, checksum};
+use super::storage::Place;
+use palpate_shared::link::{Payload, Progress, checksum};
 use serde::{Deserialize, Serialize};
 
 /// Which model is in use; bytes of it where it was loaded.
@@ -13,12 +13,17 @@ pub(super) enum Source {
 }
 
 impl Source {
-    pub(super) const fn with_length(self, length: u32) -> Self {
-        match self {
-            Self::BuiltIn => Self::BuiltIn,
-            Self::First(_) => Self::First(length),
-            Self::Second(_) => Self::Second(length),
+    /// A loaded model.
+    pub(super) const fn loaded(place: Place, length: u32) -> Self {
+        match place {
+            Place::First => Self::First(length),
+            Place::Second => Self::Second(length),
         }
+    }
+
+    /// Whether the model is in this place.
+    pub(super) const fn is_in(self, place: Place) -> bool {
+        matches!((self, place), (Self::First(_), Place::First) | (Self::Second(_), Place::Second))
     }
 }
 
@@ -37,7 +42,6 @@ const VERSION: u32 = 2;
 /// A record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Record<'a> {
-    pub(super) counter: u32,
     /// The checksum of the model that it is of; 0 for none.
     pub(super) model: u32,
     pub(super) source: Source,
@@ -47,65 +51,50 @@ pub(super) struct Record<'a> {
     pub(super) evidence: &'a [u8],
 }
 
-/// Length and checksum stand before the record.
+/// Length and checksum stand before the counter and the record.
 const HEADER: usize = 6;
 
-/// Two places for records, written in turns.
-#[derive(Debug)]
-pub(super) struct Records<'a> {
-    places: [&'a mut [u8]; 2],
-    /// Counter of the newest record.
-    counter: u32,
+/// The most bytes that a record takes for models of up to `objects` objects.
+pub const fn record_length(objects: usize) -> usize {
+    // Header; counter, model, source and staging; session; an outcome takes up to 26 bytes; the snapshot.
+    HEADER + 45 + 18 + 26 * palpate_shared::link::WINDOW + crate::SNAPSHOT_LENGTH + 10 * objects
 }
 
-impl<'a> Records<'a> {
-    pub(super) fn new(places: [&'a mut [u8]; 2]) -> Self {
-        let counter = newest(&places).map_or(0, |record| record.counter);
-        Self { places, counter }
-    }
+/// A record among other bytes.
+pub(super) struct Found<'p> {
+    pub(super) counter: u32,
+    pub(super) record: &'p [u8],
+    /// Bytes in all.
+    pub(super) length: usize,
+}
 
-    /// The newest whole record.
-    pub(super) fn newest(&self) -> Option<Record<'_>> {
-        newest(&self.places)
-    }
-
-    /// Whether there are no places: the chip does without records.
-    pub(super) fn is_empty(&self) -> bool {
-        self.places.iter().all(|place| place.is_empty())
-    }
-
-    /// Writes a record over the older one; its counter is put in. On an error the newest one stays.
-    pub(super) fn write(&mut self, record: Record<'_>) -> Result<(), NotStored> {
-        let counter = self.counter.wrapping_add(1);
-        let [even, odd] = &mut self.places;
-        let place = if counter.is_multiple_of(2) { even } else { odd };
-        let (header, body) = place.split_first_chunk_mut::<HEADER>().ok_or(NotStored)?;
-        let record = Record { counter, ..record };
-        let written = postcard::to_slice(&record, body).map_err(|_| NotStored)?;
-        let length = u16::try_from(written.len()).map_err(|_| NotStored)?;
-        let [c0, c1, c2, c3] = (checksum(written) ^ VERSION).to_le_bytes();
-        let [l0, l1] = length.to_le_bytes();
-        *header = [l0, l1, c0, c1, c2, c3];
-        self.counter = counter;
-        // The power may go at any moment from here on: the writes must not be delayed.
-        compiler_fence(Ordering::SeqCst);
-        Ok(())
+impl Found<'_> {
+    /// Whether this record was written after `other`.
+    pub(super) const fn is_newer_than(&self, other: u32) -> bool {
+        let ahead = self.counter.wrapping_sub(other);
+        ahead != 0 && ahead >> 31 == 0
     }
 }
 
-fn newest<'p>(places: &'p [&mut [u8]; 2]) -> Option<Record<'p>> {
-    let [even, odd] = places.each_ref().map(|place| read(place));
-    match (even, odd) {
-        (Some(even), Some(odd)) if odd.counter.wrapping_sub(even.counter) >> 31 == 0 => Some(odd),
-        (even, odd) => even.or(odd),
-    }
-}
-
-fn read(place: &[u8]) -> Option<Record<'_>> {
-    let (&[l0, l1, c0, c1, c2, c3], body) = place.split_first_chunk::<HEADER>()?;
-    let written = body.get(..usize::from(u16::from_le_bytes([l0, l1])))?;
+/// The record at the start of `bytes`, if there is a whole one.
+pub(super) fn read(bytes: &[u8]) -> Option<Found<'_>> {
+    let (&[l0, l1, c0, c1, c2, c3], body) = bytes.split_first_chunk::<HEADER>()?;
+    let length = usize::from(u16::from_le_bytes([l0, l1]));
+    let written = body.get(..length)?;
     if checksum(written) ^ VERSION != u32::from_le_bytes([c0, c1, c2, c3]) {
         return None;
     }
-    postcard::from_bytes(written).ok()
+    let (counter, record) = postcard::take_from_bytes(written).ok()?;
+    Some(Found { counter, record, length: HEADER + length })
+}
+
+/// Writes the record that `fill` gives to the start of `bytes`; its length in all, or `None` if there is no room.
+pub(super) fn write(bytes: &mut [u8], counter: u32, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Option<usize> {
+    let (header, body) = bytes.split_first_chunk_mut::<HEADER>()?;
+    let mut length = postcard::to_slice(&counter, body).ok()?.len();
+    length += fill(body.get_mut(length..)?)?;
+    let [c0, c1, c2, c3] = (checksum(body.get(..length)?) ^ VERSION).to_le_bytes();
+    let [l0, l1] = u16::try_from(length).ok()?.to_le_bytes();
+    *header = [l0, l1, c0, c1, c2, c3];
+    Some(HEADER + length)
 }

@@ -1,7 +1,11 @@
 //! A model in use, and the commands it can be given.
 
-use super::record::{Record, Records, Source, Staged};
+use super::record::{Record, Source, Staged, record_length};
+use super::storage::{NoStorage, Place, Storage};
+use crate::decide::State;
+use crate::model::Opened;
 use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
+use core::fmt;
 use palpate_shared::Touch;
 use palpate_shared::link::{
     Decision, Detail, Device, ModelInfo, NotStored, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
@@ -11,106 +15,192 @@ use palpate_shared::link::{
 /// object alone would take.
 type SnapshotBuffer<const N: usize> = [[u8; SNAPSHOT_LENGTH + 10]; N];
 
-/// A recognizer with room for `N` objects, as a [`Device`] at the end of a link.
-#[derive(Debug)]
-pub struct Station<'m, 'r, const N: usize> {
-    model: Option<&'m Model<'m>>,
-    recognizer: Option<Recognizer<'m, N>>,
-    /// Where models and snapshots arrive.
-    staging: &'m mut [u8],
-    staged: Option<Staged>,
-    source: Source,
-    /// What the model that is arriving will be.
-    next_source: Source,
-    switched: bool,
-    /// The checksum of the model that was switched to.
-    switched_to: u32,
-    /// Touches that were not counted.
-    refused: u32,
-    records: Option<&'m mut Records<'r>>,
+/// A storage whose records are too short for what a station has to keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordsTooShort {
+    /// Bytes that a record needs: [`record_length`].
+    pub needed: usize,
+    /// Bytes that it can have.
+    pub found: usize,
 }
 
-impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
-    /// A station that has one model and no memory: nothing can be loaded, nothing lasts.
-    pub fn new(model: &'m Model<'m>) -> Self {
-        Self::with_memory(Some(model), &mut [], (Source::BuiltIn, Source::BuiltIn), None)
+impl fmt::Display for RecordsTooShort {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { needed, found } = self;
+        write!(f, "a record may have {found} bytes and needs {needed}: see station::record_length")
     }
+}
 
-    pub(super) fn with_memory(
-        model: Option<&'m Model<'m>>,
-        staging: &'m mut [u8],
-        (source, next_source): (Source, Source),
-        records: Option<&'m mut Records<'r>>,
-    ) -> Self {
-        let recognizer = model.and_then(|model| Recognizer::new(model, Stopping::from_model(model)).ok());
-        let mut station = Self {
-            model,
-            recognizer,
-            staging,
-            staged: None,
-            source,
-            next_source,
-            switched: false,
-            switched_to: 0,
-            refused: 0,
-            records,
-        };
-        station.resume();
+impl core::error::Error for RecordsTooShort {}
+
+/// A recognizer with room for `N` objects, as a [`Device`] at the end of a link, and what it keeps in `S`.
+#[derive(Debug)]
+pub struct Station<'m, const N: usize, S = NoStorage> {
+    built_in: &'m [u8],
+    storage: S,
+    /// The model in use, and what is known under it.
+    opened: Option<Opened>,
+    state: Option<State<N>>,
+    source: Source,
+    /// The model of the newest record: it must not be written over.
+    kept: Source,
+    staged: Option<Staged>,
+    /// Touches that were not counted.
+    refused: u32,
+}
+
+impl<'m, const N: usize> Station<'m, N> {
+    /// A station that has one model and no storage: nothing can be loaded, nothing lasts.
+    pub fn new(model: &Model<'m>) -> Self {
+        let mut station = Self::empty(model.bytes(), NoStorage);
+        station.use_model(Some(model.opened()));
         station
     }
+}
 
-    /// Continues from the newest record if it is of this model.
-    fn resume(&mut self) {
-        let model = self.model.map_or(0, |model| model.checksum());
-        let Some(record) = self.records.as_ref().and_then(|records| records.newest()) else { return };
-        if (record.source, record.model) == (self.source, model) {
-            self.staged = record.staged;
-            if let Some(recognizer) = &mut self.recognizer {
-                // A record without evidence is from the moment of a switch.
-                let _ = recognizer.restore(record.evidence);
-            }
+impl<'m, const N: usize, S> Station<'m, N, S> {
+    const fn empty(built_in: &'m [u8], storage: S) -> Self {
+        let (source, kept) = (Source::BuiltIn, Source::BuiltIn);
+        Self { built_in, storage, opened: None, state: None, source, kept, staged: None, refused: 0 }
+    }
+}
+
+impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
+    /// A station that continues from the newest record in `storage`, if it is of a model that is still there; also the
+    /// progress of the link, and how many records have been written. `built_in` is a model in flash, in use until
+    /// another is loaded; it may be empty.
+    ///
+    /// # Errors
+    /// [`RecordsTooShort`].
+    pub fn open(built_in: &'m [u8], storage: S) -> Result<(Self, Progress, u32), RecordsTooShort> {
+        let (needed, found) = (record_length(N), storage.record_length());
+        if found < needed && found > 0 {
+            return Err(RecordsTooShort { needed, found });
+        }
+        let mut station = Self::empty(built_in, storage);
+        let newest = station.storage.newest();
+        let starts = newest.map_or(0, |(counter, _)| counter);
+        let record = newest.and_then(|(_, record)| postcard::from_bytes::<Record<'_>>(record).ok());
+        let Some(record) = record else {
+            station.use_model(station.model_at(Source::BuiltIn).map(|model| model.opened()));
+            return Ok((station, Progress::NONE, starts));
+        };
+        let model = station.model_at(record.source);
+        // A record of a model that is not there any more is not of this program: neither its evidence nor its progress.
+        if model.map_or(0, |model| model.checksum()) != record.model {
+            station.use_model(station.model_at(Source::BuiltIn).map(|model| model.opened()));
+            return Ok((station, Progress::NONE, starts));
+        }
+        let (source, staged, progress) = (record.source, record.staged, record.progress.clone());
+        let opened = model.map(|model| model.opened());
+        let state = model.and_then(|model| {
+            let mut recognizer = Recognizer::new(&model, Stopping::from_model(&model)).ok()?;
+            // A record without evidence is from the moment of a switch.
+            let _ = recognizer.restore(record.evidence);
+            Some(recognizer.into_state())
+        });
+        (station.opened, station.state) = (opened, state);
+        (station.source, station.kept, station.staged) = (source, source, staged);
+        Ok((station, progress, starts))
+    }
+
+    /// The model that a source names, if it is one.
+    fn model_at(&self, source: Source) -> Option<Model<'_>> {
+        Model::new(self.bytes_at(source)).ok()
+    }
+
+    fn bytes_at(&self, source: Source) -> &[u8] {
+        let prefix = |place, length| {
+            let length = usize::try_from(length).unwrap_or(usize::MAX);
+            self.storage.model(place).get(..length).unwrap_or_default()
+        };
+        match source {
+            Source::BuiltIn => self.built_in,
+            Source::First(length) => prefix(Place::First, length),
+            Source::Second(length) => prefix(Place::Second, length),
         }
     }
 
-    /// The model to continue with, once a command has switched to another one.
-    pub(super) fn switched(&self) -> Option<Source> {
-        self.switched.then_some(self.source)
+    /// Puts a model into use, with nothing touched.
+    fn use_model(&mut self, opened: Option<Opened>) {
+        self.opened = opened;
+        self.state = self.model().and_then(|model| {
+            let recognizer = Recognizer::new(&model, Stopping::from_model(&model)).ok()?;
+            Some(recognizer.into_state())
+        });
+    }
+
+    /// The model in use.
+    pub fn model(&self) -> Option<Model<'_>> {
+        self.opened?.model(self.bytes_at(self.source))
+    }
+
+    /// Lets the recognizer do something.
+    ///
+    /// # Errors
+    /// [`Refusal::NoModel`] without a usable model.
+    fn with<T>(&mut self, act: impl FnOnce(&mut Recognizer<'_, N>) -> T) -> Result<T, Refusal> {
+        let state = self.state.take().ok_or(Refusal::NoModel)?;
+        let model = self.model().ok_or(Refusal::NoModel)?;
+        let mut recognizer = Recognizer::continued(model, state);
+        let done = act(&mut recognizer);
+        self.state = Some(recognizer.into_state());
+        Ok(done)
+    }
+
+    /// What the recognizer says, without changing it.
+    fn ask<T>(&self, question: impl FnOnce(&Model<'_>, &State<N>) -> T) -> Result<T, Refusal> {
+        let (model, state) = (self.model().ok_or(Refusal::NoModel)?, self.state.as_ref().ok_or(Refusal::NoModel)?);
+        Ok(question(&model, state))
     }
 
     /// Takes a touch into account.
     ///
-    /// Cost: [`Recognizer::push`], and with a detail a posterior and 400 instructions per object.
+    /// Cost: [`Recognizer::push`] and about 300 instructions, and with a detail a posterior and 400 instructions per
+    /// object.
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without a usable model; [`Refusal::Pattern`], [`Refusal::Spread`], [`Refusal::NoPose`] or
     /// [`Refusal::Features`] for a touch that the model was not trained for: [`Station::refused`] counts those.
     pub fn push(&mut self, touch: &Touch, detail: bool) -> Result<VerdictMessage, Refusal> {
-        let recognizer = self.recognizer.as_mut().ok_or(Refusal::NoModel)?;
-        let decision = match recognizer.push(touch) {
-            Ok(Verdict::Undecided) => Decision::Undecided,
-            Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
-            Ok(Verdict::Unknown) => Decision::Unknown,
-            Err(refused) => {
-                self.refused = self.refused.saturating_add(1);
-                return Err(refusal(refused));
-            }
-        };
-        let best = recognizer.best();
-        let detail = detail.then(|| Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
-        let best = u8::try_from(best).unwrap_or(u8::MAX);
-        Ok(VerdictMessage { decision, best, touches: recognizer.touches(), detail })
+        let pushed = self.with(|recognizer| {
+            let decision = match recognizer.push(touch)? {
+                Verdict::Undecided => Decision::Undecided,
+                Verdict::Recognized { object, .. } => Decision::Recognized(object),
+                Verdict::Unknown => Decision::Unknown,
+            };
+            let best = recognizer.best();
+            let detail = detail.then(|| Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
+            let best = u8::try_from(best).unwrap_or(u8::MAX);
+            Ok(VerdictMessage { decision, best, touches: recognizer.touches(), detail })
+        })?;
+        if pushed.is_err() {
+            self.refused = self.refused.saturating_add(1);
+        }
+        pushed.map_err(refusal)
     }
 
-    /// How many touches were not counted because the model was not trained for them, since power-up or the last change
-    /// of the model.
+    /// How many touches were not counted because the model was not trained for them, since power-up.
     pub const fn refused(&self) -> u32 {
         self.refused
     }
 
+    /// The storage again.
+    pub fn into_storage(self) -> S {
+        self.storage
+    }
+
+    /// Where the next model goes: not over the one in use, nor over the one that a power cut would bring back.
+    fn next_place(&self) -> Option<Place> {
+        let free = |place: &Place| !self.source.is_in(*place) && !self.kept.is_in(*place);
+        [Place::First, Place::Second].into_iter().find(free)
+    }
+
     /// Puts what has arrived into use.
     fn accept(&mut self, staged: Staged) -> Result<(), Refusal> {
+        let place = self.next_place().ok_or(Refusal::Unwritable)?;
         let length = usize::try_from(staged.length).unwrap_or(usize::MAX);
-        let bytes = self.staging.get(..length).ok_or(Refusal::TooLong)?;
+        let bytes = self.storage.model(place).get(..length).ok_or(Refusal::TooLong)?;
         if checksum(bytes) != staged.checksum {
             return Err(Refusal::Checksum);
         }
@@ -120,17 +210,32 @@ impl<'m, 'r, const N: usize> Station<'m, 'r, N> {
                 if model.object_count() > N {
                     return Err(Refusal::TooLong);
                 }
-                self.source = self.next_source.with_length(staged.length);
-                self.switched = true;
-                self.switched_to = model.checksum();
+                let opened = model.opened();
+                self.source = Source::loaded(place, staged.length);
+                self.use_model(Some(opened));
                 Ok(())
             }
             Payload::Snapshot => {
-                let recognizer = self.recognizer.as_mut().ok_or(Refusal::NoModel)?;
-                recognizer.restore(bytes).map_err(|_| Refusal::Invalid)
+                let (model, state) = (self.model().ok_or(Refusal::NoModel)?, self.state.clone());
+                let mut recognizer = Recognizer::continued(model, state.ok_or(Refusal::NoModel)?);
+                recognizer.restore(bytes).map_err(|_| Refusal::Invalid)?;
+                self.state = Some(recognizer.into_state());
+                Ok(())
             }
             _ => Err(Refusal::Unsupported),
         }
+    }
+
+    /// Takes the next part of what is arriving.
+    fn take(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+        let staged = self.staged.filter(|staged| staged.received == offset).ok_or(Refusal::OutOfOrder)?;
+        let start = usize::try_from(offset).map_err(|_| Refusal::TooLong)?;
+        let end = start.checked_add(bytes.len()).and_then(|end| u32::try_from(end).ok());
+        let received = end.filter(|&end| end <= staged.length).ok_or(Refusal::TooLong)?;
+        let place = self.next_place().ok_or(Refusal::Unwritable)?;
+        let written = self.storage.write_model(place, start, bytes);
+        self.staged = written.is_ok().then_some(Staged { received, ..staged });
+        written.map_err(|_| Refusal::Unwritable)
     }
 }
 
@@ -148,42 +253,31 @@ fn outcome(result: Result<(), Refusal>) -> Outcome {
     result.map_or_else(Outcome::Refused, |()| Outcome::Done)
 }
 
-impl<const N: usize> Device for Station<'_, '_, N> {
+impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
     fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome {
         self.push(touch, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
     }
 
     fn reset(&mut self) -> Outcome {
-        match &mut self.recognizer {
-            Some(recognizer) => {
-                recognizer.reset();
-                Outcome::Done
-            }
-            None => Outcome::Refused(Refusal::NoModel),
-        }
+        outcome(self.with(|recognizer| recognizer.reset()))
     }
 
     fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome {
-        if self.staging.is_empty() {
+        self.staged = None;
+        let room = self.storage.room();
+        outcome(if room == 0 {
             // No smaller model would fit either.
-            return Outcome::Refused(Refusal::Unsupported);
-        }
-        let fits = usize::try_from(length).is_ok_and(|length| length <= self.staging.len());
-        self.staged = fits.then_some(Staged { payload, length, checksum, received: 0 });
-        outcome(fits.then_some(()).ok_or(Refusal::TooLong))
+            Err(Refusal::Unsupported)
+        } else if usize::try_from(length).is_ok_and(|length| length <= room) {
+            self.staged = Some(Staged { payload, length, checksum, received: 0 });
+            Ok(())
+        } else {
+            Err(Refusal::TooLong)
+        })
     }
 
     fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Outcome {
-        let mut take = || {
-            let staged = self.staged.as_mut().filter(|staged| staged.received == offset).ok_or(Refusal::OutOfOrder)?;
-            let start = usize::try_from(offset).map_err(|_| Refusal::TooLong)?;
-            let end = start.checked_add(bytes.len()).ok_or(Refusal::TooLong)?;
-            let received = u32::try_from(end).ok().filter(|&end| end <= staged.length).ok_or(Refusal::TooLong)?;
-            self.staging.get_mut(start..end).ok_or(Refusal::TooLong)?.copy_from_slice(bytes);
-            staged.received = received;
-            Ok(())
-        };
-        outcome(take())
+        outcome(self.take(offset, bytes))
     }
 
     fn commit(&mut self) -> Outcome {
@@ -192,7 +286,7 @@ impl<const N: usize> Device for Station<'_, '_, N> {
     }
 
     fn model(&self) -> Option<ModelInfo> {
-        let model = self.model?;
+        let model = Self::model(self)?;
         Some(ModelInfo {
             checksum: model.checksum(),
             length: u32::try_from(model.bytes().len()).unwrap_or(u32::MAX),
@@ -202,20 +296,23 @@ impl<const N: usize> Device for Station<'_, '_, N> {
     }
 
     fn name(&self, object: u8) -> Option<&str> {
-        let model = self.model?;
-        (usize::from(object) < model.object_count()).then(|| model.object_name(usize::from(object)))
+        let object = usize::from(object);
+        let model = self.opened?.model(self.bytes_at(self.source))?;
+        (object < model.object_count()).then(|| model.object_name(object))
     }
 
     fn posterior(&self, object: u8) -> Option<u64> {
         let object = usize::from(object);
-        let known = self.model.is_some_and(|model| object < model.object_count());
-        self.recognizer.as_ref().filter(|_| known).map(|recognizer| recognizer.posterior(object).q56())
+        let known = |model: &Model<'_>, state: &State<N>| {
+            (object < model.object_count()).then(|| state.posterior(model, object).q56())
+        };
+        self.ask(known).ok()?
     }
 
     fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal> {
-        let recognizer = self.recognizer.as_ref().ok_or(Refusal::NoModel)?;
         let mut whole: SnapshotBuffer<N> = [[0; _]; N];
-        let whole = recognizer.snapshot(whole.as_flattened_mut()).map_err(|_| Refusal::TooLong)?;
+        let whole = self.ask(|model, state| state.snapshot(model, whole.as_flattened_mut()))?;
+        let whole = whole.map_err(|_| Refusal::TooLong)?;
         let rest = usize::try_from(offset).ok().and_then(|offset| whole.get(offset..)).ok_or(Refusal::OutOfOrder)?;
         let count = rest.len().min(buffer.len());
         buffer.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
@@ -227,14 +324,17 @@ impl<const N: usize> Device for Station<'_, '_, N> {
     }
 
     fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
-        let Some(records) = self.records.as_mut().filter(|records| !records.is_empty()) else { return Ok(()) };
+        if self.storage.record_length() == 0 {
+            return Ok(());
+        }
         let mut buffer: SnapshotBuffer<N> = [[0; _]; N];
-        // The evidence of the model before is none of the next one's.
-        let recognizer = self.recognizer.as_ref().filter(|_| !self.switched);
-        let evidence = recognizer.and_then(|recognizer| recognizer.snapshot(buffer.as_flattened_mut()).ok());
-        let model = if self.switched { self.switched_to } else { self.model.map_or(0, |model| model.checksum()) };
-        let evidence = evidence.unwrap_or_default();
-        let progress = progress.clone();
-        records.write(Record { counter: 0, model, source: self.source, staged: self.staged, progress, evidence })
+        let evidence = self.ask(|model, state| state.snapshot(model, buffer.as_flattened_mut()).ok());
+        let evidence = evidence.ok().flatten().unwrap_or_default();
+        let model = self.model().map_or(0, |model| model.checksum());
+        let (source, staged) = (self.source, self.staged);
+        let record = Record { model, source, staged, progress: progress.clone(), evidence };
+        self.storage.store(|bytes| postcard::to_slice(&record, bytes).ok().map(|written| written.len()))?;
+        self.kept = source;
+        Ok(())
     }
 }

@@ -158,6 +158,16 @@ impl DeviceEnd {
         announce(event, &self.progress, self.boot, &mut self.events, &mut send);
     }
 
+    /// Lets a device store what it knows, as after every command: for what it has done without one. The host is told if
+    /// that fails, once per start.
+    pub fn store(&mut self, device: &mut impl Device, mut send: impl FnMut(&[u8])) {
+        let unstored = self.statistics.unstored;
+        store(&self.progress, &mut self.statistics, device);
+        if unstored == 0 && self.statistics.unstored > 0 {
+            self.tell(Event::NotStored, &mut send);
+        }
+    }
+
     /// Waits for bytes on `transport`, and answers them there. Call it in a loop.
     ///
     /// # Errors
@@ -209,7 +219,7 @@ fn respond(
             }
             let mut buffer = [0; CHUNK];
             let answer = answer(query, progress, statistics, boot, device, &mut buffer);
-            let message = Message::Answer { tag, answer };
+            let message = Message::Answer { asker: frame.session, tag, answer };
             send(encode(&Frame { session: progress.session, message }, &mut [0; FRAME_MAX]));
         }
         Message::Command { sequence, command } => {

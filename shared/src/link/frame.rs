@@ -5,7 +5,7 @@ use crate::checksum::checksum;
 use cobs::{DecodeResult, DecoderState};
 
 /// The version of frames and messages. A frame of another version is not read.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 
 /// Version and session.
 const HEADER: usize = 5;

@@ -117,6 +117,12 @@ enum Phase {
     Doubting,
 }
 
+/// Starts of chips that a host remembers: an event may be late by as many.
+const BOOTS: usize = 8;
+
+/// From the number of a session that could not be opened to the next; odd, so that none comes again soon.
+const SESSION_STEP: u32 = 0x9e37_79b9;
+
 /// A frame in flight.
 #[derive(Clone, Copy, Debug)]
 struct Sent {
@@ -165,10 +171,9 @@ pub struct HostEnd {
     window: [Option<Sent>; WINDOW],
     question: Option<(u8, Sent)>,
     tag: u8,
-    /// The chip's boot number, and the number of its next event.
-    boot: Option<(u32, u32)>,
-    /// The boot number before: events that come with it are late.
-    previous_boot: Option<u32>,
+    /// The chip's boot number and the number of its next event, and those of its starts before, or of other chips: the
+    /// newest first.
+    boots: [Option<(u32, u32)>; BOOTS],
     last_rush: Option<(u32, u64)>,
     /// Commands answered when we asked whether the chip has forgotten them.
     doubted: u32,
@@ -189,8 +194,7 @@ impl HostEnd {
             window: [None; WINDOW],
             question: None,
             tag: 0,
-            boot: None,
-            previous_boot: None,
+            boots: [None; BOOTS],
             last_rush: None,
             doubted: 0,
             forgotten: false,
@@ -214,7 +218,7 @@ impl HostEnd {
     /// Starts opening a session; [`Incoming::Opened`] says when it is. Everything in flight is dropped.
     ///
     /// `session` is the session's number: a random one, another each time, so that no two hosts take the same. 0 counts
-    /// as 1.
+    /// as 1. Where the chip has another session by the time that it is asked to open this one, other numbers follow.
     pub fn connect(&mut self, session: u32, now: u64, mut send: impl FnMut(&[u8])) {
         self.phase = Phase::Asking;
         // 0 is the session of a chip that knows of none.
@@ -311,7 +315,9 @@ impl HostEnd {
     ) {
         self.is_alive(&frame.message);
         match frame.message {
-            Message::Answer { tag, answer } if self.question.as_ref().is_some_and(|(t, _)| *t == tag) => {
+            Message::Answer { asker, tag, answer }
+                if asker == self.session && self.question.as_ref().is_some_and(|(t, _)| *t == tag) =>
+            {
                 self.question = None;
                 self.take_answer(frame.session, answer, now, send, incoming);
             }
@@ -331,26 +337,29 @@ impl HostEnd {
             Message::Expected { .. } if self.can_ask() => {
                 self.doubt(now, send);
             }
-            Message::Event { boot, .. } if self.previous_boot == Some(boot) => self.statistics.repeated += 1,
             Message::Event { boot, sequence, event } => {
-                let known = self.boot.filter(|(known, _)| *known == boot);
-                let is_new_boot = known.is_none() && self.boot.is_some();
-                let expected = match known {
+                let known = self.boots.iter().position(|known| known.is_some_and(|(known, _)| known == boot));
+                let is_first = self.boots.iter().all(Option::is_none);
+                let expected = match known.and_then(|place| self.boots.get(place).copied().flatten()) {
                     Some((_, next)) => next,
-                    // A chip that has started counts from 0; what it said before we listened is not missed.
-                    None if is_new_boot => 0,
-                    None => sequence,
+                    // What a chip said before we listened is not missed; one that has started counts from 0.
+                    None if is_first => sequence,
+                    None => 0,
                 };
                 let missed = sequence.wrapping_sub(expected);
                 if missed >> 31 == 1 {
                     self.statistics.repeated += 1;
                     return;
                 }
-                if is_new_boot {
-                    self.previous_boot = self.boot.map(|(boot, _)| boot);
+                // A late event of a start before does not make that the newest.
+                let place = known.unwrap_or_else(|| {
+                    self.boots.rotate_right(1);
+                    0
+                });
+                if let Some(slot) = self.boots.get_mut(place) {
+                    *slot = Some((boot, sequence.wrapping_add(1)));
                 }
-                self.boot = Some((boot, sequence.wrapping_add(1)));
-                if event == Event::Started || is_new_boot {
+                if event == Event::Started || known.is_none() && !is_first {
                     // What was on its way to the chip when it was reset is gone.
                     self.send_again(self.oldest, now, send);
                     if let Some((_, question)) = &mut self.question {
@@ -398,7 +407,12 @@ impl HostEnd {
                 incoming(Incoming::Opened);
             }
             // In the second case another host opened one in the meantime, or the chip was reset.
-            (Phase::Asking | Phase::Opening, Answer::Session { boot, .. }) => {
+            (phase @ (Phase::Asking | Phase::Opening), Answer::Session { boot, .. }) => {
+                if phase == Phase::Opening {
+                    // The chip that was asked before may be another one and have opened it, or may still do so: what is
+                    // repeated there must not be a command that it expects.
+                    self.session = self.session.wrapping_add(SESSION_STEP).max(1);
+                }
                 self.phase = Phase::Opening;
                 self.put_question(Query::Open { previous: session, boot }, now, send);
             }

@@ -18,6 +18,8 @@ pub enum Message<'a> {
     },
     /// Chip: the answer to the question with this tag.
     Answer {
+        /// The session of the question's frame: that of the host that asked, whichever is open.
+        asker: u32,
         /// The question's number.
         tag: u8,
         /// The answer.
@@ -176,6 +178,7 @@ pub enum Outcome {
 
 /// Why the chip refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Refusal {
     /// There is no model yet: load one.
@@ -200,6 +203,8 @@ pub enum Refusal {
     NoPose,
     /// The model is over rows of features, not touches: not counted.
     Features,
+    /// What arrived could not be written, or was being written when the power was cut.
+    Unwritable,
 }
 
 impl Refusal {
@@ -222,6 +227,7 @@ impl core::fmt::Display for Refusal {
             Self::Pattern => "the model was not trained on touches with these contacts",
             Self::Spread => "the contacts are further apart in time than in any touch that the model was trained on",
             Self::NoPose => "the model needs the probe's pose, and the touch has none",
+            Self::Unwritable => "the chip could not write it: load it again; its memory may be worn out",
             Self::Features => "the chip's model is over rows of features, not touches",
         })
     }
@@ -237,6 +243,8 @@ pub enum Event {
     Touch {
         /// The touch.
         touch: TouchMessage,
+        /// Microseconds between the announcement of its pose and the end of the touch.
+        pose_age: Option<u32>,
         /// What is known after it.
         verdict: VerdictMessage,
     },
@@ -260,6 +268,7 @@ pub enum Event {
 
 /// What can go wrong with a chip's own fingers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FaultKind {
     /// A finger stays closed.
@@ -321,6 +330,7 @@ impl From<&TouchMessage> for Touch {
 
 /// A verdict, and what it is based on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VerdictMessage {
     /// What is known.
     pub decision: Decision,
@@ -334,6 +344,7 @@ pub struct VerdictMessage {
 
 /// What is known after a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Decision {
     /// Nothing yet.
@@ -346,6 +357,7 @@ pub enum Decision {
 
 /// Enough to see whether two recognizers agree in every bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Detail {
     /// The posterior of the best object: u64 in Q56, little endian.
     pub posterior: [u8; 8],

@@ -30,6 +30,8 @@
 //! opening cannot open again. A boot number also comes with every event: events are counted from the chip's start, and
 //! the host notices a start even if the event that announces it was lost.
 //!
+//! An answer names the session of the host that asked, so that several hosts may listen to one chip.
+//!
 //! [`DeviceEnd`] and [`HostEnd`] do this without a transport or a clock: bytes go in, bytes come out. Over an
 //! [`embedded_io`] transport: [`DeviceEnd::serve`] and [`HostEnd::exchange`].
 
@@ -56,5 +58,7 @@ pub const CHUNK: usize = 128;
 /// Posteriors in one answer.
 pub const POSTERIORS: usize = CHUNK / 8;
 
+#[cfg(test)]
+mod state_machine;
 #[cfg(test)]
 mod tests;

@@ -483,7 +483,8 @@ fn two_hosts_that_saw_the_same_session_do_not_take_each_others_outcomes() {
         talk(host, sent, &mut chip, &mut notebook);
         assert!(host.is_idle());
     }
-    assert_eq!(chip.progress().session(), 0x9abc_def0);
+    // The second one's, under the number after that which it could not open.
+    assert_eq!(chip.progress().session(), 0x9abc_def0_u32.wrapping_add(0x9e37_79b9));
     for (number, (host, sent)) in hosts.iter_mut().enumerate() {
         let touch = Command::Touch { touch: (&touch(7)).into(), detail: false };
         host.submit(touch, 0, |frame| sent.push(frame.to_vec())).unwrap();
@@ -546,14 +547,14 @@ fn frames_of_another_version_are_not_read() {
     let mut out = [0; FRAME_MAX];
     let bytes = encode(&Frame { session: 7, message: Message::Expected { sequence: 1 } }, &mut out).to_vec();
     assert!(decode(&bytes)[0].is_ok());
-    // Version 3 with a valid checksum.
-    let mut plain = vec![3, 7, 0, 0, 0, 4, 1];
+    // Version 4 with a valid checksum.
+    let mut plain = vec![4, 7, 0, 0, 0, 4, 1];
     let checksum = crate::format::checksum(&plain);
     plain.extend(checksum.to_le_bytes());
     let mut encoded = [0; 32];
     let length = cobs::encode(&plain, &mut encoded);
     encoded[length] = 0;
-    assert_eq!(decode(&encoded[..=length]), [Err(FrameError::Version(3))]);
+    assert_eq!(decode(&encoded[..=length]), [Err(FrameError::Version(4))]);
 }
 
 #[test]
@@ -566,24 +567,24 @@ fn golden_frames_pin_the_format() {
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
             &[
-                0, 3, 2, 2, 1, 1, 3, 2, 1, 3, 172, 2, 6, 240, 162, 4, 1, 1, 2, 2, 2, 3, 3, 255, 255, 1, 1, 7, 1, 1,
-                139, 169, 130, 211, 0,
+                0, 3, 3, 2, 1, 1, 3, 2, 1, 3, 172, 2, 6, 240, 162, 4, 1, 1, 2, 2, 2, 3, 3, 255, 255, 1, 1, 7, 1, 1,
+                150, 84, 55, 210, 0,
             ],
         ),
         (
             Message::Outcome { sequence: 200, outcome: Outcome::Verdict(verdict) },
             &[
-                0, 3, 2, 2, 1, 1, 26, 3, 200, 1, 1, 1, 4, 4, 17, 1, 8, 7, 6, 5, 4, 3, 2, 1, 4, 3, 2, 1, 89, 6, 221, 48,
-                0,
+                0, 3, 3, 2, 1, 1, 26, 3, 200, 1, 1, 1, 4, 4, 17, 1, 8, 7, 6, 5, 4, 3, 2, 1, 4, 3, 2, 1, 206, 160, 192,
+                215, 0,
             ],
         ),
         (
             Message::Query { tag: 5, query: Query::Open { previous: 513, boot: 7 } },
-            &[0, 3, 2, 2, 1, 1, 1, 10, 5, 1, 129, 4, 7, 21, 17, 189, 93, 0],
+            &[0, 3, 3, 2, 1, 1, 1, 10, 5, 1, 129, 4, 7, 213, 206, 51, 156, 0],
         ),
         (
-            Message::Answer { tag: 5, answer: Answer::Name("spoon") },
-            &[0, 3, 2, 2, 1, 1, 14, 1, 5, 2, 5, 115, 112, 111, 111, 110, 53, 31, 233, 22, 0],
+            Message::Answer { asker: 2, tag: 5, answer: Answer::Name("spoon") },
+            &[0, 3, 3, 2, 1, 1, 15, 1, 2, 5, 2, 5, 115, 112, 111, 111, 110, 220, 237, 239, 183, 0],
         ),
     ];
     for (message, golden) in frames {
@@ -602,8 +603,12 @@ fn decode(bytes: &[u8]) -> Vec<Result<(), FrameError>> {
 fn the_longest_messages_fit_into_a_frame() {
     let longest = [
         Message::Command { sequence: u32::MAX, command: Command::Chunk { offset: u32::MAX, bytes: &[0; CHUNK] } },
-        Message::Answer { tag: 255, answer: Answer::Snapshot { length: u32::MAX, bytes: &[255; CHUNK] } },
-        Message::Answer { tag: 255, answer: Answer::Posteriors(&[7; CHUNK]) },
+        Message::Answer {
+            asker: u32::MAX,
+            tag: 255,
+            answer: Answer::Snapshot { length: u32::MAX, bytes: &[255; CHUNK] },
+        },
+        Message::Answer { asker: u32::MAX, tag: 255, answer: Answer::Posteriors(&[7; CHUNK]) },
     ];
     for message in longest {
         let mut out = [0; FRAME_MAX];
@@ -693,4 +698,86 @@ proptest! {
         rig.send_touches(0..60);
         rig.assert_exactly_once(60);
     }
+}
+
+/// A frame as a chip would send it.
+fn from_chip(message: Message<'_>) -> Vec<u8> {
+    encode(&Frame { session: 1, message }, &mut [0; FRAME_MAX]).to_vec()
+}
+
+#[test]
+fn late_events_of_an_earlier_start_are_not_counted_twice_and_do_not_confuse_the_count() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let fault = Event::Fault { kind: FaultKind::Bouncing, finger: 2 };
+    let mut missed = Vec::new();
+    // Two starts, and between the events of the last one late copies of the first one's.
+    for (boot, sequence) in [(1, 0), (1, 1), (2, 0), (3, 0), (1, 1), (3, 1), (1, 3), (3, 2), (3, 2), (2, 2), (3, 4)] {
+        let bytes = from_chip(Message::Event { boot, sequence, event: fault });
+        rig.host.receive(
+            &bytes,
+            0,
+            |_| (),
+            |incoming| {
+                let Incoming::Event { missed: before, .. } = incoming else { panic!("{incoming:?}") };
+                missed.push((boot, sequence, before));
+            },
+        );
+    }
+    assert_eq!(
+        missed,
+        [(1, 0, 0), (1, 1, 0), (2, 0, 0), (3, 0, 0), (3, 1, 0), (1, 3, 1), (3, 2, 0), (2, 2, 1), (3, 4, 1)]
+    );
+}
+
+#[test]
+fn an_answer_to_another_hosts_question_is_not_taken_for_ones_own() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let mut tag = 0;
+    rig.host.ask(Query::Name { object: 1 }, 0, |frame| {
+        let mut decoder = Decoder::new();
+        for &byte in frame {
+            if let Some(Ok(Frame { message: Message::Query { tag: own, .. }, .. })) = decoder.feed(byte) {
+                tag = own;
+            }
+        }
+    });
+    let mut answers = Vec::new();
+    for (asker, name) in [(2, "bowl"), (1, "wristwatch")] {
+        let bytes = from_chip(Message::Answer { asker, tag, answer: Answer::Name(name) });
+        rig.host.receive(&bytes, 0, |_| (), |incoming| answers.push(std::format!("{incoming:?}")));
+    }
+    assert_eq!(answers, ["Answer(Name(\"wristwatch\"))"]);
+}
+
+#[test]
+fn a_session_that_one_chip_may_have_opened_late_is_not_opened_on_another_under_the_same_number() {
+    let mut host = HostEnd::new(HostSettings { retry: 20_000, attempts: 12 });
+    let mut chips = [1, 2].map(|boot| (DeviceEnd::new(Progress::NONE, boot), Notebook::default()));
+    let sent = core::cell::RefCell::new(Vec::new());
+    let send = |frame: &[u8]| sent.borrow_mut().extend_from_slice(frame);
+    // The frames of one side, to the other side; what that one says.
+    let say = |(end, notebook): &mut (DeviceEnd, Notebook), bytes: &[u8]| {
+        let mut said = Vec::new();
+        end.receive(bytes, notebook, |frame| said.extend_from_slice(frame));
+        said
+    };
+    host.connect(7, 0, send);
+    let answer = say(&mut chips[0], &sent.take());
+    host.receive(&answer, 0, send, |_| ());
+    // The first chip opens the session, and its answer is lost. The host is plugged into the other one and asks again.
+    let opening = sent.take();
+    say(&mut chips[0], &opening);
+    assert_eq!(chips[0].0.progress().session(), 7);
+    let answer = say(&mut chips[1], &opening);
+    host.receive(&answer, 0, send, |_| ());
+    let answer = say(&mut chips[1], &sent.take());
+    let mut opened = false;
+    host.receive(&answer, 0, send, |incoming| opened = incoming == Incoming::Opened);
+    assert!(opened);
+    host.submit(Command::Touch { touch: (&touch(0)).into(), detail: false }, 0, send).unwrap();
+    let command = sent.take();
+    say(&mut chips[1], &command);
+    // The outcome is lost; the host is plugged back and repeats the touch.
+    say(&mut chips[0], &command);
+    assert_eq!([chips[0].1.touches.len(), chips[1].1.touches.len()], [0, 1], "counted once");
 }

@@ -9,7 +9,7 @@ use cortex_m_rt::entry;
 use palpate_firmware::meter::{self, Meter};
 use palpate_firmware::{exit, fail, println, sections::Sections};
 use palpate_onboard::effector::{Edge, Effector, Finger, Geometry, Scale, Settings};
-use palpate_onboard::station::{Memory, Station, serve};
+use palpate_onboard::station::{Memory, Station, record_length, serve};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::link::{
     Command, Decoder, Detail, Device, DeviceEnd, FRAME_MAX, Frame, Message, Progress, TouchMessage, encode,
@@ -138,14 +138,14 @@ fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
 
 /// The whole program, with records.
 fn whole(meter: &mut Meter, touch: &Touch) {
-    let mut records = [[0_u8; Memory::record_length(OBJECTS)]; 2];
+    let mut records = [[0_u8; record_length(OBJECTS)]; 2];
     let [first, second] = &mut records;
     let mut run = |touches: u32| {
         first.fill(0);
         second.fill(0);
-        let memory = Memory { built_in: MODEL, models: [&mut [], &mut []], records: [first, second] };
+        let memory = Memory { models: [&mut [], &mut []], records: [first, second] };
         let mut wire = Wire { touch, touches, sequence: 0, frame: [0; FRAME_MAX], at: 0, length: 0 };
-        match serve::<OBJECTS, _>(memory, 0, &mut wire) {
+        match serve::<OBJECTS, _, _>(MODEL, memory, 0, &mut wire) {
             Ok(()) => wire.sequence,
             Err(_) => fail(),
         }

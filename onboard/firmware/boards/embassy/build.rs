@@ -1,0 +1,9 @@
+//! Hands memory.x to the linker and the model to the program.
+
+#[path = "../../image.rs"]
+mod image;
+
+fn main() -> std::io::Result<()> {
+    image::link()?;
+    image::build_in("../../../../models/household.palpate")
+}

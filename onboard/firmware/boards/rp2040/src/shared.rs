@@ -1,0 +1,150 @@
+//! What interrupts and the main loop share: the switches, what the UART has received, the alarm that wakes.
+
+use core::cell::RefCell;
+use critical_section::{CriticalSection, Mutex};
+use hal::Timer;
+use hal::fugit::ExtU32;
+use hal::gpio::bank0::{Gpio0, Gpio1, Gpio2, Gpio3, Gpio4};
+use hal::gpio::{FunctionSioInput, FunctionUart, Interrupt, Pin, PullDown, PullUp};
+use hal::pac::{self, UART0, interrupt};
+use hal::timer::{Alarm, Alarm0};
+use hal::uart::Reader;
+use heapless::Deque;
+use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
+use rp2040_hal as hal;
+
+/// A switch to ground.
+type Switch<G> = Pin<G, FunctionSioInput, PullUp>;
+/// The three switches.
+pub type Switches = (Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>);
+/// The link's wires.
+pub type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
+
+/// Bytes that may wait for the main loop: all that a host sends without an answer, 8 commands and a question.
+const WAITING: usize = 2048;
+
+/// The chip's microsecond timer.
+#[derive(Clone, Copy)]
+struct Micros(Timer);
+
+impl Clock for Micros {
+    fn micros(&self) -> u32 {
+        self.0.get_counter_low()
+    }
+}
+
+struct Shared {
+    watcher: Watcher<Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>>,
+    clock: Micros,
+    reader: Reader<UART0, Wires>,
+    received: Deque<u8, WAITING>,
+    alarm: Alarm0,
+}
+
+static SHARED: Mutex<RefCell<Option<Shared>>> = Mutex::new(RefCell::new(None));
+
+fn with<T>(act: impl FnOnce(&mut Shared) -> T) -> Option<T> {
+    critical_section::with(|cs| within(cs, act))
+}
+
+fn within<T>(cs: CriticalSection<'_>, act: impl FnOnce(&mut Shared) -> T) -> Option<T> {
+    SHARED.borrow_ref_mut(cs).as_mut().map(act)
+}
+
+/// Begins to watch and to listen.
+#[allow(unsafe_code)]
+pub fn start(switches: Switches, mut reader: Reader<UART0, Wires>, mut alarm: Alarm0, timer: Timer) {
+    for kind in [Interrupt::EdgeLow, Interrupt::EdgeHigh] {
+        switches.0.set_interrupt_enabled(kind, true);
+        switches.1.set_interrupt_enabled(kind, true);
+        switches.2.set_interrupt_enabled(kind, true);
+    }
+    reader.enable_rx_interrupt();
+    alarm.enable_interrupt();
+    let clock = Micros(timer);
+    let fingers = Fingers::new(switches.0, switches.1, switches.2, Active::Low);
+    let watcher = Watcher::start(fingers, &clock);
+    let shared = Shared { watcher, clock, reader, received: Deque::new(), alarm };
+    critical_section::with(|cs| SHARED.replace(cs, Some(shared)));
+    for interrupt in [pac::Interrupt::IO_IRQ_BANK0, pac::Interrupt::UART0_IRQ, pac::Interrupt::TIMER_IRQ_0] {
+        // SAFETY: no critical section of this program is made by masking an interrupt.
+        unsafe { pac::NVIC::unmask(interrupt) };
+    }
+}
+
+/// What the switches have to say.
+pub fn sense() -> Sensed {
+    with(|shared| shared.watcher.sense(&shared.clock)).unwrap_or(Sensed::Nothing(0))
+}
+
+/// What the UART has received; how many bytes.
+pub fn receive(buffer: &mut [u8]) -> usize {
+    let mut count = 0;
+    for slot in buffer {
+        let Some(byte) = with(|shared| shared.received.pop_front()).flatten() else { break };
+        *slot = byte;
+        count += 1;
+    }
+    count
+}
+
+/// Does something with the flash, which nothing may read meanwhile. What the switches did is found afterwards, and not
+/// taken for a contact time.
+pub fn while_nobody_looks(act: impl FnOnce()) {
+    critical_section::with(|cs| {
+        act();
+        within(cs, |shared| shared.watcher.interrupt_late(&shared.clock));
+    });
+}
+
+/// Sleeps until an interrupt, or until `due` of [`ProbeStation`](palpate_onboard::station::ProbeStation) says.
+pub fn sleep(due: impl FnOnce(u32) -> Option<u32>) {
+    critical_section::with(|cs| {
+        let busy = within(cs, |shared| {
+            // At least once per second, and never so soon that the alarm is missed.
+            let due = due(shared.clock.micros()).unwrap_or(u32::MAX).clamp(20, 1_000_000);
+            let set = shared.alarm.schedule(due.micros()).is_ok();
+            !(set && shared.watcher.is_idle() && shared.received.is_empty())
+        });
+        // With interrupts held back none can come between the look and the sleep; a pending one ends the sleep.
+        if busy == Some(false) {
+            cortex_m::asm::wfi();
+        }
+    });
+}
+
+/// One of the switches has opened or closed.
+#[interrupt]
+fn IO_IRQ_BANK0() {
+    with(|shared| {
+        // First the cause, then the levels: an edge in between comes back as an interrupt.
+        let (first, middle, last) = shared.watcher.pins();
+        for kind in [Interrupt::EdgeLow, Interrupt::EdgeHigh] {
+            first.clear_interrupt(kind);
+            middle.clear_interrupt(kind);
+            last.clear_interrupt(kind);
+        }
+        shared.watcher.interrupt(&shared.clock);
+    });
+}
+
+/// The UART's FIFO, which holds 2.8 ms, has something to take: also while the main loop sends, or works.
+#[interrupt]
+fn UART0_IRQ() {
+    with(|shared| {
+        let mut buffer = [0; 32];
+        // What was garbled on the way is missing, and the host sends it again.
+        while let Ok(count) = shared.reader.read_raw(&mut buffer) {
+            for byte in buffer.iter().take(count) {
+                // No host that keeps to the window sends more.
+                let _ = shared.received.push_back(*byte);
+            }
+        }
+    });
+}
+
+/// It is time to wake.
+#[interrupt]
+fn TIMER_IRQ_0() {
+    with(|shared| shared.alarm.clear_interrupt());
+}

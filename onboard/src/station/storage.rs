@@ -1,0 +1,75 @@
+//! What a station keeps through resets and power cuts, wherever that is.
+
+use palpate_shared::link::NotStored;
+
+/// One of the two places for models: one in use, the other being filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The first.
+    First,
+    /// The second.
+    Second,
+}
+
+/// What a station keeps through resets and power cuts: [`Memory`](super::Memory) in RAM or FRAM,
+/// [`FlashStorage`](super::FlashStorage) in flash, or [`NoStorage`].
+///
+/// The power may go at any moment of any call; what was there before the call has to be there after it, or what the call
+/// was to write.
+pub trait Storage {
+    /// Bytes of each place for models; 0 where no model can be loaded.
+    fn room(&self) -> usize;
+
+    /// All bytes of a place for models, to be read in place.
+    fn model(&self, place: Place) -> &[u8];
+
+    /// Writes part of a model. Parts come in order from 0 on, each at a multiple of [`CHUNK`](palpate_shared::link::CHUNK)
+    /// bytes; the last part that came may come again after a power cut.
+    ///
+    /// # Errors
+    /// [`NotStored`]: what is there now is not what was given. Nobody asks for it then.
+    fn write_model(&mut self, place: Place, offset: usize, bytes: &[u8]) -> Result<(), NotStored>;
+
+    /// The most bytes of a record, see [`record_length`](super::record_length); 0 where nothing is kept.
+    fn record_length(&self) -> usize;
+
+    /// The newest whole record, and how many were written up to it.
+    fn newest(&self) -> Option<(u32, &[u8])>;
+
+    /// Keeps another record: `fill` writes it and returns its length, or `None` where it does not fit. Once this has
+    /// returned, [`Storage::newest`] returns the record, also after a power cut.
+    ///
+    /// # Errors
+    /// [`NotStored`]: the newest record is the one from before.
+    fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored>;
+}
+
+/// Keeps nothing: every start is the first, and no model can be loaded.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoStorage;
+
+impl Storage for NoStorage {
+    fn room(&self) -> usize {
+        0
+    }
+
+    fn model(&self, _: Place) -> &[u8] {
+        &[]
+    }
+
+    fn write_model(&mut self, _: Place, _: usize, _: &[u8]) -> Result<(), NotStored> {
+        Err(NotStored)
+    }
+
+    fn record_length(&self) -> usize {
+        0
+    }
+
+    fn newest(&self) -> Option<(u32, &[u8])> {
+        None
+    }
+
+    fn store(&mut self, _: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored> {
+        Ok(())
+    }
+}
