@@ -21,6 +21,7 @@ const CONTACTS: Trained = Trained {
         largest_spread: 1_000_000,
     }),
     noise: None,
+    shares: None,
 };
 
 fn model(seed: u64) -> Vec<u8> {
