@@ -99,7 +99,11 @@ fn varied_objects_are_closed_and_right_side_out_and_never_the_same() {
             let name = format!("{} with seed {seed}", object.name);
             assert_closed(&name, varied.mesh());
             assert_eq!(pieces(varied.mesh()), 1, "{name}");
-            assert!((5_000..=70_000).contains(&varied.mesh().triangles.len()), "{name}: {}", varied.mesh().triangles.len());
+            assert!(
+                (5_000..=70_000).contains(&varied.mesh().triangles.len()),
+                "{name}: {}",
+                varied.mesh().triangles.len()
+            );
             let size = volume(varied.mesh());
             assert!(size > 0.3 * volumes[0] && size < 3.0 * volumes[0], "{name}: {size}, canonical {}", volumes[0]);
             assert!(volumes.iter().all(|other| (size / other - 1.0).abs() > 1e-4), "{name} is the same as another");
