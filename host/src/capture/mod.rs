@@ -154,7 +154,7 @@ fn entry(object: &Object, origin: &Origin) -> Entry {
 }
 
 /// The scenes of each object's instances, built side by side.
-fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
+pub(crate) fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
     let scene = |(object, instance): (&Object, &Instance)| {
         progress::check(progress)?;
         let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
@@ -596,5 +596,61 @@ mod tests {
             text(&Origin { approaches: true, seed: 7, ..Origin::default() }, 0..4),
             "0.110923 0.000000 -\n- - -\n- - 0.000000\n0.000000 0.028569 0.057137\n"
         );
+    }
+
+    fn instance(name: &str, rings: u32) -> Instance {
+        Instance { name: name.into(), mesh: Mesh::globe(rings) }
+    }
+
+    #[test]
+    fn touches_of_an_object_are_of_its_instances_in_turn() {
+        let two = Object::of_instances("globe", vec![instance("fine", 12), instance("coarse", 3)]).unwrap();
+        let origin = origin(300);
+        let scenes = scenes(&[&two], &origin, &()).unwrap();
+        let both = Sampler::of_instances(&scenes[0], "globe", &origin);
+        let alone = [0, 1].map(|turn| Sampler::new(&scenes[0][turn], "globe", &origin));
+        for index in 0..100 {
+            assert_eq!(both.sample(index).unwrap(), alone[index as usize % 2].sample(index).unwrap());
+        }
+        let directory = tempfile::tempdir().unwrap();
+        let disc = objects().remove(0);
+        capture(&[two, disc], &with(origin), directory.path(), &()).unwrap();
+        let listing = Listing::read(directory.path()).unwrap().unwrap();
+        assert_eq!(listing.objects[1].instances, ["fine", "coarse"]);
+        assert!(listing.objects[0].instances.is_empty());
+        assert_eq!(Dataset::read(directory.path()).unwrap().len(), 600);
+    }
+
+    #[test]
+    fn an_object_at_its_true_size_is_scaled_to_millimeters() {
+        let unit = Length::Millimeter;
+        let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 10.0 };
+        let origin = Origin { unit, probe, ..origin(50) };
+        let mut object = Object::new("globe", Mesh::globe(12));
+        let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem().cloned();
+        let unknown = problem(scenes(&[&object], &origin, &()));
+        assert_eq!(unknown, Some(Problem::Capture(CaptureProblem::NoTrueSize { name: "globe".into() })));
+        // Meters: about two of them.
+        object.millimeters = Some(1_000.0);
+        let [low, high] = scenes(&[&object], &origin, &()).unwrap()[0][0].bounds();
+        assert!((1_900.0..2_300.0).contains(&(high - low).max_element()), "{low} {high}");
+        // As where an object is 10 units long: half of the longest side.
+        assert_eq!(origin.clearance([low, high]), (high - low).max_element() / 2.0);
+        object.millimeters = Some(1.0);
+        let [low, high] = scenes(&[&object], &origin, &()).unwrap()[0][0].bounds();
+        assert_eq!(origin.clearance([low, high]), 16.5, "a probe that is larger than the object");
+    }
+
+    #[test]
+    fn at_ten_units_a_side_true_size_is_the_normalized_one() {
+        let mut object = Object::new("globe", Mesh::globe(12));
+        let [low, high] = object.mesh().bounds();
+        object.millimeters = Some(10.0 / f64::from((high - low).max_element()));
+        let touches = |unit| {
+            let origin = Origin { unit, ..origin(100) };
+            let scenes = scenes(&[&object], &origin, &()).unwrap();
+            touches(&scenes[0][0], "globe", &origin, 0..100).unwrap()
+        };
+        assert_eq!(touches(Length::Millimeter), touches(Length::Tenth));
     }
 }

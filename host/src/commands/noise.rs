@@ -5,7 +5,6 @@ use crate::touches::noise::{Deviation, Noise, quantity};
 
 /// The noise options. `bias` is what all touches of one robot share; everything else differs from touch to touch.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Noise")]
 pub(crate) struct NoiseArguments {
     /// Gaussian noise on every contact time: its standard deviation, such as 5ms, or a range that each touch draws it from, such as 0..10ms
     #[arg(long, value_parser = quantity_of::<Deviation>, value_name = "DURATION[..DURATION]")]

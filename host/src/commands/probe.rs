@@ -56,7 +56,7 @@ pub(crate) struct SizeArguments {
     /// The unit of the meshes: mm, cm, m or in; for one object NAME=cm; may be given several times
     #[arg(long, value_name = "[NAME=]mm|cm|m|in", value_parser = mesh_unit, requires = "true_size")]
     unit: Vec<(Option<String>, f64)>,
-    /// Objects with several meshes: of a directory inside a directory each mesh is an instance; with a number, so many varied instances of each built-in object
+    /// Objects with several meshes: of a directory inside a directory each mesh is an instance; with a number N, each built-in object has N varied instances
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "0", value_parser = instances)]
     instances: Option<usize>,
 }

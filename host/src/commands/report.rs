@@ -1,9 +1,11 @@
 use super::noise::NoiseArguments;
+use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::shell;
 use crate::Result;
 use crate::output::{print, print_json, refuse_stdout};
 use crate::report::{self, Existing, Settings};
+use crate::touches::Origin;
 use crate::touches::noise::Noise;
 use std::path::PathBuf;
 
@@ -13,6 +15,8 @@ Examples:
   palpate report                    the built-in objects, in about ten minutes
   palpate report --quick -o quick   fewer touches, in half a minute
   palpate report meshes/ -o report  your own OBJ files
+  palpate report meshes/ --true-size --unit mm --probe probe.toml
+                                    objects as large as they are, and your probe
   palpate report --noise 0..10ms    with our robust model trained for this noise
   palpate report --resume           continue an interrupted report")]
 pub(crate) struct Arguments {
@@ -41,20 +45,30 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    size: SizeArguments,
+    #[command(flatten)]
     noise: NoiseArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { sources, output, seed, quick, growth, resume, force, json, noise } = arguments;
+    let Arguments { sources, output, seed, quick, growth, resume, force, json, size, noise } = arguments;
     refuse_stdout(&output)?;
-    let command = command(&sources, seed, quick, growth, &noise);
+    let command = command(&sources, seed, quick, growth, &[size.words(), noise.words()].concat());
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
     let growth = settings.growth || growth;
-    let noise = if noise.is_given() { noise.over(Noise::default()) } else { settings.noise };
+    refuse_unstated(&size)?;
+    let capture = size.origin(Origin::default())?;
+    let real = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
+    let noise = match real {
+        Some(real) => noise.over(real),
+        None if noise.is_given() => noise.over(Noise::default()),
+        None => settings.noise,
+    };
     noise.check()?;
-    let settings = Settings { command, growth, noise, ..settings };
+    let settings = Settings { command, growth, noise, capture, ..settings };
+    let objects = || size.objects(&settings.sources, seed);
     let existing = Existing { resume, replace: force };
-    let written = report::report(&settings, &output, existing, &Bar::new())?;
+    let written = report::report_on(&objects, &settings, &output, existing, &Bar::new())?;
     if json {
         return print_json(&written.summary);
     }
@@ -64,12 +78,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 }
 
 /// The command that makes this report again, wherever it is written.
-fn command(sources: &[String], seed: u64, quick: bool, growth: bool, noise: &NoiseArguments) -> String {
+fn command(sources: &[String], seed: u64, quick: bool, growth: bool, more: &[String]) -> String {
     let seed = seed.to_string();
     let words = ["palpate", "report"].into_iter().chain(sources.iter().map(String::as_str)).chain(["--seed", &seed]);
-    let noise = noise.words();
     let switches = quick.then_some("--quick").into_iter().chain(growth.then_some("--growth"));
-    shell::command(words.chain(switches).chain(noise.iter().map(String::as_str)))
+    shell::command(words.chain(switches).chain(more.iter().map(String::as_str)))
 }
 
 #[cfg(test)]
@@ -78,13 +91,10 @@ mod tests {
 
     #[test]
     fn the_command_of_a_report_makes_it_again() {
+        assert_eq!(command(&["builtin".into()], 1, false, false, &[]), "palpate report builtin --seed 1");
         assert_eq!(
-            command(&["builtin".into()], 1, false, false, &NoiseArguments::default()),
-            "palpate report builtin --seed 1"
-        );
-        assert_eq!(
-            command(&["my meshes".into(), "cup.obj".into()], 2, true, true, &NoiseArguments::default()),
-            "palpate report 'my meshes' cup.obj --seed 2 --quick --growth"
+            command(&["my meshes".into(), "cup.obj".into()], 2, true, true, &["--noise".into(), "0ms..5ms".into()]),
+            "palpate report 'my meshes' cup.obj --seed 2 --quick --growth --noise 0ms..5ms"
         );
     }
 }

@@ -55,9 +55,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let origin = size.origin(Origin { length: *length, ..Origin::default() })?;
     refuse_unstated(size)?;
     let object = size.object(&arguments.object)?;
-    let [first, ..] = &object.instances().collect::<Vec<_>>()[..] else { unreachable!("an object has an instance") };
     let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
-    let length = origin.length_of(&object, first).ok_or_else(unknown)?;
+    let length = object.instances().next().and_then(|first| origin.length_of(&object, first)).ok_or_else(unknown)?;
     let probe = Probe {
         radius: radius.unwrap_or(origin.probe.radius),
         spacing: spacing.unwrap_or(origin.probe.spacing),

@@ -1,12 +1,12 @@
 //! A model's margins for every test touch, computed once.
 
 use crate::compile;
-use crate::ensemble::{Ensemble, feature_row};
+use crate::ensemble::{Ensemble, StatedProbe, feature_row};
 use crate::error::{EvaluateProblem, Result};
 use crate::random::{self, Purpose};
 use crate::touches::Dataset;
 use palpate_onboard::{Model, Refused};
-use palpate_shared::format::TrainedTouches;
+use palpate_shared::format::{TrainedProbe, TrainedTouches};
 use palpate_shared::{Descriptor, Touch};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -71,6 +71,14 @@ impl Candidate<'_> {
         }
     }
 
+    /// The probe that the model states, if it states one.
+    pub fn probe(&self) -> Option<TrainedProbe> {
+        match self {
+            Self::Full(ensemble) => ensemble.origin.probe.as_ref().map(StatedProbe::trained),
+            Self::Compiled(model) => model.probe(),
+        }
+    }
+
     fn objects(&self) -> Vec<String> {
         match self {
             Self::Full(ensemble) => ensemble.objects.clone(),
@@ -85,6 +93,7 @@ impl<'m> Margins<'m> {
     /// model may know more.
     ///
     /// # Errors
+    /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if model and data set state different probes;
     /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
@@ -94,6 +103,9 @@ impl<'m> Margins<'m> {
         let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
             return Err(EvaluateProblem::NoPose { descriptor }.into());
+        }
+        if let Some((model, data)) = candidate.probe().zip(StatedProbe::of(dataset)) {
+            StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
         }
         let tested = dataset.objects.iter().map(|touched| {
             let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: objects.clone() };

@@ -7,7 +7,7 @@
 use super::results::json;
 use crate::chip::instructions::Chip;
 use crate::error::{Error, Result};
-use crate::mesh::Object;
+use crate::mesh::{Instance, Object};
 use crate::output::write_json;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -131,10 +131,14 @@ fn key(settings: &impl Serialize, objects: &[Object], surroundings: &Surrounding
     for object in objects {
         digest.update(&(object.name.len() as u64).to_le_bytes());
         digest.update(object.name.as_bytes());
-        digest.update(&(object.mesh().vertices.len() as u64).to_le_bytes());
-        object.mesh().vertices.iter().flatten().for_each(|c| digest.update(&c.to_le_bytes()));
-        digest.update(&(object.mesh().triangles.len() as u64).to_le_bytes());
-        object.mesh().triangles.iter().flatten().for_each(|i| digest.update(&i.to_le_bytes()));
+        digest.update(&object.millimeters.unwrap_or_default().to_le_bytes());
+        digest.update(&(object.instances().len() as u64).to_le_bytes());
+        for Instance { mesh, .. } in object.instances() {
+            digest.update(&(mesh.vertices.len() as u64).to_le_bytes());
+            mesh.vertices.iter().flatten().for_each(|c| digest.update(&c.to_le_bytes()));
+            digest.update(&(mesh.triangles.len() as u64).to_le_bytes());
+            mesh.triangles.iter().flatten().for_each(|i| digest.update(&i.to_le_bytes()));
+        }
     }
     Ok(digest.finalize())
 }

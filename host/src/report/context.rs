@@ -2,7 +2,7 @@
 
 use super::cache::Cache;
 use super::settings::Settings;
-use crate::capture::Sampler;
+use crate::capture::{self, Sampler};
 use crate::compile;
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
@@ -24,7 +24,8 @@ pub(super) struct Context<'a> {
     pub(super) objects: &'a [Object],
     pub(super) cache: &'a Cache,
     pub(super) progress: &'a dyn Progress,
-    scenes: Vec<Scene>,
+    /// Those of each object's instances.
+    scenes: Vec<Vec<Scene>>,
     captured: OnceCell<Captured>,
     first: OnceCell<Split>,
     models: OnceCell<Models>,
@@ -56,8 +57,7 @@ impl<'a> Context<'a> {
         cache: &'a Cache,
         progress: &'a dyn Progress,
     ) -> Result<Self> {
-        let length = Origin::default().length;
-        let scenes = objects.par_iter().map(|object| Scene::new(object.mesh(), length)).collect::<Result<_>>()?;
+        let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &settings.capture, progress)?;
         let (captured, first, models, kinds) = Default::default();
         Ok(Self { settings, objects, cache, progress, scenes, captured, first, models, kinds })
     }
@@ -68,8 +68,11 @@ impl<'a> Context<'a> {
             let began = Instant::now();
             let touched = self.touch(self.settings.touches, self.settings.seed)?;
             let (objects, approaches) = touched.into_iter().unzip();
-            let origin =
-                Origin { touches: self.settings.touches as u64, seed: self.settings.seed, ..Origin::default() };
+            let origin = Origin {
+                touches: self.settings.touches as u64,
+                seed: self.settings.seed,
+                ..self.settings.capture.clone()
+            };
             let data = Dataset { origin: Some(origin), ..Dataset::new(objects) };
             Ok(Captured { data, approaches, seconds: began.elapsed().as_secs_f64() })
         })
@@ -78,7 +81,8 @@ impl<'a> Context<'a> {
     /// `count` full touches of each object, and the approaches that they took.
     pub(super) fn touch(&self, count: usize, seed: u64) -> Result<Vec<(ObjectTouches, u64)>> {
         self.progress.begin("touching", Some((count * self.objects.len()) as u64));
-        let one = |(object, scene): (&Object, &Scene)| touch(scene, &object.name, count, seed, self.progress);
+        let origin = Origin { seed, ..self.settings.capture.clone() };
+        let one = |(object, scenes): (&Object, &Vec<Scene>)| touch(scenes, &object.name, count, &origin, self.progress);
         self.objects.iter().zip(&self.scenes).map(one).collect()
     }
 
@@ -166,9 +170,9 @@ impl<'a> Context<'a> {
         train::Settings { noise: self.settings.noise, ..self.ours() }
     }
 
-    /// The objects, ready to be touched.
-    pub(super) fn scenes(&self) -> &[Scene] {
-        &self.scenes
+    /// The objects, ready to be touched; of each its first instance.
+    pub(super) fn scenes(&self) -> Vec<&Scene> {
+        self.scenes.iter().filter_map(|scenes| scenes.first()).collect()
     }
 
     /// The objects' names.
@@ -180,19 +184,18 @@ impl<'a> Context<'a> {
 /// Touches between two looks at the progress.
 const CHUNK: usize = 1_000;
 
-/// `count` full touches of a scene, and the approaches that they took.
+/// `count` full touches of an object's scenes, and the approaches that they took.
 ///
 /// # Errors
 /// If the object cannot be touched with three fingers, or the report was cancelled.
 pub(super) fn touch(
-    scene: &Scene,
+    scenes: &[Scene],
     name: &str,
     count: usize,
-    seed: u64,
+    origin: &Origin,
     progress: &dyn Progress,
 ) -> Result<(ObjectTouches, u64)> {
-    let origin = Origin { seed, ..Origin::default() };
-    let sampler = Sampler::new(scene, name, &origin);
+    let sampler = Sampler::of_instances(scenes, name, origin);
     let chunk = |chunk: usize| -> Result<Vec<(Touch, u64)>> {
         let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
         progress::advance(progress, indices.len() as u64)?;

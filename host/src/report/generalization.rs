@@ -82,10 +82,10 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
 }
 
 fn touched(context: &Context, objects: &[Object], count: usize) -> Result<Dataset> {
-    let length = Origin::default().length;
+    let origin = Origin { seed: context.settings.seed, ..Origin::default() };
     let one = |object: &Object| {
-        let scene = Scene::new(object.mesh(), length)?;
-        Ok(touch(&scene, &object.name, count, context.settings.seed, context.progress)?.0)
+        let scene = Scene::new(object.mesh(), origin.length)?;
+        Ok(touch(&[scene], &object.name, count, &origin, context.progress)?.0)
     };
     let mut objects: Vec<ObjectTouches> = objects.iter().map(one).collect::<Result<_>>()?;
     objects.sort_by(|a, b| a.name.cmp(&b.name));

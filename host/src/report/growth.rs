@@ -75,11 +75,11 @@ pub(super) fn measure(context: &Context) -> Result<Growth> {
 
 fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
     let settings = context.settings;
-    let length = Origin::default().length;
+    let origin = Origin { seed: settings.seed, ..Origin::default() };
     let began = Instant::now();
     let touched = objects.iter().map(|object| {
-        let scene = Scene::new(object.mesh(), length)?;
-        Ok(touch(&scene, &object.name, settings.growth_touches, settings.seed, context.progress)?.0)
+        let scene = Scene::new(object.mesh(), origin.length)?;
+        Ok(touch(&[scene], &object.name, settings.growth_touches, &origin, context.progress)?.0)
     });
     let mut data = Dataset::new(touched.collect::<Result<_>>()?);
     let capture = began.elapsed().as_secs_f64();
@@ -107,11 +107,12 @@ fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
 fn triangles_cost(context: &Context, count: usize) -> Result<Triangles> {
     let mesh = Mesh::globe((count as f64 / 4.0).sqrt().round() as u32);
     let began = Instant::now();
-    let scene = Scene::new(&mesh, Origin::default().length)?;
+    let origin = Origin { seed: context.settings.seed, ..Origin::default() };
+    let scene = Scene::new(&mesh, origin.length)?;
     let build = began.elapsed().as_secs_f64();
     let touches = if context.settings.quick { 5_000 } else { 40_000 };
     let began = Instant::now();
-    let (_, approaches) = touch(&scene, "globe", touches, context.settings.seed, context.progress)?;
+    let (_, approaches) = touch(&[scene], "globe", touches, &origin, context.progress)?;
     let seconds = began.elapsed().as_secs_f64();
     Ok(Triangles { count: mesh.triangles.len(), build, approaches: approaches as f64 / seconds })
 }

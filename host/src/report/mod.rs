@@ -28,4 +28,4 @@ pub(crate) mod statistics;
 pub mod view;
 
 pub use settings::Settings;
-pub use stages::{Existing, Report, report};
+pub use stages::{Existing, Report, report, report_on};

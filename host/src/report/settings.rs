@@ -1,5 +1,6 @@
 //! How much of everything a report measures.
 
+use crate::touches::Origin;
 use crate::touches::noise::Noise;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,9 @@ pub struct Settings {
     pub seed: u64,
     /// Fewer folds, levels and touches; the same figures.
     pub quick: bool,
+    /// How objects are touched: the probe, and the unit of its lengths. How many touches and from which seed say the
+    /// settings beside it. Growth and generalization use the published probe.
+    pub capture: Origin,
     /// Full touches captured of each object.
     pub touches: usize,
     /// Folds that the touches are divided into.
@@ -64,6 +68,7 @@ impl Settings {
             command: String::new(),
             seed,
             quick: false,
+            capture: Origin::default(),
             touches: 21_000,
             folds: 10,
             folds_used: 10,

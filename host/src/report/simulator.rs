@@ -45,7 +45,7 @@ struct Cast {
 /// Casts fingers at the objects, every sixth so that it grazes.
 pub(super) fn measure(context: &Context) -> Result<Vec<Engine>> {
     let count = if context.settings.quick { 90 } else { 600 };
-    let probe = Probe::default();
+    let probe = context.settings.capture.probe;
     let scenes = context.scenes();
     let casts: Vec<Vec<Cast>> = scenes
         .iter()

@@ -11,7 +11,7 @@ use crate::capture;
 use crate::compile;
 use crate::ensemble::train;
 use crate::error::{ReportProblem, Result};
-use crate::mesh::source;
+use crate::mesh::{Object, source};
 use crate::output::write_json;
 use crate::page::document::{Page, Section};
 use crate::progress::{self, Progress};
@@ -71,12 +71,27 @@ impl Stages<'_> {
 /// [`ReportProblem::OtherResults`] for a directory that holds other results, unless [`Existing::replace`];
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn report(settings: &Settings, directory: &Path, existing: Existing, progress: &dyn Progress) -> Result<Report> {
+    report_on(&|| source::objects(&settings.sources), settings, directory, existing, progress)
+}
+
+/// The same on the objects that `objects` gives, whatever the settings' sources are, such as objects with several
+/// instances or at their true size. They are to be sorted by name.
+///
+/// # Errors
+/// As [`report`] and `objects`.
+pub fn report_on(
+    objects: &dyn Fn() -> Result<Vec<Object>>,
+    settings: &Settings,
+    directory: &Path,
+    existing: Existing,
+    progress: &dyn Progress,
+) -> Result<Report> {
     // The command makes no difference to the results.
     let made_from = json!({ "job": "report", "settings": Settings { command: String::new(), ..settings.clone() } });
     if !existing.replace {
         results::refuse_others(directory, &made_from, &["index.html"], cache::DIRECTORY)?;
     }
-    let objects = source::objects(&settings.sources)?;
+    let objects = objects()?;
     if objects.len() < 2 {
         return Err(ReportProblem::OneObject.into());
     }

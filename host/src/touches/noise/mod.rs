@@ -99,7 +99,7 @@ impl FromStr for Deviation {
     fn from_str(text: &str) -> Result<Self, TouchesProblem> {
         let problem = || TouchesProblem::BadQuantity {
             text: text.into(),
-            example: "a duration such as 5ms, or a range such as 0..10ms",
+            example: "a duration with its unit such as 5ms, or a range such as 0..10ms",
         };
         let Some((least, largest)) = text.split_once("..") else {
             return quantity::duration(text).map(Self::from).map_err(|_| problem());
