@@ -6,6 +6,7 @@ use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
+use crate::probe::approach::Aim;
 use crate::tune::probe::{Design, Trial};
 
 /// The page. `command` is what remakes it.
@@ -14,7 +15,7 @@ use crate::tune::probe::{Design, Trial};
 /// If a chart cannot be drawn.
 pub(crate) fn page(design: &Design, command: &str) -> Result<Page> {
     let mut result = Section::new("result", "The result");
-    result.text(assumed(design)).table(compared(design, command));
+    result.text(assumed(design)).table(compared(design, command)).table(by_aim(design, command));
     let mut trade = Section::new("spacing", "What another spacing costs");
     trade.figure(by_spacing(design, command)?);
     let mut tried = Section::new("tried", "What was tried");
@@ -22,7 +23,7 @@ pub(crate) fn page(design: &Design, command: &str) -> Result<Page> {
     Ok(Page {
         title: "Which probe to build".into(),
         summary: format!(
-            "{}: {} approaches to {} % errors, against {} with the published probe. Lengths are in units: a tenth of the \
+            "{}: {} approaches to {}\u{a0}% errors, against {} with the published probe. Lengths are in units: a tenth of the \
              object's longest side.",
             described(&design.best),
             approaches(&design.best),
@@ -113,7 +114,7 @@ fn row(name: &str, trial: &Trial) -> Vec<Cell> {
 }
 
 fn compared(design: &Design, command: &str) -> Table {
-    let mut data = Records::new(COLUMNS);
+    let mut data = Records::new(std::iter::once("probe").chain(COLUMNS.into_iter().skip(1)));
     data.push(row("best", &design.best));
     data.push(row("published", &design.published));
     Table {
@@ -122,6 +123,25 @@ fn compared(design: &Design, command: &str) -> Table {
         caption:
             "Approaches to a verdict on average, with the standard error of the drawing of sequences; the shares of \
                   wrong verdicts and of sequences without one; the share of approaches with each contact pattern."
+                .into(),
+        command: command.into(),
+        data,
+    }
+}
+
+/// The best of the first round for each aim: what it is worth to know where the object's middle is.
+fn by_aim(design: &Design, command: &str) -> Table {
+    let mut data = Records::new(COLUMNS);
+    let round = design.rounds.first().map_or(&[][..], Vec::as_slice);
+    let of = |aim: Aim| round.iter().find(|trial| trial.aim == aim);
+    Aim::ALL.into_iter().filter_map(of).for_each(|trial| data.push(row("coarse", trial)));
+    Table {
+        id: "aims".into(),
+        title: "What it is worth to aim".into(),
+        caption:
+            "The best probe of the coarse round for each aim: box is anywhere in the bounding box, middle the box of \
+                  half its sides, mass a box of a quarter of them about the surface's center of mass. A robot that \
+                  cannot aim well should search with --aim box."
                 .into(),
         command: command.into(),
         data,

@@ -1,6 +1,6 @@
 //! Which probe to build: the spacing, radius and tilt, and the aim of approaches, that need the fewest approaches.
 //!
-//! Every probe tried touches the objects anew in the simulator; a model is trained on these approaches and tested on
+//! Every probe tried touches the objects in the simulator; a model is trained on these approaches and tested on
 //! others, with the stopping rule set so that the share of wrong verdicts is the one asked for. What counts is how many approaches that takes on average. The search narrows down: a coarse grid with a quarter of the approaches
 //! per object; the best of it and what lies between them with half; and, with all of them, every spacing at the best
 //! radius, tilt and aim.

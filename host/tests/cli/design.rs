@@ -16,9 +16,9 @@ const QUICK: [&str; 17] = [
     "--aim",
     "box",
     "--approaches",
-    "400",
+    "200",
     "--sequences",
-    "50",
+    "30",
     "--error-rate",
     "5%",
     "-o",
@@ -84,7 +84,7 @@ fn a_probe_design_that_cannot_be_says_which_option_is_wrong() {
 fn a_capture_aims_where_it_is_told_and_its_data_set_says_so() {
     let directory = tempfile::tempdir().unwrap();
     let capture = |name: &str, more: &[&str]| {
-        let words = ["capture", "fork", "bowl", "--touches", "400", "--approaches", "-o", name];
+        let words = ["capture", "fork", "bowl", "--touches", "200", "--approaches", "-o", name];
         stdout(command(words.iter().chain(more)).current_dir(directory.path()).output().unwrap());
         let read = |file: &str| std::fs::read_to_string(directory.path().join(name).join(file)).unwrap();
         let touched = read("fork.txt").lines().filter(|line| *line != "- - -").count();
