@@ -119,6 +119,8 @@ pub struct Interrupt(u16);
 pub const LINK_RECEIVED: Interrupt = Interrupt(0);
 /// The UART over which a host plays the pins has received a byte.
 pub const PINS_RECEIVED: Interrupt = Interrupt(2);
+/// The first timer is at 0.
+pub const TIMER: Interrupt = Interrupt(8);
 /// A pin has changed: the first GPIO port's combined interrupt.
 pub const PIN_CHANGED: Interrupt = Interrupt(6);
 
@@ -134,6 +136,22 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Interrupt {
     fn number(self) -> u16 {
         self.0
     }
+}
+
+/// Lets the timer interrupt once, after `cycles`.
+pub fn set_timer(cycles: u32) {
+    const BASE: usize = 0x4000_0000;
+    let (control, value_now, reload, clear) = (0x0, 0x4, 0x8, 0xc);
+    for (register, value) in [(control, 0), (clear, 1), (reload, cycles), (value_now, cycles), (control, 0b1001)] {
+        // SAFETY: the machine's CMSDK timer has these registers, any value may be written, and it reaches no memory.
+        unsafe { write_volatile((BASE + register) as *mut u32, value) };
+    }
+}
+
+/// Lets this interrupt, and no other that was not given this, be interrupted by others.
+pub fn yield_to_others(interrupt: Interrupt) {
+    // SAFETY: no critical section of the images is made by priorities. Nobody else holds the NVIC.
+    unsafe { cortex_m::Peripherals::steal().NVIC.set_priority(interrupt, 0xc0) };
 }
 
 /// Lets an interrupt come.

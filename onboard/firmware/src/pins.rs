@@ -75,34 +75,53 @@ fn with<T>(act: impl FnOnce(&mut Watcher<Pin, Pin, Pin>) -> T) -> Option<T> {
     critical_section::with(|cs| WATCHER.borrow_ref_mut(cs).as_mut().map(act))
 }
 
-/// The host's hand on the pins.
-pub struct Player {
+/// The host's hand on the pins, which moves in a timer's interrupt: at any instruction of the main loop, and of the pin
+/// interrupt, which it may interrupt.
+struct Player {
     uart: Uart,
     received: [u8; 6],
     count: usize,
+    random: u32,
 }
 
-impl Default for Player {
-    fn default() -> Self {
-        Self::new()
+static PLAYER: Mutex<RefCell<Option<Player>>> = Mutex::new(RefCell::new(None));
+
+/// Begins to play.
+pub fn play() {
+    let player = Player { uart: Uart::take(Port::Pins), received: [0; 6], count: 0, random: 1 };
+    critical_section::with(|cs| PLAYER.replace(cs, Some(player)));
+    chip::yield_to_others(PIN_CHANGED);
+    chip::unmask(chip::TIMER);
+    chip::set_timer(1_000);
+}
+
+/// The timer's interrupt: one edge.
+pub fn tick() {
+    // The pin interrupt comes soon after an edge; edges are further apart than that. And a main loop that has fallen
+    // behind catches up between touches.
+    let busy = NVIC::is_pending(PIN_CHANGED) || with(|watcher| watcher.waiting() > 32).unwrap_or(true);
+    let wait = critical_section::with(|cs| {
+        let mut player = PLAYER.borrow_ref_mut(cs);
+        let player = player.as_mut()?;
+        if !busy {
+            player.play();
+        }
+        // Xorshift: any number of cycles up to the length of a pass through the main loop.
+        player.random ^= player.random << 13;
+        player.random ^= player.random >> 17;
+        player.random ^= player.random << 5;
+        Some(50 + player.random % 4_096)
+    });
+    if let Some(cycles) = wait {
+        chip::set_timer(cycles);
     }
 }
 
 impl Player {
-    /// Begins to listen.
-    pub fn new() -> Self {
-        Self { uart: Uart::take(Port::Pins), received: [0; 6], count: 0 }
-    }
-
-    /// Whether the host has sent something.
-    pub fn is_ready(&self) -> bool {
-        self.uart.is_ready()
-    }
-
-    /// Plays one edge, if one has come, and says whether it did.
-    pub fn play(&mut self) -> bool {
+    /// Plays one edge, if one has come.
+    fn play(&mut self) {
         while let Some(slot) = self.received.get_mut(self.count) {
-            let Some(byte) = self.uart.receive() else { return false };
+            let Some(byte) = self.uart.receive() else { return };
             *slot = byte;
             self.count += 1;
         }
@@ -114,6 +133,5 @@ impl Player {
             PORT.store(levels | u32::from(level & 1) << finger, Ordering::Relaxed);
             NVIC::pend(PIN_CHANGED);
         }
-        true
     }
 }

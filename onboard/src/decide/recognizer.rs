@@ -70,9 +70,13 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         if objects > N {
             return Err(CapacityError { objects, capacity: N });
         }
-        let mut priors = model.priors().iter();
-        let evidence = core::array::from_fn(|_| priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into()));
-        Ok(Self { model: *model, state: State { stopping, evidence, touches: 0, verdict: Verdict::Undecided } })
+        let state = State { stopping, evidence: [0; N], touches: 0, verdict: Verdict::Undecided };
+        // In place: moved into the result it would be copied, and without copies no code for them is linked.
+        let mut recognizer = Ok(Self { model: model.copied(), state });
+        if let Ok(recognizer) = &mut recognizer {
+            recognizer.reset();
+        }
+        recognizer
     }
 
     /// A recognizer that continues from a state under the same model.

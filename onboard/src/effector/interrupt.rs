@@ -79,6 +79,11 @@ impl<A: InputPin, B: InputPin, C: InputPin, const EDGES: usize> Watcher<A, B, C,
         }
     }
 
+    /// Edges that wait for the main loop.
+    pub fn waiting(&self) -> usize {
+        self.edges.len()
+    }
+
     /// Whether no edge waits for the main loop: it may sleep.
     pub fn is_idle(&self) -> bool {
         self.edges.is_empty() && !self.lost

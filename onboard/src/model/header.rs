@@ -1,15 +1,17 @@
 //! The header, and the sections that it says there are.
 
+use super::Model;
 use crate::bytes::{ModelError, take};
 use crate::layouts::Sections;
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HEADER_LENGTH, Header, Key, Layout, LeafType, MAGIC, RAW_FEATURES, VERSION, checksum,
+    CHECKSUM_LENGTH, HEADER_LENGTH, Header, Key, Layout, LeafType, MAGIC, RAW_FEATURES, TrainedTouches, VERSION,
+    checksum,
 };
 
-/// Finds the sections.
+/// Finds the sections, for a model that states nothing about its touches.
 #[inline(never)]
-pub(super) fn read(bytes: &[u8]) -> Result<(Sections<'_>, Option<Descriptor>), ModelError> {
+pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
     let found = bytes.len();
     if bytes.iter().zip(MAGIC).any(|(&byte, magic)| byte != magic) {
         return Err(ModelError::NotAModel);
@@ -53,7 +55,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Sections<'_>, Option<Descriptor>), M
     if rest.len() != CHECKSUM_LENGTH {
         return Err(ModelError::Section { offset: found - rest.len() });
     }
-    Ok((Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf }, descriptor))
+    let touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
+    let sections = Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf };
+    Ok(Model { sections, descriptor, touches })
 }
 
 /// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.

@@ -59,16 +59,23 @@ impl<'a> Model<'a> {
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
     #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
-        let mut model = header::read(bytes).map(|(sections, descriptor)| {
-            let touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
-            Self { sections, descriptor, touches }
-        });
+        let mut model = header::read(bytes);
         if let Ok(opened) = &mut model
             && let Err(error) = check::check(&opened.sections, &opened.sections.header(), &mut opened.touches)
         {
             model = Err(error);
         }
         model
+    }
+
+    /// A copy, field by field: a `memcpy` of this length would be a call, and its code several hundred bytes of flash.
+    pub(crate) const fn copied(&self) -> Self {
+        let &Self { sections: Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, .. }, .. } = self;
+        let Sections { objects, layout, leaf, .. } = self.sections;
+        let sections = Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf };
+        let TrainedTouches { patterns, counted, needs_pose, largest_spread } = self.touches;
+        let touches = TrainedTouches { patterns, counted, needs_pose, largest_spread };
+        Self { sections, descriptor: self.descriptor, touches }
     }
 
     /// The header.

@@ -9,7 +9,7 @@ use core::convert::Infallible;
 use cortex_m_rt::{entry, exception};
 use embedded_io::Write;
 use palpate_firmware::chip::{self, Interrupt};
-use palpate_firmware::pins::{self, Player};
+use palpate_firmware::pins;
 use palpate_firmware::uart::{Port, Uart};
 use palpate_onboard::effector::Sensed;
 use palpate_onboard::station::{Board, NoStorage, ProbeSettings, ProbeStation};
@@ -46,14 +46,13 @@ fn main() -> ! {
         palpate_firmware::println!("no model is built in: build with PALPATE_MODEL=/path/to/model.palpate");
         palpate_firmware::fail()
     }
-    let mut player = Player::new();
     pins::watch();
+    pins::play();
     loop {
-        let played = player.play();
         let Ok(happened) = station.step(&mut chip);
-        if happened.is_none() && !played {
+        if happened.is_none() {
             // On a board: also until ProbeStation::due. Here time passes when the host says so.
-            chip::sleep_unless(|| player.is_ready() || chip.0.is_ready() || !pins::is_idle());
+            chip::sleep_unless(|| chip.0.is_ready() || !pins::is_idle());
         }
     }
 }
@@ -66,6 +65,7 @@ unsafe fn DefaultHandler(number: i16) {
         chip::LINK_RECEIVED => Port::Link.received(),
         chip::PINS_RECEIVED => Port::Pins.received(),
         chip::PIN_CHANGED => pins::changed(),
+        chip::TIMER => pins::tick(),
         _ => {}
     }
 }
