@@ -3,7 +3,8 @@
 use palpate::compile::{Leaf, Settings, compile};
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-    Counted, Length, MUST_UNDERSTAND, Tag, Trained, TrainedNoise, TrainedProbe, TrainedTouches, checksum, write_section,
+    Counted, Length, MUST_UNDERSTAND, PatternShares, Tag, Trained, TrainedNoise, TrainedProbe, TrainedTouches,
+    checksum, write_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 use palpate_tests::random::{self, Shape};
@@ -18,6 +19,7 @@ const TRAINED: Trained = Trained {
         largest_spread: 1_050_000,
     }),
     noise: Some(TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 0 }),
+    shares: Some(PatternShares([1, 2, 3, 4, 5, 65_520])),
 };
 
 fn model(descriptor: Descriptor) -> Vec<u8> {
@@ -38,9 +40,14 @@ fn what_a_model_states_is_read_back_and_changes_no_margin() {
     let plain = model(Descriptor::ContactsCurvature);
     let stated = trained(&plain, &TRAINED);
     let (plain, stated) = (Model::new(&plain).unwrap(), Model::new(&stated).unwrap());
-    let read = Trained { probe: stated.probe(), touches: Some(stated.trained_touches()), noise: stated.noise() };
+    let read = Trained {
+        probe: stated.probe(),
+        touches: Some(stated.trained_touches()),
+        noise: stated.noise(),
+        shares: stated.pattern_shares(),
+    };
     assert_eq!(read, TRAINED);
-    assert_eq!(stated.optional_sections().map(|section| section.tag).collect::<Vec<_>>(), [1, 2, 3]);
+    assert_eq!(stated.optional_sections().map(|section| section.tag).collect::<Vec<_>>(), [1, 2, 3, 9]);
     assert_eq!((stated.header().version(), plain.header().version()), (2, 1));
     assert_eq!((stated.object_name(2), stated.prior(1)), (plain.object_name(2), plain.prior(1)));
     let (mut a, mut b) = ([0; 3], [0; 3]);
