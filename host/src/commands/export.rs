@@ -123,5 +123,7 @@ fn layout(name: &str) -> Result<LayoutChoice, String> {
         return Ok(LayoutChoice(None));
     }
     let layout = Layout::ALL.iter().copied().find(|layout| layout.name() == name);
-    layout.map(|layout| LayoutChoice(Some(layout))).ok_or_else(|| "use one of auto, compact, complete, grid, wide, patterns".to_owned())
+    layout
+        .map(|layout| LayoutChoice(Some(layout)))
+        .ok_or_else(|| "use one of auto, compact, complete, grid, wide, patterns".to_owned())
 }
