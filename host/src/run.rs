@@ -74,7 +74,7 @@ impl Default for Settings {
             replace: false,
             capture: capture::Settings::default(),
             approaches: 63_000,
-            noise: Noise::default(),
+            noise: Noise::switch(),
             test_share: 0.1,
             groups: 1000,
             error_rate: 0.01,
@@ -94,6 +94,8 @@ pub struct Summary {
     pub command: String,
     /// Seed of all that is random.
     pub seed: u64,
+    /// What was added to the touches that ours was trained on, and to all that are tested on.
+    pub noise: Noise,
     /// The capture of full touches.
     pub capture: capture::Summary,
     /// The capture of approaches.
@@ -214,6 +216,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         tool_version: env!("CARGO_PKG_VERSION"),
         command: settings.command.clone(),
         seed,
+        noise: settings.noise,
         capture: captured,
         approach_capture: approached,
         touches: Touches { train: split.train.len(), test: split.test.len() },
@@ -458,8 +461,18 @@ fn table(summary: &Summary) -> Records {
     table
 }
 
-/// What a missing accuracy means, if one is missing.
+/// What the test touches had, and what a missing accuracy means, if one is missing.
 fn note(summary: &Summary) -> String {
+    let noise = &summary.noise;
+    let noise = match noise.is_none() {
+        true => "No noise was added to touches.".to_owned(),
+        false => format!("Ours was trained, and all are tested, with {noise}; the paper's method is trained without."),
+    };
+    [noise, missing(summary)].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// What a missing accuracy means, if one is missing.
+fn missing(summary: &Summary) -> String {
     let missing = |method: &Method| TABLE_AT.iter().any(|at| !method.evaluation.accuracy.contains_key(at));
     if ![&summary.paper, &summary.full, &summary.ours].into_iter().any(missing) {
         return String::new();

@@ -21,6 +21,8 @@ Examples:
                                objects as large as they are, and your probe
   palpate run --json | jq .ours.accuracy
 
+Ours is trained for a usual switch, polled every millisecond (--noise 0..5ms --timer 1ms), unless the options or the probe file say otherwise; all methods are tested with the same noise. --noise 0ms --timer 0ms adds none.
+
 Three methods are trained and compared: the published one, on the times of full touches; ours on full touches; and ours on every approach with at least one contact, which is the model to use.
 
 Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html.")]
@@ -81,7 +83,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
                 .chain(["--approaches", &approaches.to_string(), "--seed", &seed.to_string()])
                 .chain(size.words().iter().chain(&noise.words()).map(String::as_str)),
         ),
-        noise: noise.over(file.map_or_else(Noise::default, |file| file.real)),
+        noise: noise.over(file.map(|file| file.real).filter(|real| !real.is_none()).unwrap_or_else(Noise::switch)),
         sources: sources.clone(),
         ..run::Settings::default()
     };

@@ -147,6 +147,12 @@ impl Noise {
         Self { deviation: deviation.into(), ..Self::default() }
     }
 
+    /// What a usual switch adds: its contact closes up to 5 ms off, how much differs from touch to touch and switch to
+    /// switch, and a program that polls it every millisecond counts whole ones.
+    pub fn switch() -> Self {
+        Self { deviation: Deviation { least: 0.0, largest: 5_000.0 }, timer: 1_000.0, ..Self::default() }
+    }
+
     /// Whether it changes no touch.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
