@@ -56,7 +56,15 @@ impl Cells {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let bytes = (0..sectors * SECTOR).map(|_| rng.random()).collect();
         let power = Rc::new(Cell::new(true));
-        Self { bytes, erases: vec![0; sectors], endurance: vec![u32::MAX; sectors], steps: 0, faults: Vec::new(), power, rng }
+        Self {
+            bytes,
+            erases: vec![0; sectors],
+            endurance: vec![u32::MAX; sectors],
+            steps: 0,
+            faults: Vec::new(),
+            power,
+            rng,
+        }
     }
 
     /// Does a step to the bytes from `at` on.
