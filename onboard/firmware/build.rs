@@ -1,4 +1,4 @@
-//! Hands memory.x to the linker, the built-in model to the images, and the benchmark's models to the benchmark.
+//! Hands the memory to the linker, the built-in model to the images, and the benchmark's models to the benchmark.
 
 mod image;
 
@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
-    image::link()?;
+    // Not called memory.x, which the linker would take from here whatever it is told.
+    image::link("mps2.x")?;
     image::build_in("../../models/household.palpate")?;
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or(io::ErrorKind::NotFound)?);
     models(&out.join("bench"))

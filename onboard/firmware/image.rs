@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 use std::{env, fs, io};
 
-/// Hands memory.x and cortex-m-rt's linker script to the linker.
+/// Hands the memory that `default` describes, unless `PALPATE_MEMORY` names another file, and cortex-m-rt's linker script to the linker.
 ///
 /// # Errors
-/// memory.x cannot be copied.
-pub fn link() -> io::Result<()> {
+/// The file cannot be copied.
+pub fn link(default: &str) -> io::Result<()> {
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or(io::ErrorKind::NotFound)?);
-    fs::copy("memory.x", out.join("memory.x"))?;
-    println!("cargo::rerun-if-changed=memory.x");
+    let memory = PathBuf::from(env::var_os("PALPATE_MEMORY").unwrap_or_else(|| default.into()));
+    fs::copy(&memory, out.join("memory.x"))?;
+    println!("cargo::rerun-if-env-changed=PALPATE_MEMORY");
+    println!("cargo::rerun-if-changed={}", memory.display());
     println!("cargo::rustc-link-search={}", out.display());
     // Here and not in .cargo/config.toml, where RUSTFLAGS would override them.
     println!("cargo::rustc-link-arg-bins=-Tlink.x");

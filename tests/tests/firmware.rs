@@ -319,3 +319,24 @@ fn run_gpio(image: &Path, machine: &str, recording: Vec<u8>, count: usize) -> Ve
     assert!(guard.join().unwrap(), "600 s were not enough");
     events
 }
+
+#[test]
+#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+fn a_core_that_faults_on_unaligned_loads_gives_the_hosts_margins_and_verdicts_wherever_the_model_stands() {
+    let bytes = include_bytes!("../../models/household.palpate");
+    let digest = palpate_tests::identity::digest(&Model::new(bytes).unwrap());
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../onboard/firmware").canonicalize().unwrap();
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--release", "--quiet", "--bin", "alignment", "--target", M0, "--target-dir"]);
+    // Not among images with another memory.
+    let target = folder.join("target/microbit");
+    cargo.arg(&target).current_dir(&folder).env("PALPATE_MEMORY", "microbit.x");
+    cargo.env_remove("CARGO_TARGET_DIR").env_remove("RUSTFLAGS").env_remove("PALPATE_MODEL");
+    assert!(cargo.status().unwrap().success(), "the firmware does not build");
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args(["-machine", "microbit", "-nographic", "-semihosting-config", "enable=on,target=native", "-kernel"]);
+    let output = qemu.arg(target.join(M0).join("release/alignment")).stdin(Stdio::null()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    assert_eq!(said.lines().collect::<Vec<_>>(), [format!("at 0: {digest:08x}"), format!("at 1: {digest:08x}")]);
+}

@@ -1,6 +1,6 @@
 //! What every machine must make of a touch, as bytes: the same lines for the `identity` image and for the host's tests.
 
-use palpate_onboard::{Model, Recognizer, Verdict};
+use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 
 /// Bytes of [`record`].
@@ -26,4 +26,24 @@ pub fn record(model: &Model<'_>, recognizer: &mut Recognizer<'_, 10>, touch: &To
     let fields = margins.chain(posterior.to_le_bytes()).chain(verdict.to_le_bytes());
     bytes.iter_mut().zip(fields).for_each(|(to, from)| *to = from);
     bytes
+}
+
+/// A number that depends on every bit of what the model makes of a thousand touches, full and partial.
+pub fn digest(model: &Model<'_>) -> u32 {
+    let Ok(mut recognizer) = Recognizer::<10>::new(model, Stopping::from_model(model)) else { return 0 };
+    let (mut random, mut digest) = (1_u32, 0_u32);
+    for _ in 0..1_000 {
+        let times = [(); 3].map(|()| {
+            // Xorshift.
+            random ^= random << 13;
+            random ^= random >> 17;
+            random ^= random << 5;
+            if random.is_multiple_of(7) { u32::MAX } else { random % 300_000 }
+        });
+        for byte in record(model, &mut recognizer, &Touch::from_micros(times)) {
+            digest = digest.rotate_left(5) ^ u32::from(byte);
+            digest = digest.wrapping_mul(0x0100_0193);
+        }
+    }
+    digest
 }

@@ -4,6 +4,6 @@
 mod image;
 
 fn main() -> std::io::Result<()> {
-    image::link()?;
+    image::link("memory.x")?;
     image::build_in("../../../../models/household.palpate")
 }
