@@ -33,9 +33,12 @@ fn models() -> Vec<Vec<u8>> {
     };
     let mut models = Vec::new();
     for each in [true, false] {
-        let ensemble = random::ensemble(Shape { each, ..shape }, 5);
         for &leaf in Leaf::ALL {
             for &layout in Layout::ALL {
+                // Tables by contact pattern have no other descriptor.
+                let descriptor =
+                    if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };
+                let ensemble = random::ensemble(Shape { each, descriptor, ..shape }, 5);
                 let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
                 models.push(compile(&ensemble, &settings).unwrap().bytes);
                 // The same with optional sections.

@@ -195,7 +195,9 @@ fn compiled_models<'e>(
     settings: &Settings,
 ) -> Result<Vec<Measured<'e>>> {
     let mut models: Vec<Measured<'e>> = Vec::new();
-    let layouts: &[Layout] = if recipe.bins.len() > 1 { &[Layout::Grid] } else { &[Layout::Compact, Layout::Complete] };
+    // A table for each contact pattern where partial touches are evidence, one table otherwise.
+    let table = if ensemble.descriptor.uses_partial_touches() { Layout::Patterns } else { Layout::Grid };
+    let layouts: &[Layout] = if recipe.bins.len() > 1 { &[table] } else { &[Layout::Compact, Layout::Complete] };
     for leaf in [Leaf::I8, Leaf::I16] {
         let mut measured: Option<Row> = None;
         for &layout in layouts {

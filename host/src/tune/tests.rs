@@ -24,6 +24,7 @@ fn approaches_are_what_is_saved_where_the_data_set_holds_them() {
     }
     assert_eq!(tuned.ensemble.descriptor, palpate_shared::Descriptor::ContactsCurvature);
     assert!(tuned.test.approaches.is_some());
+    assert!(tuned.rows.iter().any(|row| row.layout == Some("patterns")));
 }
 
 #[test]
