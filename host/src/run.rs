@@ -201,8 +201,8 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
     evaluate::add_noise(&mut approaches.test, &settings.noise, seed.wrapping_add(1))?;
     let probe = Some(StatedProbe::from(&settings.capture.origin));
-    let tested = Tested { approaches: &approaches.test, robots };
-    let method = |name, files, preset, split| Trial::new(name, files, preset, split, tested, settings, out, progress);
+    let job = Job { settings, approaches: &approaches.test, robots, out, progress };
+    let method = |name, files, preset, split| Trial::new(name, files, preset, split, job);
     let compact = train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() };
     let full = train::Settings { counted: Some(Counted::Full), ..compact.clone() };
     let contacts = train::Settings { counted: Some(Counted::Contacts), ..compact };
@@ -264,12 +264,15 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
     }))
 }
 
-/// What all methods are tested on besides their own kind of touches.
+/// What is the same for all methods: also the approaches that they are tested on besides their own kind of touches.
 #[derive(Clone, Copy)]
-struct Tested<'d> {
+struct Job<'d> {
+    settings: &'d Settings,
     approaches: &'d Dataset,
     /// How many robots made the test touches, in turn.
     robots: usize,
+    out: &'d Path,
+    progress: &'d dyn Progress,
 }
 
 /// A method, trained, compiled and tested.
@@ -282,16 +285,8 @@ struct Trial {
 }
 
 impl Trial {
-    fn new(
-        name: &str,
-        stem: &str,
-        preset: train::Settings,
-        split: &Split,
-        tested: Tested<'_>,
-        settings: &Settings,
-        out: &Path,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
+    fn new(name: &str, stem: &str, preset: train::Settings, split: &Split, job: Job<'_>) -> Result<Self> {
+        let Job { settings, approaches, robots, out, progress } = job;
         let began = Instant::now();
         let ensemble = train::train(&split.train, &preset, progress)?;
         let train_seconds = began.elapsed().as_secs_f64();
@@ -302,7 +297,7 @@ impl Trial {
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
         let model = compile::open(&compiled.bytes)?;
-        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?.of_robots(tested.robots);
+        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?.of_robots(robots);
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
         let mut evaluation = evaluate::evaluate(
@@ -316,7 +311,7 @@ impl Trial {
                 seed,
             },
         )?;
-        let approached = Margins::new(Candidate::Compiled(&model), tested.approaches)?.of_robots(tested.robots);
+        let approached = Margins::new(Candidate::Compiled(&model), approaches)?.of_robots(robots);
         let fewest_approaches = approached.fewest_approaches();
         let at: Vec<usize> = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect();
         let stopping =

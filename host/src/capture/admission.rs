@@ -68,7 +68,7 @@ fn resumed(directory: &Path, found: Listing, wanted: &Listing, add: bool) -> Res
     if found.palpate != wanted.palpate {
         return refuse(CaptureProblem::ResumesOtherVersion { found: found.palpate });
     }
-    let differences = differences(&found, &wanted);
+    let differences = differences(&found, wanted);
     if !differences.is_empty() {
         return refuse(CaptureProblem::ResumesOtherSettings { differences });
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub enum ModelFile {
     /// The full model, from XGBoost JSON.
-    Full(Ensemble),
+    Full(Box<Ensemble>),
     /// The bytes that the chip reads, checked.
     Compiled(CompiledModel),
 }
@@ -24,7 +24,7 @@ impl ModelFile {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
         if bytes.trim_ascii_start().starts_with(b"{") {
-            return Ensemble::load(path).map(Self::Full);
+            return Ensemble::load(path).map(|ensemble| Self::Full(Box::new(ensemble)));
         }
         CompiledModel::from_file(path, bytes).map(Self::Compiled)
     }

@@ -502,9 +502,8 @@ mod tests {
     #[test]
     fn settings_out_of_range_are_refused_by_name() {
         let base = settings();
-        #[expect(clippy::reversed_empty_ranges, reason = "that is what is wrong")]
         let cases = [
-            ("spacing", Settings { spacing: 2.0..=1.0, ..base.clone() }),
+            ("spacing", Settings { spacing: RangeInclusive::new(2.0, 1.0), ..base.clone() }),
             ("radius", Settings { radius: 0.0..=1.0, ..base.clone() }),
             ("tilt", Settings { tilt: 0.0..=90.0, ..base.clone() }),
             ("speed", Settings { speed: 0.0, ..base.clone() }),
