@@ -567,11 +567,7 @@ mod tests {
 
     fn objects() -> Vec<Object> {
         [("ball", [1.0, 1.0, 1.0]), ("cigar", [1.0, 0.3, 0.3]), ("disc", [1.0, 1.0, 0.2])]
-            .map(|(name, sides)| {
-                let mut mesh = Mesh::globe(10);
-                mesh.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= sides[axis]));
-                Object::new(name, mesh)
-            })
+            .map(|(name, sides)| Object::new(name, Mesh::globe(10).stretched(sides)))
             .to_vec()
     }
 

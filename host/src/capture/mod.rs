@@ -197,10 +197,9 @@ mod tests {
     use std::collections::BTreeMap;
 
     fn objects() -> Vec<Object> {
-        let globe = Mesh::globe(12);
-        let mut disc = globe.clone();
-        disc.vertices.iter_mut().for_each(|vertex| vertex[2] *= 0.1);
-        [("disc", disc), ("globe", globe)].map(|(name, mesh)| Object::new(name, mesh)).into()
+        [("disc", 0.1), ("globe", 1.0)]
+            .map(|(name, height)| Object::new(name, Mesh::globe(12).stretched([1.0, 1.0, height])))
+            .into()
     }
 
     fn origin(touches: u64) -> Origin {

@@ -7,6 +7,7 @@ use crate::evaluate::{self, CostOfNoise};
 use crate::output;
 use crate::probe::file::ProbeFile;
 use crate::touches::noise::Noise;
+use palpate_onboard::Refused;
 use palpate_shared::format::Counted;
 use palpate_shared::{Descriptor, Touch};
 use std::path::PathBuf;
@@ -121,7 +122,7 @@ struct Trained {
     objects: usize,
     /// Touches of the data set.
     touches: usize,
-    /// Those of them that are evidence.
+    /// Those of them that are evidence to the ensemble.
     used: usize,
     counted: &'static str,
     trees: usize,
@@ -150,9 +151,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let seconds = start.elapsed().as_secs_f64();
     ensemble.save(&arguments.output)?;
     let evidence = ensemble.trained_touches();
-    let is_used = |touch: &&Touch| {
-        evidence.counted.patterns().contains(touch.pattern()) && (!evidence.needs_pose || touch.pose().is_some())
-    };
+    let is_used = |touch: &&Touch| Refused::check(&evidence, touch).is_ok();
     let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
     let trees = ensemble.trees.len();
     // A binary tree has one leaf more than splits.

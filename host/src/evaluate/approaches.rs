@@ -129,37 +129,21 @@ impl Margins<'_> {
     }
 
     fn summary(&self, outcomes: &[Vec<Outcome>], error_rate: f64, max_touches: u32) -> ApproachSequential {
-        let mean = |number: &dyn Fn(&Outcome) -> f64| -> Vec<Estimate> {
-            outcomes.iter().map(|outcomes| Estimate::mean(outcomes.iter().map(number))).collect()
-        };
-        let share = |hit: &dyn Fn(usize, &Outcome) -> bool| -> Vec<Estimate> {
-            let share = |(position, outcomes): (usize, &Vec<Outcome>)| {
-                Estimate::share(outcomes.iter().filter(|outcome| hit(position, outcome)).count(), outcomes.len())
-            };
-            outcomes.iter().enumerate().map(share).collect()
-        };
-        let right = |position: usize| self.tested[position].object;
-        let approaches = mean(&|outcome| outcome.approaches as f64);
-        let touches = mean(&|outcome| outcome.touches as f64);
-        let errors = share(&|position, outcome| outcome.recognized.is_some_and(|object| object != right(position)));
-        let undecideds = share(&|_, outcome| outcome.recognized.is_none());
-        let per_object = |estimates: &[Estimate]| {
-            self.tested_names().iter().cloned().zip(estimates.iter().map(|estimate| estimate.value)).collect()
-        };
-        let [mean_approaches, mean_touches, error, undecided] =
-            [&approaches, &touches, &errors, &undecideds].map(|estimates| Estimate::mean_of(estimates.iter().copied()));
+        let approaches = self.mean(outcomes, |outcome| outcome.approaches);
+        let error = self.wrong(outcomes);
+        let undecided = self.undecided(outcomes);
         ApproachSequential {
             error_rate,
             max_touches,
-            mean_approaches: mean_approaches.value,
-            mean_approaches_standard_error: mean_approaches.standard_error,
-            mean_touches: mean_touches.value,
-            error: error.value,
-            error_standard_error: error.standard_error,
-            undecided: undecided.value,
-            per_object: per_object(&approaches),
-            error_per_object: per_object(&errors),
-            undecided_per_object: per_object(&undecideds),
+            mean_approaches: approaches.all.value,
+            mean_approaches_standard_error: approaches.all.standard_error,
+            mean_touches: self.mean(outcomes, |outcome| outcome.touches).all.value,
+            error: error.all.value,
+            error_standard_error: error.all.standard_error,
+            undecided: undecided.all.value,
+            per_object: approaches.per_object,
+            error_per_object: error.per_object,
+            undecided_per_object: undecided.per_object,
         }
     }
 }

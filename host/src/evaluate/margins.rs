@@ -129,7 +129,7 @@ impl<'m> Margins<'m> {
     }
 
     /// The same where `robots` robots made the touches of each object in turn (touch i by robot i modulo `robots`): every
-    /// group and sequence is then of one robot's touches. 0 is taken as 1.
+    /// group and sequence is then of one robot's touches. 0 means 1.
     pub fn of_robots(mut self, robots: usize) -> Self {
         self.robots = robots.max(1);
         for tested in &mut self.tested {

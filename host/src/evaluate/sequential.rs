@@ -64,6 +64,13 @@ pub struct Outcome {
     pub recognized: Option<usize>,
 }
 
+/// A figure of sequences.
+pub(super) struct Figure {
+    /// Each object weighted equally.
+    pub(super) all: Estimate,
+    pub(super) per_object: BTreeMap<String, f64>,
+}
+
 impl Margins<'_> {
     /// Pushes random sequences of each object's touches into a recognizer until it stops.
     ///
@@ -75,35 +82,54 @@ impl Margins<'_> {
         let stopping = self.stopping(settings)?;
         let outcomes: Vec<Vec<Outcome>> =
             (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
-        let shares = |hit: &dyn Fn(usize, &Outcome) -> bool| -> Vec<Estimate> {
-            let share = |(position, outcomes): (usize, &Vec<Outcome>)| {
-                Estimate::share(outcomes.iter().filter(|outcome| hit(position, outcome)).count(), sequences)
-            };
-            outcomes.iter().enumerate().map(share).collect()
-        };
-        let right = |position: usize| self.tested[position].object;
-        let errors = shares(&|position, outcome| outcome.recognized.is_some_and(|object| object != right(position)));
-        let undecideds = shares(&|_, outcome| outcome.recognized.is_none());
-        let touches: Vec<Estimate> =
-            outcomes.iter().map(|outcomes| Estimate::mean(outcomes.iter().map(|o| o.touches as f64))).collect();
-        let per_object = |estimates: &[Estimate]| {
-            self.tested_names().iter().cloned().zip(estimates.iter().map(|estimate| estimate.value)).collect()
-        };
-        let [mean, error, undecided] =
-            [&touches, &errors, &undecideds].map(|estimates| Estimate::mean_of(estimates.iter().copied()));
+        let touches = self.mean(&outcomes, |outcome| outcome.touches);
+        let error = self.wrong(&outcomes);
+        let undecided = self.undecided(&outcomes);
         Ok(Sequential {
             error_rate,
             max_touches: stopping.max_touches(),
-            mean_touches: mean.value,
-            mean_touches_standard_error: mean.standard_error,
-            error: error.value,
-            error_standard_error: error.standard_error,
-            undecided: undecided.value,
-            per_object: per_object(&touches),
-            error_per_object: per_object(&errors),
-            undecided_per_object: per_object(&undecideds),
+            mean_touches: touches.all.value,
+            mean_touches_standard_error: touches.all.standard_error,
+            error: error.all.value,
+            error_standard_error: error.all.standard_error,
+            undecided: undecided.all.value,
+            per_object: touches.per_object,
+            error_per_object: error.per_object,
+            undecided_per_object: undecided.per_object,
             outcomes,
         })
+    }
+
+    /// The share of sequences with a wrong verdict.
+    pub(super) fn wrong(&self, outcomes: &[Vec<Outcome>]) -> Figure {
+        self.figure(outcomes, |position, outcomes| {
+            let is_wrong = |object| object != self.tested[position].object;
+            let wrong = outcomes.iter().filter(|outcome| outcome.recognized.is_some_and(is_wrong));
+            Estimate::share(wrong.count(), outcomes.len())
+        })
+    }
+
+    /// The share of sequences without a verdict.
+    pub(super) fn undecided(&self, outcomes: &[Vec<Outcome>]) -> Figure {
+        self.figure(outcomes, |_, outcomes| {
+            Estimate::share(outcomes.iter().filter(|outcome| outcome.recognized.is_none()).count(), outcomes.len())
+        })
+    }
+
+    /// The mean of a number over sequences.
+    pub(super) fn mean(&self, outcomes: &[Vec<Outcome>], number: impl Fn(&Outcome) -> usize) -> Figure {
+        self.figure(outcomes, |_, outcomes| Estimate::mean(outcomes.iter().map(|outcome| number(outcome) as f64)))
+    }
+
+    /// What `of` makes of a tested object's position and the sequences of it.
+    fn figure(&self, outcomes: &[Vec<Outcome>], of: impl Fn(usize, &[Outcome]) -> Estimate) -> Figure {
+        let estimates: Vec<Estimate> =
+            outcomes.iter().enumerate().map(|(position, outcomes)| of(position, outcomes)).collect();
+        let values = estimates.iter().map(|estimate| estimate.value);
+        Figure {
+            per_object: self.tested_names().iter().cloned().zip(values).collect(),
+            all: Estimate::mean_of(estimates.iter().copied()),
+        }
     }
 
     fn outcomes(&self, position: usize, stopping: Stopping, sequences: usize, seed: u64) -> Vec<Outcome> {

@@ -208,8 +208,7 @@ mod tests {
     /// Three ellipsoids with hills, as OBJ files.
     fn meshes(directory: &Path) -> Vec<String> {
         for (name, sides) in [("ball", [1.0, 1.0, 1.0]), ("cigar", [1.0, 0.3, 0.3]), ("disc", [1.0, 1.0, 0.2])] {
-            let mut mesh = Mesh::globe(10);
-            mesh.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= sides[axis]));
+            let mesh = Mesh::globe(10).stretched(sides);
             write_whole(&directory.join(format!("{name}.obj")), |out| obj::write(&mesh, out)).unwrap();
         }
         vec![directory.to_str().unwrap().to_string()]
