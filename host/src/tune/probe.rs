@@ -518,6 +518,27 @@ mod tests {
     }
 
     #[test]
+    fn at_true_size_the_search_is_in_millimeters_and_takes_objects_of_known_size_only() {
+        let mut objects = objects();
+        assert!(Settings::at_true_size(&objects).is_none());
+        // A globe is 20 of its units wide.
+        objects.iter_mut().for_each(|object| object.millimeters = Some(5.0));
+        let unit = median_length(&objects).unwrap() / LENGTH;
+        let usual = Settings::at_true_size(&objects).unwrap();
+        assert_eq!(usual.published.spacing, hundredths(1.5 * unit));
+        assert_eq!(usual.spacing, hundredths(0.5 * unit)..=hundredths(3.0 * unit));
+        let Settings { radius, tilt, aims, sequences, error_rate, .. } = settings();
+        let radius = radius.start() * unit..=radius.end() * unit;
+        let settings = Settings { radius, tilt, aims, sequences, error_rate, approaches: 400, ..usual };
+        let found = design(&objects, &settings, &()).unwrap();
+        assert!(found.toml().contains("unit = \"mm\"\nradius = "), "{}", found.toml());
+        assert!(found.best.probe.spacing >= 0.5 * unit - 0.01, "{:?}", found.best);
+        objects[0].millimeters = None;
+        let error = design(&objects, &settings, &()).unwrap_err().to_string();
+        assert!(error.starts_with("globe: "), "{error}");
+    }
+
+    #[test]
     fn the_same_seed_gives_the_same_design_on_any_number_of_threads() {
         let settings = Settings { spacing: 0.5..=1.0, approaches: 200, sequences: 30, ..settings() };
         let with = |threads| {
