@@ -43,7 +43,7 @@
 //!         break;
 //!     }
 //! }
-//! let Verdict::Recognized { object, touches } = verdict else { panic!("{verdict:?}") };
+//! let Verdict::Recognized { object, touches, .. } = verdict else { panic!("{verdict:?}") };
 //! println!("{} after {touches} touches", model.object_name(object.into()));
 //! assert_eq!(model.object_name(object.into()), "disc");
 //! # Ok(())

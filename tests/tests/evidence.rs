@@ -2,7 +2,7 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
-use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
+use palpate_onboard::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
 use palpate_shared::format::checksum;
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::random;
@@ -33,6 +33,14 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
 
 fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
     compile(ensemble, &Settings { leaf, layout: Some(Layout::Compact), ..Settings::default() }).unwrap().bytes
+}
+
+/// The object that was recognized, and after how many touches.
+fn recognized(verdict: Result<Verdict, Refused>) -> Option<(u8, u32)> {
+    match verdict {
+        Ok(Verdict::Recognized { object, touches, .. }) => Some((object, touches)),
+        _ => None,
+    }
 }
 
 fn stopping(error_rate: f64, max_touches: u32) -> Stopping {
@@ -66,7 +74,7 @@ fn a_touch_that_only_one_object_can_explain_decides_at_once() {
         let model = Model::new(&bytes).unwrap();
         let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(1e-12, 10)).unwrap();
         assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Undecided));
-        assert_eq!(recognizer.push(&touch(1000)), Ok(Verdict::Recognized { object: 1, touches: 2 }));
+        assert_eq!(recognized(recognizer.push(&touch(1000))), Some((1, 2)));
         assert_eq!(recognizer.posterior(1).complement(), 0.0);
         assert_eq!(recognizer.posterior(0).to_f64(), 0.0);
     }
@@ -83,7 +91,7 @@ fn the_posterior_passes_one_minus_a_billionth_exactly_when_the_evidence_says_so(
             assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Undecided), "after {number} of {needed}");
             assert!(recognizer.posterior(0).complement() > error_rate);
         }
-        assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Recognized { object: 0, touches: needed }));
+        assert_eq!(recognized(recognizer.push(&touch(0))), Some((0, needed)));
         let complement = recognizer.posterior(0).complement();
         assert!(complement <= error_rate && complement > error_rate / 2.0, "{complement:e}");
     }
@@ -145,7 +153,7 @@ fn thousands_of_touches_pulling_back_and_forth_leave_nothing_behind() {
     assert_eq!(recognizer.evidence(), [0, 0, 0]);
     recognizer.push(&touch(1000)).unwrap();
     recognizer.push(&touch(1000)).unwrap();
-    assert_eq!(recognizer.push(&touch(1000)), Ok(Verdict::Recognized { object: 1, touches: 10_003 }));
+    assert_eq!(recognized(recognizer.push(&touch(1000))), Some((1, 10_003)));
 }
 
 /// A snapshot with this evidence.
@@ -193,6 +201,35 @@ fn a_snapshot_goes_on_where_it_was_taken() {
         if index % 50 == 49 {
             whole.reset();
         }
+    }
+}
+
+#[test]
+fn a_verdicts_posterior_is_the_recognizers_bit_for_bit_also_after_a_snapshot() {
+    let bytes =
+        compiled(&steps(&[300.0, 600.0], &[&[0.9, 0.2, -0.3], &[0.31, 0.5, 0.2], &[-0.1, 0.6, -1.0]]), Leaf::I16);
+    let model = Model::new(&bytes).unwrap();
+    for error_rate in [0.3, 0.01, 1e-9] {
+        let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(error_rate, 200)).unwrap();
+        let mut recognitions = 0;
+        for touch in random::touches(2_000, 9) {
+            // Partial touches are refused.
+            let Ok(verdict) = recognizer.push(&touch) else { continue };
+            if let Verdict::Recognized { object, .. } = verdict {
+                recognitions += 1;
+                assert_eq!(verdict.posterior(), Some(recognizer.posterior(object.into())));
+                assert!(verdict.posterior().unwrap().complement() <= error_rate);
+                let mut resumed: Recognizer<3> = Recognizer::new(&model, stopping(error_rate, 200)).unwrap();
+                resumed.restore(recognizer.snapshot(&mut [0; 64]).unwrap()).unwrap();
+                assert_eq!(resumed.verdict(), verdict);
+            } else {
+                assert_eq!(verdict.posterior(), None);
+            }
+            if verdict != Verdict::Undecided {
+                recognizer.reset();
+            }
+        }
+        assert!(recognitions >= 3, "{recognitions} at {error_rate}");
     }
 }
 

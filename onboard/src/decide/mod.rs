@@ -7,7 +7,7 @@ mod recognizer;
 mod snapshot;
 mod stopping;
 
-pub use evidence::Posterior;
+pub use evidence::{Posterior, Rivals};
 pub use exponential::exp2_negative;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;

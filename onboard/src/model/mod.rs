@@ -59,23 +59,8 @@ impl<'a> Model<'a> {
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
     #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
-        let mut model = header::read(bytes);
-        if let Ok(opened) = &mut model
-            && let Err(error) = check::check(&opened.sections, &opened.sections.header(), &mut opened.touches)
-        {
-            model = Err(error);
-        }
-        model
-    }
-
-    /// A copy, field by field: a `memcpy` of this length would be a call, and its code several hundred bytes of flash.
-    pub(crate) const fn copied(&self) -> Self {
-        let &Self { sections: Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, .. }, .. } = self;
-        let Sections { objects, layout, leaf, .. } = self.sections;
-        let sections = Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf };
-        let TrainedTouches { patterns, counted, needs_pose, largest_spread } = self.touches;
-        let touches = TrainedTouches { patterns, counted, needs_pose, largest_spread };
-        Self { sections, descriptor: self.descriptor, touches }
+        header::whole(bytes)?;
+        header::read(bytes).map_err(|wrong| wrong.in_model(bytes))
     }
 
     /// The header.
@@ -90,7 +75,7 @@ impl<'a> Model<'a> {
 
     /// How many objects the model knows: 1 to 256.
     pub fn object_count(&self) -> usize {
-        usize::from(self.sections.objects)
+        self.sections.objects()
     }
 
     /// How many features a row has: 1 to 256.
@@ -155,7 +140,7 @@ impl<'a> Model<'a> {
 
     /// The probe that the model was trained for, if it states one.
     pub fn probe(&self) -> Option<TrainedProbe> {
-        TrainedProbe::from_bytes(optional::find(self.sections.optional, Tag::Probe))
+        TrainedProbe::from_bytes(optional::find(self.optional(), Tag::Probe))
     }
 
     /// The touches that the model was trained on, and so the only ones that count as evidence: full touches, with a pose
@@ -166,25 +151,30 @@ impl<'a> Model<'a> {
 
     /// The noise in the training, if the model states it.
     pub fn noise(&self) -> Option<TrainedNoise> {
-        TrainedNoise::from_bytes(optional::find(self.sections.optional, Tag::Noise))
+        TrainedNoise::from_bytes(optional::find(self.optional(), Tag::Noise))
     }
 
     /// How often each contact pattern occurred among the approaches of the training, if the model states it.
     pub fn pattern_shares(&self) -> Option<PatternShares> {
-        PatternShares::from_bytes(optional::find(self.sections.optional, Tag::PatternShares))
+        PatternShares::from_bytes(optional::find(self.optional(), Tag::PatternShares))
     }
 
     /// The optional sections, in the order of their tags; also those that this crate does not know.
     pub fn optional_sections(&self) -> impl Iterator<Item = Section<'a>> {
-        let mut rest = self.sections.optional;
+        let mut rest = self.optional();
         core::iter::from_fn(move || take_section(&mut rest))
     }
 
     /// The evidence for each object before any touch.
     pub(crate) fn priors(&self) -> &'a [[u8; 4]] {
-        // They follow the base margins, which are as long.
-        let start = self.sections.offset(self.sections.base) + self.sections.base.len();
-        self.sections.bytes.get(start..start + self.sections.base.len()).unwrap_or_default().as_chunks().0
+        self.sections.base_and_priors().1.as_chunks().0
+    }
+
+    /// The optional sections.
+    fn optional(&self) -> &'a [u8] {
+        let length = usize::try_from(self.header().optional_length()).unwrap_or_default();
+        let start = HEADER_LENGTH + self.text_length();
+        self.sections.bytes.get(start..start + length).unwrap_or_default()
     }
 
     fn text_length(&self) -> usize {

@@ -1,6 +1,6 @@
 //! The optional sections: checked once, then found by their tags.
 
-use crate::bytes::ModelError;
+use crate::bytes::Wrong;
 use crate::layouts::Sections;
 use palpate_shared::format::{Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
 
@@ -17,13 +17,11 @@ pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
 /// Checks that sections fill their part of the model, in the order of their tags, that what recognition depends on makes
 /// sense (whoever asks for probe or noise finds out about those), and that none is there
 /// that has to be understood and is not. Sets `touches` if the model states them.
-pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
-    let mut rest = model.optional;
+pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], touches: &mut TrainedTouches) -> Result<(), Wrong> {
     let mut last = 0;
     while !rest.is_empty() {
         let offset = model.offset(rest);
-        let Section { tag, must_understand, content } =
-            take_section(&mut rest).ok_or(ModelError::Section { offset })?;
+        let Section { tag, must_understand, content } = take_section(&mut rest).ok_or(Wrong::Section(offset))?;
         let valid = match tag {
             _ if tag <= last => false,
             _ if tag == Tag::Probe.code() => content.len() >= TrainedProbe::LENGTH,
@@ -31,11 +29,11 @@ pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Resul
                 TrainedTouches::from_bytes(content).map(|stated| *touches = stated).is_some()
             }
             _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
-            _ if must_understand => return Err(ModelError::NotUnderstood { tag, offset }),
+            _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,
         };
         if !valid {
-            return Err(ModelError::Field { offset });
+            return Err(Wrong::Field(offset));
         }
         last = tag;
     }
