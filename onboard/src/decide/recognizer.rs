@@ -1,6 +1,6 @@
 //! Touch by touch to a verdict.
 
-use super::evidence::{self, Posterior, Unit};
+use super::evidence::{self, Posterior, SHARPNESS, Unit};
 use super::stopping::Stopping;
 use crate::model::{Model, Refused};
 use core::fmt;
@@ -43,7 +43,7 @@ impl core::error::Error for CapacityError {}
 
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
-/// State: 8 bytes per object, and 40; and the model, which is copied: 68 bytes, not those that it is read from.
+/// State: 8 bytes per object, and 40; and the model, which is copied: 72 bytes, not those that it is read from.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: Model<'m>,
@@ -138,9 +138,19 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         evidence::best(self.evidence()).0
     }
 
-    /// The posterior of an object; 0 for one that the model does not know.
+    /// What the weights of all objects but the [best](Self::best) come to, the best one's being 1, in Q56: the best
+    /// object is recognized once this is at most its [threshold](Stopping::odds_of).
     ///
-    /// Cost: an exponential for each object, and about 800 instructions.
+    /// Cost: an exponential for each object.
+    pub fn rivals(&self) -> u64 {
+        let evidence = self.evidence();
+        evidence::rivals(evidence, evidence::best(evidence), unit(&self.model))
+    }
+
+    /// The posterior of an object, of the evidence divided by the model's [temperature](Model::temperature); 0 for an
+    /// object that the model does not know.
+    ///
+    /// Cost: an exponential for each object, and about 1,000 instructions.
     pub fn posterior(&self, object: usize) -> Posterior {
         self.state.posterior(&self.model, object)
     }
@@ -182,7 +192,8 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         }
         self.state.touches = self.state.touches.saturating_add(1);
         let best = evidence::best(self.evidence());
-        if evidence::is_decided(self.evidence(), best, self.state.stopping.odds, unit(&self.model)) {
+        let odds = self.state.stopping.odds_of(best.0, &self.model);
+        if evidence::is_decided(self.evidence(), best, odds, unit(&self.model)) {
             let object = u8::try_from(best.0).unwrap_or(u8::MAX);
             self.state.verdict = Verdict::Recognized { object, touches: self.state.touches };
         } else if self.state.touches >= self.state.stopping.max_touches {
@@ -198,7 +209,8 @@ impl<const N: usize> State<N> {
     }
 
     pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
-        evidence::posterior(self.evidence(model), object, unit(model))
+        let sharpness = model.temperature().sharpness();
+        evidence::posterior(self.evidence(model), object, Unit { sharpness, ..unit(model) })
     }
 
     pub(crate) const fn touches(&self) -> u32 {
@@ -219,5 +231,5 @@ impl<const N: usize> State<N> {
 
 fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
-    Unit { bits: header.unit_bits(), shift: header.unit_shift() }
+    Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }
