@@ -64,6 +64,7 @@
 //! | [`ensemble`] | the full model: trees in `f32`, XGBoost JSON, training | [`ensemble::Ensemble`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
+//! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
@@ -102,6 +103,8 @@ pub mod ensemble;
 
 pub mod compile;
 pub mod evaluate;
+
+pub mod calibrate;
 
 #[cfg(feature = "train")]
 pub mod tune;

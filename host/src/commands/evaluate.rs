@@ -46,9 +46,10 @@ pub(crate) struct Arguments {
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]
     groups: usize,
-    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%
-    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
-    error_rate: f64,
+    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%, which nothing promises [default: the
+    /// model's own thresholds; 1% for an ensemble]
+    #[arg(long, value_name = "RATE", value_parser = share)]
+    error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
     max_touches: Option<u32>,

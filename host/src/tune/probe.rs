@@ -418,7 +418,7 @@ impl Search<'_> {
             progress::check(self.progress)?;
             let threshold = 1.0 / (1.0 + (-log_odds).exp());
             let settings =
-                SequentialSettings { error_rate: threshold, max_touches: Some(MAX_TOUCHES), sequences, seed };
+                SequentialSettings { error_rate: Some(threshold), max_touches: Some(MAX_TOUCHES), sequences, seed };
             Ok::<_, Error>((threshold, margins.approaches(&[], &settings)?))
         };
         let [mut strict, mut loose] = ODDS;

@@ -1,6 +1,6 @@
 //! Touch by touch to a verdict.
 
-use super::evidence::{self, Posterior, Rivals, Unit};
+use super::evidence::{self, Posterior, Rivals, SHARPNESS, Unit};
 use super::stopping::Stopping;
 use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
@@ -30,7 +30,8 @@ pub enum Verdict {
 impl Verdict {
     /// The posterior of the object that was recognized, when it was; `None` if none was.
     ///
-    /// Cost: that of [`Rivals::posterior`]. For other objects, and before a decision: [`Recognizer::posterior`].
+    /// Cost: that of [`Rivals::posterior`]. It is that of the evidence as it is, which the threshold is for; for the model's
+    /// [temperature](Model::temperature), other objects, and before a decision: [`Recognizer::posterior`].
     pub fn posterior(&self) -> Option<Posterior> {
         match self {
             Self::Recognized { rivals, .. } => Some(rivals.posterior()),
@@ -58,7 +59,7 @@ impl core::error::Error for CapacityError {}
 
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
-/// State: 8 bytes per object, and 40; and the model, which is copied: 64 bytes, not those that it is read from.
+/// State: 8 bytes per object, and 40; and the model, which is copied: 68 bytes, not those that it is read from.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: Model<'m>,
@@ -70,12 +71,9 @@ pub struct Recognizer<'m, const N: usize> {
 pub(crate) struct State<const N: usize> {
     /// Margins summed over touches, and the prior, in units of a margin; anything before the first touch.
     evidence: [i64; N],
-    /// [`Stopping`]'s.
-    odds: u64,
+    stopping: Stopping,
     /// Of the object that was recognized.
     rivals: Rivals,
-    /// [`Stopping`]'s.
-    max_touches: u32,
     touches: u32,
     decided: Decided,
 }
@@ -98,16 +96,14 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         if objects > N {
             return Err(CapacityError { objects, capacity: N });
         }
-        let Stopping { odds, max_touches } = stopping;
         Ok(Self {
             model: *model,
             state: State {
                 // Not the priors yet: written into, it would be copied to its place, and a copy of this length is a call that
                 // brings in 800 bytes of code.
                 evidence: [0; N],
-                odds,
+                stopping,
                 rivals: Rivals::from_q56(0),
-                max_touches,
                 touches: 0,
                 decided: Decided::Nothing,
             },
@@ -173,9 +169,20 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         evidence::best(self.state.evidence_or_priors(&self.model, &mut [0; N])).0
     }
 
-    /// The posterior of an object; 0 for one that the model does not know.
+    /// What the weights of all objects but the [best](Self::best) come to, the best one's being 1, in Q56: the best
+    /// object is recognized once this is at most its [threshold](Stopping::odds_of).
     ///
-    /// Cost: an exponential for each object, and about 800 instructions.
+    /// Cost: an exponential for each object.
+    pub fn rivals(&self) -> u64 {
+        let mut priors = [0; N];
+        let evidence = self.state.evidence_or_priors(&self.model, &mut priors);
+        evidence::rivals(evidence, evidence::best(evidence), u64::MAX, unit(&self.model)).map_or(u64::MAX, Rivals::q56)
+    }
+
+    /// The posterior of an object, of the evidence divided by the model's [temperature](Model::temperature); 0 for an
+    /// object that the model does not know.
+    ///
+    /// Cost: an exponential for each object, and about 1,000 instructions.
     pub fn posterior(&self, object: usize) -> Posterior {
         self.state.posterior(&self.model, object)
     }
@@ -218,10 +225,11 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.touches = self.state.touches.saturating_add(1);
         let best = evidence::best(self.evidence());
         let unit = unit(&self.model);
-        if let Some(rivals) = evidence::rivals(self.evidence(), best, self.state.odds, unit) {
+        let odds = self.state.stopping.odds_of(best.0, &self.model);
+        if let Some(rivals) = evidence::rivals(self.evidence(), best, odds, unit) {
             self.state.decided = Decided::Object(u8::try_from(best.0).unwrap_or(u8::MAX));
             self.state.rivals = rivals;
-        } else if self.state.touches >= self.state.max_touches {
+        } else if self.state.touches >= self.state.stopping.max_touches {
             self.state.decided = Decided::Unknown;
         }
         self.verdict()
@@ -235,7 +243,8 @@ impl<const N: usize> State<N> {
     }
 
     pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
-        evidence::posterior(self.evidence_or_priors(model, &mut [0; N]), object, unit(model))
+        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit(model) };
+        evidence::posterior(self.evidence_or_priors(model, &mut [0; N]), object, unit)
     }
 
     /// The evidence, which before the first touch is the priors; they are put into `priors`.
@@ -291,5 +300,5 @@ fn start(model: &Model<'_>, evidence: &mut [i64]) {
 
 fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
-    Unit { bits: header.unit_bits(), shift: header.unit_shift() }
+    Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }

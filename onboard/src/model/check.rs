@@ -1,16 +1,17 @@
 //! What is checked when a model is opened, so that no later step can fail.
 
-use super::optional;
+use super::optional::{self, Stated};
 use crate::bytes::{Wrong, take};
 use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
-use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, TrainedTouches};
+use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
 
-/// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves.
+/// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves. Sets what the optional
+/// sections state.
 #[inline(never)]
-pub(super) fn check(model: &Sections<'_>, optional: &[u8], touches: &mut TrainedTouches) -> Result<(), Wrong> {
+pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) -> Result<(), Wrong> {
     let header = &model.header();
     if Key::from_code(header.key()).is_none() {
         return Err(Wrong::Field(13));
@@ -22,7 +23,7 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], touches: &mut Trained
     if !built_in || !built_in::leaf(model.leaf) {
         return Err(Wrong::NotBuiltIn(if built_in { 7 } else { 6 }));
     }
-    optional::check(model, optional, touches)?;
+    optional::check(model, optional, stated)?;
     ranks::check(model, header.last_feature())?;
     let section = |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(Wrong::Section(model.offset(part))) };
     let values = model.objects();

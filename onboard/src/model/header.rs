@@ -2,6 +2,7 @@
 
 use super::Model;
 use super::check;
+use super::optional::Stated;
 use crate::bytes::{ModelError, Wrong, take};
 use crate::layouts::Sections;
 use palpate_shared::Descriptor;
@@ -65,9 +66,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, Wrong> {
     let leaf = LeafType::from_code(header.leaf()).ok_or(Wrong::Field(7))?;
     let descriptor = descriptor(&header).map_err(Wrong::Field)?;
     let sections = Sections { bytes, margins, ranked, groups, nodes, leaves, axis_count, layout, leaf };
-    let mut touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
-    check::check(&sections, optional, &mut touches)?;
-    Ok(Model { sections, descriptor, touches })
+    let touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
+    let mut stated = Stated { touches, by_object: 0 };
+    check::check(&sections, optional, &mut stated)?;
+    let Stated { touches, by_object } = stated;
+    Ok(Model { sections, descriptor, touches, by_object })
 }
 
 /// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.

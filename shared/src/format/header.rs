@@ -163,6 +163,15 @@ impl Default for HeaderBuilder {
     }
 }
 
+/// A header to be changed.
+impl From<Header<'_>> for HeaderBuilder {
+    fn from(header: Header<'_>) -> Self {
+        let mut bytes = [0; HEADER_LENGTH];
+        bytes.iter_mut().zip(header.0).for_each(|(to, from)| *to = *from);
+        Self(bytes)
+    }
+}
+
 impl HeaderBuilder {
     /// A model with optional sections of `length` bytes together; without any it stays one of version 1.
     pub fn with_sections(self, length: u32) -> Self {
