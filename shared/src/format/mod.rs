@@ -7,6 +7,7 @@
 mod codes;
 mod header;
 mod key;
+mod plan;
 mod records;
 mod trained;
 
@@ -14,6 +15,7 @@ pub use crate::checksum::checksum;
 pub use codes::{Counted, Key, Layout, LeafType, Length, RAW_FEATURES};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
+pub use plan::Plan;
 pub use records::{Axis, Columns, Group};
 pub use trained::{
     MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
