@@ -39,7 +39,7 @@ pub(crate) struct Unit {
 
 impl Unit {
     /// e^-(`ahead` units) in Q56.
-    fn weight(self, ahead: u64) -> u64 {
+    pub(super) fn weight(self, ahead: u64) -> u64 {
         let ahead = u64::from(u32::try_from(ahead).unwrap_or(u32::MAX));
         exp2_negative((ahead * u64::from(self.bits)) >> (self.shift & 63))
     }

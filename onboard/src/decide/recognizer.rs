@@ -217,7 +217,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-fn unit(model: &Model<'_>) -> Unit {
+pub(super) fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
     Unit { bits: header.unit_bits(), shift: header.unit_shift() }
 }
