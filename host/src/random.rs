@@ -28,6 +28,8 @@ pub(crate) enum Purpose {
     Casts,
     /// Groups and sequences of approaches that an evaluation draws.
     Approaches,
+    /// Approaches that an evaluation draws from those in a pose.
+    Active,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -47,6 +49,7 @@ impl Purpose {
             Self::View => Some(4),
             Self::Casts => Some(5),
             Self::Approaches => Some(7),
+            Self::Active => Some(16),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }

@@ -2,7 +2,7 @@ use super::noise::NoiseArguments;
 use super::numbers::share;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
-use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings};
+use crate::evaluate::{self, Active, ActiveFacts, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings};
 use crate::output;
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
@@ -19,6 +19,8 @@ Evaluate on touches that the model was not trained on: capture them with another
 
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
 
+With --active, on approaches with pose, each next approach is drawn from those of the same object in the pose that the model's plan proposes, none twice in a sequence. A pose whose approaches are used up is not proposed again in the sequence; where none is left, it ends without a verdict.
+
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 
 Examples:
@@ -29,7 +31,8 @@ Examples:
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
   palpate evaluate model.palpate unseen --confusion 20
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
-  palpate evaluate model.palpate approaches --error-rate 0.02")]
+  palpate evaluate model.palpate approaches --error-rate 0.02
+  palpate evaluate planned.palpate approaches --active")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
@@ -53,6 +56,9 @@ pub(crate) struct Arguments {
     /// Seed of the drawing, and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Make every approach where the model's plan says, instead of one drawn at random (see `palpate plan`)
+    #[arg(long)]
+    active: bool,
     /// Print the figures as JSON
     #[arg(long)]
     json: bool,
@@ -71,6 +77,9 @@ struct Evaluated {
     trained_on: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     confusion: Option<Confusion>,
+    /// What the plan proposed approaches from, where it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    active: Option<ActiveFacts>,
 }
 
 /// How often each object was taken for each.
@@ -96,7 +105,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let (evaluation, confusion) = file.with(|candidate| {
+    let (evaluation, confusion, active) = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
@@ -115,10 +124,15 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
                 counts: margins.confusion(touches, arguments.groups, arguments.seed)?,
             })
         });
-        Ok((evaluate::evaluate(&margins, &settings)?, confusion.transpose()?))
+        let active = arguments.active.then(|| Active::new(candidate, &dataset, robots)).transpose()?;
+        let evaluation = match &active {
+            Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
+            None => evaluate::evaluate(&margins, &settings)?,
+        };
+        Ok((evaluation, confusion.transpose()?, active.map(|active| active.facts())))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, robots, trained_on, confusion };
+    let evaluated = Evaluated { evaluation, robots, trained_on, confusion, active };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -161,6 +175,15 @@ fn text(evaluated: &Evaluated) -> String {
     let mut text = table(&evaluated.evaluation);
     if let Some(approaches) = &evaluated.evaluation.approaches {
         text += &approaches_table(approaches, &evaluated.evaluation.patterns);
+    }
+    if let Some(ActiveFacts { rolls, poses, left_out, without_approaches }) = &evaluated.active {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "Each approach is in the pose that the plan proposed, of {poses} (26 directions, {rolls} roll{} each; {left_out} \
+             never touch, {without_approaches} have no approach here).",
+            if *rolls == 1 { "" } else { "s" }
+        );
     }
     if evaluated.robots > 1 {
         // Writing to a string cannot fail.

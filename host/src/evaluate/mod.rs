@@ -32,20 +32,26 @@
 //! # }
 //! ```
 
+mod active;
 mod approaches;
 #[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
+mod draws;
 mod estimate;
 mod full;
 mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
+mod plan;
+mod poses;
 mod sequential;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+mod under_plan;
 
+pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
@@ -53,7 +59,10 @@ pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
+pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
+pub use poses::{ByPose, Stock};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
+pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
 use palpate_shared::ContactPattern;

@@ -82,12 +82,17 @@ impl Margins<'_> {
         let stopping = self.stopping(settings)?;
         let outcomes: Vec<Vec<Outcome>> =
             (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
+        Ok(self.of_outcomes(outcomes, error_rate, stopping.max_touches()))
+    }
+
+    /// The figures of sequences, for each tested object as many.
+    pub(super) fn of_outcomes(&self, outcomes: Vec<Vec<Outcome>>, error_rate: f64, max_touches: u32) -> Sequential {
         let touches = self.mean(&outcomes, |outcome| outcome.touches);
         let error = self.wrong(&outcomes);
         let undecided = self.undecided(&outcomes);
-        Ok(Sequential {
+        Sequential {
             error_rate,
-            max_touches: stopping.max_touches(),
+            max_touches,
             mean_touches: touches.all.value,
             mean_touches_standard_error: touches.all.standard_error,
             error: error.all.value,
@@ -97,7 +102,7 @@ impl Margins<'_> {
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
             outcomes,
-        })
+        }
     }
 
     /// The share of sequences with a wrong verdict.
