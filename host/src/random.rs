@@ -30,6 +30,8 @@ pub(crate) enum Purpose {
     Approaches,
     /// Approaches that an evaluation draws from those in a pose.
     Active,
+    /// When objects are exchanged, and for which.
+    Switch,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -50,6 +52,7 @@ impl Purpose {
             Self::Casts => Some(5),
             Self::Approaches => Some(7),
             Self::Active => Some(16),
+            Self::Switch => Some(17),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }

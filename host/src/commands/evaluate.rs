@@ -2,7 +2,7 @@ use super::noise::NoiseArguments;
 use super::numbers::share;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
-use crate::evaluate::{self, Active, ActiveFacts, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings};
+use crate::evaluate::{self, Active, ActiveFacts, Approaches, Evaluation, LEAST_GROUPS, Margins, Rule, Settings, Switched};
 use crate::output;
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
@@ -32,7 +32,8 @@ Examples:
   palpate evaluate model.palpate unseen --confusion 20
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02
-  palpate evaluate planned.palpate approaches --active")]
+  palpate evaluate planned.palpate approaches --active
+  palpate evaluate model.palpate approaches --switch")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
@@ -59,6 +60,10 @@ pub(crate) struct Arguments {
     /// Make every approach where the model's plan says, instead of one drawn at random (see `palpate plan`)
     #[arg(long)]
     active: bool,
+    /// Say as well what an object that is exchanged at a random approach comes to, with and without forgetting: restarting
+    /// once recent touches speak by so many nats against the likeliest object
+    #[arg(long, value_name = "NATS", num_args = 0..=1, default_missing_value = "5")]
+    switch: Option<f32>,
     /// Print the figures as JSON
     #[arg(long)]
     json: bool,
@@ -80,6 +85,9 @@ struct Evaluated {
     /// What the plan proposed approaches from, where it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     active: Option<ActiveFacts>,
+    /// Sequences in which the object is exchanged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    switch: Option<Switched>,
 }
 
 /// How often each object was taken for each.
@@ -105,7 +113,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let (evaluation, confusion, active) = file.with(|candidate| {
+    let (evaluation, confusion, active, switch) = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
@@ -129,10 +137,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
             None => evaluate::evaluate(&margins, &settings)?,
         };
-        Ok((evaluation, confusion.transpose()?, active.map(|active| active.facts())))
+        let switch = arguments.switch.map(|nats| margins.switched(&settings.sequences(), nats)).transpose()?;
+        Ok((evaluation, confusion.transpose()?, active.map(|active| active.facts()), switch))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, robots, trained_on, confusion, active };
+    let evaluated = Evaluated { evaluation, robots, trained_on, confusion, active, switch };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -191,6 +200,9 @@ fn text(evaluated: &Evaluated) -> String {
     }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);
+    }
+    if let Some(switch) = &evaluated.switch {
+        text += &switch_table(switch);
     }
     if !evaluated.trained_on.is_empty() {
         let objects = evaluated.trained_on.join(", ");
@@ -303,6 +315,30 @@ fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeM
         shares.collect::<Vec<_>>().join(", "),
     );
     text
+}
+
+/// What an exchanged object comes to: one row per rule.
+fn switch_table(switch: &Switched) -> String {
+    let mut text = format!(
+        "\n{:20} {:>22} {:>8} {:>26} {:>8} {:>8}\n",
+        "forgetting", "approaches, same object", "wrong", "approaches after exchange", "wrong", "the old"
+    );
+    for (name, Rule { still, switched, old }) in
+        [("off".to_owned(), &switch.off), (format!("at {} nats", switch.nats), &switch.on)]
+    {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "{name:20} {:>22.1} {:>8} {:>26.1} {:>8} {:>8}",
+            still.mean_approaches,
+            percent(still.error),
+            switched.mean_approaches,
+            percent(switched.error),
+            percent(*old)
+        );
+    }
+    text + "Exchanged at a random approach before the verdict; wrong is any name but that of the object touched last.\n"
 }
 
 /// Shares in percent: one row per touched object, one column per object that it was taken for.

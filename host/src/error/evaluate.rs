@@ -68,6 +68,12 @@ pub enum EvaluateProblem {
         /// How many there must be.
         needed: usize,
     },
+    /// Something was asked for that only compiled models do.
+    #[error("forgetting is what a compiled model's recognizer does, and this is an ensemble")]
+    NotCompiled,
+    /// There is one object only.
+    #[error("the data set has one object: there is nothing to exchange it for")]
+    NothingToSwitch,
     /// A line is not a touch.
     #[error("{detail}")]
     Touch {
@@ -111,6 +117,8 @@ impl EvaluateProblem {
                     needed.div_ceil((*found).max(1)).max(2)
                 );
             }
+            Self::NotCompiled => "Export the ensemble first.",
+            Self::NothingToSwitch => "Capture another object.",
             Self::Touch { .. } => "Correct the line.",
             Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
         }

@@ -132,7 +132,7 @@ impl Margins<'_> {
     }
 
     /// The numbers of approaches in the order in which a group has them.
-    fn draws(&self, all: usize, position: usize, group: usize, seed: u64) -> Draws {
+    pub(super) fn draws(&self, all: usize, position: usize, group: usize, seed: u64) -> Draws {
         let group = u64::try_from(group).unwrap_or(u64::MAX);
         Draws::new(all, Purpose::Approaches, &self.tested_names()[position], group, seed)
     }

@@ -200,7 +200,7 @@ fn onboard<'r, const N: usize>(
 }
 
 /// Counts approaches, and touches that are evidence, up to the first verdict.
-fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
+pub(super) fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
     let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None };
     for verdict in verdicts {
         outcome.approaches += 1;

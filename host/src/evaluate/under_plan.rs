@@ -3,7 +3,7 @@
 use super::active::Active;
 use super::estimate::Estimate;
 use super::margins::Margins;
-use super::sequential::{Outcome, SequentialSettings};
+use super::sequential::Outcome;
 use super::{Evaluation, Settings};
 use crate::error::{Error, Result};
 use palpate_onboard::Stopping;
@@ -26,14 +26,8 @@ struct Counts {
 /// # Errors
 /// [`Problem::Setting`](crate::error::Problem::Setting) as [`evaluate`](super::evaluate()).
 pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
-    let Settings { at, at_approaches, groups, error_rate, max_touches, seed } = settings;
-    let stopping = SequentialSettings {
-        error_rate: *error_rate,
-        max_touches: *max_touches,
-        sequences: *groups,
-        seed: *seed,
-    };
-    let rule = margins.stopping(&stopping)?;
+    let Settings { at, at_approaches, groups, error_rate, seed, .. } = settings;
+    let rule = margins.stopping(&settings.sequences())?;
     if at.iter().chain(at_approaches).any(|&at| at == 0) {
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
     }

@@ -49,8 +49,14 @@ pub(crate) fn propose(
             proposal = Some(Proposal { index, pose, score });
         }
     }
-    // In Q15: separations are in 128ths, and the weights together are at least 2^15.
-    proposal.map(|best| Proposal { score: best.score / (weights >> 8).max(1), ..best })
+    proposal.map(|best| Proposal { score: mean(best.score, weights), ..best })
+}
+
+/// A sum of 128ths times weights as a mean in Q15, rounded toward 0. In two steps, so that 32 bits are enough: there are
+/// less than 2^23 of weights.
+fn mean(sum: i32, weights: i32) -> i32 {
+    let weights = weights.max(1);
+    sum / weights * 256 + sum % weights * 256 / weights
 }
 
 /// Adds up the separations of the object with the most evidence from each other one, times this one's weight in Q15, that
