@@ -34,7 +34,7 @@
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = Model::new(&compiled.bytes)?;
 //! let mut recognizer = Recognizer::<2>::new(&model, Stopping::from_model(&model))?;
-//! let scene = Scene::new(objects[0].mesh(), origin.length)?;
+//! let scene = [Scene::new(objects[0].mesh(), origin.length)?];
 //! let unseen = Origin { seed: 2, ..origin };
 //! let mut verdict = Verdict::Undecided;
 //! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {

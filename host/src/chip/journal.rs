@@ -3,7 +3,7 @@
 use super::{ChipModel, Update};
 use crate::error::{Error, Result};
 use palpate_shared::Pose;
-use palpate_shared::link::{Decision, Event};
+use palpate_shared::link::{ApproachMessage, Decision, Event};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::io::{ErrorKind, Write};
@@ -107,6 +107,15 @@ impl Journal {
 }
 
 impl Entry {
+    /// The entry for a proposed approach.
+    pub fn next(approach: &ApproachMessage) -> Self {
+        // Q15, to four digits.
+        let unit = |q15: f64| (q15 / 32_767.0 * 1e4).round() / 1e4;
+        let Pose { direction, alignment } = approach.middle();
+        let [direction, alignment] = [direction, alignment].map(|vector| vector.map(|q15| unit(q15.into())));
+        Self::Next { pose: approach.pose, direction, alignment, score: unit(approach.score.into()) }
+    }
+
     /// The entry for an update; `None` where nothing happened.
     pub fn of(update: &Update, chip: &ChipModel, at: Duration) -> Option<Self> {
         let name = |object: u8| chip.names.get(usize::from(object)).cloned().unwrap_or_default();
@@ -135,13 +144,7 @@ impl Entry {
             Update::Refused { refusal, .. } | Update::Event(Event::Refused { refusal, .. }, _) => {
                 Some(Self::Fault { what: format!("a touch was not counted: {refusal}") })
             }
-            Update::Next(approach) => {
-                // Q15, to four digits.
-                let unit = |q15: f64| (q15 / 32_767.0 * 1e4).round() / 1e4;
-                let Pose { direction, alignment } = approach.middle();
-                let [direction, alignment] = [direction, alignment].map(|vector| vector.map(|q15| unit(q15.into())));
-                Some(Self::Next { pose: approach.pose, direction, alignment, score: unit(approach.score.into()) })
-            }
+            Update::Next(approach) => Some(Self::next(approach)),
             Update::Event(..) | Update::Idle => None,
         }
     }

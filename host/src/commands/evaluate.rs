@@ -1,5 +1,6 @@
 use super::noise::NoiseArguments;
 use super::numbers::share;
+use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
 use crate::evaluate::{self, Active, ActiveFacts, Approaches, Evaluation, LEAST_GROUPS, Margins, Rule, Settings, Switched};
@@ -7,6 +8,7 @@ use crate::output;
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
 use crate::{Error, Result};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -16,6 +18,8 @@ use std::path::PathBuf;
 The model is a compiled one (model.palpate), evaluated by the code that runs on the chip, or an ensemble (ensemble.json), evaluated in f32. The same seed draws the same groups of touches for both.
 
 Evaluate on touches that the model was not trained on: capture them with another seed. An ensemble knows its training touches again; a compiled model does not.
+
+With --probe, what the file says under [real] is added to the touches, and the data set must have been captured with the probe of the file.
 
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
 
@@ -29,6 +33,7 @@ Examples:
   palpate evaluate ensemble.json unseen --at 10,30 --json
   palpate evaluate model.palpate unseen --noise 5ms
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
+  palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --confusion 20
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02
@@ -68,6 +73,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    probe: ProbeArguments,
+    #[command(flatten)]
     noise: NoiseArguments,
 }
 
@@ -78,6 +85,9 @@ struct Evaluated {
     evaluation: Evaluation,
     /// Robots that made the touches in turn, each with its own bias.
     robots: usize,
+    /// How many instances the objects have that have several: each group is of touches of one.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    instances: BTreeMap<String, usize>,
     /// Objects whose touches are those that the model was trained on.
     trained_on: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -109,7 +119,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
         ModelFile::Compiled(_) => Vec::new(),
     };
-    let noise = arguments.noise.over(Noise::default());
+    let probe = arguments.probe.read()?;
+    arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
+    let noise = arguments.noise.over(probe.map_or_else(Noise::default, |file| file.real));
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
@@ -132,7 +144,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
                 counts: margins.confusion(touches, arguments.groups, arguments.seed)?,
             })
         });
-        let active = arguments.active.then(|| Active::new(candidate, &dataset, robots)).transpose()?;
+        let active = arguments.active.then(|| Active::new(&margins, &dataset)).transpose()?;
         let evaluation = match &active {
             Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
             None => evaluate::evaluate(&margins, &settings)?,
@@ -141,7 +153,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         Ok((evaluation, confusion.transpose()?, active.map(|active| active.facts()), switch))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, robots, trained_on, confusion, active, switch };
+    let instances = dataset.instances;
+    let evaluated = Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -197,6 +210,9 @@ fn text(evaluated: &Evaluated) -> String {
     if evaluated.robots > 1 {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
+    }
+    if let Some(most) = evaluated.instances.values().max() {
+        _ = writeln!(text, "Objects have up to {most} instances; each group is of touches of one instance.");
     }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);

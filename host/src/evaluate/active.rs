@@ -1,10 +1,10 @@
 //! Approaches where the model's plan says.
 
-use super::margins::{Candidate, Margins, Values, row};
+use super::margins::{Candidate, Margins, Tested, Values, row};
 use super::poses::{ByPose, Stock};
 use super::sequential::Outcome;
 use crate::error::{EvaluateProblem, Result};
-use crate::touches::Dataset;
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Poses;
 use serde::Serialize;
@@ -15,7 +15,7 @@ use serde::Serialize;
 /// some object has no test approach in are never proposed, and one whose approaches are used up in a sequence is not
 /// proposed again in it; where none is left, the sequence ends without a verdict.
 pub struct Active {
-    /// For each robot, for each tested object.
+    /// For each tested object, for each turn: of its instances, and of robots.
     by_pose: Vec<Vec<ByPose>>,
     /// Poses that may be proposed.
     candidates: Vec<u16>,
@@ -38,13 +38,13 @@ pub struct ActiveFacts {
 }
 
 impl Active {
-    /// The approaches of a data set by the poses of the model's plan; `robots` made them in turn.
+    /// The approaches of a data set, which the margins are of, by the poses of the model's plan.
     ///
     /// # Errors
     /// [`EvaluateProblem::NoPlan`] for a model without one, or an ensemble; [`EvaluateProblem::NoApproaches`] and
     /// [`EvaluateProblem::NoPoseOf`] for a data set without approaches or without poses.
-    pub fn new(candidate: Candidate<'_>, dataset: &Dataset, robots: usize) -> Result<Self> {
-        let plan = match candidate {
+    pub fn new(margins: &Margins<'_>, dataset: &Dataset) -> Result<Self> {
+        let plan = match margins.candidate {
             Candidate::Full(_) => None,
             Candidate::Compiled(model) => model.plan(),
         };
@@ -53,7 +53,11 @@ impl Active {
             return Err(EvaluateProblem::NoApproaches.into());
         }
         let poses = plan.poses();
-        let by_pose = ByPose::all(dataset, poses, robots)?;
+        let turns = |(tested, object): (&Tested<'_>, &ObjectTouches)| -> Result<Vec<ByPose>> {
+            (0..tested.turns).map(|turn| ByPose::new(object, poses, turn, tested.turns)).collect()
+        };
+        let by_pose: Vec<Vec<ByPose>> =
+            margins.tested.iter().zip(&dataset.objects).map(turns).collect::<Result<_>>()?;
         let has_some = |pose: &u16| by_pose.iter().flatten().all(|of| of.count(*pose) > 0);
         let touching: Vec<u16> = (0..poses.count()).filter(|&pose| plan.may_touch(pose)).collect();
         let left_out = usize::from(poses.count()) - touching.len();
@@ -72,7 +76,8 @@ impl Active {
 
     /// The approaches to a tested object that sequence `group` may use.
     fn stock(&self, position: usize, group: usize, seed: u64) -> Stock<'_> {
-        self.by_pose[group % self.by_pose.len()][position].stock(group, seed)
+        let turns = &self.by_pose[position];
+        turns[group % turns.len()].stock(group, seed)
     }
 
     /// The number of the next approach in a sequence, as the recognizer proposes it and the stock has it; `None` if none

@@ -163,3 +163,133 @@ fn overlaps(margins: &Margins<'_>, position: usize, by_pose: &ByPose) -> Vec<f64
     }
     overlaps
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compile::compile;
+    use crate::ensemble::{Ensemble, Node, Origin, Output, Tree};
+    use crate::error::Problem;
+    use crate::touches::{self, ObjectTouches};
+    use palpate_onboard::{Recognizer, Stopping};
+    use palpate_shared::{ContactTime, Descriptor, Touch};
+
+    /// One nat for the first object below a curvature of 50 ms, one for the second above. Misses are no evidence.
+    fn model() -> Vec<u8> {
+        let nodes = vec![
+            Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 },
+            Node::Leaf(vec![0.5, -0.5]),
+            Node::Leaf(vec![-0.5, 0.5]),
+        ];
+        let ensemble = Ensemble {
+            descriptor: Descriptor::Curvature,
+            objects: vec!["bowl".into(), "fork".into()],
+            base_margins: vec![0.0; 2],
+            trees: vec![Tree { nodes, output: Output::Each }],
+            origin: Origin::default(),
+        };
+        compile(&ensemble, &compile::Settings::default()).unwrap().bytes
+    }
+
+    /// What `touch` says for each direction, 20 times each.
+    fn dataset(touch: impl Fn(usize, u16, usize) -> Touch) -> Dataset {
+        let poses = Poses::with_rolls(1).unwrap();
+        let all = |object| {
+            let of = |pose| (0..20).map(move |index| (pose, index));
+            let each = |(pose, index)| touch(object, pose, index).with_pose(poses.pose(pose).unwrap());
+            (0..26).flat_map(of).map(each).collect()
+        };
+        let object = |(index, name): (usize, &str)| ObjectTouches { name: name.into(), touches: all(index) };
+        let objects = ["bowl", "fork"].into_iter().enumerate().map(object).collect();
+        let origin = touches::Origin { approaches: true, pose: true, ..touches::Origin::default() };
+        Dataset { origin: Some(origin), ..Dataset::new(objects) }
+    }
+
+    fn flat() -> Touch {
+        Touch::from_micros([0, 0, 10_000])
+    }
+
+    fn bent() -> Touch {
+        Touch::from_micros([0, 0, 80_000])
+    }
+
+    fn missed() -> Touch {
+        Touch::new([ContactTime::MISSING; 3])
+    }
+
+    #[test]
+    fn separations_are_those_worked_out_by_hand_and_the_best_pose_is_proposed() {
+        let bytes = model();
+        let model = Model::new(&bytes).unwrap();
+        let dataset = dataset(|object, pose, index| match (pose, object) {
+            // Nothing is touched; one nat for either; misses and the other's touches for the first, one nat for the second.
+            (3, _) => missed(),
+            (5, 0) => flat(),
+            (7, 0) => if index % 2 == 0 { missed() } else { bent() },
+            (5 | 7, _) => bent(),
+            // Half of the approaches miss; the others say one nat.
+            _ => match (index % 2, object) {
+                (0, _) => missed(),
+                (_, 0) => flat(),
+                _ => bent(),
+            },
+        });
+        let planned = plan(&model, &dataset, 1).unwrap();
+        assert_eq!((planned.poses, planned.left_out, planned.fewest, planned.plan_bytes), (26, 1, 20, 30));
+        let with_plan = Model::new(&planned.bytes).unwrap();
+        let separations = with_plan.plan().unwrap().separations(0, 1);
+        let one = (-0.5_f64).exp();
+        let stored = |overlap: f64| (128.0 * (1.0 - overlap)).round() as i8;
+        for (pose, &separation) in separations.iter().enumerate() {
+            let expected = match pose {
+                3 => Plan::UNTOUCHED,
+                5 => stored(one),
+                7 => stored((1.0 + 1.0 / one) / 2.0),
+                _ => stored((1.0 + one) / 2.0),
+            };
+            assert_eq!(separation.cast_signed(), expected, "{pose}");
+        }
+        assert!((planned.hardest.separation - (1.0 - one)).abs() < 1e-4);
+        let recognizer = Recognizer::<2>::new(&with_plan, Stopping::from_model(&with_plan)).unwrap();
+        assert_eq!(recognizer.next_approach(0..26).map(|best| best.pose), Some(5));
+        assert_eq!(recognizer.next_approach(6..8).map(|best| best.pose), Some(6));
+        // Planned again, the plan is replaced; margins are the same.
+        let again = plan(&with_plan, &dataset, 1).unwrap();
+        assert_eq!(again.bytes, planned.bytes);
+        let mut margins = [[0; 2]; 2];
+        assert!(model.margins(&bent(), &mut margins[0]) && with_plan.margins(&bent(), &mut margins[1]));
+        assert_eq!(margins[0], margins[1]);
+    }
+
+    #[test]
+    fn what_no_plan_can_be_made_of_is_refused_by_name() {
+        let bytes = model();
+        let model = Model::new(&bytes).unwrap();
+        let good = dataset(|_, _, _| flat());
+        let refused = |change: &dyn Fn(&mut Dataset), rolls| {
+            let mut dataset = good.clone();
+            change(&mut dataset);
+            plan(&model, &dataset, rolls).map(|_| ()).unwrap_err()
+        };
+        let problem = |error: Error| match error.problem() {
+            Some(Problem::Evaluate(problem)) => problem.clone(),
+            _ => panic!("{error}"),
+        };
+        assert!(plan(&model, &good, 1).is_ok());
+        assert_eq!(refused(&|_| {}, 3).exit_code(), 2);
+        let few = refused(&|_| {}, 2);
+        assert!(matches!(problem(few), EvaluateProblem::FewInPose { needed: LEAST_IN_POSE, .. }));
+        let full = refused(&|dataset| dataset.origin.as_mut().unwrap().approaches = false, 1);
+        assert_eq!(problem(full), EvaluateProblem::NoApproaches);
+        let one = refused(&|dataset| dataset.objects.truncate(1), 1);
+        assert_eq!(problem(one), EvaluateProblem::NoneOf { object: "fork".into() });
+        let no_pose = refused(&|dataset| dataset.objects[1].touches[9] = flat(), 1);
+        assert_eq!(problem(no_pose), EvaluateProblem::NoPoseOf { object: "fork".into() });
+        let missed = refused(&|dataset| {
+            for touch in dataset.objects.iter_mut().flat_map(|object| &mut object.touches) {
+                *touch = super::tests::missed().with_pose(touch.pose().unwrap());
+            }
+        }, 1);
+        assert_eq!(problem(missed), EvaluateProblem::NoTouches);
+    }
+}

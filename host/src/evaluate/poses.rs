@@ -3,11 +3,11 @@
 use super::draws::Draws;
 use crate::error::{EvaluateProblem, Result};
 use crate::random::Purpose;
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::ObjectTouches;
 use palpate_shared::Poses;
 use std::collections::HashMap;
 
-/// The approaches of one object, or of one robot to it, by the number of their pose.
+/// The approaches of one object, or some of them, by the number of their pose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ByPose {
     name: String,
@@ -16,27 +16,18 @@ pub struct ByPose {
 }
 
 impl ByPose {
-    /// The approaches to an object that robot `robot` of `robots` made: number i by robot i modulo `robots`.
+    /// The approaches to an object of one turn of `turns`, such as robots: number i is of turn i modulo `turns`.
     ///
     /// # Errors
     /// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
-    pub fn new(touched: &ObjectTouches, poses: Poses, robot: usize, robots: usize) -> Result<Self> {
+    pub fn new(touched: &ObjectTouches, poses: Poses, turn: usize, turns: usize) -> Result<Self> {
         let mut approaches = vec![Vec::new(); poses.count().into()];
-        for (number, touch) in (0_u32..).zip(&touched.touches).skip(robot).step_by(robots.max(1)) {
+        for (number, touch) in (0_u32..).zip(&touched.touches).skip(turn).step_by(turns.max(1)) {
             let no_pose = || EvaluateProblem::NoPoseOf { object: touched.name.clone() };
             let pose = poses.number_of(&touch.pose().ok_or_else(no_pose)?);
             approaches[usize::from(pose)].push(number);
         }
         Ok(Self { name: touched.name.clone(), approaches })
-    }
-
-    /// For each robot and each object of a data set, in this order.
-    ///
-    /// # Errors
-    /// As [`ByPose::new`].
-    pub fn all(dataset: &Dataset, poses: Poses, robots: usize) -> Result<Vec<Vec<Self>>> {
-        let of = |robot| dataset.objects.iter().map(|object| Self::new(object, poses, robot, robots)).collect();
-        (0..robots.max(1)).map(of).collect()
     }
 
     /// The object's name.

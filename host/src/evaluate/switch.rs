@@ -8,10 +8,10 @@ use crate::random::{self, Purpose};
 use palpate_onboard::{Forgetting, Model, Recognizer, Stopping};
 use rand::RngExt;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Sequences with and without a switch of the object, with and without forgetting.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Switched {
     /// The evidence in nats against the likeliest object that makes the recognizer forget.
     pub nats: f32,
@@ -22,7 +22,7 @@ pub struct Switched {
 }
 
 /// What a rule comes to. Each object is weighted equally.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rule {
     /// The object stays the same: approaches to a verdict.
     pub still: Stopped,
@@ -34,7 +34,7 @@ pub struct Rule {
 }
 
 /// How sequences ended.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stopped {
     /// Approaches on average, also where no verdict was reached.
     pub mean_approaches: f64,
