@@ -30,6 +30,10 @@ pub(crate) enum Purpose {
     Approaches,
     /// The order in which touches are put into sequences of a calibration.
     Calibration,
+    /// Approaches that an evaluation draws from those in a pose.
+    Active,
+    /// When objects are exchanged, and for which.
+    Switch,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -50,6 +54,8 @@ impl Purpose {
             Self::Casts => Some(5),
             Self::Approaches => Some(7),
             Self::Calibration => Some(9),
+            Self::Active => Some(16),
+            Self::Switch => Some(17),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }

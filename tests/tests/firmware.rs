@@ -88,7 +88,7 @@ fn parity(
     let chip = connection.model().unwrap();
     let host = Model::new(model).unwrap();
     let steps = Steps::sequences(dataset(1_000), 60, touches);
-    stream(&mut connection, steps, &chip, Some(&host), |connection, update| {
+    stream(&mut connection, steps, &chip, Some(&host), false, |connection, update| {
         each(connection, &update);
         Ok(ControlFlow::Continue(()))
     })

@@ -3,7 +3,9 @@ use super::numbers::share;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
-use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings};
+use crate::evaluate::{
+    self, Active, ActiveFacts, Approaches, Evaluation, LEAST_GROUPS, Margins, Rule, Settings, Switched,
+};
 use crate::output;
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
@@ -23,6 +25,8 @@ With --probe, what the file says under [real] is added to the touches, and the d
 
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
 
+With --active, on approaches with pose, each next approach is drawn from those of the same object in the pose that the model's plan proposes, none twice in a sequence. A pose whose approaches are used up is not proposed again in the sequence; where none is left, it ends without a verdict.
+
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 
 Examples:
@@ -34,7 +38,9 @@ Examples:
   palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --confusion 20
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
-  palpate evaluate model.palpate approaches --error-rate 0.02")]
+  palpate evaluate model.palpate approaches --error-rate 0.02
+  palpate evaluate planned.palpate approaches --active
+  palpate evaluate model.palpate approaches --switch")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
@@ -59,6 +65,13 @@ pub(crate) struct Arguments {
     /// Seed of the drawing, and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Make every approach where the model's plan says, instead of one drawn at random (see `palpate plan`)
+    #[arg(long)]
+    active: bool,
+    /// Say as well what an object that is exchanged at a random approach comes to, with and without forgetting: restarting
+    /// once recent touches speak by so many nats against the likeliest object
+    #[arg(long, value_name = "NATS", num_args = 0..=1, default_missing_value = "5")]
+    switch: Option<f32>,
     /// Print the figures as JSON
     #[arg(long)]
     json: bool,
@@ -82,6 +95,12 @@ struct Evaluated {
     trained_on: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     confusion: Option<Confusion>,
+    /// What the plan proposed approaches from, where it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    active: Option<ActiveFacts>,
+    /// Sequences in which the object is exchanged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    switch: Option<Switched>,
 }
 
 /// How often each object was taken for each.
@@ -109,7 +128,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let (evaluation, confusion) = file.with(|candidate| {
+    let (evaluation, confusion, active, switch) = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
@@ -128,10 +147,17 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
                 counts: margins.confusion(touches, arguments.groups, arguments.seed)?,
             })
         });
-        Ok((evaluate::evaluate(&margins, &settings)?, confusion.transpose()?))
+        let active = arguments.active.then(|| Active::new(&margins, &dataset)).transpose()?;
+        let evaluation = match &active {
+            Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
+            None => evaluate::evaluate(&margins, &settings)?,
+        };
+        let switch = arguments.switch.map(|nats| margins.switched(&settings.sequences(), nats)).transpose()?;
+        Ok((evaluation, confusion.transpose()?, active.map(|active| active.facts()), switch))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, robots, instances: dataset.instances, trained_on, confusion };
+    let instances = dataset.instances;
+    let evaluated = Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -175,6 +201,15 @@ fn text(evaluated: &Evaluated) -> String {
     if let Some(approaches) = &evaluated.evaluation.approaches {
         text += &approaches_table(approaches, &evaluated.evaluation.patterns);
     }
+    if let Some(ActiveFacts { rolls, poses, left_out, without_approaches }) = &evaluated.active {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "Each approach is in the pose that the plan proposed, of {poses} (26 directions, {rolls} roll{} each; {left_out} \
+             never touch, {without_approaches} have no approach here).",
+            if *rolls == 1 { "" } else { "s" }
+        );
+    }
     if evaluated.robots > 1 {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
@@ -184,6 +219,9 @@ fn text(evaluated: &Evaluated) -> String {
     }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);
+    }
+    if let Some(switch) = &evaluated.switch {
+        text += &switch_table(switch);
     }
     if !evaluated.trained_on.is_empty() {
         let objects = evaluated.trained_on.join(", ");
@@ -296,6 +334,30 @@ fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeM
         shares.collect::<Vec<_>>().join(", "),
     );
     text
+}
+
+/// What an exchanged object comes to: one row per rule.
+fn switch_table(switch: &Switched) -> String {
+    let mut text = format!(
+        "\n{:20} {:>22} {:>8} {:>26} {:>8} {:>8}\n",
+        "forgetting", "approaches, same object", "wrong", "approaches after exchange", "wrong", "the old"
+    );
+    for (name, Rule { still, switched, old }) in
+        [("off".to_owned(), &switch.off), (format!("at {} nats", switch.nats), &switch.on)]
+    {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "{name:20} {:>22.1} {:>8} {:>26.1} {:>8} {:>8}",
+            still.mean_approaches,
+            percent(still.error),
+            switched.mean_approaches,
+            percent(switched.error),
+            percent(*old)
+        );
+    }
+    text + "Exchanged at a random approach before the verdict; wrong is any name but that of the object touched last.\n"
 }
 
 /// Shares in percent: one row per touched object, one column per object that it was taken for.

@@ -44,7 +44,7 @@ pub(super) struct Tested<'m> {
     /// How many instances the object has, touched in turn.
     instances: usize,
     /// How many instances and robots there are together: touch i is of turn i modulo this, and so are groups.
-    turns: usize,
+    pub(super) turns: usize,
     /// For each turn the positions of its touches that are evidence, among all that are.
     evidence: Vec<Vec<u32>>,
     /// Of the touches that are evidence.

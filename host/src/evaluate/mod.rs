@@ -32,20 +32,27 @@
 //! # }
 //! ```
 
+mod active;
 mod approaches;
 #[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
+mod draws;
 mod estimate;
 mod full;
 mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
+mod plan;
+mod poses;
 mod sequential;
+mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+mod under_plan;
 
+pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
@@ -53,7 +60,11 @@ pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
+pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
+pub use poses::{ByPose, Stock};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
+pub use switch::{Rule, Stopped, Switched};
+pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
 use palpate_shared::ContactPattern;
@@ -85,6 +96,14 @@ pub struct Settings {
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,
+}
+
+impl Settings {
+    /// The settings of its sequences.
+    pub fn sequences(&self) -> SequentialSettings {
+        let Self { error_rate, max_touches, groups, seed, .. } = *self;
+        SequentialSettings { error_rate, max_touches, sequences: groups, seed }
+    }
 }
 
 impl Default for Settings {
@@ -131,12 +150,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     if settings.at.contains(&0) {
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
     }
-    let stopping = SequentialSettings {
-        error_rate: settings.error_rate,
-        max_touches: settings.max_touches,
-        sequences: settings.groups,
-        seed: settings.seed,
-    };
+    let stopping = settings.sequences();
     let sequential = margins.sequential(&stopping)?;
     let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));

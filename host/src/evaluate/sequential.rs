@@ -85,17 +85,22 @@ impl Margins<'_> {
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
         let SequentialSettings { sequences, seed, .. } = *settings;
         let stopping = self.stopping(settings)?;
-        let Stated { error_rate, promised, per } = self.stated(settings, stopping);
         let outcomes: Vec<Vec<Outcome>> =
             (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
+        Ok(self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches()))
+    }
+
+    /// The figures of sequences, for each tested object as many.
+    pub(super) fn of_outcomes(&self, outcomes: Vec<Vec<Outcome>>, stated: Stated, max_touches: u32) -> Sequential {
+        let Stated { error_rate, promised, per } = stated;
         let touches = self.mean(&outcomes, |outcome| outcome.touches);
         let error = self.wrong(&outcomes);
         let undecided = self.undecided(&outcomes);
-        Ok(Sequential {
+        Sequential {
             error_rate,
             promised,
             per,
-            max_touches: stopping.max_touches(),
+            max_touches,
             mean_touches: touches.all.value,
             mean_touches_standard_error: touches.all.standard_error,
             error: error.all.value,
@@ -105,7 +110,7 @@ impl Margins<'_> {
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
             outcomes,
-        })
+        }
     }
 
     /// The share of sequences with a wrong verdict.
@@ -235,7 +240,7 @@ fn onboard<'r, const N: usize>(
 }
 
 /// Counts approaches, and touches that are evidence, up to the first verdict.
-fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
+pub(super) fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
     let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None };
     for verdict in verdicts {
         outcome.approaches += 1;

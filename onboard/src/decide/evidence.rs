@@ -71,7 +71,7 @@ const MOST_BITS: u64 = 1 << 42;
 
 impl Unit {
     /// e^-(`ahead` units) in Q56.
-    fn weight(self, ahead: u64) -> u64 {
+    pub(super) fn weight(self, ahead: u64) -> u64 {
         let ahead = u64::from(u32::try_from(ahead).unwrap_or(u32::MAX));
         let bits = (ahead * u64::from(self.bits)) >> (self.shift & 63);
         if self.sharpness == SHARPNESS {

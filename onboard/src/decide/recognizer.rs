@@ -298,7 +298,7 @@ fn start(model: &Model<'_>, evidence: &mut [i64]) {
     }
 }
 
-fn unit(model: &Model<'_>) -> Unit {
+pub(super) fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
     Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }

@@ -13,8 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Promise, Section, Tag, Temperature,
-    TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+    HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise, Section, Tag,
+    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
 };
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
@@ -183,6 +183,14 @@ impl<'a> Model<'a> {
     /// How often each contact pattern occurred among the approaches of the training, if the model states it.
     pub fn pattern_shares(&self) -> Option<PatternShares> {
         PatternShares::from_bytes(optional::find(self.optional(), Tag::PatternShares))
+    }
+
+    /// The plan of approaches, if the model has one: what [`Recognizer::next_approach`](crate::Recognizer::next_approach)
+    /// proposes poses by.
+    ///
+    /// Cost: about 30 instructions for each optional section.
+    pub fn plan(&self) -> Option<Plan<'a>> {
+        Plan::from_bytes(optional::find(self.optional(), Tag::Plan), self.object_count())
     }
 
     /// The optional sections, in the order of their tags; also those that this crate does not know.

@@ -2,7 +2,9 @@
 
 use crate::bytes::Wrong;
 use crate::layouts::Sections;
-use palpate_shared::format::{OddsByObject, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
+use palpate_shared::format::{
+    OddsByObject, Plan, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+};
 
 /// What optional sections state that recognition depends on.
 pub(super) struct Stated {
@@ -41,6 +43,7 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
                 content.len() >= OddsByObject::LENGTH * model.objects()
             }
             _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
+            _ if tag == Tag::Plan.code() => Plan::from_bytes(content, model.objects()).is_some(),
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,
         };

@@ -7,6 +7,7 @@
 mod codes;
 mod header;
 mod key;
+mod plan;
 mod promise;
 mod records;
 mod trained;
@@ -15,6 +16,7 @@ pub use crate::checksum::checksum;
 pub use codes::{Counted, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
+pub use plan::Plan;
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
 pub use trained::{

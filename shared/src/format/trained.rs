@@ -20,7 +20,7 @@ pub enum Tag {
     ThresholdsByObject,
     /// Reserved: a test for objects that the model does not know.
     FitTest,
-    /// Reserved: a plan of approaches.
+    /// [`Plan`](super::Plan).
     Plan,
     /// Reserved: the features' names, for models over rows of features.
     FeatureNames,
