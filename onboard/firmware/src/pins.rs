@@ -4,20 +4,18 @@
 //!
 //! The host sends six bytes for each edge over the second UART: finger (0, 1, 2), level (0, 1), time in microseconds (u32,
 //! little endian). The time counts as the clock's, the level is put into the port register, and the pin interrupt is
-//! pended, as a port does. Finger 3 is no edge: time passes.
+//! pended, as a port does. Finger 3 is no edge: time passes. Finger 4 is none either: the power goes, and comes back.
 
-use crate::chip::{self, PIN_CHANGED};
+use crate::chip::{self, PIN_CHANGED, SWITCHES};
 use crate::uart::{Port, Uart};
 use core::cell::RefCell;
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
-use cortex_m::peripheral::NVIC;
+use cortex_m::peripheral::{NVIC, SCB};
 use critical_section::Mutex;
 use embedded_hal::digital::{ErrorType, InputPin};
 use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 
-/// The port's levels, a bit a pin.
-static PORT: AtomicU32 = AtomicU32::new(0);
 /// Microseconds.
 static TIME: AtomicU32 = AtomicU32::new(0);
 
@@ -30,7 +28,7 @@ impl ErrorType for Pin {
 
 impl InputPin for Pin {
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        Ok(PORT.load(Ordering::Relaxed) >> (self.0 & 31) & 1 == 1)
+        Ok(SWITCHES.load(Ordering::Relaxed) >> (self.0 & 31) & 1 == 1)
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
@@ -125,12 +123,19 @@ impl Player {
             *slot = byte;
             self.count += 1;
         }
-        self.count = 0;
         let [finger, level, t0, t1, t2, t3] = self.received;
+        if finger == 3 && !is_idle() {
+            // Time is not faster than the main loop.
+            return;
+        }
+        self.count = 0;
+        if finger == 4 {
+            SCB::sys_reset();
+        }
         TIME.store(u32::from_le_bytes([t0, t1, t2, t3]), Ordering::Relaxed);
         if finger < 3 {
-            let levels = PORT.load(Ordering::Relaxed) & !(1 << finger);
-            PORT.store(levels | u32::from(level & 1) << finger, Ordering::Relaxed);
+            let levels = SWITCHES.load(Ordering::Relaxed) & !(1 << finger);
+            SWITCHES.store(levels | u32::from(level & 1) << finger, Ordering::Relaxed);
             NVIC::pend(PIN_CHANGED);
         }
     }
