@@ -252,7 +252,7 @@ fn segments(touches: &[Touch], rng: &mut ChaCha8Rng) -> Vec<Segment> {
     now = now.wrapping_add(150_000);
     for (index, touch) in touches.iter().enumerate() {
         let edges = edges(touch, rng);
-        let cut = rng.random_ratio(1, 50).then(|| rng.random_range(0..1_350_000));
+        let cut = rng.random_ratio(1, 50).then(|| rng.random_range(0..1_340_000));
         for &(at, finger, closed) in edges.iter().filter(|(at, ..)| cut.is_none_or(|cut| *at < cut)) {
             recording.edge(finger, closed, now.wrapping_add(at));
         }

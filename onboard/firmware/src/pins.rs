@@ -19,7 +19,7 @@ use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 /// Microseconds.
 static TIME: AtomicU32 = AtomicU32::new(0);
 /// When the main loop last found that nothing more had happened.
-static SEEN: AtomicU32 = AtomicU32::new(0);
+static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// A pin of the emulated port.
 pub struct Pin(pub u8);
@@ -94,7 +94,7 @@ static PLAYER: Mutex<RefCell<Option<Player>>> = Mutex::new(RefCell::new(None));
 
 /// Begins to play.
 pub fn play() {
-    let player = Player { uart: Uart::take(Port::Pins), received: [0; 6], count: 0, passes: false, random: 1 };
+    let player = Player { uart: Uart::take(Port::Pins), received: [0; 6], count: 0, passes: true, random: 1 };
     critical_section::with(|cs| PLAYER.replace(cs, Some(player)));
     chip::yield_to_others(PIN_CHANGED);
     chip::unmask(chip::TIMER);
