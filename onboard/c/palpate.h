@@ -1179,7 +1179,7 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
     const uint16_t best = palpate_best(recognizer);
     uint32_t sharpness = 65536;
-    uint64_t own = 0, others = 0;
+    uint64_t own = 0, others = 0, all;
     uint16_t i;
     if (object >= model->objects) {
         return 0;
@@ -1201,10 +1201,9 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
             own = i == object ? bits : own;
         }
     }
-    if (object == best) {
-        return PALPATE_ONE - palpate_ratio_(others, PALPATE_ONE + others);
-    }
-    return palpate_ratio_(own, PALPATE_ONE + others);
+    /* 256 objects that are level are as much as does not fit. */
+    all = others > UINT64_MAX - PALPATE_ONE ? UINT64_MAX : PALPATE_ONE + others;
+    return object == best ? PALPATE_ONE - palpate_ratio_(others, all) : palpate_ratio_(own, all);
 }
 
 /* ---- Snapshots ---- */
