@@ -21,7 +21,7 @@ impl<'m> Script<'m> {
         self.block(b'M', bytes);
         let opened = Model::new(bytes);
         let (code, place) = opened.as_ref().map_or_else(|error| (code(error), error.offset()), |_| (0, 0));
-        self.say(&format!("open {code} {place}"));
+        self.say(&format!("open {code} {place:x}"));
         let start = |model: &Model<'m>| Recognizer::new(model, Stopping::from_model(model)).expect("at most 256 objects");
         self.recognizer = opened.ok().as_ref().map(start);
         self.recognizer.is_some()
@@ -82,7 +82,7 @@ impl<'m> Script<'m> {
         let recognizer = self.recognizer();
         let objects = 0..=recognizer.model().object_count();
         let posteriors: Vec<u64> = objects.map(|object| recognizer.posterior(object).q56()).collect();
-        self.say(&format!("best {}", self.recognizer().best()));
+        self.say(&format!("best {:x}", self.recognizer().best()));
         self.numbers("posteriors", &posteriors);
     }
 
@@ -102,7 +102,7 @@ impl<'m> Script<'m> {
         let snapshot = self.recognizer().snapshot(&mut buffer).expect("a long buffer").to_vec();
         let mut line = "snapshot ".to_string();
         snapshot.iter().for_each(|byte| write!(line, "{byte:02x}").expect("a string"));
-        self.say(&format!("{line} {} 0", snapshot.len()));
+        self.say(&format!("{line} {:x} 0", snapshot.len()));
         snapshot
     }
 
@@ -135,7 +135,7 @@ impl<'m> Script<'m> {
             Verdict::Recognized { object, .. } => (1, object),
             Verdict::Unknown => (2, 0),
         };
-        self.say(&format!("verdict {verdict} {object} {}", self.recognizer().touches()));
+        self.say(&format!("verdict {verdict} {object:x} {:x}", self.recognizer().touches()));
     }
 
     fn block(&mut self, command: u8, bytes: &[u8]) {
@@ -144,9 +144,13 @@ impl<'m> Script<'m> {
         self.commands.extend_from_slice(bytes);
     }
 
-    fn numbers(&mut self, word: &str, numbers: &[impl std::fmt::Display]) {
+    fn numbers<T: Copy + Into<i128>>(&mut self, word: &str, numbers: &[T]) {
         self.expected += word;
-        numbers.iter().for_each(|number| write!(self.expected, " {number}").expect("a string"));
+        for &number in numbers {
+            let number: i128 = number.into();
+            let sign = if number < 0 { "-" } else { "" };
+            write!(self.expected, " {sign}{:x}", number.unsigned_abs()).expect("a string");
+        }
         self.say("");
     }
 
