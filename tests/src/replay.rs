@@ -186,13 +186,10 @@ const fn refusal(refused: Refused) -> u8 {
     }
 }
 
-/// Whether the walk through a model that was opened is specified: slot 0 of a complete tree is not checked, and what
-/// comes of a wrong one is up to the implementation.
+/// Whether `FORMAT.md` says where the walk through a model that was opened leads. Slot 0 of a complete tree is not checked,
+/// nor that the sizes of subtrees agree: what comes of wrong ones is up to the implementation, as long as it ends.
 pub fn is_specified(model: &Model<'_>) -> bool {
     let (bytes, header) = (model.bytes(), model.header());
-    if header.layout() != Layout::Complete.code() {
-        return true;
-    }
     let groups = HEADER_LENGTH
         + header.text_length() as usize
         + header.optional_length() as usize
@@ -200,11 +197,39 @@ pub fn is_specified(model: &Model<'_>) -> bool {
         + 4 * usize::from(header.axes())
         + header.cuts_length() as usize;
     let mut splits = groups + 8 * usize::from(header.groups());
+    let number = |at: usize| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
     bytes[groups..splits].chunks(8).all(|group| {
-        let slots = 1 << group[0];
         let trees = u32::from_le_bytes([group[4], group[5], group[6], group[7]]) as usize;
-        let roots = (0..trees).all(|tree| bytes[splits + tree * slots] == 1);
-        splits += 2 * trees * slots;
-        roots
+        match model.layout() {
+            Layout::Complete => {
+                let slots = 1 << group[0];
+                let roots = (0..trees).all(|tree| bytes[splits + tree * slots] == 1);
+                splits += 2 * trees * slots;
+                roots
+            }
+            _ => (0..trees).all(|_| {
+                let (start, count) = (splits + 2, number(splits));
+                let is_wide = model.layout() == Layout::Wide;
+                let size = if is_wide { 6 } else { 3 };
+                splits = start + size * count;
+                let left = |split: usize| {
+                    let at = start + size * (split + 1);
+                    if is_wide { number(at - 2) } else { bytes[at - 1].into() }
+                };
+                agrees(&left, 0, count)
+            }),
+        }
     })
+}
+
+/// Whether subtrees stay within those that they are part of.
+fn agrees(left: &impl Fn(usize) -> usize, mut start: usize, end: usize) -> bool {
+    while start < end {
+        let right = start + 1 + left(start);
+        if right > end || !agrees(left, start + 1, right) {
+            return false;
+        }
+        start = right;
+    }
+    true
 }
