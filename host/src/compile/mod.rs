@@ -20,7 +20,7 @@
 //!     Node::Leaf(vec![-0.5, 0.5]),
 //! ];
 //! let ensemble = Ensemble {
-//!     descriptor: Descriptor::Curvature,
+//!     inputs: Descriptor::Curvature.into(),
 //!     objects: vec!["bowl".into(), "fork".into()],
 //!     base_margins: vec![0.0; 2],
 //!     trees: vec![Tree { nodes, output: Output::Each }],
@@ -75,13 +75,14 @@ pub struct Settings {
     pub max_touches: u32,
     /// How likely each object is before any touch, in any common unit; `None` makes all equal.
     pub priors: Option<Vec<f64>>,
-    /// Compiles an ensemble over rows of this many f32 features instead of touches, whatever the ensemble's descriptor.
-    pub raw_features: Option<usize>,
+    /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
+    /// feature's scale; `None` compares f32 values.
+    pub scales: Option<Vec<f32>>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { leaf: Leaf::I16, layout: None, error_rate: 0.01, max_touches: 200, priors: None, raw_features: None }
+        Self { leaf: Leaf::I16, layout: None, error_rate: 0.01, max_touches: 200, priors: None, scales: None }
     }
 }
 
@@ -94,7 +95,7 @@ pub struct Compiled {
     pub splits: usize,
     /// Leaves of the ensemble.
     pub leaves: usize,
-    /// The farthest that a margin of a touch can be from the ensemble's, in nats.
+    /// The farthest that a margin can be from the ensemble's, and from that of the library that trained it, in nats.
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
@@ -122,7 +123,7 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 /// the layout asked for; [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
-    let forest = Forest::new(ensemble, settings.raw_features)?;
+    let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
     let mut candidates = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
@@ -141,7 +142,9 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let Some((_, layout, parts)) = best else {
         return Err(CompileProblem::FitsNoLayout.into());
     };
-    let (margin_error, instructions) = (parts.margin_error, parts.instructions);
-    let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts)?;
+    let instructions = parts.instructions;
+    let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
+    let margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding);
+    let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts, margin_error)?;
     Ok(Compiled { bytes, splits: forest.splits(), leaves: forest.leaves(), margin_error, layout, instructions })
 }

@@ -59,7 +59,7 @@ pub(super) enum Values<'m> {
 impl Candidate<'_> {
     fn descriptor(&self) -> Option<Descriptor> {
         match self {
-            Self::Full(ensemble) => Some(ensemble.descriptor),
+            Self::Full(ensemble) => ensemble.descriptor(),
             Self::Compiled(model) => model.descriptor(),
         }
     }

@@ -94,7 +94,7 @@ pub fn difference(
     progress: &dyn Progress,
 ) -> Result<Difference> {
     let names = (0..model.object_count()).map(|object| model.object_name(object));
-    if model.descriptor() != Some(ensemble.descriptor) || !names.eq(ensemble.objects.iter().map(String::as_str)) {
+    if model.descriptor() != ensemble.descriptor() || !names.eq(ensemble.objects.iter().map(String::as_str)) {
         return Err(EvaluateProblem::OtherModel.into());
     }
     progress.begin("margins", Some(touches.len() as u64));

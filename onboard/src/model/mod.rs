@@ -13,8 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Tag, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_section,
+    Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Tag, TrainedNoise, TrainedProbe,
+    TrainedTouches, take_feature, take_section,
 };
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
@@ -172,6 +172,12 @@ impl<'a> Model<'a> {
     /// How often each contact pattern occurred among the approaches of the training, if the model states it.
     pub fn pattern_shares(&self) -> Option<PatternShares> {
         PatternShares::from_bytes(optional::find(self.sections.optional, Tag::PatternShares))
+    }
+
+    /// The features of a model over rows, in their order, as far as the model states them.
+    pub fn features(&self) -> impl Iterator<Item = Feature<'a>> {
+        let mut rest = optional::find(self.sections.optional, Tag::FeatureNames);
+        core::iter::from_fn(move || take_feature(&mut rest))
     }
 
     /// The optional sections, in the order of their tags; also those that this crate does not know.

@@ -16,8 +16,8 @@ pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_W
 pub use key::f32_key;
 pub use records::{Axis, Columns, Group};
 pub use trained::{
-    MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_section, write_section,
+    Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
+    TrainedTouches, take_feature, take_section, write_section,
 };
 
 /// Bytes of the checksum at the end.

@@ -11,7 +11,7 @@ fn ensemble(multi_output: bool) -> Ensemble {
 }
 
 fn document(multi_output: bool) -> Value {
-    serde_json::to_value(Document::new(&ensemble(multi_output))).unwrap()
+    serde_json::to_value(Document::new(&ensemble(multi_output), Descriptor::Curvature)).unwrap()
 }
 
 fn load(text: &[u8]) -> Result<Ensemble> {
@@ -62,7 +62,7 @@ fn a_model_that_xgboost_wrote_is_read() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/ensemble/xgboost/xgboost-3.2.json");
     let ensemble = Ensemble::load(file).unwrap();
     assert_eq!(ensemble.objects, ["bowl", "fork", "mouse"]);
-    assert_eq!(ensemble.descriptor, Descriptor::Curvature);
+    assert_eq!(ensemble.descriptor(), Some(Descriptor::Curvature));
     // `booster.predict(..., output_margin=True)` of XGBoost 3.2.0 on the same rows.
     let expected = include_str!("xgboost-3.2.margins.json");
     let expected: Vec<(Vec<Option<f32>>, Vec<f32>)> = serde_json::from_str(expected).unwrap();
