@@ -60,6 +60,7 @@ impl<'a> Forest<'a> {
             return Err(CompileProblem::Features { features, most: MAX_FEATURES }.into());
         }
         let thresholds = Thresholds::new(&ensemble.inputs, scales)?;
+        thresholds.check_range(ensemble)?;
         let mut trees = Vec::with_capacity(ensemble.trees.len());
         for (index, tree) in ensemble.trees.iter().enumerate() {
             let place = |problem| CompileProblem::Tree { tree: index, problem };
@@ -235,6 +236,21 @@ impl<'a> Thresholds<'a> {
                 Err(Error::setting("scales", text, allowed))
             }
         }
+    }
+
+    /// Whether whole thresholds fit 32 bits: beyond, all values would be the same.
+    fn check_range(self, ensemble: &Ensemble) -> Result<()> {
+        let Self::Scaled(scales) = self else { return Ok(()) };
+        for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
+            let &Node::Split { feature, threshold, .. } = node else { continue };
+            let Some(&scale) = scales.get(feature) else { continue };
+            if threshold.is_finite() && (f64::from(threshold) * f64::from(scale)).abs() > f64::from(i32::MAX - 1) {
+                let name = ensemble.inputs.names().get(feature).map(ToString::to_string).unwrap_or_default();
+                let allowed = format!("a smaller scale: its threshold {threshold} is beyond 2^31 units");
+                return Err(Error::setting("scales", format!("{scale} for {name}"), allowed));
+            }
+        }
+        Ok(())
     }
 
     fn key(self) -> Key {

@@ -9,6 +9,7 @@ mod mesh;
 mod page;
 mod probe;
 mod report;
+mod rows;
 mod touches;
 mod tune;
 
@@ -21,6 +22,7 @@ pub use mesh::MeshProblem;
 pub use page::PageProblem;
 pub use probe::ProbeProblem;
 pub use report::ReportProblem;
+pub use rows::RowsProblem;
 pub use touches::TouchesProblem;
 pub use tune::TuneProblem;
 
@@ -110,6 +112,9 @@ pub enum Problem {
     /// With evaluating.
     #[error(transparent)]
     Evaluate(#[from] EvaluateProblem),
+    /// With rows of features, and models over them.
+    #[error(transparent)]
+    Rows(#[from] RowsProblem),
     /// With searching for a model.
     #[error(transparent)]
     Tune(#[from] TuneProblem),
@@ -136,6 +141,7 @@ impl Problem {
             Self::Ensemble(problem) => problem.fix(),
             Self::Compile(problem) => problem.fix(),
             Self::Evaluate(problem) => problem.fix(),
+            Self::Rows(problem) => problem.fix(),
             Self::Tune(problem) => problem.fix(),
             Self::Chip(problem) => problem.fix(),
             Self::Page(problem) => problem.fix(),
@@ -195,6 +201,7 @@ problems!(
     EnsembleProblem,
     CompileProblem,
     EvaluateProblem,
+    RowsProblem,
     TuneProblem,
     ChipProblem,
     PageProblem,

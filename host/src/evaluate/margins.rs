@@ -280,7 +280,7 @@ fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touc
 }
 
 /// The object with the most evidence; the first of several, as on the chip.
-pub(super) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
+pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
     (0..evidence.len()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best })
 }
 

@@ -38,6 +38,7 @@ mod cost_of_noise;
 mod curve;
 mod estimate;
 mod full;
+mod isolated;
 mod margins;
 pub mod model_file;
 mod noisy;
@@ -45,6 +46,7 @@ pub mod parity;
 mod sequential;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+pub mod verify;
 
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]

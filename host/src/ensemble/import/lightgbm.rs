@@ -90,14 +90,11 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         draft.trees.push(DraftTree { nodes, output });
     }
     if head.values.contains_key("average_output") {
-        let rounds = (blocks.len() / outputs).max(1) as f64;
-        let leaves = draft.trees.iter_mut().flat_map(|tree| &mut tree.nodes);
-        leaves.for_each(|node| {
-            if let DraftNode::Leaf(values) = node {
-                values.iter_mut().for_each(|value| *value /= rounds);
-            }
-        });
-        draft.notes.push("A random forest: its margins are averages over the trees.".into());
+        let rounds = (blocks.len() / outputs).max(1);
+        draft.notes.push(format!(
+            "A random forest: margins are the library's raw scores, which are sums. Its probabilities are those of averages: \
+             posteriors here are as if margins were {rounds} times as large."
+        ));
     }
     Ok(draft.finish(names)?)
 }

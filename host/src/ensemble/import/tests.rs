@@ -65,3 +65,68 @@ fn margins_are_the_librarys_own_on_plain_tied_and_missing_rows() {
     }
     assert!(exact > 20);
 }
+
+/// A generator of numbers: xorshift.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        usize::try_from(self.0 % limit as u64).unwrap()
+    }
+}
+
+#[test]
+fn damaged_files_are_refused_or_are_sound_and_never_panic() {
+    let mut numbers = Numbers(0x9e37_79b9_7f4a_7c15);
+    for path in models() {
+        let whole = std::fs::read(&path).unwrap();
+        for mutant in 0..150 {
+            let mut bytes = whole.clone();
+            for _ in 0..=numbers.below(3) {
+                let at = numbers.below(bytes.len());
+                match mutant % 5 {
+                    0 => bytes.truncate(at.max(1)),
+                    1 => bytes[at] = bytes[at].wrapping_add(1),
+                    2 => bytes[at] = numbers.below(256) as u8,
+                    3 => {
+                        // A digit, so that counts and children change.
+                        let digits = bytes.iter().enumerate().skip(at).find(|(_, byte)| byte.is_ascii_digit());
+                        if let Some((at, _)) = digits {
+                            bytes[at] = b'0' + numbers.below(10) as u8;
+                        }
+                    }
+                    _ => {
+                        let from = numbers.below(bytes.len());
+                        let piece = bytes[from..bytes.len().min(from + 40)].to_vec();
+                        bytes.splice(at..at, piece);
+                    }
+                }
+            }
+            if let Ok(ensemble) = read(Path::new("mutant"), &bytes, None) {
+                ensemble.check().unwrap();
+                ensemble.margins_of_features(&vec![0.5; ensemble.inputs.count()]);
+            }
+        }
+    }
+}
+
+#[test]
+fn counts_and_nesting_without_end_are_refused_soon() {
+    let huge = "9".repeat(30);
+    for text in [
+        "[".repeat(1_000_000),
+        format!("{{\"learner\":{}", "{\"a\":".repeat(100_000)),
+        format!("tree\nnum_tree_per_iteration={huge}\nmax_feature_idx=1\nend of trees\n"),
+        format!("tree\nnum_tree_per_iteration=1\nmax_feature_idx={}\nend of trees\n", u64::MAX),
+        "tree\nnum_tree_per_iteration=1\nmax_feature_idx=0\nfeature_names=a\nTree=0\nnum_leaves=99999999999\n\
+         leaf_value=1\nend of trees\n"
+            .to_owned(),
+    ] {
+        assert!(read(Path::new("endless"), text.as_bytes(), None).is_err());
+    }
+    // A field whose length is beyond the file.
+    assert!(read(Path::new("endless"), b"\x08\x0a\x3a\xff\xff\xff\xff\x7f", None).is_err());
+}
