@@ -103,7 +103,10 @@ struct Exported {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    output::refuse_input(&arguments.output, [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten())?;
+    output::refuse_input(
+        &arguments.output,
+        [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten(),
+    )?;
     let names = arguments.names.as_deref().map(names).transpose()?;
     let ensemble = Ensemble::load_named(&arguments.ensemble, names.as_deref())?;
     let scales = scales(&arguments, &ensemble)?;
@@ -176,7 +179,9 @@ fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<Option<Vec<f32>>
     // A feature that nothing was said about is taken as it is, which only whole thresholds can be.
     for (index, name) in names.iter().enumerate() {
         let is_named = arguments.scale.iter().any(|(own, _)| own == name);
-        if let Some(threshold) = scales::fraction(ensemble, index).filter(|_| arguments.fit_scales.is_none() && !is_named) {
+        if let Some(threshold) =
+            scales::fraction(ensemble, index).filter(|_| arguments.fit_scales.is_none() && !is_named)
+        {
             let allowed = format!("a scale for {name} too, which has the threshold {threshold}, or --fit-scales");
             return Err(Error::setting("scale", "incomplete", allowed));
         }

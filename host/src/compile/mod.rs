@@ -112,7 +112,7 @@ pub struct Candidate {
     /// The layout.
     #[serde(serialize_with = "name_of")]
     pub layout: Layout,
-    /// Bytes of the model, but for its text and what is the same in all layouts.
+    /// Bytes of the model.
     pub bytes: usize,
     /// About how many instructions a touch takes.
     pub instructions: Instructions,
@@ -167,9 +167,10 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
     let made = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
+    let overhead = write::overhead(ensemble, settings, &forest)?;
     let candidate = |(layout, parts): &(Layout, parts::Parts)| Candidate {
         layout: *layout,
-        bytes: parts.bytes(),
+        bytes: parts.bytes() + overhead,
         instructions: parts.instructions,
         margin_error: parts.margin_error,
     };
@@ -195,7 +196,8 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
         all.filter(move |(_, candidate)| !is_exact || candidate.margin_error == 0.0)
     };
     let smallest = eligible().map(|(_, candidate)| candidate.bytes).min()?;
-    let instructions = |candidate: &Candidate, core: Core| candidate.instructions.on(core).unwrap_or(candidate.instructions.m4f);
+    let instructions =
+        |candidate: &Candidate, core: Core| candidate.instructions.on(core).unwrap_or(candidate.instructions.m4f);
     let best = match goal {
         Goal::Size => eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f)),
         Goal::Speed => eligible().min_by_key(|(_, candidate)| (candidate.instructions.m4f, candidate.bytes)),

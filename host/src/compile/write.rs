@@ -7,7 +7,9 @@ use crate::ensemble::{Ensemble, Node, Output};
 use crate::error::{CompileProblem, Error, Result};
 use crate::probe::approach::Probe;
 use palpate_onboard::Stopping;
-use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, Tag, Trained, checksum, write_section};
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, RAW_FEATURES, Tag, Trained, checksum, write_section,
+};
 
 /// The model's bytes.
 pub(super) fn write(
@@ -74,6 +76,11 @@ pub(super) fn write(
     bytes.extend(&parts.leaves);
     bytes.extend(checksum(&bytes).to_le_bytes());
     Ok(bytes)
+}
+
+/// Bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
+pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
+    Ok(text(ensemble)?.len().next_multiple_of(4) + optional(ensemble, settings, forest)?.len() + CHECKSUM_LENGTH)
 }
 
 /// What the model states about its training.

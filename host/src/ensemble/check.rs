@@ -39,7 +39,8 @@ impl Ensemble {
         let features = self.inputs.count();
         let infinite = self.descriptor().is_none();
         for (number, tree) in self.trees.iter().enumerate() {
-            tree.check(features, objects, infinite).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })?;
+            tree.check(features, objects, infinite)
+                .map_err(|problem| EnsembleProblem::Tree { tree: number, problem })?;
         }
         Ok(())
     }

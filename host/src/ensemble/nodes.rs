@@ -62,7 +62,8 @@ mod tests {
         for threshold in cases {
             let (at_most, below) = (after(threshold), from(threshold));
             let near = threshold as f32;
-            let around = [near.next_down().next_down(), near.next_down(), near, near.next_up(), near.next_up().next_up()];
+            let around =
+                [near.next_down().next_down(), near.next_down(), near, near.next_up(), near.next_up().next_up()];
             for x in around.into_iter().chain([f32::MIN, f32::MAX, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0]) {
                 if x.is_nan() {
                     continue;

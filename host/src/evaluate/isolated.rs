@@ -33,7 +33,13 @@ pub(super) fn first_different_tree(
             LeafType::I8 | LeafType::I16 => 0.501 * f64::from(model.unit()) * f64::from(leaves.shift).exp2(),
         };
         let expected = |object: usize| match tree.output {
-            Output::One(own) => if own == object { leaf[0] } else { 0.0 },
+            Output::One(own) => {
+                if own == object {
+                    leaf[0]
+                } else {
+                    0.0
+                }
+            }
             Output::Each => leaf[object],
         };
         let differs = own.iter().enumerate().any(|(object, own)| (own - f64::from(expected(object))).abs() > slack);

@@ -57,6 +57,11 @@ pub(super) enum Values<'m> {
 }
 
 impl Candidate<'_> {
+    /// Whether the model is over touches; otherwise it is over rows of features.
+    pub fn is_of_touches(&self) -> bool {
+        self.descriptor().is_some()
+    }
+
     fn descriptor(&self) -> Option<Descriptor> {
         match self {
             Self::Full(ensemble) => ensemble.descriptor(),

@@ -43,6 +43,7 @@ mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
+mod rows;
 mod sequential;
 #[cfg(all(test, feature = "train"))]
 mod tests;
@@ -55,6 +56,7 @@ pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
+pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 
 use crate::error::{Error, Result};

@@ -169,15 +169,20 @@ pub fn verify(
     let mut generated = 0;
     let mut batch: Vec<f32> = Vec::new();
     let mut result = Ok(());
-    generate(ensemble, &rows.values, |feature, threshold| around(&reference.encoder, feature, threshold), |row| {
-        batch.extend(row);
-        generated += 1;
-        if generated % BATCH == 0 && result.is_ok() {
-            let done = compare_all(model, &reference, &batch, rows.len() + generated - BATCH, progress);
-            result = done.map(|done| difference = std::mem::take(&mut difference).with(done));
-            batch.clear();
-        }
-    });
+    generate(
+        ensemble,
+        &rows.values,
+        |feature, threshold| around(&reference.encoder, feature, threshold),
+        |row| {
+            batch.extend(row);
+            generated += 1;
+            if generated % BATCH == 0 && result.is_ok() {
+                let done = compare_all(model, &reference, &batch, rows.len() + generated - BATCH, progress);
+                result = done.map(|done| difference = std::mem::take(&mut difference).with(done));
+                batch.clear();
+            }
+        },
+    );
     result?;
     let rest = compare_all(model, &reference, &batch, rows.len() + generated - generated % BATCH, progress)?;
     difference = difference.with(rest);

@@ -3,18 +3,12 @@
 use crate::ensemble::{Ensemble, Node, Tree};
 
 /// Values at which a comparison may go wrong, for every feature.
-const SPECIAL: [f32; 9] =
-    [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 0.0, -0.0, 1e-42, -1e-42];
+const SPECIAL: [f32; 9] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 0.0, -0.0, 1e-42, -1e-42];
 
 /// Rows that lead to every split of the ensemble, with its feature at the threshold, one step to each side of it
 /// (`step` says which values these are), and missing; and rows with one feature missing, infinite or subnormal. The other
 /// features are those of `rows` in turn, as far as the way to the split allows.
-pub fn generate(
-    ensemble: &Ensemble,
-    rows: &[f32],
-    step: impl Fn(usize, f32) -> [f32; 3],
-    mut see: impl FnMut(&[f32]),
-) {
+pub fn generate(ensemble: &Ensemble, rows: &[f32], step: impl Fn(usize, f32) -> [f32; 3], mut see: impl FnMut(&[f32])) {
     let features = ensemble.inputs.count();
     let zeros = vec![0.0; features];
     let given: Vec<&[f32]> = rows.chunks_exact(features).collect();
@@ -99,7 +93,8 @@ mod tests {
 
     #[test]
     fn every_split_is_reached_and_decided_both_ways() {
-        let split = |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };
+        let split =
+            |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };
         let leaf = |value: f32| Node::Leaf(vec![value]);
         let nodes = vec![
             split(0, 5.0, 1, 2),

@@ -104,10 +104,8 @@ impl Rows {
 /// [`Error::Io`]; [`RowsProblem`] naming the line.
 pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
     let file = std::fs::File::open(path).map_err(|source| Error::io(path, "read the margins", source))?;
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .has_headers(false)
-        .from_reader(std::io::BufReader::new(file));
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).has_headers(false).from_reader(std::io::BufReader::new(file));
     let mut margins = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| not_rows(path, &error))?;

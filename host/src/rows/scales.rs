@@ -68,7 +68,8 @@ const LARGEST: f64 = 1e7;
 /// which none is beyond ten million: f32 holds no more digits.
 pub fn fit(ensemble: &Ensemble, rows: &Rows) -> Vec<f32> {
     let of_feature = |feature: usize| {
-        let values: Vec<f64> = rows.iter().map(|row| f64::from(row[feature])).filter(|value| value.is_finite()).collect();
+        let values: Vec<f64> =
+            rows.iter().map(|row| f64::from(row[feature])).filter(|value| value.is_finite()).collect();
         let thresholds = thresholds(ensemble, feature).into_iter().map(f64::from);
         let finite = values.iter().copied().chain(thresholds.filter(|threshold| threshold.is_finite()));
         let largest = finite.map(f64::abs).fold(0.0, f64::max);

@@ -39,9 +39,11 @@ fn every_kind_exports_and_verifies_against_its_librarys_own_margins() {
         for leaf in ["f32", "i16"] {
             let output = path("model.palpate");
             let exported = json(run(["export", &data(model), "-o", &output, "--leaf", leaf, "--json"]));
-            assert_eq!(exported["features"], serde_json::json!(["width", "height", "count", "angle"]).filter_names(model));
-            let verified =
-                json(run(["verify", &output, &data(model), &rows, "--library-margins", &margins, "--json"]));
+            assert_eq!(
+                exported["features"],
+                serde_json::json!(["width", "height", "count", "angle"]).filter_names(model)
+            );
+            let verified = json(run(["verify", &output, &data(model), &rows, "--library-margins", &margins, "--json"]));
             let mut keys: Vec<&str> = verified.as_object().unwrap().keys().map(String::as_str).collect();
             keys.sort_unstable();
             let expected = [
@@ -140,6 +142,49 @@ fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
 }
 
 #[test]
+fn labeled_rows_are_evaluated_one_by_one() {
+    let (_directory, path) = place();
+    let name = "xgboost-2.1-softprob";
+    let model = path("model.palpate");
+    stdout(run(["export", &data(&format!("{name}.ubj")), "-o", &model, "--names", "cup,jug,pan"]));
+    // Labels by name and by number; the first row's are wrong.
+    let rows = std::fs::read_to_string(data(&format!("{name}.rows.csv"))).unwrap();
+    let margins = std::fs::read_to_string(data(&format!("{name}.margins.csv"))).unwrap();
+    let mut labeled = format!("{},kind\n", rows.lines().next().unwrap());
+    for (number, (row, margins)) in rows.lines().skip(1).zip(margins.lines()).enumerate() {
+        let margins: Vec<f64> = margins.split(',').map(|margin| margin.parse().unwrap()).collect();
+        let best = (0..3).fold(0, |best, object| if margins[object] > margins[best] { object } else { best });
+        let label = (best + usize::from(number == 0)) % 3;
+        labeled +=
+            &format!("{row},{}\n", if number % 2 == 0 { ["cup", "jug", "pan"][label] } else { ["0", "1", "2"][label] });
+    }
+    std::fs::write(path("labeled.csv"), labeled).unwrap();
+    for file in [model.clone(), data(&format!("{name}.ubj"))] {
+        let evaluated = run(["evaluate", &file, &path("labeled.csv"), "--label", "kind", "--json"]);
+        if file == model {
+            let evaluated = json(evaluated);
+            assert_eq!(evaluated["rows"], 60);
+            assert!((evaluated["accuracy"].as_f64().unwrap() - 59.0 / 60.0).abs() < 1e-12, "{evaluated}");
+        } else {
+            // The file's own classes have no such names.
+            let message = stderr(evaluated, 1);
+            assert!(
+                message.contains("labeled.csv: the label") && message.contains("none of the model's classes"),
+                "{message}"
+            );
+        }
+    }
+    let message = stderr(run(["evaluate", &model, &path("labeled.csv"), "--label", "color"]), 1);
+    assert!(message.contains("no column \"color\""), "{message}");
+    // A regression's labels are numbers.
+    let name = "catboost-1.2-regression";
+    stdout(run(["export", &data(&format!("{name}.json")), "-o", &model, "--leaf", "f32"]));
+    std::fs::write(path("labeled.csv"), "width,height,count,angle,amount\n1,990,2,0.5,2\n").unwrap();
+    let evaluated = json(run(["evaluate", &model, &path("labeled.csv"), "--label", "amount", "--json"]));
+    assert_eq!(evaluated["mean_absolute_error"], evaluated["root_mean_square_error"]);
+}
+
+#[test]
 fn a_regression_gives_its_value_and_no_verdict() {
     let (_directory, path) = place();
     let name = "catboost-1.2-regression";
@@ -223,6 +268,7 @@ fn the_layout_is_chosen_for_what_is_asked_and_all_candidates_are_named() {
     let least = |key: fn(&Value) -> Option<u64>| candidates.iter().min_by_key(|candidate| key(candidate)).unwrap();
     assert_eq!(size["layout"], least(|candidate| candidate["bytes"].as_u64())["layout"]);
     assert_eq!(speed["layout"], least(|candidate| candidate["instructions"]["m4f"].as_u64())["layout"]);
+    assert_eq!(size["bytes"], least(|candidate| candidate["bytes"].as_u64())["bytes"]);
     let smallest = least(|candidate| candidate["bytes"].as_u64())["bytes"].as_u64().unwrap();
     let small = candidates.iter().filter(|candidate| candidate["bytes"].as_u64().unwrap() <= 2 * smallest);
     let fastest = small.min_by_key(|candidate| candidate["instructions"]["m4f"].as_u64()).unwrap();

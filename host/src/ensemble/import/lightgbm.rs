@@ -130,7 +130,9 @@ fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<us
         return Err(EnsembleProblem::Objective { found: name.into() }.into());
     }
     if matches!(name, "binary" | "multiclassova") && sigmoid.parse() != Ok(1.0) {
-        draft.notes.push(format!("Posteriors take margins as log-odds, but the model's are to be multiplied by {sigmoid}."));
+        draft
+            .notes
+            .push(format!("Posteriors take margins as log-odds, but the model's are to be multiplied by {sigmoid}."));
     }
     if name == "multiclassova" {
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());

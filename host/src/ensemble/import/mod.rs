@@ -80,8 +80,9 @@ pub fn read(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensem
                 EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "no UBJSON from here on".into() },
             )),
         },
-        Kind::LightGbm => lightgbm::read(bytes, names)
-            .map_err(|refused| Error::at(refused.line.map_or(Place::file(path), |line| Place::line(path, line)), refused.problem)),
+        Kind::LightGbm => lightgbm::read(bytes, names).map_err(|refused| {
+            Error::at(refused.line.map_or(Place::file(path), |line| Place::line(path, line)), refused.problem)
+        }),
         Kind::Onnx => onnx::read(bytes, names).map_err(wrong),
     }
 }
@@ -103,15 +104,16 @@ fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
         [b'{', b'i' | b'U' | b'I' | b'u' | b'l' | b'm' | b'L' | b'$' | b'#', ..] => Ok(Kind::Ubjson),
         _ if text.starts_with(b"{") || text.starts_with(b"[") => Ok(Kind::Json),
         _ if text.starts_with(b"tree\n") || text.starts_with(b"tree\r\n") => Ok(Kind::LightGbm),
-        _ if starts(b"PLPT") => refused("it is a compiled model already", "Give the ensemble that it was exported from."),
+        _ if starts(b"PLPT") => {
+            refused("it is a compiled model already", "Give the ensemble that it was exported from.")
+        }
         _ if starts(b"CBM1") => refused(
             "it is CatBoost's binary format",
             "Save the model with `model.save_model(\"model.json\", format=\"json\")`.",
         ),
-        _ if starts(b"binf") || starts(b"CONFIG-offset:") => refused(
-            "it is XGBoost's old binary format",
-            "Save the model with `booster.save_model(\"model.json\")`.",
-        ),
+        _ if starts(b"binf") || starts(b"CONFIG-offset:") => {
+            refused("it is XGBoost's old binary format", "Save the model with `booster.save_model(\"model.json\")`.")
+        }
         [0x80, 2..=5, ..] => refused(
             "it is a Python pickle, which only Python can open",
             "Convert a scikit-learn model with `skl2onnx.to_onnx(model, X[:1])`, and save the bytes of its \

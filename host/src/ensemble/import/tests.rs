@@ -23,7 +23,8 @@ fn models() -> Vec<PathBuf> {
 
 fn numbers<T: std::str::FromStr>(path: &Path, header: usize, missing: impl Fn() -> T) -> Vec<Vec<T>> {
     let text = std::fs::read_to_string(path).unwrap();
-    let number = |cell: &str| if cell.is_empty() { missing() } else { cell.parse().unwrap_or_else(|_| panic!("{cell}")) };
+    let number =
+        |cell: &str| if cell.is_empty() { missing() } else { cell.parse().unwrap_or_else(|_| panic!("{cell}")) };
     text.lines().skip(header).map(|line| line.split(',').map(number).collect()).collect()
 }
 
@@ -54,7 +55,8 @@ fn margins_are_the_librarys_own_on_plain_tied_and_missing_rows() {
             let own = if margins.len() == 2 && expected.len() == 1 { &margins[1..] } else { &margins };
             assert_eq!(own.len(), expected.len(), "{name}");
             for (own, expected) in own.iter().zip(expected) {
-                let is_same = if is_exact { *own == f64::from(*expected as f32) } else { (own - expected).abs() <= rounding };
+                let is_same =
+                    if is_exact { *own == f64::from(*expected as f32) } else { (own - expected).abs() <= rounding };
                 assert!(is_same, "{name}, row {number}: {own} instead of {expected} ({rounding:e})");
             }
             if expected.len() > 1 {

@@ -44,7 +44,8 @@ pub(super) fn from_json(path: &Path, bytes: &[u8], names: Option<&[String]>) -> 
 pub(super) fn from_ubjson(path: &Path, value: serde_json::Value, names: Option<&[String]>) -> Result<Ensemble> {
     let wrong = |problem| Error::at(Place::file(path), problem);
     check_booster(&serde_json::from_value(value.clone()).unwrap_or_default()).map_err(wrong)?;
-    let damaged = |error: serde_json::Error| EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
+    let damaged =
+        |error: serde_json::Error| EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
     let document: Document = serde_json::from_value(value).map_err(|error| wrong(damaged(error)))?;
     document.into_ensemble(names, "UBJSON").map_err(wrong)
 }

@@ -37,10 +37,16 @@ impl Objective {
             "binary:hinge" => (Kind::Binary, Link::Identity),
             "reg:logistic" => (Kind::One, Link::Logit),
             "count:poisson" | "reg:gamma" | "reg:tweedie" | "survival:cox" | "survival:aft" => (Kind::One, Link::Log),
-            "reg:squarederror" | "reg:linear" | "reg:squaredlogerror" | "reg:pseudohubererror"
-            | "reg:absoluteerror" | "reg:quantileerror" | "reg:expectileerror" | "rank:pairwise" | "rank:ndcg" | "rank:map" => {
-                (Kind::One, Link::Identity)
-            }
+            "reg:squarederror"
+            | "reg:linear"
+            | "reg:squaredlogerror"
+            | "reg:pseudohubererror"
+            | "reg:absoluteerror"
+            | "reg:quantileerror"
+            | "reg:expectileerror"
+            | "rank:pairwise"
+            | "rank:ndcg"
+            | "rank:map" => (Kind::One, Link::Identity),
             _ => return Err(EnsembleProblem::Objective { found: name.into() }),
         };
         Ok(Self { kind, link })
@@ -48,12 +54,14 @@ impl Objective {
 }
 
 impl Link {
-    /// The margin of a base score, in f32 as XGBoost computes it.
+    /// The margin of a base score, in f32 as XGBoost computes it. C libraries' logarithms of f32 are the nearest f32
+    /// nearly always; that of an f64, rounded, is always.
     pub(super) fn margin(self, base_score: f32) -> f32 {
+        let ln = |value: f32| f64::from(value).ln() as f32;
         match self {
             Self::Identity => base_score,
-            Self::Logit => -(1.0 / base_score - 1.0).ln(),
-            Self::Log => base_score.ln(),
+            Self::Logit => -ln(1.0 / base_score - 1.0),
+            Self::Log => ln(base_score),
         }
     }
 }

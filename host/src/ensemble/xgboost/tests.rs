@@ -111,7 +111,12 @@ fn what_contradicts_itself_is_refused_and_the_place_named() {
         (true, "/learner/attributes/palpate_objects", json!("[\"a\",\"b\"]"), "it has 3 classes"),
         (true, "/learner/learner_model_param/base_score", json!("[1,2]"), "base_score"),
         (true, "/learner/learner_model_param/base_score", json!("NaN"), "not finite"),
-        (true, "/learner/objective/name", json!("reg:squarederror"), "its objective is reg:squarederror. Train with multi:softprob"),
+        (
+            true,
+            "/learner/objective/name",
+            json!("reg:squarederror"),
+            "its objective is reg:squarederror. Train with multi:softprob",
+        ),
         (true, "/learner/gradient_booster/name", json!("gblinear"), "booster is gblinear"),
         (true, &format!("{model}/tree_info"), json!([0]), "tree_info has 1 entries for 4 trees"),
         (false, &format!("{model}/tree_info/5"), json!(3), "tree 5: it is for object 3 of 3"),
@@ -121,7 +126,12 @@ fn what_contradicts_itself_is_refused_and_the_place_named() {
         (true, &format!("{trees}/1/left_children/1"), json!(0), "tree 1: node 0 is reached twice"),
         (true, &format!("{trees}/2/split_indices/0"), json!(2), "tree 2: node 0: it splits on feature 2"),
         (true, &format!("{trees}/2/split_indices"), json!([0]), "tree 2: split_indices has 1 entries"),
-        (true, &format!("{trees}/2/split_type/0"), json!(1), "tree 2: it splits on categories of the feature curvature"),
+        (
+            true,
+            &format!("{trees}/2/split_type/0"),
+            json!(1),
+            "tree 2: it splits on categories of the feature curvature",
+        ),
         (true, &format!("{trees}/0/leaf_weights"), json!([0.5]), "leaf_weights has no 3 values"),
         (true, &format!("{trees}/0/leaf_weights/0"), json!(1e39), "number out of range"),
         (false, &format!("{trees}/0/split_conditions/0"), json!("x"), "expected f32"),
@@ -178,7 +188,9 @@ fn weights_of_dropped_trees_are_read_where_each_version_puts_them() {
     }
     let mut few = document(true);
     few["learner"]["gradient_booster"]["weight_drop"] = json!([1.0]);
-    assert!(load(few.to_string().as_bytes()).unwrap_err().to_string().contains("weight_drop has 1 entries for 4 trees"));
+    assert!(
+        load(few.to_string().as_bytes()).unwrap_err().to_string().contains("weight_drop has 1 entries for 4 trees")
+    );
 }
 
 #[test]

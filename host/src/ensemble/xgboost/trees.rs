@@ -53,12 +53,7 @@ pub(super) fn tree(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<T
 }
 
 /// Node `position` as the file has it, its values and its feature checked, its children checked for range only.
-fn node(
-    columns: &TreeColumns,
-    position: usize,
-    output: Output,
-    shape: &Shape,
-) -> Result<Node, TreeProblem> {
+fn node(columns: &TreeColumns, position: usize, output: Output, shape: &Shape) -> Result<Node, TreeProblem> {
     let (features, objects) = (shape.features.len(), shape.groups);
     let left = columns.left_children[position];
     if left == -1 {

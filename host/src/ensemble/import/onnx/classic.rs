@@ -20,8 +20,7 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
     if !tracks.is_empty() && tracks.len() != count {
         return Err(damaged(format!("nodes_missing_value_tracks_true has {} entries for {count} nodes", tracks.len())));
     }
-    let places: HashMap<(i64, i64), usize> =
-        trees.iter().copied().zip(ids.iter().copied()).zip(0..).collect();
+    let places: HashMap<(i64, i64), usize> = trees.iter().copied().zip(ids.iter().copied()).zip(0..).collect();
     if places.len() != count {
         return Err(damaged("two nodes of a tree have the same number"));
     }
@@ -93,7 +92,8 @@ impl Weights {
         let map: Map = if is_classifier {
             classes(node, draft, targets, values, base, transform)?
         } else {
-            let wanted = outputs(node.attributes.get("n_targets").and_then(|attribute| attribute.integer).unwrap_or(1))?;
+            let wanted =
+                outputs(node.attributes.get("n_targets").and_then(|attribute| attribute.integer).unwrap_or(1))?;
             if wanted > 1 {
                 return Err(unsupported(
                     format!("it has {wanted} targets, which are no classes of one object"),

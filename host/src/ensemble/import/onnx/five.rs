@@ -18,7 +18,8 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
     let values = numbers("nodes_splits", Some(count))?;
     let modes = integers("nodes_modes", Some(count))?;
     let (trues, falses) = (integers("nodes_truenodeids", Some(count))?, integers("nodes_falsenodeids", Some(count))?);
-    let (true_leaves, false_leaves) = (integers("nodes_trueleafs", Some(count))?, integers("nodes_falseleafs", Some(count))?);
+    let (true_leaves, false_leaves) =
+        (integers("nodes_trueleafs", Some(count))?, integers("nodes_falseleafs", Some(count))?);
     let tracks = integers("nodes_missing_value_tracks_true", None)?;
     if !tracks.is_empty() && tracks.len() != count {
         return Err(damaged(format!("nodes_missing_value_tracks_true has {} entries for {count} nodes", tracks.len())));

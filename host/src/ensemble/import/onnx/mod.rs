@@ -60,7 +60,9 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     let features = match node.operation {
         "TreeEnsemble" => five::read(node, &mut draft)?,
         "TreeEnsembleClassifier" | "TreeEnsembleRegressor" => classic::read(node, &mut draft)?,
-        other => return Err(unsupported(format!("its operator {other} is unknown"), "Convert it with opset 5 or older.")),
+        other => {
+            return Err(unsupported(format!("its operator {other} is unknown"), "Convert it with opset 5 or older."));
+        }
     };
     let count = columns.unwrap_or(features);
     if count < features {
