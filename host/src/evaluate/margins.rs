@@ -59,9 +59,14 @@ pub(super) enum Values<'m> {
 }
 
 impl Candidate<'_> {
+    /// Whether the model is over touches; otherwise it is over rows of features.
+    pub fn is_of_touches(&self) -> bool {
+        self.descriptor().is_some()
+    }
+
     fn descriptor(&self) -> Option<Descriptor> {
         match self {
-            Self::Full(ensemble) => Some(ensemble.descriptor),
+            Self::Full(ensemble) => ensemble.descriptor(),
             Self::Compiled(model) => model.descriptor(),
         }
     }
@@ -303,7 +308,7 @@ fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touc
 }
 
 /// The object with the most evidence; the first of several, as on the chip.
-pub(super) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
+pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
     (0..evidence.len()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best })
 }
 

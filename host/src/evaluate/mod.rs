@@ -40,17 +40,20 @@ mod curve;
 mod draws;
 mod estimate;
 mod full;
+mod isolated;
 mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
 mod poses;
+mod rows;
 mod sequential;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 mod under_plan;
+pub mod verify;
 
 pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
@@ -62,6 +65,7 @@ pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
 pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
 pub use poses::{ByPose, Stock};
+pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use switch::{Rule, Stopped, Switched};
 pub use under_plan::evaluate_active;

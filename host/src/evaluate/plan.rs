@@ -182,7 +182,7 @@ mod tests {
             Node::Leaf(vec![-0.5, 0.5]),
         ];
         let ensemble = Ensemble {
-            descriptor: Descriptor::Curvature,
+            inputs: Descriptor::Curvature.into(),
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],

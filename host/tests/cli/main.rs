@@ -11,6 +11,7 @@ mod models;
 mod objects;
 mod probe;
 mod reports;
+mod rows;
 mod support;
 mod view;
 

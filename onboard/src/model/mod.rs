@@ -13,8 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise, Section, Tag,
-    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+    Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise, Section, Tag,
+    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
 };
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
@@ -191,6 +191,12 @@ impl<'a> Model<'a> {
     /// Cost: about 30 instructions for each optional section.
     pub fn plan(&self) -> Option<Plan<'a>> {
         Plan::from_bytes(optional::find(self.optional(), Tag::Plan), self.object_count())
+    }
+
+    /// The features of a model over rows, in their order, as far as the model states them.
+    pub fn features(&self) -> impl Iterator<Item = Feature<'a>> {
+        let mut rest = optional::find(self.optional(), Tag::FeatureNames);
+        core::iter::from_fn(move || take_feature(&mut rest))
     }
 
     /// The optional sections, in the order of their tags; also those that this crate does not know.
