@@ -58,7 +58,7 @@ impl core::error::Error for CapacityError {}
 
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
-/// State: 8 bytes per object, and 40; and the model, which is copied: 64 bytes, not those that it is read from.
+/// State: 8 bytes per object, and 32; and the model, which is copied: 64 bytes, not those that it is read from.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: Model<'m>,

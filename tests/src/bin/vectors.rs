@@ -178,7 +178,9 @@ fn layouts(text: &mut String) {
     let most = Shape { objects: 256, trees: 1, depth: 1, ..SHAPE };
     play(text, "256 objects", &compiled(most, 11, Leaf::I8, Layout::Compact), &touches(4, 6));
     let bytes = palpate_tests::unaligned::model();
-    play(text, "not aligned, thresholds of 3 bytes and of 1", &bytes, &touches(8, 7));
+    // The touch of the worked example comes first.
+    let touches: Vec<Touch> = [Touch::from_micros([30_000, 0, 50_000])].into_iter().chain(touches(8, 7)).collect();
+    play(text, "not aligned, thresholds of 3 bytes and of 1", &bytes, &touches);
 }
 
 /// Every descriptor, with poses.
