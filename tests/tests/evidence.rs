@@ -3,8 +3,8 @@
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
 use palpate_onboard::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
-use palpate_shared::format::checksum;
 use palpate_shared::{Descriptor, Touch};
+use palpate_tests::abuse::snapshot;
 use palpate_tests::random;
 
 /// A touch with this curvature.
@@ -156,17 +156,6 @@ fn thousands_of_touches_pulling_back_and_forth_leave_nothing_behind() {
     assert_eq!(recognized(recognizer.push(&touch(1000))), Some((1, 10_003)));
 }
 
-/// A snapshot with this evidence.
-fn snapshot(model: &Model<'_>, evidence: &[i64]) -> Vec<u8> {
-    let mut buffer = [0; 64];
-    let mut bytes = postcard::to_slice(&(model.checksum(), 7_u32, 0_u8, 0_u8), &mut buffer).unwrap().to_vec();
-    for evidence in evidence {
-        bytes.extend_from_slice(postcard::to_slice(evidence, &mut [0; 10]).unwrap());
-    }
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    bytes
-}
-
 #[test]
 fn evidence_at_its_limits_saturates_towards_undecided_and_never_wraps() {
     let bytes = compiled(&steps(&[500.0], &[&[5.0, 5.0, 4.9], &[-5.0, -5.0, -5.0]]), Leaf::I16);
@@ -174,7 +163,7 @@ fn evidence_at_its_limits_saturates_towards_undecided_and_never_wraps() {
     let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(0.01, u32::MAX)).unwrap();
     for (curvature, limit) in [(0, i64::MAX), (1000, i64::MIN)] {
         let near = limit - limit.signum() * 10;
-        recognizer.restore(&snapshot(&model, &[near, near, near])).unwrap();
+        recognizer.restore(&snapshot(&model, 7, 0, 0, &[near, near, near])).unwrap();
         for _ in 0..100 {
             assert_eq!(recognizer.push(&touch(curvature)), Ok(Verdict::Undecided));
         }
@@ -257,7 +246,7 @@ fn snapshots_of_other_models_and_damaged_ones_are_refused_and_change_nothing() {
         changed[position] ^= 0x10;
         assert_eq!(recognizer.restore(&changed), Err(SnapshotError::Damaged));
     }
-    assert_eq!(recognizer.restore(&snapshot(&model, &[1, 2, 3])), Err(SnapshotError::Damaged));
+    assert_eq!(recognizer.restore(&snapshot(&model, 7, 0, 0, &[1, 2, 3])), Err(SnapshotError::Damaged));
     assert_eq!((recognizer.evidence(), recognizer.touches()), (&evidence[..], 1));
 }
 
