@@ -68,7 +68,7 @@ mod model;
 pub mod station;
 
 pub use bytes::{Aligned, ModelError};
-pub use decide::{CapacityError, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
+pub use decide::{CapacityError, NothingExpected, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use model::{Model, Refused};

@@ -1,6 +1,7 @@
 //! Margins to a verdict: evidence, its exponential, when to stop, and the state as bytes.
 
 mod evidence;
+mod expected;
 mod exponential;
 mod recognizer;
 #[cfg(feature = "link")]
@@ -8,6 +9,7 @@ mod snapshot;
 mod stopping;
 
 pub use evidence::Posterior;
+pub use expected::NothingExpected;
 pub use exponential::exp2_negative;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;
