@@ -40,9 +40,13 @@ mod walk;
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow};
 pub use fresh::calibrate_fresh;
+#[cfg(feature = "cli")]
+pub(crate) use fresh::fresh;
 pub use model::{Calibrated, Settings, added_bytes, calibrate, calibrate_with};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
+#[cfg(feature = "cli")]
+pub(crate) use temperature::temperature;
 /// What the promised rate is of, in words.
 pub fn of_what(per: Per) -> &'static str {
     match per {
