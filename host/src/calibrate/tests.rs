@@ -111,12 +111,13 @@ fn a_promise_per_name_or_object_is_kept_for_each_of_them() {
     let name = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Name)).unwrap();
     let (_, by_name, _) = errors(&fresh, &name.odds, 4);
     assert!(by_name.iter().all(|error| *error <= rate + 2.0 * spread), "{by_name:?}");
-    assert!(by_name.iter().all(|error| *error > rate / 3.0), "{by_name:?} is not used up");
+    assert!(by_name.iter().all(|error| *error > 0.6 * rate), "{by_name:?} is not used up");
     let object = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Object)).unwrap();
     let (_, _, by_object) = errors(&fresh, &object.odds, 4);
     assert!(by_object.iter().all(|error| *error <= rate + 2.0 * spread), "{by_object:?}");
     assert!(object.mean_touches > average.mean_touches, "each object costs more than their average");
-    assert_eq!((name.tallies.len(), object.tallies.len(), name.sequences), (4, 4, 20_000));
+    assert_eq!((name.tallies.len(), object.tallies.len(), name.sequences), (4, 4, 40_000));
+    assert!(name.mean_touches < 1.1 * average.mean_touches, "{} {}", name.mean_touches, average.mean_touches);
 }
 
 #[test]
