@@ -36,10 +36,9 @@ fn recognize(bytes: &[u8], touches: impl Iterator<Item = palpate::Result<Touch>>
                 println!("not counted: {refused}");
                 continue;
             }
-            Ok(Verdict::Recognized { object, touches }) => {
-                let object = usize::from(object);
-                let posterior = recognizer.posterior(object).to_f64();
-                println!("{} after {touches} touches, posterior {posterior:.4}", model.object_name(object));
+            Ok(Verdict::Recognized { object, touches, rivals }) => {
+                let (name, posterior) = (model.object_name(object.into()), rivals.posterior().to_f64());
+                println!("{name} after {touches} touches, posterior {posterior:.4}");
             }
             Ok(Verdict::Unknown) => println!("unknown"),
         }

@@ -43,7 +43,7 @@
 //!         break;
 //!     }
 //! }
-//! let Verdict::Recognized { object, touches } = verdict else { panic!("{verdict:?}") };
+//! let Verdict::Recognized { object, touches, .. } = verdict else { panic!("{verdict:?}") };
 //! println!("{} after {touches} touches", model.object_name(object.into()));
 //! assert_eq!(model.object_name(object.into()), "disc");
 //! # Ok(())
@@ -61,9 +61,11 @@
 //! | [`probe`] | the simulator: scene, approach, first contact | [`probe::scene::Scene`] |
 //! | [`touches`] | touches in memory and on disk; noise; splits | [`touches::Dataset`] |
 //! | [`capture`] | touches objects, many times | [`capture::capture`](fn@capture::capture) |
-//! | [`ensemble`] | the full model: trees in `f32`, XGBoost JSON, training | [`ensemble::Ensemble`] |
+//! | [`ensemble`] | the full model: trees in `f32`, files of XGBoost, LightGBM, CatBoost and ONNX, training | [`ensemble::Ensemble`] |
+//! | [`rows`] | rows of features, for models that other libraries trained | [`rows::Rows`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
+//! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
@@ -99,9 +101,12 @@ pub mod touches;
 
 pub mod capture;
 pub mod ensemble;
+pub mod rows;
 
 pub mod compile;
 pub mod evaluate;
+
+pub mod calibrate;
 
 #[cfg(feature = "train")]
 pub mod tune;

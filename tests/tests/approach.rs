@@ -178,7 +178,8 @@ fn a_chip_proposes_over_the_link_what_the_hosts_recognizer_proposes() {
 fn a_chip_without_a_plan_refuses_to_propose() {
     let bytes = model(3);
     let mut desk = Desk::new([Step::Ask(Query::NextApproach { without: [0; POSE_BYTES] })], 0);
-    palpate_onboard::station::serve::<OBJECTS, _, _>(&bytes, palpate_onboard::station::NoStorage, 0, &mut desk).unwrap();
+    palpate_onboard::station::serve::<OBJECTS, _, _>(&bytes, palpate_onboard::station::NoStorage, 0, &mut desk)
+        .unwrap();
     assert_eq!(desk.answers, ["Refused(NoPlan)"]);
 }
 
@@ -214,7 +215,7 @@ fn recent_touches_that_contradict_the_evidence_restart_it_and_become_it() {
     let mut hasty = Recognizer::<3>::new(&model, Stopping::new(0.01, 100).unwrap()).unwrap();
     hasty.push_margins_forgetting(&[one, 0, 0], &mut forgetting);
     let verdict = hasty.push_margins_forgetting(&[0, 20 * one, 0], &mut forgetting);
-    assert_eq!(verdict, Verdict::Recognized { object: 1, touches: 2 });
+    assert!(matches!(verdict, Verdict::Recognized { object: 1, touches: 2, .. }), "{verdict:?}");
     assert_eq!(hasty.push_margins_forgetting(&[90 * one, 0, 0], &mut forgetting), verdict);
 }
 
@@ -244,7 +245,8 @@ fn no_limit_and_no_margin_makes_forgetting_panic() {
         }
         assert_eq!(recognizer.touches(), 9);
     }
-    let refused = recognizer::<4>(&model).push_forgetting(&Touch::from_micros([0, 1, 2]), &mut Forgetting::new(&model, 5.0));
+    let refused =
+        recognizer::<4>(&model).push_forgetting(&Touch::from_micros([0, 1, 2]), &mut Forgetting::new(&model, 5.0));
     // It needs a pose.
     assert!(refused.is_err());
 }

@@ -4,8 +4,8 @@ use super::Transport;
 use crate::error::{ChipProblem, Error, Place, Result};
 use crate::progress::{self, Progress};
 use palpate_shared::link::{
-    Answer, ApproachMessage, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo, Outcome,
-    POSE_BYTES, Payload, Query, Refusal, Statistics, checksum,
+    Answer, ApproachMessage, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo,
+    Outcome, POSE_BYTES, Payload, Query, Refusal, Statistics, checksum,
 };
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};

@@ -2,10 +2,15 @@ use super::noise::NoiseArguments;
 use super::numbers::share;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
+use crate::error::{Problem, RowsProblem};
 use crate::evaluate::model_file::ModelFile;
-use crate::evaluate::{self, Active, ActiveFacts, Approaches, Evaluation, LEAST_GROUPS, Margins, Rule, Settings, Switched};
+use crate::evaluate::{
+    self, Active, ActiveFacts, Approaches, Classes, Evaluation, LEAST_GROUPS, Margins, Regression, RowsEvaluation,
+    Rule, Settings, Switched, evaluate_rows,
+};
 use crate::output;
 use crate::progress::Progress;
+use crate::rows::feature_names;
 use crate::touches::noise::Noise;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
@@ -25,6 +30,8 @@ On a data set of approaches, figures are also given per approach: a touch that t
 
 With --active, on approaches with pose, each next approach is drawn from those of the same object in the pose that the model's plan proposes, none twice in a sequence. A pose whose approaches are used up is not proposed again in the sequence; where none is left, it ends without a verdict.
 
+With --label the file has rows of features for a model that was exported from another library's (CSV): each row is classified alone, and compared with the class in the column, its name or its number from 0; or for a model with one output with the number there.
+
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 
 Examples:
@@ -38,21 +45,26 @@ Examples:
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02
   palpate evaluate planned.palpate approaches --active
-  palpate evaluate model.palpate approaches --switch")]
+  palpate evaluate model.palpate approaches --switch
+  palpate evaluate model.palpate rows.csv --label kind")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
-    /// Directory that `palpate capture` filled
+    /// Directory that `palpate capture` filled; with --label a CSV file of rows
     directory: PathBuf,
+    /// Column of the rows' classes, or of the numbers that a regression should give
+    #[arg(long, value_name = "COLUMN", conflicts_with_all = ["at", "confusion"])]
+    label: Option<String>,
     /// Numbers of touches after which to give the accuracy [default: 5,10,20,30,60, as far as the touches go]
     #[arg(long, value_delimiter = ',', value_name = "TOUCHES,…")]
     at: Option<Vec<usize>>,
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]
     groups: usize,
-    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%
-    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
-    error_rate: f64,
+    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%, which nothing promises [default: the
+    /// model's own thresholds; 1% for an ensemble]
+    #[arg(long, value_name = "RATE", value_parser = share)]
+    error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
     max_touches: Option<u32>,
@@ -114,6 +126,9 @@ struct Confusion {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
+    if let Some(label) = &arguments.label {
+        return rows(&arguments, &file, label);
+    }
     let mut dataset = super::dataset(&arguments.directory)?;
     let trained_on: Vec<String> = match &file {
         ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
@@ -159,6 +174,43 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         return output::print_json(&evaluated);
     }
     output::print(&text(&evaluated))
+}
+
+/// Evaluates a model on labeled rows.
+fn rows(arguments: &Arguments, file: &ModelFile, label: &str) -> Result<()> {
+    let names = match file {
+        ModelFile::Full(ensemble) => ensemble.inputs.names().into_iter().map(String::from).collect(),
+        ModelFile::Compiled(compiled) => feature_names(&compiled.model()),
+    };
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let rows = super::verify::read_rows(&arguments.directory, &names, Some(label))?;
+    let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| match error.problem() {
+        Some(Problem::Rows(RowsProblem::Label { .. })) => error.in_file(&arguments.directory),
+        _ => error.in_file(&arguments.model),
+    })?;
+    if arguments.json {
+        return output::print_json(&evaluated);
+    }
+    let RowsEvaluation { rows, classes, regression } = evaluated;
+    let mut text = String::new();
+    if let Some(Classes { accuracy, accuracy_standard_error, names, confusion, .. }) = classes {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "{rows} rows, each taken alone: {:.1} % right (± {:.1}, a standard error)",
+            100.0 * accuracy,
+            100.0 * accuracy_standard_error
+        );
+        text +=
+            &confusion_table(&Confusion { touches: 1, touched: names.clone(), recognized: names, counts: confusion });
+    }
+    if let Some(Regression { mean_absolute_error, root_mean_square_error }) = regression {
+        text = format!(
+            "{rows} rows: margins are off by {mean_absolute_error:.4} on average, {root_mean_square_error:.4} in the root \
+             mean square\n"
+        );
+    }
+    output::print(&text)
 }
 
 /// The numbers of touches to give the accuracy after: those asked for, or the usual ones that enough groups can be drawn
@@ -361,7 +413,8 @@ fn switch_table(switch: &Switched) -> String {
 fn confusion_table(confusion: &Confusion) -> String {
     let names = confusion.touched.iter().chain(&confusion.recognized);
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("7.1 %".len() + 2);
-    let mut text = format!("\nTaken for, after {} touches\n{:width$}", confusion.touches, "");
+    let s = if confusion.touches == 1 { "" } else { "es" };
+    let mut text = format!("\nTaken for, after {} touch{s}\n{:width$}", confusion.touches, "");
     // Writing to a string cannot fail.
     confusion.recognized.iter().for_each(|name| _ = write!(text, " {name:>width$}"));
     text.push('\n');

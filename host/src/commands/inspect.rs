@@ -3,6 +3,7 @@ use crate::Result;
 use crate::chip::instructions::Chip;
 use crate::compile::{self, CompiledModel, Core, Instructions, Memory};
 use crate::output;
+use crate::rows::{Encoder, feature_names};
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Length, TrainedNoise, TrainedProbe};
 use palpate_shared::{ContactPattern, Pose, Q15_ONE, Touch};
@@ -40,6 +41,9 @@ struct Inspected<'a> {
     ensemble: String,
     descriptor: &'static str,
     features: usize,
+    /// Of a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    feature_names: Option<Vec<Feature>>,
     objects: Vec<&'a str>,
     layout: &'static str,
     leaf: &'static str,
@@ -65,6 +69,12 @@ struct Inspected<'a> {
     instructions: Instructions,
     #[serde(skip_serializing_if = "Option::is_none")]
     chip: Option<OnChip>,
+}
+
+#[derive(serde::Serialize)]
+struct Feature {
+    name: String,
+    scale: Option<f32>,
 }
 
 #[derive(serde::Serialize)]
@@ -104,6 +114,15 @@ struct Noise {
     timer: u32,
     /// Standard deviation of the pose in degrees; 0 for none.
     pose_degrees: f64,
+}
+
+/// The features of a model over rows.
+fn features(model: &Model<'_>) -> Vec<Feature> {
+    let scales: Vec<Option<f32>> = match Encoder::of(model) {
+        Encoder::Real => vec![None; model.feature_count()],
+        Encoder::Scaled(scales) => scales.into_iter().map(Some).collect(),
+    };
+    feature_names(model).into_iter().zip(scales).map(|(name, scale)| Feature { name, scale }).collect()
 }
 
 /// The probe that a model states, or the one that its header assumes.
@@ -201,6 +220,7 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         ensemble: format!("{:016x}", header.ensemble()),
         descriptor: model.descriptor().map_or("none (rows of features)", palpate_shared::Descriptor::name),
         features: model.feature_count(),
+        feature_names: model.descriptor().is_none().then(|| features(model)),
         objects: (0..model.object_count()).map(|object| model.object_name(object)).collect(),
         layout: model.layout().name(),
         leaf: model.leaf_type().name(),
@@ -238,6 +258,7 @@ fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
         ("sections", length(header.optional_length())),
         ("base_margins", 4 * objects),
         ("priors", 4 * objects),
+        ("sections", length(header.optional_length())),
         ("axes", 4 * usize::from(header.axes())),
         ("thresholds", length(header.cuts_length())),
         ("groups", 8 * usize::from(header.groups())),
@@ -296,6 +317,13 @@ fn text(inspected: &Inspected<'_>) -> String {
     };
     line("format version", format!("{} (palpate {})", inspected.version, inspected.tool_version));
     line("descriptor", format!("{}, {} features", inspected.descriptor, inspected.features));
+    if let Some(features) = &inspected.feature_names {
+        let feature = |Feature { name, scale }: &Feature| match scale {
+            Some(scale) => format!("{name} × {scale}"),
+            None => name.clone(),
+        };
+        line("features", features.iter().map(feature).collect::<Vec<_>>().join(", "));
+    }
     line("objects", format!("{}: {}", inspected.objects.len(), inspected.objects.join(", ")));
     line("trees", format!("{}, {} splits, {} leaves", inspected.trees, inspected.splits, inspected.leaves));
     line("layout", format!("{}, {} leaves", inspected.layout, inspected.leaf));

@@ -16,11 +16,13 @@ mod plan;
 mod probe;
 mod progress;
 mod recognize;
+mod recognize_rows;
 mod report;
 mod run;
 mod shell;
 mod train;
 mod tune;
+mod verify;
 mod view;
 mod watch;
 
@@ -78,6 +80,8 @@ commands! {
     Probe => design,
     /// Compare a compiled model with its ensemble
     Parity => parity,
+    /// Compare a model over rows of features with the file that it was exported from
+    Verify => verify,
     /// Remake the whole evaluation: every figure, the limit, speed against error
     Report => report,
     /// Recognize on a chip at the end of a line

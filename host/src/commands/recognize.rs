@@ -17,18 +17,27 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided, recognized, or unknown once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
 
+With --features each line in is a row of features for a model that was exported from another library's: CSV with the features' names in the header, or as many columns as features, empty cells for missing values. Each line out is the verdict of that row alone, or with --add-up of all rows since the last verdict. A model with one output gives its value and no verdict.
+
 Examples:
   palpate recognize model.palpate data/fork.txt
   probe | palpate recognize model.palpate
   palpate recognize model.palpate - --json < data/fork.txt
   palpate recognize model.palpate data/fork.txt --error-rate 5% --max-touches 30
-  probe | palpate recognize planned.palpate --active")]
+  probe | palpate recognize planned.palpate --active
+  palpate recognize model.palpate rows.csv --features --json")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
     /// File with touches; - is standard input
     #[arg(default_value = "-")]
     file: PathBuf,
+    /// The file has rows of features, not touches
+    #[arg(long)]
+    features: bool,
+    /// Add up the evidence of rows until there is a verdict, as that of touches
+    #[arg(long, requires = "features")]
+    add_up: bool,
     /// Stop at this error rate, such as 0.05 or 5%, instead of the model's
     #[arg(long, value_name = "RATE", value_parser = share)]
     error_rate: Option<f64>,
@@ -70,10 +79,23 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         Error::at(Place::file(&arguments.model), problem)
     };
     let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
+    if arguments.features {
+        return super::recognize_rows::run(recognizer, &arguments.file, arguments.add_up, arguments.json)
+            .map_err(|error| error.in_file(&arguments.model));
+    }
+    if model.descriptor().is_none() {
+        return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
+    }
     if arguments.active && model.plan().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
-    let stream = Stream { recognizer, model: &model, longest: compile::longest_time(&model), active: arguments.active, json: arguments.json };
+    let stream = Stream {
+        recognizer,
+        model: &model,
+        longest: compile::longest_time(&model),
+        active: arguments.active,
+        json: arguments.json,
+    };
     let path = &arguments.file;
     if path.as_os_str() == "-" {
         return stream.run(std::io::stdin().lock(), Path::new("standard input"));
@@ -162,7 +184,8 @@ impl Stream<'_> {
 
     /// The approach that helps most, where that is asked for and nothing is decided.
     fn next(&self) -> Option<Entry> {
-        let poses = self.model.plan().filter(|_| self.active && self.recognizer.verdict() == Verdict::Undecided)?.poses();
+        let poses =
+            self.model.plan().filter(|_| self.active && self.recognizer.verdict() == Verdict::Undecided)?.poses();
         let proposal = self.recognizer.next_approach(0..poses.count())?;
         Some(Entry::next(&ApproachMessage::new(proposal.pose, proposal.score, &poses.pose(proposal.pose)?)))
     }

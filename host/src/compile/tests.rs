@@ -1,5 +1,5 @@
 use super::*;
-use crate::ensemble::{Node, Origin, Output, StatedProbe, Tree};
+use crate::ensemble::{Inputs, Node, Origin, Output, StatedProbe, Tree};
 use crate::error::{Problem, TreeProblem};
 use crate::probe::approach::Probe;
 use palpate_onboard::ModelError;
@@ -16,7 +16,7 @@ fn leaf(values: &[f32]) -> Node {
 /// An ensemble of two objects over these trees, whose leaves have a value for each.
 fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
     Ensemble {
-        descriptor,
+        inputs: descriptor.into(),
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0; 2],
         trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
@@ -248,8 +248,8 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(setting(&Settings { max_touches: 0, ..Settings::default() }), "max_touches");
     assert_eq!(setting(&Settings { priors: Some(vec![1.0]), ..Settings::default() }), "priors");
     assert_eq!(setting(&Settings { priors: Some(vec![1.0, 0.0]), ..Settings::default() }), "priors");
-    assert_eq!(setting(&Settings { raw_features: Some(0), ..Settings::default() }), "raw_features");
-    assert_eq!(setting(&Settings { raw_features: Some(257), ..Settings::default() }), "raw_features");
+    // Touches are whole numbers already, and a row has a scale for each feature.
+    assert_eq!(setting(&Settings { scales: Some(vec![1.0, 1.0]), ..Settings::default() }), "scales");
 }
 
 #[test]
@@ -259,10 +259,14 @@ fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
         .map(|number| vec![split(0, number as f32 * 0.05 - 0.2, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])])
         .collect();
     let problem = refusal(&ensemble(Descriptor::Curvature, seconds.clone()), &Settings::default());
-    assert_eq!(problem, CompileProblem::Thresholds { feature: "curvature", thresholds: 9, rounded: 2 });
+    assert_eq!(problem, CompileProblem::Thresholds { feature: "curvature", thresholds: 9, rounded: 2, example: -0.2 });
     // Rows of features are compared as they are, fractions and all.
-    let raw = Settings { raw_features: Some(2), leaf: Leaf::F32, ..Settings::default() };
-    compile(&ensemble(Descriptor::Curvature, seconds), &raw).unwrap();
+    let rows = Ensemble { inputs: Inputs::unnamed(2), ..ensemble(Descriptor::Curvature, seconds) };
+    compile(&rows, &Settings { leaf: Leaf::F32, ..Settings::default() }).unwrap();
+    for scales in [vec![1.0], vec![1.0, 0.0], vec![f32::NAN, 1.0]] {
+        let error = compile(&rows, &Settings { scales: Some(scales), ..Settings::default() }).unwrap_err();
+        assert!(matches!(error.problem(), Some(Problem::Setting { name: "scales", .. })), "{error}");
+    }
     // Whole thresholds, and halves between neighbors, are what trainers put between whole numbers.
     for step in [1.0, 0.5] {
         let whole = (0..9).map(|n| vec![split(0, n as f32 * step, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])]);
@@ -398,8 +402,8 @@ fn a_table_for_each_contact_pattern_has_no_cell_that_no_touch_reaches() {
     assert_eq!(model.header().leaves_length(), 2 * 2 * (3 + 2 + 3 + 4 * 3));
     // Full touches are not what it is for, nor rows of features.
     let problem = CompileProblem::DoesNotFit { layout: Layout::Patterns };
-    let raw = Settings { raw_features: Some(4), ..with(Some(Layout::Patterns), Leaf::I16) };
-    assert_eq!(refusal(&ensemble, &raw), problem);
+    let rows = Ensemble { inputs: Inputs::unnamed(4), ..ensemble };
+    assert_eq!(refusal(&rows, &with(Some(Layout::Patterns), Leaf::I16)), problem);
     assert_eq!(refusal(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), &with(Some(Layout::Patterns), Leaf::I16)), problem);
 }
 

@@ -1,5 +1,6 @@
 //! What can go wrong, said so that the user knows where and what to do next.
 
+mod calibrate;
 mod capture;
 mod chip;
 mod compile;
@@ -9,9 +10,11 @@ mod mesh;
 mod page;
 mod probe;
 mod report;
+mod rows;
 mod touches;
 mod tune;
 
+pub use calibrate::CalibrateProblem;
 pub use capture::CaptureProblem;
 pub use chip::ChipProblem;
 pub use compile::CompileProblem;
@@ -21,6 +24,7 @@ pub use mesh::MeshProblem;
 pub use page::PageProblem;
 pub use probe::ProbeProblem;
 pub use report::ReportProblem;
+pub use rows::RowsProblem;
 pub use touches::TouchesProblem;
 pub use tune::TuneProblem;
 
@@ -110,6 +114,12 @@ pub enum Problem {
     /// With evaluating.
     #[error(transparent)]
     Evaluate(#[from] EvaluateProblem),
+    /// With calibrating.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateProblem),
+    /// With rows of features, and models over them.
+    #[error(transparent)]
+    Rows(#[from] RowsProblem),
     /// With searching for a model.
     #[error(transparent)]
     Tune(#[from] TuneProblem),
@@ -136,6 +146,8 @@ impl Problem {
             Self::Ensemble(problem) => problem.fix(),
             Self::Compile(problem) => problem.fix(),
             Self::Evaluate(problem) => problem.fix(),
+            Self::Calibrate(problem) => problem.fix(),
+            Self::Rows(problem) => problem.fix(),
             Self::Tune(problem) => problem.fix(),
             Self::Chip(problem) => problem.fix(),
             Self::Page(problem) => problem.fix(),
@@ -195,6 +207,8 @@ problems!(
     EnsembleProblem,
     CompileProblem,
     EvaluateProblem,
+    CalibrateProblem,
+    RowsProblem,
     TuneProblem,
     ChipProblem,
     PageProblem,

@@ -4,7 +4,7 @@ use crate::compile;
 use crate::ensemble::{Ensemble, StatedProbe, feature_row};
 use crate::error::{EvaluateProblem, Result};
 use crate::random::{self, Purpose};
-use crate::touches::Dataset;
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused};
 use palpate_shared::format::{TrainedProbe, TrainedTouches};
 use palpate_shared::{Descriptor, Touch};
@@ -59,9 +59,14 @@ pub(super) enum Values<'m> {
 }
 
 impl Candidate<'_> {
+    /// Whether the model is over touches; otherwise it is over rows of features.
+    pub fn is_of_touches(&self) -> bool {
+        self.descriptor().is_some()
+    }
+
     fn descriptor(&self) -> Option<Descriptor> {
         match self {
-            Self::Full(ensemble) => Some(ensemble.descriptor),
+            Self::Full(ensemble) => ensemble.descriptor(),
             Self::Compiled(model) => model.descriptor(),
         }
     }
@@ -87,6 +92,24 @@ impl Candidate<'_> {
             Self::Compiled(model) => compile::names(model),
         }
     }
+
+    /// The descriptor, and for each object of a data set its index in the model; see [`Margins::new`].
+    pub(crate) fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
+        let descriptor = self.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
+        let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
+        if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
+            return Err(EvaluateProblem::NoPose { descriptor }.into());
+        }
+        if let Some((model, data)) = self.probe().zip(StatedProbe::of(dataset)) {
+            StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
+        }
+        let known = self.objects();
+        let index = |touched: &ObjectTouches| {
+            let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: known.clone() };
+            known.iter().position(|name| *name == touched.name).ok_or_else(|| unknown().into())
+        };
+        Ok((descriptor, dataset.objects.iter().map(index).collect::<Result<_>>()?))
+    }
 }
 
 impl<'m> Margins<'m> {
@@ -99,24 +122,15 @@ impl<'m> Margins<'m> {
     /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
+        let (descriptor, known) = candidate.of(dataset)?;
         let objects = candidate.objects();
-        let descriptor = candidate.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
         let trained = candidate.trained_touches();
-        let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
-        if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
-            return Err(EvaluateProblem::NoPose { descriptor }.into());
-        }
-        if let Some((model, data)) = candidate.probe().zip(StatedProbe::of(dataset)) {
-            StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
-        }
-        let tested = dataset.objects.iter().map(|touched| {
-            let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: objects.clone() };
-            let object = objects.iter().position(|name| *name == touched.name).ok_or_else(unknown)?;
+        let tested = dataset.objects.iter().zip(known).map(|(touched, object)| {
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
             let evidence: Vec<&Touch> = touched.touches.iter().filter(is_evidence).collect();
             let mut position = 0..;
             let approach = |touch| if is_evidence(&touch) { position.next() } else { None };
-            Ok(Tested {
+            Tested {
                 object,
                 touches: evidence.len(),
                 approaches: touched.touches.iter().map(approach).collect(),
@@ -124,9 +138,9 @@ impl<'m> Margins<'m> {
                 turns: 1,
                 evidence: Vec::new(),
                 values: values(candidate, descriptor, &evidence, objects.len()),
-            })
+            }
         });
-        let tested = tested.collect::<Result<_>>()?;
+        let tested = tested.collect();
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
         let margins = Self { candidate, descriptor, objects, tested, tested_names, hold_approaches, shares };
         Ok(margins.of_robots(1))
@@ -294,7 +308,7 @@ fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touc
 }
 
 /// The object with the most evidence; the first of several, as on the chip.
-pub(super) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
+pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
     (0..evidence.len()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best })
 }
 

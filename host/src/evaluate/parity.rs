@@ -86,6 +86,7 @@ pub struct Difference {
 ///
 /// # Errors
 /// [`EvaluateProblem::OtherModel`] when the two are not of the same objects and descriptor;
+/// [`EvaluateProblem::RawFeatures`] for an ensemble over rows;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn difference(
     ensemble: &Ensemble,
@@ -93,8 +94,11 @@ pub fn difference(
     touches: &[&Touch],
     progress: &dyn Progress,
 ) -> Result<Difference> {
+    if ensemble.descriptor().is_none() {
+        return Err(EvaluateProblem::RawFeatures.into());
+    }
     let names = (0..model.object_count()).map(|object| model.object_name(object));
-    if model.descriptor() != Some(ensemble.descriptor) || !names.eq(ensemble.objects.iter().map(String::as_str)) {
+    if model.descriptor() != ensemble.descriptor() || !names.eq(ensemble.objects.iter().map(String::as_str)) {
         return Err(EvaluateProblem::OtherModel.into());
     }
     progress.begin("margins", Some(touches.len() as u64));
@@ -151,7 +155,10 @@ fn compare_verdicts<const N: usize>(
     }
     Ok(match (compiled.verdict(), full.verdict()) {
         (a, b) if a == b => (0, 0),
-        (Verdict::Recognized { object: a, .. }, Verdict::Recognized { object: b, .. }) if a == b => (0, 1),
+        (
+            Verdict::Recognized { object: a, touches: first, .. },
+            Verdict::Recognized { object: b, touches: second, .. },
+        ) if a == b => (0, usize::from(first != second)),
         _ => (1, 0),
     })
 }

@@ -182,7 +182,7 @@ mod tests {
             Node::Leaf(vec![-0.5, 0.5]),
         ];
         let ensemble = Ensemble {
-            descriptor: Descriptor::Curvature,
+            inputs: Descriptor::Curvature.into(),
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
@@ -225,7 +225,13 @@ mod tests {
             // Nothing is touched; one nat for either; misses and the other's touches for the first, one nat for the second.
             (3, _) => missed(),
             (5, 0) => flat(),
-            (7, 0) => if index % 2 == 0 { missed() } else { bent() },
+            (7, 0) => {
+                if index % 2 == 0 {
+                    missed()
+                } else {
+                    bent()
+                }
+            }
             (5 | 7, _) => bent(),
             // Half of the approaches miss; the others say one nat.
             _ => match (index % 2, object) {
@@ -286,11 +292,14 @@ mod tests {
         assert_eq!(problem(one), EvaluateProblem::NoneOf { object: "fork".into() });
         let no_pose = refused(&|dataset| dataset.objects[1].touches[9] = flat(), 1);
         assert_eq!(problem(no_pose), EvaluateProblem::NoPoseOf { object: "fork".into() });
-        let missed = refused(&|dataset| {
-            for touch in dataset.objects.iter_mut().flat_map(|object| &mut object.touches) {
-                *touch = super::tests::missed().with_pose(touch.pose().unwrap());
-            }
-        }, 1);
+        let missed = refused(
+            &|dataset| {
+                for touch in dataset.objects.iter_mut().flat_map(|object| &mut object.touches) {
+                    *touch = super::tests::missed().with_pose(touch.pose().unwrap());
+                }
+            },
+            1,
+        );
         assert_eq!(problem(missed), EvaluateProblem::NoTouches);
     }
 }

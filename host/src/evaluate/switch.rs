@@ -94,9 +94,8 @@ impl Margins<'_> {
             };
             let old = |position: usize| {
                 let of = switched(position);
-                let own = |(outcome, ..): &&(Outcome, usize, usize)| {
-                    outcome.recognized == Some(self.tested[position].object)
-                };
+                let own =
+                    |(outcome, ..): &&(Outcome, usize, usize)| outcome.recognized == Some(self.tested[position].object);
                 Estimate::share(of.iter().filter(own).count(), of.len())
             };
             let positions = 0..self.tested.len();
@@ -186,8 +185,10 @@ fn stopped(objects: impl Iterator<Item = Vec<(Outcome, usize, usize)>>) -> Stopp
         Estimate::mean_of(objects.iter().map(of).collect::<Vec<_>>().into_iter())
     };
     let after = |(outcome, at, _): &(Outcome, usize, usize)| outcome.approaches.saturating_sub(*at) as f64;
-    let means: Vec<Estimate> =
-        objects.iter().map(|sequences| Estimate::mean(sequences.iter().map(after).collect::<Vec<_>>().into_iter())).collect();
+    let means: Vec<Estimate> = objects
+        .iter()
+        .map(|sequences| Estimate::mean(sequences.iter().map(after).collect::<Vec<_>>().into_iter()))
+        .collect();
     let mean = Estimate::mean_of(means.into_iter());
     let error = share(&|(outcome, _, right)| outcome.recognized.is_some_and(|object| object != *right));
     Stopped {

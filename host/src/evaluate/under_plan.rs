@@ -26,7 +26,7 @@ struct Counts {
 /// # Errors
 /// [`Problem::Setting`](crate::error::Problem::Setting) as [`evaluate`](super::evaluate()).
 pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
-    let Settings { at, at_approaches, groups, error_rate, seed, .. } = settings;
+    let Settings { at, at_approaches, groups, seed, .. } = settings;
     let rule = margins.stopping(&settings.sequences())?;
     if at.iter().chain(at_approaches).any(|&at| at == 0) {
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
@@ -43,8 +43,8 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
             (0..*groups).into_par_iter().map(run).collect()
         })
         .collect();
-    let (rate, most) = (*error_rate, rule.max_touches());
-    let in_approaches = margins.summary(&outcomes, rate, most);
+    let (stated, most) = (|| margins.stated(&settings.sequences(), rule), rule.max_touches());
+    let in_approaches = margins.summary(&outcomes, stated(), most);
     let accuracies = margins.accuracies(at, &by_touches);
     Ok(Evaluation {
         descriptor: margins.descriptor().name(),
@@ -53,7 +53,7 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
         accuracy: accuracies.all,
         accuracy_standard_error: accuracies.standard_error,
         per_object: accuracies.per_object,
-        sequential: margins.of_outcomes(outcomes, rate, most),
+        sequential: margins.of_outcomes(outcomes, stated(), most),
         approaches: Some(margins.in_approaches(used, margins.accuracies(at_approaches, &by_approaches), in_approaches)),
         patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
     })

@@ -149,7 +149,7 @@ fn way(context: &Context, ensemble: &Ensemble, test: &Dataset) -> Result<Way> {
     let sequences = if context.settings.quick { 300 } else { 1_000 };
     let at: Vec<usize> = AT.into_iter().filter(|&at| at <= margins.fewest_approaches()).collect();
     let settings =
-        SequentialSettings { error_rate: ERROR_RATE, max_touches: None, sequences, seed: context.settings.seed };
+        SequentialSettings { error_rate: Some(ERROR_RATE), max_touches: None, sequences, seed: context.settings.seed };
     Ok(Way::new(compiled.bytes.len(), &margins.approaches(&at, &settings)?))
 }
 

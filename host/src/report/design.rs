@@ -204,7 +204,7 @@ fn by_spacing(design: &Design, command: &str) -> Result<Figure> {
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(1.0, f64::max));
     let spacings = || line.iter().map(|trial| trial.probe.spacing);
     let mut chart = Chart::new(
-        &format!("distance between neighboring fingers ({})", unit(design)),
+        format!("distance between neighboring fingers ({})", unit(design)),
         Axis::linear(spacings().fold(f64::INFINITY, f64::min), spacings().fold(0.0, f64::max), 6),
         "approaches to a verdict",
         Axis::logarithmic(0.9 * low, 1.1 * high),

@@ -196,7 +196,11 @@ fn compiled_models<'e>(
 ) -> Result<Vec<Measured<'e>>> {
     let mut models: Vec<Measured<'e>> = Vec::new();
     // A table for each contact pattern where partial touches are evidence, one table otherwise.
-    let table = if ensemble.descriptor.uses_partial_touches() { Layout::Patterns } else { Layout::Grid };
+    let table = if ensemble.descriptor().is_some_and(palpate_shared::Descriptor::uses_partial_touches) {
+        Layout::Patterns
+    } else {
+        Layout::Grid
+    };
     let layouts: &[Layout] = if recipe.bins.len() > 1 { &[table] } else { &[Layout::Compact, Layout::Complete] };
     for leaf in [Leaf::I8, Leaf::I16] {
         let mut measured: Option<Row> = None;
@@ -266,7 +270,7 @@ fn evaluated(candidate: Candidate<'_>, (touches, robots): &Held, settings: &Sett
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),
         at_approaches: [10, 20, 60].into_iter().filter(|&at| at <= approaches).collect(),
         groups: settings.groups,
-        error_rate: settings.error_rate,
+        error_rate: Some(settings.error_rate),
         max_touches: None,
         seed: settings.seed,
     };

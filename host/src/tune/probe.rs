@@ -418,7 +418,7 @@ impl Search<'_> {
             progress::check(self.progress)?;
             let threshold = 1.0 / (1.0 + (-log_odds).exp());
             let settings =
-                SequentialSettings { error_rate: threshold, max_touches: Some(MAX_TOUCHES), sequences, seed };
+                SequentialSettings { error_rate: Some(threshold), max_touches: Some(MAX_TOUCHES), sequences, seed };
             Ok::<_, Error>((threshold, margins.approaches(&[], &settings)?))
         };
         let [mut strict, mut loose] = ODDS;
@@ -515,6 +515,27 @@ mod tests {
         assert!(design.by_spacing.is_sorted_by(|a, b| a.probe.spacing < b.probe.spacing));
         assert!((design.best.patterns.values().sum::<f64>() - 1.0).abs() < 1e-9);
         assert_eq!(design.best.per_object.keys().collect::<Vec<_>>(), ["disc", "globe"]);
+    }
+
+    #[test]
+    fn at_true_size_the_search_is_in_millimeters_and_takes_objects_of_known_size_only() {
+        let mut objects = objects();
+        assert!(Settings::at_true_size(&objects).is_none());
+        // A globe is 20 of its units wide.
+        objects.iter_mut().for_each(|object| object.millimeters = Some(5.0));
+        let unit = median_length(&objects).unwrap() / LENGTH;
+        let usual = Settings::at_true_size(&objects).unwrap();
+        assert_eq!(usual.published.spacing, hundredths(1.5 * unit));
+        assert_eq!(usual.spacing, hundredths(0.5 * unit)..=hundredths(3.0 * unit));
+        let Settings { radius, tilt, aims, sequences, error_rate, .. } = settings();
+        let radius = radius.start() * unit..=radius.end() * unit;
+        let settings = Settings { radius, tilt, aims, sequences, error_rate, approaches: 400, ..usual };
+        let found = design(&objects, &settings, &()).unwrap();
+        assert!(found.toml().contains("unit = \"mm\"\nradius = "), "{}", found.toml());
+        assert!(found.best.probe.spacing >= 0.5 * unit - 0.01, "{:?}", found.best);
+        objects[0].millimeters = None;
+        let error = design(&objects, &settings, &()).unwrap_err().to_string();
+        assert!(error.starts_with("globe: "), "{error}");
     }
 
     #[test]

@@ -22,7 +22,7 @@ fn approaches_are_what_is_saved_where_the_data_set_holds_them() {
         });
         assert_eq!(row.frontier, !beaten, "{row:?}");
     }
-    assert_eq!(tuned.ensemble.descriptor, palpate_shared::Descriptor::ContactsCurvature);
+    assert_eq!(tuned.ensemble.descriptor(), Some(palpate_shared::Descriptor::ContactsCurvature));
     assert!(tuned.test.approaches.is_some());
     assert!(tuned.rows.iter().any(|row| row.layout == Some("patterns")));
 }

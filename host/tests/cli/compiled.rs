@@ -29,7 +29,7 @@ pub(crate) fn ensemble() -> Ensemble {
     let split = Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 };
     let nodes = vec![split, leaf(0.7, -0.7), leaf(-0.7, 0.7)];
     Ensemble {
-        descriptor: Descriptor::Curvature,
+        inputs: Descriptor::Curvature.into(),
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0, 0.0],
         trees: vec![Tree { nodes, output: Output::Each }],

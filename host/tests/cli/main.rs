@@ -12,6 +12,7 @@ mod objects;
 mod plan;
 mod probe;
 mod reports;
+mod rows;
 mod support;
 mod view;
 

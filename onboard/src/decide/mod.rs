@@ -12,7 +12,7 @@ mod stopping;
 pub use approach::Proposal;
 #[cfg(feature = "station")]
 pub(crate) use approach::propose;
-pub use evidence::Posterior;
+pub use evidence::{Posterior, Rivals};
 pub use exponential::exp2_negative;
 pub use forgetting::Forgetting;
 #[cfg(feature = "station")]

@@ -1,7 +1,9 @@
 //! The chip's end of the link.
 
 use super::frame::{Decoder, FRAME_MAX, Frame, encode};
-use super::message::{Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics};
+use super::message::{
+    Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,
+};
 use super::{CHUNK, POSE_BYTES, POSTERIORS, WINDOW};
 use crate::Touch;
 use embedded_io::{Read, Write};
