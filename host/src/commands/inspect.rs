@@ -255,7 +255,6 @@ fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
     BTreeMap::from([
         ("header", HEADER_LENGTH),
         ("text", length(header.text_length())),
-        ("sections", length(header.optional_length())),
         ("base_margins", 4 * objects),
         ("priors", 4 * objects),
         ("sections", length(header.optional_length())),

@@ -116,7 +116,7 @@ pub(super) fn measure(context: &Context) -> Result<Plans> {
     }
     let margins = Margins::new(Candidate::Compiled(&model), &test)?;
     let sequences = SequentialSettings {
-        error_rate: FORGETTING_RATE,
+        error_rate: Some(FORGETTING_RATE),
         max_touches: None,
         sequences: count(context),
         seed: settings.seed,
@@ -140,7 +140,7 @@ fn at_rates(context: &Context, bytes: &[u8], test: &Dataset, active: bool) -> Re
             at: Vec::new(),
             at_approaches: Vec::new(),
             groups: count(context),
-            error_rate,
+            error_rate: Some(error_rate),
             max_touches: None,
             seed: context.settings.seed,
         };
@@ -202,7 +202,8 @@ fn figure(context: &Context, plans: &Plans) -> Result<Figure> {
     for (policy, (color, shape)) in plans.policies.iter().zip(styles) {
         let known = policy.stopped.iter().filter(|stopped| stopped.error > 0.0);
         let points: Vec<(f64, f64)> = known.map(|stopped| (stopped.approaches, stopped.error)).collect();
-        let label = policy.rolls.map_or("random".into(), |rolls| format!("{rolls} roll{}", if rolls == 1 { "" } else { "s" }));
+        let label =
+            policy.rolls.map_or("random".into(), |rolls| format!("{rolls} roll{}", if rolls == 1 { "" } else { "s" }));
         chart.series(&label, color, shape, &points);
         for (rate, stopped) in RATES.iter().zip(&policy.stopped) {
             data.push([

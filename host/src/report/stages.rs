@@ -4,8 +4,8 @@ use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
-    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, published, results,
-    sequential, simulator,
+    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, published,
+    results, sequential, simulator,
 };
 use crate::capture;
 use crate::compile;

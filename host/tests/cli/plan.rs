@@ -15,14 +15,28 @@ impl Place {
         let place = Self { directory: tempfile::tempdir().unwrap() };
         std::fs::create_dir(place.path("meshes")).unwrap();
         for (name, sides) in [("ball", [1.0, 1.0, 1.0]), ("cigar", [1.0, 0.4, 0.4]), ("disc", [1.0, 1.0, 0.3])] {
-            let mut text = Vec::new();
-            obj::write(&Mesh::globe(8).stretched(sides), &mut text).unwrap();
+            let (mut mesh, mut text) = (Mesh::globe(8), Vec::new());
+            for vertex in &mut mesh.vertices {
+                vertex.iter_mut().zip(sides).for_each(|(coordinate, side)| *coordinate *= side);
+            }
+            obj::write(&mesh, &mut text).unwrap();
             std::fs::write(place.path("meshes").join(format!("{name}.obj")), text).unwrap();
         }
         for (data, seed) in [("train", "1"), ("fresh", "2"), ("unseen", "3")] {
             place.capture(data, &["--approaches", "--pose", "--touches", "1500", "--seed", seed]);
         }
-        place.ok(&["train", "train", "-o", "ensemble.json", "--descriptor", "oriented", "--touches", "all", "--rounds", "8"]);
+        place.ok(&[
+            "train",
+            "train",
+            "-o",
+            "ensemble.json",
+            "--descriptor",
+            "oriented",
+            "--touches",
+            "all",
+            "--rounds",
+            "8",
+        ]);
         place.ok(&["export", "ensemble.json", "-o", "model.palpate"]);
         place.ok(&["plan", "model.palpate", "fresh", "-o", "planned.palpate", "--rolls", "1"]);
         place
@@ -58,7 +72,10 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
     assert_eq!(length("planned.palpate"), length("model.palpate") + 4 + 26 * 3 + 8 + 2);
     let planned = place.json(&["plan", "model.palpate", "fresh", "-o", "again.palpate", "--rolls", "1", "--json"]);
     assert_eq!((&planned["poses"], &planned["plan_bytes"]), (&26.into(), &82.into()));
-    assert_eq!(std::fs::read(place.path("again.palpate")).unwrap(), std::fs::read(place.path("planned.palpate")).unwrap());
+    assert_eq!(
+        std::fs::read(place.path("again.palpate")).unwrap(),
+        std::fs::read(place.path("planned.palpate")).unwrap()
+    );
     let inspected = place.json(&["inspect", "planned.palpate", "--json"]);
     assert_eq!((&inspected["plan"]["rolls"], &inspected["plan"]["left_out"]), (&1.into(), &0.into()));
     assert!(place.json(&["inspect", "model.palpate", "--json"])["plan"].is_null());
