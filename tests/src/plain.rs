@@ -275,7 +275,7 @@ impl<'a> Plain<'a> {
                 leaves = &leaves[count * length..];
             }
             if self.layout == 1 {
-                splits = &splits[2 * group.trees << group.depth..];
+                splits = &splits[(2 * group.trees) << group.depth..];
             }
         }
         sums
@@ -421,7 +421,7 @@ pub fn exp2(u: u64) -> u64 {
     if u >> 32 > 57 {
         return 0;
     }
-    let times = |a: u64, b: u64| a * b >> 32;
+    let times = |a: u64, b: u64| (a * b) >> 32;
     let f = u & 0xffff_ffff;
     let (x, i) = (f << 4 & 0xffff_ffff, f >> 28);
     let s = 186_065_157 - times(x, 4_029_616 - times(x, 56_985));
