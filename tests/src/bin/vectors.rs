@@ -226,6 +226,15 @@ fn sections(text: &mut String) {
     let grown = [&ALL.to_bytes()[..], &[1, 2, 3]].concat();
     let sections = [section(2 | 1 << 15, &grown), section(77, b"unknown"), section(78, &[])].concat();
     play(text, "a section that has grown, and unknown ones", &with_sections(&contacts, &sections), &touches);
+    let all = section(2 | 1 << 15, &ALL.to_bytes());
+    let odds = [1_u32 << 31, 1 << 20, 5].map(u32::to_le_bytes).concat();
+    let by_object = [&all[..], &section(5 | 1 << 15, &odds)].concat();
+    play(text, "thresholds by object", &with_sections(&contacts, &by_object), &touches);
+    for sharpness in [(1 << 16) / 3, 1 << 20, (1 << 20) + 1_u32] {
+        let temperature = [&all[..], &section(11, &sharpness.to_le_bytes())].concat();
+        let name = format!("a temperature of 65536 / {sharpness}");
+        play(text, &name, &with_sections(&contacts, &temperature), &touches[..8]);
+    }
 }
 
 /// The same trees over this many features of rows.
