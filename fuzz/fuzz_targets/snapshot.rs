@@ -11,6 +11,7 @@ static MODEL: &[u8] = include_bytes!("../../models/household.palpate");
 fuzz_target!(|bytes: &[u8]| {
     let model = Model::new(MODEL).expect("the model of the repository");
     let mut recognizer = Recognizer::<16>::new(&model, Stopping::from_model(&model)).expect("it has ten objects");
+    let _ = recognizer.push(&Touch::from_micros([0, 10_000, 30_000]));
     // As they are; with a right checksum; and after this model's number as well.
     let mut whole = bytes.to_vec();
     whole.extend(checksum(bytes).to_le_bytes());

@@ -36,10 +36,9 @@ fn recognize(bytes: &[u8], touches: impl Iterator<Item = palpate::Result<Touch>>
                 println!("not counted: {refused}");
                 continue;
             }
-            Ok(Verdict::Recognized { object, touches }) => {
-                let object = usize::from(object);
-                let posterior = recognizer.posterior(object).to_f64();
-                println!("{} after {touches} touches, posterior {posterior:.4}", model.object_name(object));
+            Ok(Verdict::Recognized { object, touches, rivals }) => {
+                let (name, posterior) = (model.object_name(object.into()), rivals.posterior().to_f64());
+                println!("{name} after {touches} touches, posterior {posterior:.4}");
             }
             Ok(Verdict::Unknown) => println!("unknown"),
         }
@@ -56,7 +55,7 @@ fn simulated(names: &[&str]) -> palpate::Result<Vec<Touch>> {
     let origin = Origin { seed: 2, approaches: true, ..Default::default() };
     let mut all = Vec::new();
     for name in names {
-        let scene = Scene::new(builtin::one(name)?.mesh(), origin.length)?;
+        let scene = [Scene::new(builtin::one(name)?.mesh(), origin.length)?];
         all.extend(capture::touches(&scene, name, &origin, 0..300)?);
     }
     Ok(all)

@@ -34,7 +34,7 @@
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = Model::new(&compiled.bytes)?;
 //! let mut recognizer = Recognizer::<2>::new(&model, Stopping::from_model(&model))?;
-//! let scene = Scene::new(objects[0].mesh(), origin.length)?;
+//! let scene = [Scene::new(objects[0].mesh(), origin.length)?];
 //! let unseen = Origin { seed: 2, ..origin };
 //! let mut verdict = Verdict::Undecided;
 //! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {
@@ -43,7 +43,7 @@
 //!         break;
 //!     }
 //! }
-//! let Verdict::Recognized { object, touches } = verdict else { panic!("{verdict:?}") };
+//! let Verdict::Recognized { object, touches, .. } = verdict else { panic!("{verdict:?}") };
 //! println!("{} after {touches} touches", model.object_name(object.into()));
 //! assert_eq!(model.object_name(object.into()), "disc");
 //! # Ok(())
@@ -65,6 +65,7 @@
 //! | [`rows`] | rows of features, for models that other libraries trained | [`rows::Rows`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
+//! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
@@ -104,6 +105,8 @@ pub mod rows;
 
 pub mod compile;
 pub mod evaluate;
+
+pub mod calibrate;
 
 #[cfg(feature = "train")]
 pub mod tune;

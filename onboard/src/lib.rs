@@ -22,8 +22,8 @@
 //! // Contact times of the three fingers in microseconds, as an `effector` measures them.
 //! match recognizer.push(&Touch::from_micros([30_000, 0, 50_000])) {
 //!     Ok(Verdict::Undecided) => { /* touch again */ }
-//!     Ok(Verdict::Recognized { object, touches }) => {
-//!         let _ = (model.object_name(object.into()), touches);
+//!     Ok(Verdict::Recognized { object, touches, rivals }) => {
+//!         let _ = (model.object_name(object.into()), touches, rivals.posterior());
 //!     }
 //!     Ok(Verdict::Unknown) => { /* the limit of touches was reached */ }
 //!     Err(refused) => { /* the model was not trained for such touches: not counted, touch again */
@@ -68,7 +68,9 @@ mod model;
 pub mod station;
 
 pub use bytes::{Aligned, ModelError};
-pub use decide::{CapacityError, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
+pub use decide::{
+    CapacityError, Forgetting, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict, exp2_negative,
+};
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use model::{Model, Refused};

@@ -212,31 +212,29 @@ impl Descriptor {
     pub fn features(self, touch: &Touch) -> Features {
         const NONE: i32 = MISSING_FEATURE;
         let [first, middle, last] = touch.times().map(within_limit);
-        if self == Self::Times {
-            let values = [clamp(first), clamp(middle), clamp(last), NONE, NONE, NONE, NONE, NONE, NONE, NONE];
-            return Features { values, len: 3 };
-        }
         let (mut curvature, mut slope, mut pair) = (NONE, NONE, NONE);
         if first != NONE && last != NONE {
-            slope = clamp((last - first).abs());
+            slope = (last - first).abs();
             if middle != NONE {
-                curvature = clamp(first - 2 * middle + last);
+                curvature = first - 2 * middle + last;
             }
         } else if middle != NONE {
             // The one outer finger that touched, if one did: the other is missing, which is the least number.
             let outer = first.max(last);
             if outer != NONE {
-                pair = clamp(middle - outer);
+                pair = middle - outer;
             }
         }
         let contacts = self.uses_partial_touches();
         // What the pose gives comes after these; without a pattern, already where the last two are.
-        let (head, start) = if contacts {
+        let (head, start) = if self == Self::Times {
+            ([first, middle, last, NONE], 4)
+        } else if contacts {
             ([touch.pattern().code().into(), curvature, slope, pair], 4)
         } else {
             ([curvature, slope, NONE, NONE], 2)
         };
-        let [a, b, c, d] = head;
+        let [a, b, c, d] = head.map(clamp);
         let mut values = [a, b, c, d, NONE, NONE, NONE, NONE, NONE, NONE];
         if let Some(pose) = touch.pose()
             && let Some(tail) = values.get_mut(start..).and_then(<[i32]>::first_chunk_mut)
@@ -261,6 +259,7 @@ fn within_limit(time: ContactTime) -> i32 {
 }
 
 /// A feature within its limits; a missing one stays missing.
+#[inline(never)]
 fn clamp(value: i32) -> i32 {
     if value == MISSING_FEATURE { value } else { value.clamp(-FEATURE_LIMIT, FEATURE_LIMIT) }
 }

@@ -93,7 +93,7 @@ impl Touch {
     /// Microseconds between the first and the last contact; 0 with fewer than two contacts.
     pub fn spread(&self) -> u32 {
         // A missing contact is the largest number, and so 0 as one more.
-        self.times.map(|time| time.0.wrapping_add(1)).into_iter().fold(1, u32::max) - 1
+        self.times.iter().fold(1, |last, time| time.0.wrapping_add(1).max(last)) - 1
     }
 
     /// Whether all three fingers touched.

@@ -1,8 +1,12 @@
 //! What the tests between the floors share.
 
+pub mod abuse;
 pub mod desk;
 pub mod flash;
 #[path = "../../onboard/firmware/src/identity.rs"]
 pub mod identity;
+pub mod plain;
 pub mod random;
 pub mod sections;
+pub mod unaligned;
+pub mod vectors;

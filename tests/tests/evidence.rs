@@ -2,9 +2,9 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
-use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
-use palpate_shared::format::checksum;
+use palpate_onboard::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
 use palpate_shared::{Descriptor, Touch};
+use palpate_tests::abuse::snapshot;
 use palpate_tests::random;
 
 /// A touch with this curvature.
@@ -33,6 +33,14 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
 
 fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
     compile(ensemble, &Settings { leaf, layout: Some(Layout::Compact), ..Settings::default() }).unwrap().bytes
+}
+
+/// The object that was recognized, and after how many touches.
+fn recognized(verdict: Result<Verdict, Refused>) -> Option<(u8, u32)> {
+    match verdict {
+        Ok(Verdict::Recognized { object, touches, .. }) => Some((object, touches)),
+        _ => None,
+    }
 }
 
 fn stopping(error_rate: f64, max_touches: u32) -> Stopping {
@@ -66,7 +74,7 @@ fn a_touch_that_only_one_object_can_explain_decides_at_once() {
         let model = Model::new(&bytes).unwrap();
         let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(1e-12, 10)).unwrap();
         assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Undecided));
-        assert_eq!(recognizer.push(&touch(1000)), Ok(Verdict::Recognized { object: 1, touches: 2 }));
+        assert_eq!(recognized(recognizer.push(&touch(1000))), Some((1, 2)));
         assert_eq!(recognizer.posterior(1).complement(), 0.0);
         assert_eq!(recognizer.posterior(0).to_f64(), 0.0);
     }
@@ -83,7 +91,7 @@ fn the_posterior_passes_one_minus_a_billionth_exactly_when_the_evidence_says_so(
             assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Undecided), "after {number} of {needed}");
             assert!(recognizer.posterior(0).complement() > error_rate);
         }
-        assert_eq!(recognizer.push(&touch(0)), Ok(Verdict::Recognized { object: 0, touches: needed }));
+        assert_eq!(recognized(recognizer.push(&touch(0))), Some((0, needed)));
         let complement = recognizer.posterior(0).complement();
         assert!(complement <= error_rate && complement > error_rate / 2.0, "{complement:e}");
     }
@@ -145,18 +153,7 @@ fn thousands_of_touches_pulling_back_and_forth_leave_nothing_behind() {
     assert_eq!(recognizer.evidence(), [0, 0, 0]);
     recognizer.push(&touch(1000)).unwrap();
     recognizer.push(&touch(1000)).unwrap();
-    assert_eq!(recognizer.push(&touch(1000)), Ok(Verdict::Recognized { object: 1, touches: 10_003 }));
-}
-
-/// A snapshot with this evidence.
-fn snapshot(model: &Model<'_>, evidence: &[i64]) -> Vec<u8> {
-    let mut buffer = [0; 64];
-    let mut bytes = postcard::to_slice(&(model.checksum(), 7_u32, 0_u8, 0_u8), &mut buffer).unwrap().to_vec();
-    for evidence in evidence {
-        bytes.extend_from_slice(postcard::to_slice(evidence, &mut [0; 10]).unwrap());
-    }
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    bytes
+    assert_eq!(recognized(recognizer.push(&touch(1000))), Some((1, 10_003)));
 }
 
 #[test]
@@ -166,7 +163,7 @@ fn evidence_at_its_limits_saturates_towards_undecided_and_never_wraps() {
     let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(0.01, u32::MAX)).unwrap();
     for (curvature, limit) in [(0, i64::MAX), (1000, i64::MIN)] {
         let near = limit - limit.signum() * 10;
-        recognizer.restore(&snapshot(&model, &[near, near, near])).unwrap();
+        recognizer.restore(&snapshot(&model, 7, 0, 0, &[near, near, near])).unwrap();
         for _ in 0..100 {
             assert_eq!(recognizer.push(&touch(curvature)), Ok(Verdict::Undecided));
         }
@@ -197,6 +194,35 @@ fn a_snapshot_goes_on_where_it_was_taken() {
 }
 
 #[test]
+fn a_verdicts_posterior_is_the_recognizers_bit_for_bit_also_after_a_snapshot() {
+    let bytes =
+        compiled(&steps(&[300.0, 600.0], &[&[0.9, 0.2, -0.3], &[0.31, 0.5, 0.2], &[-0.1, 0.6, -1.0]]), Leaf::I16);
+    let model = Model::new(&bytes).unwrap();
+    for error_rate in [0.3, 0.01, 1e-9] {
+        let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(error_rate, 200)).unwrap();
+        let mut recognitions = 0;
+        for touch in random::touches(2_000, 9) {
+            // Partial touches are refused.
+            let Ok(verdict) = recognizer.push(&touch) else { continue };
+            if let Verdict::Recognized { object, .. } = verdict {
+                recognitions += 1;
+                assert_eq!(verdict.posterior(), Some(recognizer.posterior(object.into())));
+                assert!(verdict.posterior().unwrap().complement() <= error_rate);
+                let mut resumed: Recognizer<3> = Recognizer::new(&model, stopping(error_rate, 200)).unwrap();
+                resumed.restore(recognizer.snapshot(&mut [0; 64]).unwrap()).unwrap();
+                assert_eq!(resumed.verdict(), verdict);
+            } else {
+                assert_eq!(verdict.posterior(), None);
+            }
+            if verdict != Verdict::Undecided {
+                recognizer.reset();
+            }
+        }
+        assert!(recognitions >= 3, "{recognitions} at {error_rate}");
+    }
+}
+
+#[test]
 fn snapshots_of_other_models_and_damaged_ones_are_refused_and_change_nothing() {
     let bytes = compiled(&steps(&[300.0], &[&[0.9, 0.2], &[0.31, 0.5]]), Leaf::I16);
     let other = compiled(&steps(&[301.0], &[&[0.9, 0.2], &[0.31, 0.5]]), Leaf::I16);
@@ -220,7 +246,7 @@ fn snapshots_of_other_models_and_damaged_ones_are_refused_and_change_nothing() {
         changed[position] ^= 0x10;
         assert_eq!(recognizer.restore(&changed), Err(SnapshotError::Damaged));
     }
-    assert_eq!(recognizer.restore(&snapshot(&model, &[1, 2, 3])), Err(SnapshotError::Damaged));
+    assert_eq!(recognizer.restore(&snapshot(&model, 7, 0, 0, &[1, 2, 3])), Err(SnapshotError::Damaged));
     assert_eq!((recognizer.evidence(), recognizer.touches()), (&evidence[..], 1));
 }
 

@@ -130,10 +130,7 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
     let compiled = SECTIONS.map(|(leaf, layout, _)| {
         compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap().bytes
     });
-    let bytes = UNALIGNED.iter().flat_map(|row| row.split(' '));
-    let mut unaligned: Vec<u8> = bytes.map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect();
-    unaligned.extend(palpate_shared::format::checksum(&unaligned).to_le_bytes());
-    for bytes in compiled.iter().chain([&unaligned]) {
+    for bytes in compiled.iter().chain([&palpate_tests::unaligned::model()]) {
         let model = Model::new(bytes).unwrap();
         for (touch, expected) in touches {
             let mut margins = [0; 2];
@@ -145,18 +142,6 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
         }
     }
 }
-
-/// What exporters wrote before they aligned numbers: no zeros after the text, and thresholds of three bytes and of one.
-const UNALIGNED: [&str; 7] = [
-    "50 4c 50 54 01 00 01 00 b6 00 00 00 01 00 01 01",
-    "02 00 02 00 02 00 00 00 03 00 00 00 05 00 00 00",
-    "00 00 80 3c 29 3b aa b8 05 00 00 00 00 00 00 00",
-    "eb 57 0a d4 fa 95 02 00 c8 00 00 00 00 00 c0 3f",
-    "00 00 20 41 0b 00 00 00 00 00 00 00 00 00 00 00",
-    "07 00 00 00 0c 00 00 00 0c 00 00 00 00 00 00 00",
-    // The version, "0.1.0", and the sections.
-    "05 30 2e 31 2e 30 02 61 62 01 63 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 03 02 01 02 01 01 e9 03 00 70 11 01 fd 01 00 00 00 01 00 00 00 02 00 00 00 01 00 00 00 01 00 00 01 01 00 00 01 00 00 00 00 88 80 78 84 c0 40 c0 40 a0 90 60 80",
-];
 
 const HEADER: [&str; 6] = [
     "50 4c 50 54 01 00 01 00 bc 00 00 00 01 00 01 01",

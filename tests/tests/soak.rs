@@ -110,7 +110,7 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
     let (mut early, mut done, mut events) = ([None; 2], 0_u64, 0);
     let processes = ["self".to_owned(), chip.id().to_string()];
     let summary =
-        stream(&mut connection, Steps::sequences(dataset, 300, count), &described, Some(&model), |_, update| {
+        stream(&mut connection, Steps::sequences(dataset, 300, count), &described, Some(&model), false, |_, update| {
             done += u64::from(matches!(update, Update::Touch { .. } | Update::Refused { .. }));
             events += u32::from(matches!(update, Update::Event(..)));
             if done == count / 10 && early[0].is_none() {

@@ -4,8 +4,8 @@ use super::Transport;
 use crate::error::{ChipProblem, Error, Place, Result};
 use crate::progress::{self, Progress};
 use palpate_shared::link::{
-    Answer, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo, Outcome, Payload, Query,
-    Refusal, Statistics, checksum,
+    Answer, ApproachMessage, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo,
+    Outcome, POSE_BYTES, Payload, Query, Refusal, Statistics, checksum,
 };
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -26,6 +26,7 @@ enum Reply {
     Name(String),
     Statistics(Statistics),
     Posteriors(Vec<u64>),
+    NextApproach(ApproachMessage),
     Refused(Refusal),
     Other,
 }
@@ -217,6 +218,18 @@ impl Connection {
         Ok(posteriors)
     }
 
+    /// The approach that the chip proposes, of those in any pose. A chip whose program is older than version 0.3 does not
+    /// answer.
+    ///
+    /// # Errors
+    /// [`ChipProblem::Refused`] if its model has no plan. When the line broke or the chip is silent.
+    pub fn next_approach(&mut self) -> Result<ApproachMessage> {
+        match self.ask(Query::NextApproach { without: [0; POSE_BYTES] })? {
+            Reply::NextApproach(approach) => Ok(approach),
+            reply => self.unexpected(&reply),
+        }
+    }
+
     /// Loads a model into the chip, which checks it before it uses it. `progress` counts bytes.
     ///
     /// # Errors
@@ -264,6 +277,7 @@ fn keep(answer: Answer<'_>) -> Reply {
         Answer::Posteriors(bytes) => {
             Reply::Posteriors(bytes.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
         }
+        Answer::NextApproach(approach) => Reply::NextApproach(approach),
         Answer::Refused(refusal) => Reply::Refused(refusal),
         _ => Reply::Other,
     }

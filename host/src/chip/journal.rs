@@ -2,7 +2,8 @@
 
 use super::{ChipModel, Update};
 use crate::error::{Error, Result};
-use palpate_shared::link::{Decision, Event};
+use palpate_shared::Pose;
+use palpate_shared::link::{ApproachMessage, Decision, Event};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::io::{ErrorKind, Write};
@@ -42,6 +43,17 @@ pub enum Entry {
         posteriors: Option<Vec<f64>>,
         /// Seconds since the beginning.
         at: f64,
+    },
+    /// The approach that the chip proposes next.
+    Next {
+        /// The number of its pose.
+        pose: u16,
+        /// Unit vector of the motion.
+        direction: [f64; 3],
+        /// Unit vector along the row of fingers.
+        alignment: [f64; 3],
+        /// How well it tells the likeliest object from the others, from 0 to 1.
+        score: f64,
     },
     /// A fault of the chip's own fingers.
     Fault {
@@ -95,6 +107,15 @@ impl Journal {
 }
 
 impl Entry {
+    /// The entry for a proposed approach.
+    pub fn next(approach: &ApproachMessage) -> Self {
+        // Q15, to four digits.
+        let unit = |q15: f64| (q15 / 32_767.0 * 1e4).round() / 1e4;
+        let Pose { direction, alignment } = approach.middle();
+        let [direction, alignment] = [direction, alignment].map(|vector| vector.map(|q15| unit(q15.into())));
+        Self::Next { pose: approach.pose, direction, alignment, score: unit(approach.score.into()) }
+    }
+
     /// The entry for an update; `None` where nothing happened.
     pub fn of(update: &Update, chip: &ChipModel, at: Duration) -> Option<Self> {
         let name = |object: u8| chip.names.get(usize::from(object)).cloned().unwrap_or_default();
@@ -123,6 +144,7 @@ impl Entry {
             Update::Refused { refusal, .. } | Update::Event(Event::Refused { refusal, .. }, _) => {
                 Some(Self::Fault { what: format!("a touch was not counted: {refusal}") })
             }
+            Update::Next(approach) => Some(Self::next(approach)),
             Update::Event(..) | Update::Idle => None,
         }
     }
@@ -155,6 +177,10 @@ impl fmt::Display for Entry {
                     None => Ok(()),
                 }
             }
+            Self::Next { pose, direction: [x, y, z], alignment: [u, v, w], score } => write!(
+                f,
+                "next: pose {pose}, along {x:.2} {y:.2} {z:.2}, row {u:.2} {v:.2} {w:.2}, separation {score:.3}"
+            ),
             Self::Fault { what } => write!(f, "fault: {what}"),
             Self::Link { resent, garbled, missed } => {
                 write!(f, "link: {resent} frames sent again, {garbled} garbled, {missed} events missed")

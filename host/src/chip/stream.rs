@@ -5,7 +5,9 @@ use crate::error::{ChipProblem, Result};
 use palpate_onboard::Model;
 use palpate_onboard::station::Station;
 use palpate_shared::Touch;
-use palpate_shared::link::{Command, Decision, Device, Event, Outcome, Refusal, TouchMessage, VerdictMessage};
+use palpate_shared::link::{
+    ApproachMessage, Command, Decision, Device, Event, Outcome, POSE_BYTES, Refusal, TouchMessage, VerdictMessage,
+};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
@@ -34,6 +36,8 @@ pub enum Update {
         /// Why.
         refusal: Refusal,
     },
+    /// The approach that the chip proposes next, after a touch that decided nothing.
+    Next(ApproachMessage),
     /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
     /// Nothing has happened for a while.
@@ -49,7 +53,9 @@ pub struct Summary {
     pub refused: u64,
     /// Touches, counted or not, that were compared with the host's recognizer.
     pub compared: u64,
-    /// Of these, with another verdict, posterior or evidence.
+    /// Proposed approaches that were compared with the host's recognizer.
+    pub approaches: u64,
+    /// Of all that was compared, with another verdict, posterior, evidence or approach.
     pub differences: u64,
     /// The first of them.
     pub first_difference: Option<String>,
@@ -113,14 +119,18 @@ enum Sent {
 
 /// Streams `steps` to the chip until they end or `each` breaks, and passes every update to `each`, in order. With a
 /// `mirror`, the host recognizes the same touches with this model and compares every verdict, posterior and evidence.
+/// With `asks`, the chip is asked for the next approach after every touch that decided nothing, and its answer is compared
+/// too: one touch at a time is then under way.
 ///
 /// # Errors
-/// When a step cannot be read, the chip refuses a touch, the line breaks, or the mirror's model is not the chip's.
+/// When a step cannot be read, the chip refuses a touch, the line breaks, the mirror's model is not the chip's, or it is
+/// asked for an approach and its model has no plan.
 pub fn stream(
     connection: &mut Connection,
     mut steps: Steps,
     chip: &ChipModel,
     mirror: Option<&Model<'_>>,
+    asks: bool,
     mut each: impl FnMut(&mut Connection, Update) -> Result<ControlFlow<()>>,
 ) -> Result<Summary> {
     if let Some(model) = mirror
@@ -131,7 +141,7 @@ pub fn stream(
     }
     let mut mirror = mirror.map(Station::<256>::new);
     // A person who types lines wants each verdict before typing the next line.
-    let one_by_one = matches!(steps, Steps::Lines { .. });
+    let one_by_one = asks || matches!(steps, Steps::Lines { .. });
     let mut run = Run { summary: Summary::default(), under_way: VecDeque::new(), truth: None, decided: false };
     let mut pending = None;
     let mut more = true;
@@ -159,8 +169,22 @@ pub fn stream(
             Some(Received::Outcome(outcome)) => run.take(outcome, chip).map_err(|problem| connection.wrong(problem))?,
         };
         busy.set(!run.under_way.is_empty(), Instant::now());
+        // A verdict ends the object: what comes next is another one.
+        let is_open = match &update {
+            Update::Touch { verdict, .. } => verdict.decision == Decision::Undecided,
+            Update::Refused { .. } => !run.decided,
+            _ => false,
+        };
         if each(connection, update)?.is_break() {
             break;
+        }
+        if asks && is_open {
+            let approach = connection.next_approach()?;
+            let expected = mirror.as_ref().map(|mirror| mirror.next_approach(&[0; POSE_BYTES]));
+            run.compare_approaches(expected, approach);
+            if each(connection, Update::Next(approach))?.is_break() {
+                break;
+            }
         }
     }
     busy.set(false, Instant::now());
@@ -258,6 +282,17 @@ impl Run {
             self.summary.differences += 1;
             let number = self.summary.touches + self.summary.refused;
             let difference = || format!("touch {number}, {touch:?}: the host says {expected:?}, the chip {verdict:?}");
+            self.summary.first_difference.get_or_insert_with(difference);
+        }
+    }
+
+    fn compare_approaches(&mut self, expected: Option<Result<ApproachMessage, Refusal>>, approach: ApproachMessage) {
+        let Some(expected) = expected else { return };
+        self.summary.approaches += 1;
+        if expected != Ok(approach) {
+            self.summary.differences += 1;
+            let number = self.summary.touches + self.summary.refused;
+            let difference = || format!("after touch {number} the host proposes {expected:?}, the chip {approach:?}");
             self.summary.first_difference.get_or_insert_with(difference);
         }
     }

@@ -1,16 +1,19 @@
 use super::noise::NoiseArguments;
 use super::numbers::share;
+use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::error::{Problem, RowsProblem};
 use crate::evaluate::model_file::ModelFile;
 use crate::evaluate::{
-    self, Approaches, Classes, Evaluation, LEAST_GROUPS, Margins, Regression, RowsEvaluation, Settings, evaluate_rows,
+    self, Active, ActiveFacts, Approaches, Classes, Evaluation, LEAST_GROUPS, Margins, Regression, RowsEvaluation,
+    Rule, Settings, Switched, evaluate_rows,
 };
 use crate::output;
 use crate::progress::Progress;
 use crate::rows::feature_names;
 use crate::touches::noise::Noise;
 use crate::{Error, Result};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -21,7 +24,11 @@ The model is a compiled one (model.palpate), evaluated by the code that runs on 
 
 Evaluate on touches that the model was not trained on: capture them with another seed. An ensemble knows its training touches again; a compiled model does not.
 
+With --probe, what the file says under [real] is added to the touches, and the data set must have been captured with the probe of the file.
+
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
+
+With --active, on approaches with pose, each next approach is drawn from those of the same object in the pose that the model's plan proposes, none twice in a sequence. A pose whose approaches are used up is not proposed again in the sequence; where none is left, it ends without a verdict.
 
 With --label the file has rows of features for a model that was exported from another library's (CSV): each row is classified alone, and compared with the class in the column, its name or its number from 0; or for a model with one output with the number there.
 
@@ -33,9 +40,12 @@ Examples:
   palpate evaluate ensemble.json unseen --at 10,30 --json
   palpate evaluate model.palpate unseen --noise 5ms
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
+  palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --confusion 20
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02
+  palpate evaluate planned.palpate approaches --active
+  palpate evaluate model.palpate approaches --switch
   palpate evaluate model.palpate rows.csv --label kind")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
@@ -51,9 +61,10 @@ pub(crate) struct Arguments {
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]
     groups: usize,
-    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%
-    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
-    error_rate: f64,
+    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%, which nothing promises [default: the
+    /// model's own thresholds; 1% for an ensemble]
+    #[arg(long, value_name = "RATE", value_parser = share)]
+    error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
     max_touches: Option<u32>,
@@ -63,9 +74,18 @@ pub(crate) struct Arguments {
     /// Seed of the drawing, and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Make every approach where the model's plan says, instead of one drawn at random (see `palpate plan`)
+    #[arg(long)]
+    active: bool,
+    /// Say as well what an object that is exchanged at a random approach comes to, with and without forgetting: restarting
+    /// once recent touches speak by so many nats against the likeliest object
+    #[arg(long, value_name = "NATS", num_args = 0..=1, default_missing_value = "5")]
+    switch: Option<f32>,
     /// Print the figures as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    probe: ProbeArguments,
     #[command(flatten)]
     noise: NoiseArguments,
 }
@@ -77,10 +97,19 @@ struct Evaluated {
     evaluation: Evaluation,
     /// Robots that made the touches in turn, each with its own bias.
     robots: usize,
+    /// How many instances the objects have that have several: each group is of touches of one.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    instances: BTreeMap<String, usize>,
     /// Objects whose touches are those that the model was trained on.
     trained_on: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     confusion: Option<Confusion>,
+    /// What the plan proposed approaches from, where it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    active: Option<ActiveFacts>,
+    /// Sequences in which the object is exchanged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    switch: Option<Switched>,
 }
 
 /// How often each object was taken for each.
@@ -105,11 +134,13 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
         ModelFile::Compiled(_) => Vec::new(),
     };
-    let noise = arguments.noise.over(Noise::default());
+    let probe = arguments.probe.read()?;
+    arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
+    let noise = arguments.noise.over(probe.map_or_else(Noise::default, |file| file.real));
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let (evaluation, confusion) = file.with(|candidate| {
+    let (evaluation, confusion, active, switch) = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
@@ -128,10 +159,17 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
                 counts: margins.confusion(touches, arguments.groups, arguments.seed)?,
             })
         });
-        Ok((evaluate::evaluate(&margins, &settings)?, confusion.transpose()?))
+        let active = arguments.active.then(|| Active::new(&margins, &dataset)).transpose()?;
+        let evaluation = match &active {
+            Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
+            None => evaluate::evaluate(&margins, &settings)?,
+        };
+        let switch = arguments.switch.map(|nats| margins.switched(&settings.sequences(), nats)).transpose()?;
+        Ok((evaluation, confusion.transpose()?, active.map(|active| active.facts()), switch))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, robots, trained_on, confusion };
+    let instances = dataset.instances;
+    let evaluated = Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -212,12 +250,27 @@ fn text(evaluated: &Evaluated) -> String {
     if let Some(approaches) = &evaluated.evaluation.approaches {
         text += &approaches_table(approaches, &evaluated.evaluation.patterns);
     }
+    if let Some(ActiveFacts { rolls, poses, left_out, without_approaches }) = &evaluated.active {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "Each approach is in the pose that the plan proposed, of {poses} (26 directions, {rolls} roll{} each; {left_out} \
+             never touch, {without_approaches} have no approach here).",
+            if *rolls == 1 { "" } else { "s" }
+        );
+    }
     if evaluated.robots > 1 {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
     }
+    if let Some(most) = evaluated.instances.values().max() {
+        _ = writeln!(text, "Objects have up to {most} instances; each group is of touches of one instance.");
+    }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);
+    }
+    if let Some(switch) = &evaluated.switch {
+        text += &switch_table(switch);
     }
     if !evaluated.trained_on.is_empty() {
         let objects = evaluated.trained_on.join(", ");
@@ -330,6 +383,30 @@ fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeM
         shares.collect::<Vec<_>>().join(", "),
     );
     text
+}
+
+/// What an exchanged object comes to: one row per rule.
+fn switch_table(switch: &Switched) -> String {
+    let mut text = format!(
+        "\n{:20} {:>22} {:>8} {:>26} {:>8} {:>8}\n",
+        "forgetting", "approaches, same object", "wrong", "approaches after exchange", "wrong", "the old"
+    );
+    for (name, Rule { still, switched, old }) in
+        [("off".to_owned(), &switch.off), (format!("at {} nats", switch.nats), &switch.on)]
+    {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "{name:20} {:>22.1} {:>8} {:>26.1} {:>8} {:>8}",
+            still.mean_approaches,
+            percent(still.error),
+            switched.mean_approaches,
+            percent(switched.error),
+            percent(*old)
+        );
+    }
+    text + "Exchanged at a random approach before the verdict; wrong is any name but that of the object touched last.\n"
 }
 
 /// Shares in percent: one row per touched object, one column per object that it was taken for.

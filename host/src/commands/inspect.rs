@@ -63,6 +63,8 @@ struct Inspected<'a> {
     noise: Option<Noise>,
     /// Share of each contact pattern among the approaches of the training; null if the model does not state it.
     pattern: Option<BTreeMap<&'static str, f64>>,
+    /// The plan of approaches; null if the model has none.
+    plan: Option<PlanOf>,
     /// Per touch, estimated.
     instructions: Instructions,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -164,6 +166,23 @@ fn pattern(model: &Model<'_>) -> Option<BTreeMap<&'static str, f64>> {
     Some(ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(shares).collect())
 }
 
+/// The plan of approaches.
+#[derive(serde::Serialize)]
+struct PlanOf {
+    /// Rolls of the row of fingers for each of 26 directions.
+    rolls: u8,
+    poses: u16,
+    /// Poses in which nothing is ever touched.
+    left_out: usize,
+}
+
+fn plan(model: &Model<'_>) -> Option<PlanOf> {
+    let plan = model.plan()?;
+    let poses = plan.poses();
+    let left_out = (0..poses.count()).filter(|&pose| !plan.may_touch(pose)).count();
+    Some(PlanOf { rolls: poses.rolls(), poses: poses.count(), left_out })
+}
+
 /// What the model costs on a chip.
 #[derive(serde::Serialize)]
 struct OnChip {
@@ -218,6 +237,7 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         touches: evidence(model),
         noise: noise(model),
         pattern: pattern(model),
+        plan: plan(model),
         instructions: Instructions::of_model(model),
         chip: None,
     }
@@ -235,6 +255,7 @@ fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
     BTreeMap::from([
         ("header", HEADER_LENGTH),
         ("text", length(header.text_length())),
+        ("sections", length(header.optional_length())),
         ("base_margins", 4 * objects),
         ("priors", 4 * objects),
         ("sections", length(header.optional_length())),
@@ -350,6 +371,9 @@ fn text(inspected: &Inspected<'_>) -> String {
     if let Some(pattern) = &inspected.pattern {
         let shares = pattern.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
         line("approaches", shares.collect::<Vec<_>>().join(", "));
+    }
+    if let Some(PlanOf { rolls, poses, left_out }) = &inspected.plan {
+        line("plan", format!("{poses} poses: 26 directions, {rolls} of the row's rolls each; {left_out} never touch"));
     }
     line("instructions", format!("{} (per touch, estimated)", instructions(inspected.instructions)));
     line("bytes", inspected.bytes.to_string());

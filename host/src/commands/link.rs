@@ -26,6 +26,9 @@ pub(crate) struct ChipOptions {
     /// Touches in all, from a data set [default: all that it holds]
     #[arg(long, value_name = "N")]
     touches: Option<u64>,
+    /// Ask the chip after each touch for the approach that helps most; its model needs a plan (see `palpate plan`)
+    #[arg(long)]
+    pub(super) active: bool,
     /// Speed of a serial port, in bits per second
     #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
     baud: u32,
@@ -82,6 +85,7 @@ Examples:
   palpate link /dev/ttyACM0 --load model.palpate      load a model into it
   palpate link /dev/ttyACM0 touches/                  recognize a data set
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
+  palpate link /dev/ttyACM0 - --active                and say where to touch next
   palpate link emulator --load model.palpate --parity touches/ --touches 10000
   palpate link emulator --load model.palpate --parity touches/ \\
       --bad-line 0.001,0.001,0.01,5
@@ -127,7 +131,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let progress = Bar::new();
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
-    let summary = stream(&mut connection, steps, &chip, model.as_ref(), |_, update| {
+    let summary = stream(&mut connection, steps, &chip, model.as_ref(), arguments.chip.active, |_, update| {
         if matches!(update, Update::Touch { .. } | Update::Refused { .. }) {
             progress.advance(1);
         }
@@ -210,6 +214,11 @@ impl<'c> Printer<'c> {
                 let s = if touches == 1 { "" } else { "es" };
                 print(&format!("{truth}{said} after {touches} touch{s}, posterior {posterior:.4}\n"))?;
             }
+            Update::Next(_) if !self.json && every_touch => {
+                if let Some(entry) = &entry {
+                    print(&format!("{entry}\n"))?;
+                }
+            }
             Update::Refused { refusal, .. } if !self.json && every_touch => {
                 print(&format!("not counted: {refusal}\n"))?
             }
@@ -236,7 +245,11 @@ impl<'c> Printer<'c> {
             text += &format!("not counted: {} touches that the model was not trained for\n", summary.refused);
         }
         if *compared > 0 {
-            text += &format!("compared with the host: {compared} touches, {differences} differences\n");
+            let approaches = match summary.approaches {
+                0 => String::new(),
+                approaches => format!(" and {approaches} proposed approaches"),
+            };
+            text += &format!("compared with the host: {compared} touches{approaches}, {differences} differences\n");
         }
         text += &format!(
             "link: {} frames sent, {} again; {} garbled here, {} on the chip; {} commands came twice, {} too early\n",

@@ -12,6 +12,7 @@ mod noise;
 mod numbers;
 mod objects;
 mod parity;
+mod plan;
 mod probe;
 mod progress;
 mod recognize;
@@ -69,6 +70,8 @@ commands! {
     Inspect => inspect,
     /// Recognize objects from a stream of touches
     Recognize => recognize,
+    /// Add a plan of approaches to a model: where to touch next
+    Plan => plan,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
     /// Find the best model that fits a chip

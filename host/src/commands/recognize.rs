@@ -1,11 +1,13 @@
 use super::numbers::share;
 use crate::Result;
+use crate::chip::Entry;
 use crate::compile::{self, CompiledModel};
 use crate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
 use crate::output;
 use crate::touches::parse_touch;
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
+use palpate_shared::link::ApproachMessage;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -22,6 +24,7 @@ Examples:
   probe | palpate recognize model.palpate
   palpate recognize model.palpate - --json < data/fork.txt
   palpate recognize model.palpate data/fork.txt --error-rate 5% --max-touches 30
+  probe | palpate recognize planned.palpate --active
   palpate recognize model.palpate rows.csv --features --json")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
@@ -41,6 +44,9 @@ pub(crate) struct Arguments {
     /// Give up after this many touches instead of the model's limit
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
+    /// Say after each touch where to touch next; the model needs a plan (see `palpate plan`)
+    #[arg(long)]
+    active: bool,
     /// Print one JSON object per line
     #[arg(long)]
     json: bool,
@@ -55,6 +61,9 @@ struct Line<'a> {
     /// Why the touch was not counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     refused: Option<String>,
+    /// The approach that helps most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next: Option<Entry>,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
@@ -77,7 +86,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     if model.descriptor().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
     }
-    let stream = Stream { recognizer, model: &model, longest: compile::longest_time(&model), json: arguments.json };
+    if arguments.active && model.plan().is_none() {
+        return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
+    }
+    let stream = Stream {
+        recognizer,
+        model: &model,
+        longest: compile::longest_time(&model),
+        active: arguments.active,
+        json: arguments.json,
+    };
     let path = &arguments.file;
     if path.as_os_str() == "-" {
         return stream.run(std::io::stdin().lock(), Path::new("standard input"));
@@ -92,6 +110,7 @@ struct Stream<'m> {
     model: &'m Model<'m>,
     /// The longest time between contacts that makes sense, in seconds.
     longest: f64,
+    active: bool,
     json: bool,
 }
 
@@ -146,15 +165,28 @@ impl Stream<'_> {
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),
             refused: refused.map(|refused| refused.to_string()),
+            next: self.next(),
         };
         if self.json {
             // Numbers and strings are always JSON.
             let text = serde_json::to_string(&line).unwrap_or_default();
             return output::print(&format!("{text}\n"));
         }
-        if let Some(refused) = line.refused {
-            return output::print(&format!("{:4}  not counted: {refused}\n", line.touch));
+        match line.refused {
+            Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", line.touch))?,
+            None => output::print(&format!(
+                "{:4}  {:10}  {} {:.4}\n",
+                line.touch, line.verdict, line.object, line.posterior
+            ))?,
         }
-        output::print(&format!("{:4}  {:10}  {} {:.4}\n", line.touch, line.verdict, line.object, line.posterior))
+        line.next.map_or(Ok(()), |next| output::print(&format!("      {next}\n")))
+    }
+
+    /// The approach that helps most, where that is asked for and nothing is decided.
+    fn next(&self) -> Option<Entry> {
+        let poses =
+            self.model.plan().filter(|_| self.active && self.recognizer.verdict() == Verdict::Undecided)?.poses();
+        let proposal = self.recognizer.next_approach(0..poses.count())?;
+        Some(Entry::next(&ApproachMessage::new(proposal.pose, proposal.score, &poses.pose(proposal.pose)?)))
     }
 }

@@ -37,6 +37,43 @@ pub enum EvaluateProblem {
         /// Room of the recognizer.
         capacity: usize,
     },
+    /// The model has no plan of approaches.
+    #[error("the model has no plan of approaches")]
+    NoPlan,
+    /// A plan was asked for a model of one object.
+    #[error("the model has one object: there is nothing to tell it from")]
+    OneObjectToPlan,
+    /// A plan needs approaches, also those that missed.
+    #[error("the data set holds full touches only, without the approaches in between")]
+    NoApproaches,
+    /// A plan needs approaches to every object.
+    #[error("the data set has no approaches to {object}")]
+    NoneOf {
+        /// The object.
+        object: String,
+    },
+    /// A plan needs the probe's pose.
+    #[error("there are approaches to {object} without the probe's pose")]
+    NoPoseOf {
+        /// The object.
+        object: String,
+    },
+    /// There are too few approaches in a pose.
+    #[error("only {found} approaches to {object} are in one of the poses, and a plan needs {needed}")]
+    FewInPose {
+        /// The object.
+        object: String,
+        /// The fewest approaches in a pose.
+        found: usize,
+        /// How many there must be.
+        needed: usize,
+    },
+    /// Something was asked for that only compiled models do.
+    #[error("forgetting is what a compiled model's recognizer does, and this is an ensemble")]
+    NotCompiled,
+    /// There is one object only.
+    #[error("the data set has one object: there is nothing to exchange it for")]
+    NothingToSwitch,
     /// A line is not a touch.
     #[error("{detail}")]
     Touch {
@@ -69,6 +106,21 @@ impl EvaluateProblem {
             Self::OtherModel => "Give the ensemble that the model was exported from.",
             Self::NoTouches => "Give at least one touch of each object.",
             Self::TooManyObjects { .. } => "Use a model of fewer objects.",
+            Self::NoPlan => {
+                "Add one: `palpate plan MODEL DIR -o OUT`, from approaches with pose. An ensemble (JSON) has to be exported first."
+            }
+            Self::OneObjectToPlan => "Train a model of two objects or more.",
+            Self::NoApproaches => "Capture every approach: --approaches --pose.",
+            Self::NoneOf { .. } => "Capture all of the model's objects.",
+            Self::NoPoseOf { .. } => "Capture the approaches with their pose: --approaches --pose.",
+            Self::FewInPose { found, needed, .. } => {
+                return format!(
+                    "Capture {} times as many approaches, or plan fewer rolls.",
+                    needed.div_ceil((*found).max(1)).max(2)
+                );
+            }
+            Self::NotCompiled => "Export the ensemble first.",
+            Self::NothingToSwitch => "Capture another object.",
             Self::Touch { .. } => "Correct the line.",
             Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
         }

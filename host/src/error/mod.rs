@@ -1,5 +1,6 @@
 //! What can go wrong, said so that the user knows where and what to do next.
 
+mod calibrate;
 mod capture;
 mod chip;
 mod compile;
@@ -13,6 +14,7 @@ mod rows;
 mod touches;
 mod tune;
 
+pub use calibrate::CalibrateProblem;
 pub use capture::CaptureProblem;
 pub use chip::ChipProblem;
 pub use compile::CompileProblem;
@@ -112,6 +114,9 @@ pub enum Problem {
     /// With evaluating.
     #[error(transparent)]
     Evaluate(#[from] EvaluateProblem),
+    /// With calibrating.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateProblem),
     /// With rows of features, and models over them.
     #[error(transparent)]
     Rows(#[from] RowsProblem),
@@ -141,6 +146,7 @@ impl Problem {
             Self::Ensemble(problem) => problem.fix(),
             Self::Compile(problem) => problem.fix(),
             Self::Evaluate(problem) => problem.fix(),
+            Self::Calibrate(problem) => problem.fix(),
             Self::Rows(problem) => problem.fix(),
             Self::Tune(problem) => problem.fix(),
             Self::Chip(problem) => problem.fix(),
@@ -201,6 +207,7 @@ problems!(
     EnsembleProblem,
     CompileProblem,
     EvaluateProblem,
+    CalibrateProblem,
     RowsProblem,
     TuneProblem,
     ChipProblem,

@@ -1,15 +1,14 @@
 //! Counted in approaches, which is what a robot pays for.
 
+use super::draws::Draws;
 use super::estimate::Estimate;
 use super::margins::{Margins, best};
-use super::sequential::{Outcome, SequentialSettings};
+use super::sequential::{Outcome, SequentialSettings, Stated};
 use crate::error::{Error, Result};
-use crate::random::{self, Purpose};
-use rand::RngExt;
-use rand::rngs::ChaCha8Rng;
+use crate::random::Purpose;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// What a model does with approaches, drawn at random from those of an object. A touch that is no evidence to the model
 /// costs an approach and changes nothing. Each object is weighted equally.
@@ -32,8 +31,12 @@ pub struct Approaches {
 /// What a recognizer does with approaches that stops by itself. Each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ApproachSequential {
-    /// What it was asked to stay below.
+    /// What it was asked to stay below: the promised rate, or that of the posterior.
     pub error_rate: f64,
+    /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
+    pub promised: Option<f64>,
+    /// Of what it is promised: "average", "name" or "object".
+    pub per: Option<&'static str>,
     /// Touches that are evidence, after which it gave up.
     pub max_touches: u32,
     /// Approaches used on average, also where it gave up.
@@ -56,6 +59,14 @@ pub struct ApproachSequential {
     pub undecided_per_object: BTreeMap<String, f64>,
 }
 
+/// Accuracies by the number of approaches or touches.
+pub(super) struct Accuracies {
+    /// Each object weighted equally.
+    pub(super) all: BTreeMap<usize, f64>,
+    pub(super) standard_error: BTreeMap<usize, f64>,
+    pub(super) per_object: BTreeMap<String, BTreeMap<usize, f64>>,
+}
+
 impl Margins<'_> {
     /// Accuracy after each of `at` approaches, over groups drawn for each object, and what a recognizer does that stops by
     /// itself, over as many sequences.
@@ -75,34 +86,59 @@ impl Margins<'_> {
             let allowed = format!("fewer approaches, or capture more: {name} has only {has}");
             return Err(Error::setting("at", most, allowed));
         }
-        let names = || self.tested_names().iter().cloned();
         let positions = 0..self.tested.len();
         let correct: Vec<Vec<Estimate>> =
             positions.clone().map(|position| self.after(position, at, most, groups, seed)).collect();
-        let accuracy = |index: usize| Estimate::mean_of(correct.iter().map(|object| object[index]));
-        let by_number = |value: &dyn Fn(usize) -> f64| -> BTreeMap<usize, f64> {
-            at.iter().enumerate().map(|(index, &at)| (at, value(index))).collect()
-        };
-        let used = self.tested.iter().map(|tested| tested.touches as f64 / tested.approaches.len().max(1) as f64);
-        let used: Vec<f64> = used.collect();
         let outcomes: Vec<Vec<Outcome>> = positions
             .map(|position| {
                 let all = self.most_approaches(position);
                 let run = |sequence| {
-                    let draws = Draws::new(all, self.tested_names()[position].as_str(), sequence, seed);
+                    let draws = self.draws(all, position, sequence, seed);
                     self.outcome(position, stopping, draws.map(|draw| self.approach(position, sequence, draw)))
                 };
                 (0..groups).into_par_iter().map(run).collect()
             })
             .collect();
-        Ok(Approaches {
+        let used = self.tested.iter().map(|tested| tested.touches as f64 / tested.approaches.len().max(1) as f64);
+        let sequential = self.summary(&outcomes, self.stated(settings, stopping), stopping.max_touches());
+        Ok(self.in_approaches(used.collect(), self.accuracies(at, &correct), sequential))
+    }
+
+    /// The figures in approaches: of each tested object the share that are evidence, then the accuracies.
+    pub(super) fn in_approaches(
+        &self,
+        used: Vec<f64>,
+        accuracies: Accuracies,
+        sequential: ApproachSequential,
+    ) -> Approaches {
+        Approaches {
             used: used.iter().sum::<f64>() / used.len().max(1) as f64,
-            used_per_object: names().zip(used).collect(),
-            accuracy: by_number(&|index| accuracy(index).value),
-            accuracy_standard_error: by_number(&|index| accuracy(index).standard_error),
-            per_object: names().zip(&correct).map(|(name, of)| (name, by_number(&|index| of[index].value))).collect(),
-            sequential: self.summary(&outcomes, settings.error_rate, stopping.max_touches()),
-        })
+            used_per_object: self.tested_names().iter().cloned().zip(used).collect(),
+            accuracy: accuracies.all,
+            accuracy_standard_error: accuracies.standard_error,
+            per_object: accuracies.per_object,
+            sequential,
+        }
+    }
+
+    /// Accuracies after `at` approaches or touches, from those of each tested object after each of them.
+    pub(super) fn accuracies(&self, at: &[usize], correct: &[Vec<Estimate>]) -> Accuracies {
+        let accuracy = |index: usize| Estimate::mean_of(correct.iter().map(|object| object[index]));
+        let by_number = |value: &dyn Fn(usize) -> f64| -> BTreeMap<usize, f64> {
+            at.iter().enumerate().map(|(index, &at)| (at, value(index))).collect()
+        };
+        let names = self.tested_names().iter().cloned();
+        Accuracies {
+            all: by_number(&|index| accuracy(index).value),
+            standard_error: by_number(&|index| accuracy(index).standard_error),
+            per_object: names.zip(correct).map(|(name, of)| (name, by_number(&|index| of[index].value))).collect(),
+        }
+    }
+
+    /// The numbers of approaches in the order in which a group has them.
+    pub(super) fn draws(&self, all: usize, position: usize, group: usize, seed: u64) -> Draws {
+        let group = u64::try_from(group).unwrap_or(u64::MAX);
+        Draws::new(all, Purpose::Approaches, &self.tested_names()[position], group, seed)
     }
 
     /// The share of groups that are recognized after each of `at` approaches.
@@ -110,7 +146,7 @@ impl Margins<'_> {
         let tested = &self.tested[position];
         let group = |mut correct: Vec<usize>, group| {
             let (mut evidence, mut is_evidence) = (self.prior(), false);
-            let draws = Draws::new(self.most_approaches(position), &self.tested_names()[position], group, seed);
+            let draws = self.draws(self.most_approaches(position), position, group, seed);
             for (index, draw) in draws.take(most).enumerate() {
                 if let Some(touch) = self.approach(position, group, draw) {
                     tested.add(touch as usize, &mut evidence);
@@ -128,12 +164,15 @@ impl Margins<'_> {
         correct.into_iter().map(|correct| Estimate::share(correct, groups)).collect()
     }
 
-    fn summary(&self, outcomes: &[Vec<Outcome>], error_rate: f64, max_touches: u32) -> ApproachSequential {
+    pub(super) fn summary(&self, outcomes: &[Vec<Outcome>], stated: Stated, max_touches: u32) -> ApproachSequential {
+        let Stated { error_rate, promised, per } = stated;
         let approaches = self.mean(outcomes, |outcome| outcome.approaches);
         let error = self.wrong(outcomes);
         let undecided = self.undecided(outcomes);
         ApproachSequential {
             error_rate,
+            promised,
+            per,
             max_touches,
             mean_approaches: approaches.all.value,
             mean_approaches_standard_error: approaches.all.standard_error,
@@ -145,57 +184,5 @@ impl Margins<'_> {
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
         }
-    }
-}
-
-/// Numbers below a limit in random order, each once, drawn only as far as they are asked for: Fisher–Yates with the
-/// places that were swapped in a map.
-struct Draws {
-    moved: HashMap<usize, usize>,
-    next: usize,
-    all: usize,
-    random: ChaCha8Rng,
-}
-
-impl Draws {
-    fn new(all: usize, name: &str, group: usize, seed: u64) -> Self {
-        let group = u64::try_from(group).unwrap_or(u64::MAX);
-        let random = random::generator(seed, Purpose::Approaches, name, group);
-        Self { moved: HashMap::new(), next: 0, all, random }
-    }
-}
-
-impl Iterator for Draws {
-    type Item = usize;
-
-    fn next(&mut self) -> Option<usize> {
-        if self.next >= self.all {
-            return None;
-        }
-        let chosen = self.random.random_range(self.next..self.all);
-        let at_next = self.moved.remove(&self.next).unwrap_or(self.next);
-        let drawn = if chosen == self.next { at_next } else { self.moved.insert(chosen, at_next).unwrap_or(chosen) };
-        self.next += 1;
-        Some(drawn)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn draws_are_a_permutation_and_any_order_is_as_likely() {
-        let mut firsts = [0; 5];
-        for group in 0..5_000 {
-            let mut drawn: Vec<usize> = Draws::new(5, "cup", group, 1).collect();
-            firsts[drawn[0]] += 1;
-            firsts[drawn[4]] += 1;
-            drawn.sort_unstable();
-            assert_eq!(drawn, [0, 1, 2, 3, 4]);
-        }
-        // 2,000 expected, with a standard deviation of 40.
-        assert!(firsts.iter().all(|&count| (1_800..2_200).contains(&count)), "{firsts:?}");
-        assert_eq!(Draws::new(0, "cup", 0, 1).count(), 0);
     }
 }

@@ -1,7 +1,7 @@
 //! The full model's recognizer.
 
 use super::margins::{best, rivals};
-use palpate_onboard::{Stopping, Verdict};
+use palpate_onboard::{Rivals, Stopping, Verdict};
 
 /// Recognizes with a full model: f32 margins, evidence in f64, and the stopping rule of the chip's recognizer.
 #[derive(Clone, Debug)]
@@ -29,9 +29,11 @@ impl FullRecognizer {
         self.evidence.iter_mut().zip(margins).for_each(|(evidence, &margin)| *evidence += f64::from(margin));
         self.touches += 1;
         let best = best(&self.evidence);
-        if rivals(&self.evidence, best, 1.0) <= self.odds {
-            // There are at most 256 objects.
-            self.verdict = Verdict::Recognized { object: best as u8, touches: self.touches };
+        let weight = rivals(&self.evidence, best, 1.0);
+        if weight <= self.odds {
+            // There are at most 256 objects, and the odds are below 1.
+            let rivals = Rivals::from_q56((weight * (1_u64 << 56) as f64) as u64);
+            self.verdict = Verdict::Recognized { object: best as u8, touches: self.touches, rivals };
         } else if self.touches >= self.stopping.max_touches() {
             self.verdict = Verdict::Unknown;
         }

@@ -32,10 +32,12 @@
 //! # }
 //! ```
 
+mod active;
 mod approaches;
 #[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
+mod draws;
 mod estimate;
 mod full;
 mod isolated;
@@ -43,12 +45,17 @@ mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
+mod plan;
+mod poses;
 mod rows;
 mod sequential;
+mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+mod under_plan;
 pub mod verify;
 
+pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
@@ -56,8 +63,12 @@ pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
+pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
+pub use poses::{ByPose, Stock};
 pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
+pub use switch::{Rule, Stopped, Switched};
+pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
 use palpate_shared::ContactPattern;
@@ -66,6 +77,9 @@ use std::collections::BTreeMap;
 
 /// Touches after which a recognizer gives up, unless its model says otherwise.
 pub const MAX_TOUCHES: u32 = 200;
+
+/// The error rate at which an ensemble's recognizer stops unless another is asked for.
+pub const ERROR_RATE: f64 = 0.01;
 
 /// Accuracies that rest on fewer different groups than this say little.
 pub const LEAST_GROUPS: u64 = 200;
@@ -79,18 +93,27 @@ pub struct Settings {
     pub at_approaches: Vec<usize>,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
-    /// The recognizer stops when the posterior passes one less this.
-    pub error_rate: f64,
+    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
+    /// ensemble.
+    pub error_rate: Option<f64>,
     /// Touches after which the recognizer gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble.
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,
 }
 
+impl Settings {
+    /// The settings of its sequences.
+    pub fn sequences(&self) -> SequentialSettings {
+        let Self { error_rate, max_touches, groups, seed, .. } = *self;
+        SequentialSettings { error_rate, max_touches, sequences: groups, seed }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         let (at, at_approaches) = (vec![5, 10, 20, 30, 60], vec![10, 20, 60]);
-        Self { at, at_approaches, groups: 1000, error_rate: 0.01, max_touches: None, seed: 1 }
+        Self { at, at_approaches, groups: 1000, error_rate: None, max_touches: None, seed: 1 }
     }
 }
 
@@ -131,12 +154,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     if settings.at.contains(&0) {
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
     }
-    let stopping = SequentialSettings {
-        error_rate: settings.error_rate,
-        max_touches: settings.max_touches,
-        sequences: settings.groups,
-        seed: settings.seed,
-    };
+    let stopping = settings.sequences();
     let sequential = margins.sequential(&stopping)?;
     let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));

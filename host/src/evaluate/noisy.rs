@@ -59,6 +59,23 @@ mod tests {
     }
 
     #[test]
+    fn every_group_is_of_one_instances_touches_and_one_robots() {
+        let mut dataset = synthetic::dataset(&[1_000, 760], 1);
+        let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
+        let name = dataset.objects[1].name.clone();
+        dataset.instances.insert(name, 4);
+        for (robots, turns) in [(1, [1, 4]), (3, [3, 12]), (2, [2, 4])] {
+            let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap().of_robots(robots);
+            for (position, turns) in turns.into_iter().enumerate() {
+                for group in 0..30 {
+                    let drawn = margins.draw(position, group, 20, 1);
+                    assert!(drawn.iter().all(|touch| touch % turns == group % turns), "{robots} robots, {turns} turns");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn without_a_bias_nothing_is_divided_and_no_noise_changes_nothing() {
         let clean = synthetic::dataset(&[1_000, 1_000], 1);
         let mut noisy = clean.clone();

@@ -155,7 +155,10 @@ fn compare_verdicts<const N: usize>(
     }
     Ok(match (compiled.verdict(), full.verdict()) {
         (a, b) if a == b => (0, 0),
-        (Verdict::Recognized { object: a, .. }, Verdict::Recognized { object: b, .. }) if a == b => (0, 1),
+        (
+            Verdict::Recognized { object: a, touches: first, .. },
+            Verdict::Recognized { object: b, touches: second, .. },
+        ) if a == b => (0, usize::from(first != second)),
         _ => (1, 0),
     })
 }

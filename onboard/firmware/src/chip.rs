@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 // Symbols that cortex-m-rt's linker script defines; only their addresses mean anything.
 unsafe extern "C" {
@@ -92,17 +92,9 @@ pub fn take_retained() -> &'static mut [u8] {
     unsafe { core::slice::from_raw_parts_mut(addr_of_mut!(_retained_start), length) }
 }
 
-/// A number that is another one after each start: the retained memory's first word, counted up. For images that keep
-/// nothing else there.
-///
-/// # Panics
-/// As [`take_retained`].
-pub fn count_start() -> u32 {
-    let Some(word) = take_retained().first_chunk_mut::<4>() else { return 0 };
-    let count = u32::from_le_bytes(*word).wrapping_add(1);
-    *word = count.to_le_bytes();
-    count
-}
+/// The levels of three switches, a bit each. They outlast a reset, as switches do: nothing initializes them.
+#[unsafe(link_section = ".uninit.switches")]
+pub static SWITCHES: AtomicU32 = AtomicU32::new(0);
 
 /// The emulated machines' external RAM, 16 MB of it, where QEMU's `-device loader,addr=0x21000000` puts what an image is
 /// to work on. Only for images that run only there.

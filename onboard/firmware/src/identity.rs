@@ -13,7 +13,7 @@ pub fn record(model: &Model<'_>, recognizer: &mut Recognizer<'_, 10>, touch: &To
     model.margins(touch, &mut margins);
     let verdict = match recognizer.push(touch) {
         Ok(Verdict::Undecided) => 0,
-        Ok(Verdict::Recognized { object, touches }) => 1 << 30 | u32::from(object) << 16 | touches,
+        Ok(Verdict::Recognized { object, touches, .. }) => 1 << 30 | u32::from(object) << 16 | touches,
         Ok(Verdict::Unknown) => 2 << 30,
         Err(_) => 3 << 30,
     };

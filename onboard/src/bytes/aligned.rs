@@ -6,6 +6,11 @@
 #[repr(align(4))]
 pub struct Aligned<T: ?Sized>(pub T);
 
+/// A value that starts at a multiple of eight, as evidence does: all is cleared by one routine of the compiler's then,
+/// instead of one for each alignment.
+#[repr(align(8))]
+pub(crate) struct AlignedTo8<T>(pub(crate) T);
+
 /// The bytes of a file, as `include_bytes!`, at a multiple of four: `include_model!("model.palpate")`.
 #[macro_export]
 macro_rules! include_model {

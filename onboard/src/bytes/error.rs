@@ -1,6 +1,7 @@
 //! Why bytes are not a model.
 
 use core::fmt;
+use palpate_shared::format::take_section;
 
 /// Why bytes are not a model; [`ModelError::offset`] is the place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +49,34 @@ pub enum ModelError {
         /// The offset of what is missing: 6 for the layout, 7 for the type of leaf.
         offset: usize,
     },
+}
+
+/// What is wrong with a model whose bytes are as they were written, and the offset of what is: an error that fits two
+/// registers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Wrong {
+    Field(usize),
+    Section(usize),
+    /// At a section whose tag stands there.
+    NotUnderstood(usize),
+    MarginRange,
+    NotBuiltIn(usize),
+}
+
+impl Wrong {
+    /// As whoever opens a model sees it.
+    pub(crate) fn in_model(self, model: &[u8]) -> ModelError {
+        match self {
+            Self::Field(offset) => ModelError::Field { offset },
+            Self::Section(offset) => ModelError::Section { offset },
+            Self::NotUnderstood(offset) => {
+                let tag = take_section(&mut model.get(offset..).unwrap_or_default()).map_or(0, |section| section.tag);
+                ModelError::NotUnderstood { tag, offset }
+            }
+            Self::MarginRange => ModelError::MarginRange,
+            Self::NotBuiltIn(offset) => ModelError::NotBuiltIn { offset },
+        }
+    }
 }
 
 impl ModelError {

@@ -4,7 +4,9 @@ mod aligned;
 mod error;
 
 pub use aligned::Aligned;
+pub(crate) use aligned::AlignedTo8;
 pub use error::ModelError;
+pub(crate) use error::Wrong;
 
 /// The element at `index`; the default beyond the end, which validated indices never reach.
 #[inline(always)]

@@ -30,18 +30,54 @@ impl Posterior {
     }
 }
 
+/// What all objects but one weigh together, that one's weight being 1: what a posterior is computed from, at no cost until
+/// it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Rivals(u64);
+
+impl Rivals {
+    /// Rivals of this weight in Q56.
+    pub const fn from_q56(weight: u64) -> Self {
+        Self(weight)
+    }
+
+    /// Their weight in Q56.
+    pub const fn q56(self) -> u64 {
+        self.0
+    }
+
+    /// The posterior of the object that they are the rivals of: 1 / (1 + their weight).
+    ///
+    /// Cost: a division of about 800 instructions, which an image that does not call this does not hold. Cannot fail.
+    pub fn posterior(self) -> Posterior {
+        Posterior(ONE - ratio(self.0, ONE.saturating_add(self.0)))
+    }
+}
+
 /// How units of evidence turn into bits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unit {
     pub(crate) bits: u32,
     pub(crate) shift: u8,
+    /// What bits are multiplied by, in Q16: one over the temperature.
+    pub(crate) sharpness: u32,
 }
+
+/// That of a temperature of 1.
+pub(crate) const SHARPNESS: u32 = 1 << 16;
+/// The most bits that are multiplied, in Q32: there a weight is 0 at any sharpness, which is 2^12 to 2^20.
+const MOST_BITS: u64 = 1 << 42;
 
 impl Unit {
     /// e^-(`ahead` units) in Q56.
-    fn weight(self, ahead: u64) -> u64 {
+    pub(super) fn weight(self, ahead: u64) -> u64 {
         let ahead = u64::from(u32::try_from(ahead).unwrap_or(u32::MAX));
-        exp2_negative((ahead * u64::from(self.bits)) >> (self.shift & 63))
+        let bits = (ahead * u64::from(self.bits)) >> (self.shift & 63);
+        if self.sharpness == SHARPNESS {
+            return exp2_negative(bits);
+        }
+        exp2_negative((bits.min(MOST_BITS) * u64::from(self.sharpness)) >> 16)
     }
 }
 
@@ -58,22 +94,18 @@ pub(crate) fn best(evidence: &[i64]) -> (usize, i64) {
     best
 }
 
-/// Whether the weights of all objects but the best come to at most `odds` (Q56), the best one's being 1: whether its
-/// posterior passes the threshold.
+/// What all objects but the best weigh together, the best one's weight being 1; `None` if that is more than `limit` (Q56):
+/// if its posterior does not pass the threshold.
 ///
-/// Cost: an exponential for each object, until it is clear that the answer is no; usually after the first rival.
-pub(crate) fn is_decided(evidence: &[i64], (winner, most): (usize, i64), odds: u64, unit: Unit) -> bool {
-    let mut left = odds;
+/// Cost: an exponential for each object, until it is clear that the answer is `None`; usually after the first rival.
+pub(crate) fn rivals(evidence: &[i64], (winner, most): (usize, i64), limit: u64, unit: Unit) -> Option<Rivals> {
+    let mut left = limit;
     for (object, &evidence) in evidence.iter().enumerate() {
-        if object == winner {
-            continue;
-        }
-        match left.checked_sub(unit.weight(most.abs_diff(evidence))) {
-            Some(rest) => left = rest,
-            None => return false,
+        if object != winner {
+            left = left.checked_sub(unit.weight(most.abs_diff(evidence)))?;
         }
     }
-    true
+    Some(Rivals(limit - left))
 }
 
 /// The posterior of one object.
@@ -81,21 +113,20 @@ pub(crate) fn is_decided(evidence: &[i64], (winner, most): (usize, i64), odds: u
 /// Cost: an exponential for each object, and a division of about 800 instructions. Error: at most 2e-8 of the smaller
 /// one of the posterior and its complement, and 2^-55.
 pub(crate) fn posterior(evidence: &[i64], object: usize, unit: Unit) -> Posterior {
-    let (winner, most) = best(evidence);
-    let Some(&own) = evidence.get(object) else { return Posterior(0) };
-    // In Q55, so that 256 objects level with each other do not overflow.
-    let own = unit.weight(most.abs_diff(own)) >> 1;
-    let mut others = 0;
-    for (other, &evidence) in evidence.iter().enumerate() {
-        if other != winner {
-            others += unit.weight(most.abs_diff(evidence)) >> 1;
-        }
+    let best = best(evidence);
+    // Of at most 255 rivals, each of which weighs 1 at most.
+    let (Some(&own), Some(rivals)) = (evidence.get(object), rivals(evidence, best, u64::MAX, unit)) else {
+        return Posterior(0);
+    };
+    if object == best.0 {
+        return rivals.posterior();
     }
-    let sum = (ONE >> 1) + others;
-    Posterior(if object == winner { ONE - ratio(others, sum) } else { ratio(own, sum) })
+    Posterior(ratio(unit.weight(best.1.abs_diff(own)), ONE.saturating_add(rivals.0)))
 }
 
 /// `part` / `whole` in Q56, rounded down, for a part that is at most the whole: long division.
+// By this name a test finds out whether an image holds it.
+#[inline(never)]
 fn ratio(part: u64, whole: u64) -> u64 {
     let (mut rest, mut quotient) = (part, 0_u64);
     if rest >= whole {
@@ -122,7 +153,7 @@ mod tests {
     /// A unit of a thousandth of a nat.
     fn unit() -> Unit {
         let bits = core::f64::consts::LOG2_E / 1000.0 * 4_294_967_296.0;
-        Unit { bits: (bits * 256.0).round() as u32, shift: 8 }
+        Unit { bits: (bits * 256.0).round() as u32, shift: 8, sharpness: SHARPNESS }
     }
 
     #[test]
@@ -135,6 +166,29 @@ mod tests {
             assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {}", weight / sum);
         }
         assert_eq!(posterior(&evidence, 4, unit()), Posterior(0));
+    }
+
+    #[test]
+    fn posteriors_at_a_temperature_are_those_of_a_softmax_of_the_evidence_divided_by_it() {
+        for sharpness in [1 << 12, 40_960, 59_578, 100_000, 1 << 20] {
+            let evidence = [1000, 400, -2500, 999, i64::MIN];
+            let weights = evidence.map(|e| (e as f64 / 1000.0 * f64::from(sharpness) / 65_536.0).exp());
+            let sum: f64 = weights.iter().sum();
+            for (object, weight) in weights.iter().enumerate() {
+                let posterior = posterior(&evidence, object, Unit { sharpness, ..unit() }).to_f64();
+                assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {} at {sharpness}", weight / sum);
+            }
+        }
+    }
+
+    #[test]
+    fn rivals_are_what_a_decision_compares_with_the_odds() {
+        for evidence in [&[0, 3_000, -400][..], &[5], &[7, 7, 7], &[i64::MAX, i64::MIN], &[100; 256]] {
+            let best = best(evidence);
+            let all = rivals(evidence, best, u64::MAX, unit()).unwrap();
+            assert_eq!(rivals(evidence, best, all.q56(), unit()), Some(all));
+            assert!(all.q56() == 0 || rivals(evidence, best, all.q56() - 1, unit()).is_none());
+        }
     }
 
     #[test]
@@ -154,7 +208,7 @@ mod tests {
     fn a_tie_is_never_decided_and_splits_the_posterior() {
         for objects in [2, 3, 10, 256] {
             let evidence = std::vec![77; objects];
-            assert!(!is_decided(&evidence, best(&evidence), ONE - 1, unit()));
+            assert_eq!(rivals(&evidence, best(&evidence), ONE - 1, unit()), None);
             for object in [0, objects - 1] {
                 let posterior = posterior(&evidence, object, unit()).to_f64();
                 assert!((posterior - 1.0 / objects as f64).abs() < 1e-9);
@@ -165,7 +219,7 @@ mod tests {
 
     #[test]
     fn the_only_object_is_decided() {
-        assert!(is_decided(&[0], best(&[0]), 0, unit()));
+        assert_eq!(rivals(&[0], best(&[0]), 0, unit()), Some(Rivals(0)));
         assert_eq!(posterior(&[-5], 0, unit()).q56(), ONE);
     }
 
@@ -174,7 +228,7 @@ mod tests {
         for rate in [0.3, 0.1, 0.01, 1e-4, 1e-9] {
             let odds = rate / (1.0 - rate);
             let q56 = (odds * ONE as f64) as u64;
-            let passes = |ahead: i64| is_decided(&[0, ahead, -400], (1, ahead), q56, unit());
+            let passes = |ahead: i64| rivals(&[0, ahead, -400], (1, ahead), q56, unit()).is_some();
             let exact = |ahead: i64| {
                 let nats = |e: i64| (e as f64 / 1000.0).exp();
                 (nats(0) + nats(-400)) / nats(ahead) <= odds

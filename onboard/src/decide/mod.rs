@@ -1,14 +1,20 @@
 //! Margins to a verdict: evidence, its exponential, when to stop, and the state as bytes.
 
+mod approach;
 mod evidence;
 mod exponential;
+mod forgetting;
 mod recognizer;
 #[cfg(feature = "link")]
 mod snapshot;
 mod stopping;
 
-pub use evidence::Posterior;
+pub use approach::Proposal;
+#[cfg(feature = "station")]
+pub(crate) use approach::propose;
+pub use evidence::{Posterior, Rivals};
 pub use exponential::exp2_negative;
+pub use forgetting::Forgetting;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;
 pub use recognizer::{CapacityError, Recognizer, Verdict};

@@ -1,7 +1,8 @@
 //! Touch by touch to a verdict.
 
-use super::evidence::{self, Posterior, Unit};
+use super::evidence::{self, Posterior, Rivals, SHARPNESS, Unit};
 use super::stopping::Stopping;
+use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
 use core::fmt;
 use palpate_shared::Touch;
@@ -18,10 +19,25 @@ pub enum Verdict {
         object: u8,
         /// How many touches it took.
         touches: u32,
+        /// What all other objects weigh beside it; its [`posterior`](Rivals::posterior) is computed when it is asked for.
+        rivals: Rivals,
     },
     /// The limit of touches was reached without a decision, which stays so until [`Recognizer::reset`]: an object that
     /// the model does not know, or a known one whose touches said too little.
     Unknown,
+}
+
+impl Verdict {
+    /// The posterior of the object that was recognized, when it was; `None` if none was.
+    ///
+    /// Cost: that of [`Rivals::posterior`]. It is that of the evidence as it is, which the threshold is for; for the model's
+    /// [temperature](Model::temperature), other objects, and before a decision: [`Recognizer::posterior`].
+    pub fn posterior(&self) -> Option<Posterior> {
+        match self {
+            Self::Recognized { rivals, .. } => Some(rivals.posterior()),
+            Self::Undecided | Self::Unknown => None,
+        }
+    }
 }
 
 /// A model with more objects than a recognizer has room for.
@@ -53,11 +69,21 @@ pub struct Recognizer<'m, const N: usize> {
 /// What a recognizer knows, without its model.
 #[derive(Clone, Debug)]
 pub(crate) struct State<const N: usize> {
-    stopping: Stopping,
-    /// Margins summed over touches, and the prior, in units of a margin.
+    /// Margins summed over touches, and the prior, in units of a margin; anything before the first touch.
     evidence: [i64; N],
+    stopping: Stopping,
+    /// Of the object that was recognized.
+    rivals: Rivals,
     touches: u32,
-    verdict: Verdict,
+    decided: Decided,
+}
+
+/// A verdict without what else is known of it, so that it takes a few instructions to copy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Decided {
+    Nothing,
+    Object(u8),
+    Unknown,
 }
 
 impl<'m, const N: usize> Recognizer<'m, N> {
@@ -70,13 +96,18 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         if objects > N {
             return Err(CapacityError { objects, capacity: N });
         }
-        let state = State { stopping, evidence: [0; N], touches: 0, verdict: Verdict::Undecided };
-        // In place: moved into the result it would be copied, and without copies no code for them is linked.
-        let mut recognizer = Ok(Self { model: model.copied(), state });
-        if let Ok(recognizer) = &mut recognizer {
-            recognizer.reset();
-        }
-        recognizer
+        Ok(Self {
+            model: *model,
+            state: State {
+                // Not the priors yet: written into, it would be copied to its place, and a copy of this length is a call that
+                // brings in 800 bytes of code.
+                evidence: [0; N],
+                stopping,
+                rivals: Rivals::from_q56(0),
+                touches: 0,
+                decided: Decided::Nothing,
+            },
+        })
     }
 
     /// A recognizer that continues from a state under the same model.
@@ -99,9 +130,9 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// [`Refused`], for a touch that the model was not trained for: it is not counted and changes nothing.
     pub fn push(&mut self, touch: &Touch) -> Result<Verdict, Refused> {
         self.model.accepts(touch)?;
-        let mut margins = [0; N];
-        self.model.margins(touch, &mut margins);
-        Ok(self.add(&margins))
+        let mut margins = AlignedTo8([0; N]);
+        self.model.margins(touch, &mut margins.0);
+        Ok(self.add(&margins.0))
     }
 
     /// Takes in a row of features, as [`Model::margins_of`].
@@ -125,7 +156,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// The verdict after the last touch.
     pub const fn verdict(&self) -> Verdict {
-        self.state.verdict
+        self.state.verdict()
     }
 
     /// How many touches were taken in since the last [`reset`](Self::reset).
@@ -135,29 +166,37 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// The object with the most evidence; the first of several.
     pub fn best(&self) -> usize {
-        evidence::best(self.evidence()).0
+        evidence::best(self.state.evidence_or_priors(&self.model, &mut [0; N])).0
     }
 
-    /// The posterior of an object; 0 for one that the model does not know.
+    /// What the weights of all objects but the [best](Self::best) come to, the best one's being 1, in Q56: the best
+    /// object is recognized once this is at most its [threshold](Stopping::odds_of).
     ///
-    /// Cost: an exponential for each object, and about 800 instructions.
+    /// Cost: an exponential for each object.
+    pub fn rivals(&self) -> u64 {
+        let mut priors = [0; N];
+        let evidence = self.state.evidence_or_priors(&self.model, &mut priors);
+        evidence::rivals(evidence, evidence::best(evidence), u64::MAX, unit(&self.model)).map_or(u64::MAX, Rivals::q56)
+    }
+
+    /// The posterior of an object, of the evidence divided by the model's [temperature](Model::temperature); 0 for an
+    /// object that the model does not know.
+    ///
+    /// Cost: an exponential for each object, and about 1,000 instructions.
     pub fn posterior(&self, object: usize) -> Posterior {
         self.state.posterior(&self.model, object)
     }
 
-    /// The evidence for each object: margins summed over touches, and the prior, in [units](Model::unit).
+    /// The evidence for each object: margins summed over touches, and the prior, in [units](Model::unit). Empty before the
+    /// first touch, when there is nothing but the [prior](Model::prior).
     pub fn evidence(&self) -> &[i64] {
         self.state.evidence(&self.model)
     }
 
     /// Forgets all touches, for the next object.
     pub fn reset(&mut self) {
-        let mut priors = self.model.priors().iter();
-        for evidence in &mut self.state.evidence {
-            *evidence = priors.next().map_or(0, |prior| i32::from_le_bytes(*prior).into());
-        }
         self.state.touches = 0;
-        self.state.verdict = Verdict::Undecided;
+        self.state.decided = Decided::Nothing;
     }
 
     /// The model.
@@ -174,31 +213,48 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     }
 
     fn add(&mut self, margins: &[i32]) -> Verdict {
-        if self.state.verdict != Verdict::Undecided {
-            return self.state.verdict;
+        if self.state.decided != Decided::Nothing {
+            return self.verdict();
+        }
+        if self.state.touches == 0 {
+            start(&self.model, &mut self.state.evidence);
         }
         for (evidence, &margin) in self.state.evidence.iter_mut().zip(margins) {
             *evidence = evidence.saturating_add(i64::from(margin));
         }
         self.state.touches = self.state.touches.saturating_add(1);
         let best = evidence::best(self.evidence());
-        if evidence::is_decided(self.evidence(), best, self.state.stopping.odds, unit(&self.model)) {
-            let object = u8::try_from(best.0).unwrap_or(u8::MAX);
-            self.state.verdict = Verdict::Recognized { object, touches: self.state.touches };
+        let unit = unit(&self.model);
+        let odds = self.state.stopping.odds_of(best.0, &self.model);
+        if let Some(rivals) = evidence::rivals(self.evidence(), best, odds, unit) {
+            self.state.decided = Decided::Object(u8::try_from(best.0).unwrap_or(u8::MAX));
+            self.state.rivals = rivals;
         } else if self.state.touches >= self.state.stopping.max_touches {
-            self.state.verdict = Verdict::Unknown;
+            self.state.decided = Decided::Unknown;
         }
-        self.state.verdict
+        self.verdict()
     }
 }
 
 impl<const N: usize> State<N> {
     pub(crate) fn evidence(&self, model: &Model<'_>) -> &[i64] {
-        self.evidence.get(..model.object_count()).unwrap_or_default()
+        let objects = if self.touches == 0 { 0 } else { model.object_count() };
+        self.evidence.get(..objects).unwrap_or_default()
     }
 
     pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
-        evidence::posterior(self.evidence(model), object, unit(model))
+        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit(model) };
+        evidence::posterior(self.evidence_or_priors(model, &mut [0; N]), object, unit)
+    }
+
+    /// The evidence, which before the first touch is the priors; they are put into `priors`.
+    pub(crate) fn evidence_or_priors<'e>(&'e self, model: &Model<'_>, priors: &'e mut [i64; N]) -> &'e [i64] {
+        let mut evidence = &self.evidence;
+        if self.touches == 0 {
+            start(model, priors);
+            evidence = priors;
+        }
+        evidence.get(..model.object_count()).unwrap_or_default()
     }
 
     pub(crate) const fn touches(&self) -> u32 {
@@ -206,18 +262,43 @@ impl<const N: usize> State<N> {
     }
 
     pub(crate) const fn verdict(&self) -> Verdict {
-        self.verdict
+        match self.decided {
+            Decided::Nothing => Verdict::Undecided,
+            Decided::Object(object) => Verdict::Recognized { object, touches: self.touches, rivals: self.rivals },
+            Decided::Unknown => Verdict::Unknown,
+        }
+    }
+
+    /// What all other objects weigh beside one that was recognized with this evidence.
+    pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize) -> Option<Rivals> {
+        let evidence = evidence.get(..model.object_count())?;
+        let best = evidence::best(evidence);
+        if best.0 == object { evidence::rivals(evidence, best, u64::MAX, unit(model)) } else { None }
     }
 
     /// Takes over the state of a snapshot.
     pub(crate) const fn set(&mut self, evidence: [i64; N], touches: u32, verdict: Verdict) {
         self.evidence = evidence;
         self.touches = touches;
-        self.verdict = verdict;
+        self.decided = match verdict {
+            Verdict::Undecided => Decided::Nothing,
+            Verdict::Recognized { object, rivals, .. } => {
+                self.rivals = rivals;
+                Decided::Object(object)
+            }
+            Verdict::Unknown => Decided::Unknown,
+        };
     }
 }
 
-fn unit(model: &Model<'_>) -> Unit {
+/// Sets evidence to what it is before any touch.
+fn start(model: &Model<'_>, evidence: &mut [i64]) {
+    for (evidence, prior) in evidence.iter_mut().zip(model.priors()) {
+        *evidence = i32::from_le_bytes(*prior).into();
+    }
+}
+
+pub(super) fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
-    Unit { bits: header.unit_bits(), shift: header.unit_shift() }
+    Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }

@@ -65,12 +65,6 @@ impl<const N: usize> Recognizer<'_, N> {
         if model != self.model().checksum() {
             return Err(SnapshotError::OtherModel);
         }
-        let verdict = match verdict {
-            0 => Verdict::Undecided,
-            1 if usize::from(object) < self.model().object_count() => Verdict::Recognized { object, touches },
-            2 => Verdict::Unknown,
-            _ => return Err(SnapshotError::Damaged),
-        };
         let mut evidence = [0; N];
         for evidence in evidence.iter_mut().take(self.model().object_count()) {
             (*evidence, rest) = postcard::take_from_bytes(rest).map_err(|_| SnapshotError::Damaged)?;
@@ -78,6 +72,16 @@ impl<const N: usize> Recognizer<'_, N> {
         if !rest.is_empty() {
             return Err(SnapshotError::Damaged);
         }
+        let verdict = match verdict {
+            0 => Verdict::Undecided,
+            _ if touches == 0 => return Err(SnapshotError::Damaged),
+            1 => {
+                let rivals = State::rivals(self.model(), &evidence, object.into()).ok_or(SnapshotError::Damaged)?;
+                Verdict::Recognized { object, touches, rivals }
+            }
+            2 => Verdict::Unknown,
+            _ => return Err(SnapshotError::Damaged),
+        };
         self.state_mut().set(evidence, touches, verdict);
         Ok(())
     }
@@ -93,7 +97,8 @@ impl<const N: usize> State<N> {
         };
         let head: Head = (model.checksum(), self.touches(), verdict, object);
         let mut length = postcard::to_slice(&head, buffer).map_err(|_| SnapshotError::Short)?.len();
-        for evidence in self.evidence(model) {
+        let mut priors = [0; N];
+        for evidence in self.evidence_or_priors(model, &mut priors) {
             let rest = buffer.get_mut(length..).ok_or(SnapshotError::Short)?;
             length += postcard::to_slice(evidence, rest).map_err(|_| SnapshotError::Short)?.len();
         }

@@ -16,7 +16,8 @@ pub enum State {
     Complete,
     /// Time ran out before all three touched, or all opened again; some may still be closed.
     TimedOut,
-    /// The touch is over, and the fingers have to be open for [`Settings::rest`]. Also the state at power-up.
+    /// The touch is over, and the fingers have to be open for [`Settings::rest`]. Also the state at power-up and after a
+    /// touch was dropped: then for [`Settings::release`], since the approach may still be going on.
     Released,
 }
 
@@ -28,7 +29,7 @@ const MOST_TIMERS: usize = 16;
 /// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
 /// with a missing finger, and faults, are only seen at the first call after they are due.
 ///
-/// RAM: 176 bytes. Cannot fail or panic, whatever the edges.
+/// RAM: 180 bytes. Cannot fail or panic, whatever the edges.
 #[derive(Clone, Debug)]
 pub struct Effector {
     settings: Settings,
@@ -37,6 +38,8 @@ pub struct Effector {
     contacts: [Option<u32>; 3],
     missing_in_a_row: [u16; 3],
     state: State,
+    /// An approach may be going on whose beginning nobody has seen: at power-up, and after a touch was dropped.
+    unseen: bool,
     now: Option<u32>,
     /// Since when all fingers have been open, as far as anybody asked.
     open_since: Option<u32>,
@@ -78,6 +81,7 @@ impl Effector {
             contacts: [None; 3],
             missing_in_a_row: [0; 3],
             state: State::Released,
+            unseen: true,
             now: None,
             open_since: None,
             touch: None,
@@ -186,7 +190,7 @@ impl Effector {
                 deadline.into_iter().chain(release).min()
             }
             State::Complete | State::TimedOut => self.all_open().then_some(0),
-            State::Released if self.all_open() => Some(self.until_open_for(settings.rest, now)),
+            State::Released if self.all_open() => Some(self.until_open_for(self.rest(), now)),
             State::Released => None,
         };
         fingers.chain(state).min()
@@ -208,8 +212,9 @@ impl Effector {
                 }
             }
             State::Complete | State::TimedOut if self.all_open() => self.state = State::Released,
-            State::Released if self.all_open() && self.open_for(self.settings.rest, now) => {
+            State::Released if self.all_open() && self.open_for(self.rest(), now) => {
                 self.state = State::Waiting;
+                self.unseen = false;
             }
             _ => {}
         }
@@ -235,7 +240,14 @@ impl Effector {
         if matches!(self.state, State::Waiting | State::Touching) {
             self.contacts = [None; 3];
             self.state = State::Released;
+            self.unseen = true;
         }
+    }
+
+    /// How long all fingers have to be open before a touch can begin. In an approach they may be for up to `release`.
+    const fn rest(&self) -> u32 {
+        let Settings { rest, release, .. } = self.settings;
+        if self.unseen && release > rest { release } else { rest }
     }
 
     fn all_open(&self) -> bool {

@@ -18,7 +18,8 @@ pub struct Settings {
     /// [`Settings::for_model`].
     pub timeout: u32,
     /// How long all fingers must be open before a touch in progress ends without its missing contacts. Longer than a
-    /// finger loses contact within one approach, and shorter than the way from one approach to the next takes.
+    /// finger loses contact within one approach, and shorter than the way from one approach to the next takes. Also how
+    /// long they must be open at power-up, and after a touch was dropped, before a touch can begin.
     pub release: u32,
     /// How long all fingers must be open after a touch before the next one can begin.
     pub rest: u32,

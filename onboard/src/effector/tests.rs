@@ -26,10 +26,17 @@ fn poll(effector: &mut Effector, now: u32, outcomes: &mut Outcomes) {
     }
 }
 
-/// Plays edges (finger, closed, time) from power-up at `start`, polling at the given times after it as well.
+/// Plays edges (finger, closed, time) from `start` on, when the fingers have been open for long enough since power-up,
+/// polling at the given times after it as well.
 fn play(start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (Outcomes, Effector) {
+    play_after(SETTINGS.release, start, edges, polls, end)
+}
+
+/// The same with power-up `rested` before `start`.
+fn play_after(rested: u32, start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (Outcomes, Effector) {
     let mut effector = Effector::new(SETTINGS);
     let mut outcomes = Outcomes::new();
+    poll(&mut effector, start.wrapping_sub(rested), &mut outcomes);
     poll(&mut effector, start, &mut outcomes);
     let mut moments: Vec<(u32, Option<(Finger, bool)>)> =
         edges.iter().map(|&(finger, closed, at)| (at, Some((finger, closed)))).collect();
@@ -48,6 +55,13 @@ fn play(start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (
 }
 
 use Finger::{First, Last, Middle};
+
+/// A touch of one finger.
+fn alone(finger: usize) -> Touch {
+    let mut times = [ContactTime::MISSING; 3];
+    times[finger] = ContactTime::FIRST;
+    Touch::new(times)
+}
 
 #[test]
 fn three_contacts_make_a_touch_of_the_first_closing_edges() {
@@ -68,7 +82,9 @@ fn states_follow_a_touch_from_waiting_to_waiting() {
         poll(&mut effector, at, &mut outcomes);
         effector.state()
     };
-    assert_eq!(state_at(0, &[]), State::Released, "at power-up the fingers have to rest first");
+    let power_up = 10_000_u32.wrapping_sub(SETTINGS.release);
+    assert_eq!(state_at(power_up, &[]), State::Released, "at power-up an approach may be going on");
+    assert_eq!(state_at(9_999, &[]), State::Released);
     assert_eq!(state_at(10_000, &[]), State::Waiting);
     assert_eq!(state_at(20_000, &[(First, true)]), State::Waiting, "not settled yet");
     assert_eq!(state_at(25_000, &[]), State::Touching);
@@ -151,14 +167,14 @@ fn fault_stuck_names_the_finger_once_and_the_others_go_on_when_it_opens() {
 
 #[test]
 fn fault_stuck_is_seen_at_power_up() {
-    let (outcomes, effector) = play(0, &[(Last, true, 0)], &[], 5_000_000);
+    let (outcomes, effector) = play_after(0, 0, &[(Last, true, 0)], &[], 5_000_000);
     assert_eq!(outcomes, [Err(Fault::Stuck(Last))]);
     assert_eq!(effector.state(), State::Released);
 }
 
 #[test]
 fn a_finger_stuck_for_longer_than_the_clock_goes_round_still_opens() {
-    let (mut outcomes, mut effector) = play(0, &[(Last, true, 0)], &[], 5_000_000);
+    let (mut outcomes, mut effector) = play_after(0, 0, &[(Last, true, 0)], &[], 5_000_000);
     for (closed, at) in [(false, 3_000_000_000), (true, 3_001_000_000)] {
         for finger in Finger::ALL {
             outcomes.extend(effector.edge(Edge::new(finger, closed, at)).transpose());
@@ -322,7 +338,7 @@ fn the_time_until_something_is_due_is_the_time_until_something_happens() {
     let clock = TestClock::default();
     let levels = [Cell::new(false), Cell::new(false), Cell::new(false)];
     let mut board = Board::<8>::start(&levels, &clock);
-    board.step(0);
+    board.step(50_000_u32.wrapping_sub(SETTINGS.release));
     board.step(50_000);
     assert_eq!(board.effector.due(50_000), None);
     board.set(100_000, &[(First, true)]);
@@ -421,16 +437,34 @@ fn unreadable_pins_are_all_reported_although_a_touch_comes_at_the_same_time() {
 fn an_approach_that_was_given_up_does_not_merge_with_the_next_one() {
     // One finger, retracted; then the next approach's middle finger, before the first one's time is up.
     let edges = [(First, true, 50_000), (First, false, 110_000), (Middle, true, 400_000), (Middle, false, 450_000)];
-    let alone = |finger: usize| {
-        let mut times = [ContactTime::MISSING; 3];
-        times[finger] = ContactTime::FIRST;
-        Ok(Touch::new(times))
-    };
     let (outcomes, effector) = play(0, &edges, &[], 600_000);
-    assert_eq!((outcomes, effector.state()), (vec![alone(0), alone(1)], State::Waiting));
+    assert_eq!((outcomes, effector.state()), (vec![Ok(alone(0)), Ok(alone(1))], State::Waiting));
     // The first touch is over 100 ms after the finger has settled open.
     assert_eq!(play(0, &edges[..2], &[], 214_999).0, []);
-    assert_eq!(play(0, &edges[..2], &[], 215_000).0, [alone(0)]);
+    assert_eq!(play(0, &edges[..2], &[], 215_000).0, [Ok(alone(0))]);
+}
+
+#[test]
+fn an_approach_that_goes_on_through_a_power_cut_is_no_touch_though_no_finger_was_closed_at_power_up() {
+    // A finger has touched and let go; the others touch within the same approach, 90 ms after power-up.
+    let rest = [(Middle, true, 90_000), (Last, true, 95_000), (Middle, false, 200_000), (Last, false, 200_000)];
+    let next = [(First, true, 400_000), (First, false, 500_000)];
+    let (outcomes, effector) = play_after(0, 0, &[&rest[..], &next].concat(), &[], 700_000);
+    assert_eq!((outcomes, effector.state()), (vec![Ok(alone(0))], State::Waiting));
+}
+
+#[test]
+fn an_approach_that_goes_on_after_its_touch_was_dropped_is_no_other_touch() {
+    // Edges are lost while the first finger lets go for a while; then the last one touches.
+    let mut effector = play(0, &[(First, true, 50_000)], &[], 90_000).1;
+    let mut outcomes = Outcomes::new();
+    let opened = Edge { after_loss: true, ..Edge::new(First, false, 100_000) };
+    outcomes.extend(effector.edge(opened).transpose());
+    for (finger, closed, at) in [(Last, true, 160_000), (Last, false, 300_000), (Last, true, 600_000)] {
+        outcomes.extend(effector.edge(Edge::new(finger, closed, at)).transpose());
+    }
+    poll(&mut effector, 2_000_000, &mut outcomes);
+    assert_eq!(outcomes, [Err(Fault::Overrun), Ok(alone(2))]);
 }
 
 #[test]
@@ -444,7 +478,7 @@ fn the_timeout_is_that_of_the_model_and_so_no_full_touch_becomes_a_partial_one()
         let settings = SETTINGS.for_model(&model, &scale);
         let mut effector = Effector::new(settings);
         let mut outcomes = Outcomes::new();
-        poll(&mut effector, 0, &mut outcomes);
+        poll(&mut effector, 50_000_u32.wrapping_sub(SETTINGS.release), &mut outcomes);
         poll(&mut effector, 50_000, &mut outcomes);
         for (finger, at) in [(First, 0), (Middle, spread / 2), (Last, spread)] {
             outcomes.extend(effector.edge(Edge::new(finger, true, 50_000 + at)).transpose());
@@ -505,7 +539,8 @@ fn each_poll_reads_each_pin_once_and_active_low_switches_close_to_low() {
     let pins = [20, 21, 23].map(|contact| Mock::new(&levels(contact)));
     let [first, middle, last] = pins;
     let clock = TestClock::default();
-    let mut probe = Probe::new(Fingers::new(first, middle, last, Active::Low), &clock, SETTINGS);
+    let settings = Settings { release: 10_000, ..SETTINGS };
+    let mut probe = Probe::new(Fingers::new(first, middle, last, Active::Low), &clock, settings);
     let mut touches = Vec::new();
     for i in 0..30 {
         clock.0.set(i * 1_000);
@@ -819,6 +854,6 @@ fn calibration_says_what_is_wrong() {
 
 #[test]
 fn the_driver_takes_the_ram_that_its_documentation_states() {
-    assert_eq!(size_of::<Effector>(), 176);
+    assert_eq!(size_of::<Effector>(), 180);
     assert_eq!(size_of::<Edge>(), 8);
 }

@@ -9,7 +9,7 @@ use palpate_shared::format::{Axis, LeafType};
 /// The number of cells of a grid: for each of its two axes, one between any two thresholds, one at either end, and one
 /// for a missing value.
 pub(crate) fn cells(model: &Sections<'_>) -> Option<usize> {
-    let (&[first, second], []) = model.axes.as_chunks() else { return None };
+    let (&[first, second], _) = model.axes_and_cuts() else { return None };
     let side = |bytes| Axis::from_bytes(bytes).map(|axis| usize::from(axis.count) + 2);
     Some(side(first)? * side(second)?)
 }
@@ -20,10 +20,11 @@ pub(crate) fn cells(model: &Sections<'_>) -> Option<usize> {
 /// instructions per object.
 #[inline(never)]
 pub(crate) fn look_up(model: &Sections<'_>, features: &[i32], margins: &mut [i32]) {
-    let mut axes = Cuts(model.cuts);
+    let (axes, cuts) = model.axes_and_cuts();
+    let mut cuts = Cuts(cuts);
     let mut cell = 0;
-    for &[feature, _, width, count] in model.axes.as_chunks().0 {
-        let cuts = axes.next(width, count);
+    for &[feature, _, width, count] in axes {
+        let cuts = cuts.next(width, count);
         let value = at_or_missing(features, feature);
         let count = usize::from(count);
         let place = if value == MISSING_FEATURE { count + 1 } else { rank_in(cuts, width, value).into() };

@@ -16,7 +16,7 @@ const SINGLE: usize = 3;
 /// The number of cells of all tables. `None` unless the descriptor is contacts-curvature and its differences κ, slope
 /// and pair have one axis each, in this order.
 pub(crate) fn cells(model: &Sections<'_>) -> Option<usize> {
-    let (&[curvature, slope, pair], []) = model.axes.as_chunks() else { return None };
+    let (&[curvature, slope, pair], _) = model.axes_and_cuts() else { return None };
     let side = |bytes, feature| {
         let axis = Axis::from_bytes(bytes).filter(|axis| axis.feature == feature)?;
         Some(usize::from(axis.count) + 1)
@@ -38,11 +38,11 @@ fn start_of_all([_, slope, pair]: [usize; 3]) -> usize {
 /// instructions per object.
 #[inline(never)]
 pub(crate) fn look_up(model: &Sections<'_>, features: &[i32], margins: &mut [i32]) {
-    let mut axes = Cuts(model.cuts);
+    let (axes, cuts) = model.axes_and_cuts();
+    let mut cuts = Cuts(cuts);
     let (mut sides, mut places) = ([1; 3], [0; 3]);
-    for ((&[feature, _, width, count], side), place) in model.axes.as_chunks().0.iter().zip(&mut sides).zip(&mut places)
-    {
-        *place = usize::from(rank_in(axes.next(width, count), width, at_or_missing(features, feature)));
+    for ((&[feature, _, width, count], side), place) in axes.iter().zip(&mut sides).zip(&mut places) {
+        *place = usize::from(rank_in(cuts.next(width, count), width, at_or_missing(features, feature)));
         *side = usize::from(count) + 1;
     }
     let [curvature, slope, pair] = places;

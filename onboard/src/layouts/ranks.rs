@@ -1,7 +1,7 @@
 //! Features to ranks: where each value stands among the thresholds, looked up once per touch.
 
 use super::Sections;
-use crate::bytes::{ModelError, take};
+use crate::bytes::{Wrong, take};
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Axis, Layout};
 
@@ -9,26 +9,22 @@ use palpate_shared::format::{Axis, Layout};
 pub(crate) type Ranks = [u8; 256];
 
 /// Checks that every axis is of a feature that exists, that columns can be numbered in a byte, and that thresholds fill their section.
-pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), ModelError> {
-    let start = model.offset(model.axes);
+pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), Wrong> {
     let mut columns = 0;
-    let mut cuts = model.cuts;
-    for (index, &bytes) in model.axes.as_chunks().0.iter().enumerate() {
-        let wrong = ModelError::Field { offset: start + Axis::LENGTH * index };
-        let axis = Axis::from_bytes(bytes).ok_or(wrong)?;
+    let (axes, mut cuts) = model.axes_and_cuts();
+    for bytes in axes {
+        let wrong = Wrong::Field(model.offset(bytes));
+        let axis = Axis::from_bytes(*bytes).ok_or(wrong)?;
         columns += axis.columns.count();
         if axis.feature > last_feature || columns > 256 {
             return Err(wrong);
         }
-        take(&mut cuts, axis.cuts_length()).ok_or(ModelError::Section { offset: model.offset(model.cuts) })?;
+        take(&mut cuts, axis.cuts_length()).ok_or(Wrong::Section(model.offset(cuts)))?;
     }
     // Wide splits number thresholds of four bytes throughout; the others have axes.
-    let ends = if model.layout == Layout::Wide {
-        model.axes.is_empty() && cuts.len().is_multiple_of(4)
-    } else {
-        cuts.is_empty()
-    };
-    if ends { Ok(()) } else { Err(ModelError::Section { offset: model.offset(cuts) }) }
+    let ends =
+        if model.layout == Layout::Wide { axes.is_empty() && cuts.len().is_multiple_of(4) } else { cuts.is_empty() };
+    if ends { Ok(()) } else { Err(Wrong::Section(model.offset(cuts))) }
 }
 
 /// Ranks of a row of features in all of the model's columns.
@@ -43,9 +39,10 @@ pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
         }
         column = column.wrapping_add(1);
     };
-    let mut axes = Cuts(model.cuts);
-    for &[feature, axis_columns, width, count] in model.axes.as_chunks().0 {
-        let cuts = axes.next(width, count);
+    let (axes, cuts) = model.axes_and_cuts();
+    let mut cuts = Cuts(cuts);
+    for &[feature, axis_columns, width, count] in axes {
+        let cuts = cuts.next(width, count);
         let value = at_or_missing(features, feature);
         // The bits of `Columns`: where a missing value goes left, and right.
         let (mut left, mut right) = (0, u8::MAX);

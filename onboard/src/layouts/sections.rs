@@ -1,21 +1,24 @@
 //! The sections of a model, found but not yet checked.
 
-use palpate_shared::format::{Header, Layout, LeafType};
+use palpate_shared::format::{Axis, Header, Layout, LeafType};
 
 /// Where the sections of a model are. What a layout reads from them it has checked before.
+///
+/// No longer than 60 bytes, so that a model is copied in a few instructions; a call to copy it would bring in 800 bytes of
+/// code. So neighbors that are rarely used apart are one slice.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sections<'a> {
     /// All of the model's bytes.
     pub(crate) bytes: &'a [u8],
-    /// The optional sections.
-    pub(crate) optional: &'a [u8],
-    pub(crate) base: &'a [u8],
-    pub(crate) axes: &'a [u8],
-    pub(crate) cuts: &'a [u8],
+    /// Base margins, then priors, four bytes of each for each object.
+    pub(crate) margins: &'a [u8],
+    /// Axes, then thresholds; see [`Sections::axes`].
+    pub(crate) ranked: &'a [u8],
     pub(crate) groups: &'a [u8],
     pub(crate) nodes: &'a [u8],
     pub(crate) leaves: &'a [u8],
-    pub(crate) objects: u16,
+    /// How many axes.
+    pub(crate) axis_count: u16,
     pub(crate) layout: Layout,
     pub(crate) leaf: LeafType,
 }
@@ -24,9 +27,9 @@ pub(crate) struct Sections<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Places {
     /// Where each part starts, in the order of the fields of [`Sections`], and where the last one ends.
-    starts: [usize; 8],
+    starts: [usize; 6],
     length: usize,
-    objects: u16,
+    axis_count: u16,
     layout: Layout,
     leaf: LeafType,
 }
@@ -36,10 +39,9 @@ impl<'a> Sections<'a> {
     pub(crate) fn places(&self) -> Places {
         let at = |section| self.offset(section);
         let end = at(self.leaves) + self.leaves.len();
-        let starts = [self.optional, self.base, self.axes, self.cuts, self.groups, self.nodes, self.leaves].map(at);
-        let [a, b, c, d, e, f, g] = starts;
-        let (length, objects) = (self.bytes.len(), self.objects);
-        Places { starts: [a, b, c, d, e, f, g, end], length, objects, layout: self.layout, leaf: self.leaf }
+        let [a, b, c, d, e] = [self.margins, self.ranked, self.groups, self.nodes, self.leaves].map(at);
+        let &Self { axis_count, layout, leaf, .. } = self;
+        Places { starts: [a, b, c, d, e, end], length: self.bytes.len(), axis_count, layout, leaf }
     }
 
     /// The sections at these places of `bytes`, of which there have to be as many as there were.
@@ -47,27 +49,43 @@ impl<'a> Sections<'a> {
         if bytes.len() != places.length {
             return None;
         }
-        let &Places { starts: [a, b, c, d, e, f, g, end], objects, layout, leaf, .. } = places;
-        // The priors stand between base and axes, and are as long as the base.
+        let &Places { starts: [a, b, c, d, e, end], axis_count, layout, leaf, .. } = places;
         Some(Self {
             bytes,
-            optional: bytes.get(a..b)?,
-            base: bytes.get(b..b + (c - b) / 2)?,
-            axes: bytes.get(c..d)?,
-            cuts: bytes.get(d..e)?,
-            groups: bytes.get(e..f)?,
-            nodes: bytes.get(f..g)?,
-            leaves: bytes.get(g..end)?,
-            objects,
+            margins: bytes.get(a..b)?,
+            ranked: bytes.get(b..c)?,
+            groups: bytes.get(c..d)?,
+            nodes: bytes.get(d..e)?,
+            leaves: bytes.get(e..end)?,
+            axis_count,
             layout,
             leaf,
         })
     }
 
     /// The header.
-    pub(crate) fn header(&self) -> Header<'a> {
-        // Sections are only found in bytes that have a header.
-        Header::split(self.bytes).map_or(Header::EMPTY, |(header, _)| header)
+    pub(crate) const fn header(&self) -> Header<'a> {
+        Header::of(self.bytes)
+    }
+
+    /// How many objects: 1 to 256.
+    #[inline(always)]
+    pub(crate) const fn objects(&self) -> usize {
+        self.margins.len() / 8
+    }
+
+    /// Base margins and priors.
+    #[inline(always)]
+    pub(crate) fn base_and_priors(&self) -> (&'a [u8], &'a [u8]) {
+        self.margins.split_at_checked(self.margins.len() / 2).unwrap_or_default()
+    }
+
+    /// Axes and thresholds.
+    #[inline(always)]
+    pub(crate) fn axes_and_cuts(&self) -> (&'a [[u8; Axis::LENGTH]], &'a [u8]) {
+        let (axes, cuts) =
+            self.ranked.split_at_checked(Axis::LENGTH * usize::from(self.axis_count)).unwrap_or_default();
+        (axes.as_chunks().0, cuts)
     }
 
     /// The offset in the model at which a section, or what is left of one, starts.

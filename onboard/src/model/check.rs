@@ -1,40 +1,41 @@
 //! What is checked when a model is opened, so that no later step can fail.
 
-use super::optional;
-use crate::bytes::{ModelError, take};
+use super::optional::{self, Stated};
+use crate::bytes::{Wrong, take};
 use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
-use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, TrainedTouches};
+use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
 
-/// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves.
+/// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves. Sets what the optional
+/// sections state.
 #[inline(never)]
-pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
+pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) -> Result<(), Wrong> {
+    let header = &model.header();
     if Key::from_code(header.key()).is_none() {
-        return Err(ModelError::Field { offset: 13 });
+        return Err(Wrong::Field(13));
     }
     if let Some(offset) = wrong_number(header) {
-        return Err(ModelError::Field { offset });
+        return Err(Wrong::Field(offset));
     }
     let built_in = built_in::layout(model.layout);
     if !built_in || !built_in::leaf(model.leaf) {
-        return Err(ModelError::NotBuiltIn { offset: if built_in { 7 } else { 6 } });
+        return Err(Wrong::NotBuiltIn(if built_in { 7 } else { 6 }));
     }
-    optional::check(model, touches)?;
+    optional::check(model, optional, stated)?;
     ranks::check(model, header.last_feature())?;
-    let section =
-        |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };
-    let values = usize::from(model.objects);
+    let section = |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(Wrong::Section(model.offset(part))) };
+    let values = model.objects();
     let mut nodes = model.nodes;
     let mut leaves = model.leaves;
     if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
-        let cells = grid::cells(model).ok_or(ModelError::Section { offset: model.offset(model.axes) })?;
+        let cells = grid::cells(model).ok_or(Wrong::Section(model.offset(model.ranked)))?;
         section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
         section(model.groups.is_empty(), model.groups)?;
     }
     if built_in::layout(Layout::Patterns) && model.layout == Layout::Patterns {
-        let cells = patterns::cells(model).ok_or(ModelError::Section { offset: model.offset(model.axes) })?;
+        let cells = patterns::cells(model).ok_or(Wrong::Section(model.offset(model.ranked)))?;
         section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
         section(model.groups.is_empty(), model.groups)?;
     }
@@ -47,10 +48,10 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut Tra
     let limit = MARGIN_LIMIT.unsigned_abs();
     let (mut range, mut largest_base) = (1_u32 << 20, 0);
     let mut shift = MAX_SHIFT;
-    for (index, &bytes) in model.groups.as_chunks().0.iter().enumerate() {
-        let wrong = ModelError::Field { offset: model.offset(model.groups) + Group::LENGTH * index };
-        let group = Group::from_bytes(bytes).ok_or(wrong)?;
-        let known = group.object.is_none_or(|object| u16::from(object) < model.objects);
+    for bytes in model.groups.as_chunks().0 {
+        let wrong = Wrong::Field(model.offset(bytes));
+        let group = Group::from_bytes(*bytes).ok_or(wrong)?;
+        let known = group.object.is_none_or(|object| usize::from(object) < values);
         let integer = model.leaf != LeafType::F32 || group.shift == 0;
         if group.shift > shift || !known || !integer {
             return Err(wrong);
@@ -59,7 +60,7 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut Tra
         if model.leaf != LeafType::F32 {
             // Shifted at most by 15 + MAX_SHIFT; a right shift of the limit cannot overflow as one of the trees could.
             if group.trees > (limit >> leaf_bits) >> shift {
-                return Err(ModelError::MarginRange);
+                return Err(Wrong::MarginRange);
             }
             range = range.saturating_add(group.trees << ((leaf_bits + shift) & 31));
         }
@@ -83,11 +84,11 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut Tra
     section(nodes.is_empty(), nodes)?;
     section(leaves.is_empty(), leaves)?;
     if model.leaf != LeafType::F32 {
-        for &base in model.base.as_chunks().0 {
+        for &base in model.base_and_priors().0.as_chunks().0 {
             largest_base = largest_base.max(i32::from_le_bytes(base).unsigned_abs());
         }
     }
-    if range.saturating_add(largest_base) > limit { Err(ModelError::MarginRange) } else { Ok(()) }
+    if range.saturating_add(largest_base) > limit { Err(Wrong::MarginRange) } else { Ok(()) }
 }
 
 /// The offset of a number of the header that makes no sense: a unit beyond its limits or in other bits than `unit_bits`

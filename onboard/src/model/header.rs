@@ -1,7 +1,9 @@
 //! The header, and the sections that it says there are.
 
 use super::Model;
-use crate::bytes::{ModelError, take};
+use super::check;
+use super::optional::Stated;
+use crate::bytes::{ModelError, Wrong, take};
 use crate::layouts::Sections;
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
@@ -9,14 +11,15 @@ use palpate_shared::format::{
     checksum,
 };
 
-/// Finds the sections, for a model that states nothing about its touches.
-#[inline(never)]
-pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
+/// Checks that bytes are a whole model of a version that is read, as it was written.
+// Otherwise its error would be moved, and a call that moves memory takes more flash than all of this.
+#[inline(always)]
+pub(super) fn whole(bytes: &[u8]) -> Result<(), ModelError> {
     let found = bytes.len();
     if bytes.iter().zip(MAGIC).any(|(&byte, magic)| byte != magic) {
         return Err(ModelError::NotAModel);
     }
-    let Some((header, mut rest)) = Header::split(bytes) else {
+    let Some((header, _)) = Header::split(bytes) else {
         let expected = u32::try_from(HEADER_LENGTH).unwrap_or_default();
         return Err(ModelError::Length { expected, found });
     };
@@ -31,33 +34,43 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         return Err(ModelError::Length { expected, found });
     };
     let (stated, computed) = (u32::from_le_bytes(*stated), checksum(body));
-    if stated != computed {
-        return Err(ModelError::Checksum { stated, computed });
-    }
-    let objects = u16::from(header.last_object()) + 1;
-    let mut section = |length: usize| {
-        let offset = found - rest.len();
-        take(&mut rest, length).ok_or(ModelError::Section { offset })
-    };
+    if stated == computed { Ok(()) } else { Err(ModelError::Checksum { stated, computed }) }
+}
+
+/// Finds the sections of a whole model, and checks them.
+pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, Wrong> {
+    let header = Header::of(bytes);
+    let mut rest = bytes.get(HEADER_LENGTH..).unwrap_or_default();
+    let objects = 8 * (usize::from(header.last_object()) + 1);
     let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-    section(length(header.text_length()))?;
-    let optional = section(length(header.optional_length()))?;
-    let base = section(4 * usize::from(objects))?;
-    section(4 * usize::from(objects))?;
-    let axes = section(4 * usize::from(header.axes()))?;
-    let cuts = section(length(header.cuts_length()))?;
-    let groups = section(8 * usize::from(header.groups()))?;
-    let nodes = section(length(header.nodes_length()))?;
-    let leaves = section(length(header.leaves_length()))?;
-    let layout = Layout::from_code(header.layout()).ok_or(ModelError::Field { offset: 6 })?;
-    let leaf = LeafType::from_code(header.leaf()).ok_or(ModelError::Field { offset: 7 })?;
-    let descriptor = descriptor(&header).map_err(|offset| ModelError::Field { offset })?;
-    if rest.len() != CHECKSUM_LENGTH {
-        return Err(ModelError::Section { offset: found - rest.len() });
+    let axis_count = header.axes();
+    let lengths = [
+        length(header.text_length()),
+        length(header.optional_length()),
+        objects,
+        length(header.cuts_length()).saturating_add(4 * usize::from(axis_count)),
+        8 * usize::from(header.groups()),
+        length(header.nodes_length()),
+        length(header.leaves_length()),
+    ];
+    let mut parts = [&[][..]; 7];
+    for (part, length) in parts.iter_mut().zip(lengths) {
+        let offset = bytes.len() - rest.len();
+        *part = take(&mut rest, length).ok_or(Wrong::Section(offset))?;
     }
+    if rest.len() != CHECKSUM_LENGTH {
+        return Err(Wrong::Section(bytes.len() - rest.len()));
+    }
+    let [_, optional, margins, ranked, groups, nodes, leaves] = parts;
+    let layout = Layout::from_code(header.layout()).ok_or(Wrong::Field(6))?;
+    let leaf = LeafType::from_code(header.leaf()).ok_or(Wrong::Field(7))?;
+    let descriptor = descriptor(&header).map_err(Wrong::Field)?;
+    let sections = Sections { bytes, margins, ranked, groups, nodes, leaves, axis_count, layout, leaf };
     let touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
-    let sections = Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf };
-    Ok(Model { sections, descriptor, touches })
+    let mut stated = Stated { touches, by_object: 0 };
+    check::check(&sections, optional, &mut stated)?;
+    let Stated { touches, by_object } = stated;
+    Ok(Model { sections, descriptor, touches, by_object })
 }
 
 /// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.

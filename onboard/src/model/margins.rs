@@ -1,6 +1,7 @@
 //! A touch to margins: the evaluator.
 
 use super::{Model, fixed};
+use crate::bytes::AlignedTo8;
 use crate::layouts::leaves::{BLOCK, Sum};
 use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
 use palpate_shared::format::{Group, Layout};
@@ -56,39 +57,27 @@ impl Model<'_> {
             patterns::look_up(&self.sections, features, margins);
             return Some(margins);
         }
-        // Without a shift (the first is the largest), and always in f32, margins start from their base.
-        let shifted = self.sections.groups.get(1).is_some_and(|&shift| shift > 0);
-        if shifted {
-            margins.fill(0);
-        } else {
-            self.start(margins);
+        let (base, _) = self.sections.base_and_priors();
+        let bases = base.as_chunks().0.iter().map(|base| i32::from_le_bytes(*base));
+        if self.is_float() {
+            // Added in this order: the base, then the trees.
+            margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = base);
+            self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
+            return Some(margins);
         }
-        let mut sum = Sum { margins, leaf: self.sections.leaf, object: None };
-        let bias = self.add_trees(features, &mut sum);
-        if shifted {
-            for (margin, &base) in margins.iter_mut().zip(self.sections.base.as_chunks().0) {
-                *margin = margin.wrapping_add(i32::from_le_bytes(base)).wrapping_sub(bias);
-            }
-        } else if bias != 0 {
-            margins.iter_mut().for_each(|margin| *margin = margin.wrapping_sub(bias));
-        }
+        margins.fill(0);
+        let bias = self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
+        margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base).wrapping_sub(bias));
         Some(margins)
-    }
-
-    /// Sets margins to their base.
-    fn start(&self, margins: &mut [i32]) {
-        match bytemuck::try_cast_slice(self.sections.base) {
-            Ok(bases) => grid::put(margins, bases, |[base]: [i32; 1]| i32::from_le(base)),
-            Err(_) => grid::put(margins, self.sections.base, i32::from_le_bytes),
-        }
     }
 
     /// Adds the leaves of all groups, and says how far every margin is too large. Groups come with the largest shift
     /// first, so that all that was added before is shifted on the way.
     fn add_trees(&self, features: &[i32], sum: &mut Sum<'_>) -> i32 {
-        let mut ranks = [0; 256];
-        ranks::rank(&self.sections, features, &mut ranks);
-        let mut reached = [0; BLOCK];
+        let mut ranks = AlignedTo8([0; 256]);
+        let ranks = &mut ranks.0;
+        ranks::rank(&self.sections, features, ranks);
+        let mut reached = AlignedTo8([0; BLOCK]);
         let (mut nodes, mut leaves) = (self.sections.nodes, self.sections.leaves);
         let (mut shift, mut bias) = (0, 0_i32);
         let shift_all = |margins: &mut [i32], bias: &mut i32, shift: u8| {
@@ -104,13 +93,13 @@ impl Model<'_> {
             sum.object = group.object;
             match self.sections.layout {
                 Layout::Complete if built_in::layout(Layout::Complete) => {
-                    complete::add(&group, &ranks, &mut reached, &mut nodes, &mut leaves, sum);
+                    complete::add(&group, ranks, &mut reached.0, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Wide if built_in::layout(Layout::Wide) => {
-                    preorder::add_wide(self.sections.cuts, &group, features, &mut nodes, &mut leaves, sum);
+                    preorder::add_wide(self.sections.axes_and_cuts().1, &group, features, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Compact if built_in::layout(Layout::Compact) => {
-                    preorder::add_compact(&group, &ranks, &mut nodes, &mut leaves, sum);
+                    preorder::add_compact(&group, ranks, &mut nodes, &mut leaves, sum);
                 }
                 // Refused when the model was opened.
                 _ => {}

@@ -13,8 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Tag, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_feature, take_section,
+    Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise, Section, Tag,
+    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
 };
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
@@ -25,6 +25,8 @@ pub struct Model<'a> {
     sections: Sections<'a>,
     descriptor: Option<Descriptor>,
     touches: TrainedTouches,
+    /// Where thresholds by object stand; 0 if there are none.
+    by_object: u32,
 }
 
 /// Where the parts of an opened model are: what a [`Model`] is without its bytes. For whoever keeps the bytes somewhere
@@ -34,21 +36,23 @@ pub(crate) struct Opened {
     places: Places,
     descriptor: Option<Descriptor>,
     touches: TrainedTouches,
+    by_object: u32,
 }
 
 impl Opened {
     /// The model in the bytes that it was opened from; `None` if there are fewer or more of them. Cost: about 100
     /// instructions. Other bytes of the same length give wrong margins, nothing worse.
     pub(crate) fn model<'a>(&self, bytes: &'a [u8]) -> Option<Model<'a>> {
-        let &Self { places, descriptor, touches } = self;
-        Some(Model { sections: Sections::at(bytes, &places)?, descriptor, touches })
+        let &Self { places, descriptor, touches, by_object } = self;
+        Some(Model { sections: Sections::at(bytes, &places)?, descriptor, touches, by_object })
     }
 }
 
 impl<'a> Model<'a> {
     /// Where its parts are.
     pub(crate) fn opened(&self) -> Opened {
-        Opened { places: self.sections.places(), descriptor: self.descriptor, touches: self.touches }
+        let &Self { descriptor, touches, by_object, .. } = self;
+        Opened { places: self.sections.places(), descriptor, touches, by_object }
     }
 
     /// Opens a model, checking everything that reading it later relies on: after this nothing can fail.
@@ -59,23 +63,8 @@ impl<'a> Model<'a> {
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
     #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
-        let mut model = header::read(bytes);
-        if let Ok(opened) = &mut model
-            && let Err(error) = check::check(&opened.sections, &opened.sections.header(), &mut opened.touches)
-        {
-            model = Err(error);
-        }
-        model
-    }
-
-    /// A copy, field by field: a `memcpy` of this length would be a call, and its code several hundred bytes of flash.
-    pub(crate) const fn copied(&self) -> Self {
-        let &Self { sections: Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, .. }, .. } = self;
-        let Sections { objects, layout, leaf, .. } = self.sections;
-        let sections = Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf };
-        let TrainedTouches { patterns, counted, needs_pose, largest_spread } = self.touches;
-        let touches = TrainedTouches { patterns, counted, needs_pose, largest_spread };
-        Self { sections, descriptor: self.descriptor, touches }
+        header::whole(bytes)?;
+        header::read(bytes).map_err(|wrong| wrong.in_model(bytes))
     }
 
     /// The header.
@@ -90,7 +79,7 @@ impl<'a> Model<'a> {
 
     /// How many objects the model knows: 1 to 256.
     pub fn object_count(&self) -> usize {
-        usize::from(self.sections.objects)
+        self.sections.objects()
     }
 
     /// How many features a row has: 1 to 256.
@@ -155,7 +144,7 @@ impl<'a> Model<'a> {
 
     /// The probe that the model was trained for, if it states one.
     pub fn probe(&self) -> Option<TrainedProbe> {
-        TrainedProbe::from_bytes(optional::find(self.sections.optional, Tag::Probe))
+        TrainedProbe::from_bytes(optional::find(self.optional(), Tag::Probe))
     }
 
     /// The touches that the model was trained on, and so the only ones that count as evidence: full touches, with a pose
@@ -164,33 +153,68 @@ impl<'a> Model<'a> {
         self.touches
     }
 
+    /// What the weights of all other objects may come to, this one's being 1, for it to be recognized, in Q56: the
+    /// model's own threshold for it. `None` if the model has one threshold for all objects, which its header states.
+    ///
+    /// Cost: about 15 instructions. Cannot fail.
+    pub fn odds_of(&self, object: usize) -> Option<u64> {
+        let start = usize::try_from(self.by_object).ok().filter(|&start| start > 0)?;
+        let section = self.sections.bytes.get(start..)?;
+        OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
+    }
+
+    /// What the model promises about its verdicts, if it was calibrated.
+    pub fn promise(&self) -> Option<Promise> {
+        Promise::from_bytes(optional::find(self.optional(), Tag::Promise))
+    }
+
+    /// What evidence is divided by before it becomes a posterior; 1 unless the model states it.
+    ///
+    /// Cost: about 30 instructions for each optional section.
+    pub fn temperature(&self) -> Temperature {
+        Temperature::from_bytes(optional::find(self.optional(), Tag::Temperature)).unwrap_or(Temperature::ONE)
+    }
+
     /// The noise in the training, if the model states it.
     pub fn noise(&self) -> Option<TrainedNoise> {
-        TrainedNoise::from_bytes(optional::find(self.sections.optional, Tag::Noise))
+        TrainedNoise::from_bytes(optional::find(self.optional(), Tag::Noise))
     }
 
     /// How often each contact pattern occurred among the approaches of the training, if the model states it.
     pub fn pattern_shares(&self) -> Option<PatternShares> {
-        PatternShares::from_bytes(optional::find(self.sections.optional, Tag::PatternShares))
+        PatternShares::from_bytes(optional::find(self.optional(), Tag::PatternShares))
+    }
+
+    /// The plan of approaches, if the model has one: what [`Recognizer::next_approach`](crate::Recognizer::next_approach)
+    /// proposes poses by.
+    ///
+    /// Cost: about 30 instructions for each optional section.
+    pub fn plan(&self) -> Option<Plan<'a>> {
+        Plan::from_bytes(optional::find(self.optional(), Tag::Plan), self.object_count())
     }
 
     /// The features of a model over rows, in their order, as far as the model states them.
     pub fn features(&self) -> impl Iterator<Item = Feature<'a>> {
-        let mut rest = optional::find(self.sections.optional, Tag::FeatureNames);
+        let mut rest = optional::find(self.optional(), Tag::FeatureNames);
         core::iter::from_fn(move || take_feature(&mut rest))
     }
 
     /// The optional sections, in the order of their tags; also those that this crate does not know.
     pub fn optional_sections(&self) -> impl Iterator<Item = Section<'a>> {
-        let mut rest = self.sections.optional;
+        let mut rest = self.optional();
         core::iter::from_fn(move || take_section(&mut rest))
     }
 
     /// The evidence for each object before any touch.
     pub(crate) fn priors(&self) -> &'a [[u8; 4]] {
-        // They follow the base margins, which are as long.
-        let start = self.sections.offset(self.sections.base) + self.sections.base.len();
-        self.sections.bytes.get(start..start + self.sections.base.len()).unwrap_or_default().as_chunks().0
+        self.sections.base_and_priors().1.as_chunks().0
+    }
+
+    /// The optional sections.
+    fn optional(&self) -> &'a [u8] {
+        let length = usize::try_from(self.header().optional_length()).unwrap_or_default();
+        let start = HEADER_LENGTH + self.text_length();
+        self.sections.bytes.get(start..start + length).unwrap_or_default()
     }
 
     fn text_length(&self) -> usize {

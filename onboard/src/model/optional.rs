@@ -1,8 +1,18 @@
 //! The optional sections: checked once, then found by their tags.
 
-use crate::bytes::ModelError;
+use crate::bytes::Wrong;
 use crate::layouts::Sections;
-use palpate_shared::format::{Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
+use palpate_shared::format::{
+    OddsByObject, Plan, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+};
+
+/// What optional sections state that recognition depends on.
+pub(super) struct Stated {
+    /// What the model was trained on.
+    pub(super) touches: TrainedTouches,
+    /// Where thresholds by object stand; 0 if there are none.
+    pub(super) by_object: u32,
+}
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
 pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
@@ -16,26 +26,29 @@ pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
 
 /// Checks that sections fill their part of the model, in the order of their tags, that what recognition depends on makes
 /// sense (whoever asks for probe or noise finds out about those), and that none is there
-/// that has to be understood and is not. Sets `touches` if the model states them.
-pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
-    let mut rest = model.optional;
+/// that has to be understood and is not. Sets what they state.
+pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) -> Result<(), Wrong> {
     let mut last = 0;
     while !rest.is_empty() {
         let offset = model.offset(rest);
-        let Section { tag, must_understand, content } =
-            take_section(&mut rest).ok_or(ModelError::Section { offset })?;
+        let Section { tag, must_understand, content } = take_section(&mut rest).ok_or(Wrong::Section(offset))?;
         let valid = match tag {
             _ if tag <= last => false,
             _ if tag == Tag::Probe.code() => content.len() >= TrainedProbe::LENGTH,
             _ if tag == Tag::Touches.code() => {
-                TrainedTouches::from_bytes(content).map(|stated| *touches = stated).is_some()
+                TrainedTouches::from_bytes(content).map(|touches| stated.touches = touches).is_some()
+            }
+            _ if tag == Tag::ThresholdsByObject.code() => {
+                stated.by_object = u32::try_from(model.offset(content)).unwrap_or_default();
+                content.len() >= OddsByObject::LENGTH * model.objects()
             }
             _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
-            _ if must_understand => return Err(ModelError::NotUnderstood { tag, offset }),
+            _ if tag == Tag::Plan.code() => Plan::from_bytes(content, model.objects()).is_some(),
+            _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,
         };
         if !valid {
-            return Err(ModelError::Field { offset });
+            return Err(Wrong::Field(offset));
         }
         last = tag;
     }

@@ -2,13 +2,14 @@
 
 use super::record::{Record, Source, Staged, record_length};
 use super::storage::{NoStorage, Place, Storage};
-use crate::decide::State;
+use crate::decide::{State, propose};
 use crate::model::Opened;
 use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
 use core::fmt;
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    Decision, Detail, Device, ModelInfo, NotStored, Outcome, Payload, Progress, Refusal, VerdictMessage, checksum,
+    ApproachMessage, Decision, Detail, Device, ModelInfo, NotStored, Outcome, POSE_BYTES, Payload, Progress, Refusal,
+    VerdictMessage, checksum,
 };
 
 /// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: for each object what one
@@ -317,6 +318,19 @@ impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
         let count = rest.len().min(buffer.len());
         buffer.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
         Ok((u32::try_from(whole.len()).unwrap_or(u32::MAX), count))
+    }
+
+    fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
+        let within = |pose: &u16| {
+            let byte = without.get(usize::from(*pose / 8)).copied().unwrap_or(0);
+            byte >> (pose % 8) & 1 == 0
+        };
+        let proposal = self.ask(|model, state| {
+            let poses = model.plan()?.poses();
+            let proposal = propose(model, state.evidence(model), (0..poses.count()).filter(within))?;
+            Some(ApproachMessage::new(proposal.pose, proposal.score, &poses.pose(proposal.pose)?))
+        })?;
+        proposal.ok_or(Refusal::NoPlan)
     }
 
     fn refused(&self) -> u32 {

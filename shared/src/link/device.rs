@@ -1,8 +1,10 @@
 //! The chip's end of the link.
 
 use super::frame::{Decoder, FRAME_MAX, Frame, encode};
-use super::message::{Answer, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics};
-use super::{CHUNK, POSTERIORS, WINDOW};
+use super::message::{
+    Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,
+};
+use super::{CHUNK, POSE_BYTES, POSTERIORS, WINDOW};
 use crate::Touch;
 use embedded_io::{Read, Write};
 use serde::{Deserialize, Serialize};
@@ -38,6 +40,15 @@ pub trait Device {
     /// # Errors
     /// A [`Refusal`] to send instead.
     fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal>;
+
+    /// The approach that helps most among those whose poses are not in `without`: see [`Query::NextApproach`].
+    ///
+    /// # Errors
+    /// A [`Refusal`] to send instead.
+    fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
+        let _ = without;
+        Err(Refusal::Unsupported)
+    }
 
     /// How many touches were not counted because the model was not trained for them, since power-up.
     fn refused(&self) -> u32 {
@@ -297,6 +308,10 @@ fn answer<'b>(
             }
             Answer::Posteriors(buffer.get(..count).unwrap_or_default())
         }
+        Query::NextApproach { without } => match device.next_approach(&without) {
+            Ok(approach) => Answer::NextApproach(approach),
+            Err(refusal) => Answer::Refused(refusal),
+        },
         Query::Snapshot { offset } => match device.snapshot(offset, buffer) {
             Ok((length, written)) => Answer::Snapshot { length, bytes: buffer.get(..written).unwrap_or_default() },
             Err(refusal) => Answer::Refused(refusal),

@@ -1,6 +1,7 @@
 //! The messages. The order of variants and fields is the format: add at the end, or raise
 //! [`VERSION`](super::VERSION).
 
+use super::POSE_BYTES;
 use crate::checksum::checksum_of;
 use crate::{ContactTime, Descriptor, Pose, Touch};
 use serde::{Deserialize, Serialize};
@@ -89,6 +90,11 @@ pub enum Query {
         /// From this byte on.
         offset: u32,
     },
+    /// In which pose should the next approach be? A chip whose program is older than this question does not answer it.
+    NextApproach {
+        /// Poses that the robot cannot reach: pose n is bit n % 8 of byte n / 8. Zeros: it can reach all.
+        without: [u8; POSE_BYTES],
+    },
 }
 
 /// The answer to a [`Query`].
@@ -119,6 +125,8 @@ pub enum Answer<'a> {
     },
     /// There is no answer.
     Refused(Refusal),
+    /// To [`Query::NextApproach`].
+    NextApproach(ApproachMessage),
 }
 
 /// Something to do, exactly once.
@@ -205,6 +213,8 @@ pub enum Refusal {
     Features,
     /// What arrived could not be written, or was being written when the power was cut.
     Unwritable,
+    /// The model has no plan of approaches, or none for a pose that can be reached.
+    NoPlan,
 }
 
 impl Refusal {
@@ -228,6 +238,7 @@ impl core::fmt::Display for Refusal {
             Self::Spread => "the contacts are further apart in time than in any touch that the model was trained on",
             Self::NoPose => "the model needs the probe's pose, and the touch has none",
             Self::Unwritable => "the chip could not write it: load it again; its memory may be worn out",
+            Self::NoPlan => "the chip's model has no plan of approaches in poses that can be reached",
             Self::Features => "the chip's model is over rows of features, not touches",
         })
     }
@@ -307,12 +318,7 @@ pub struct TouchMessage {
 impl From<&Touch> for TouchMessage {
     fn from(touch: &Touch) -> Self {
         let times = touch.times().map(|time| time.micros().unwrap_or(u32::MAX));
-        let pose = touch.pose().map(|Pose { direction, alignment }| {
-            let mut bytes = [0; 12];
-            let cosines = direction.into_iter().chain(alignment).flat_map(i16::to_le_bytes);
-            bytes.iter_mut().zip(cosines).for_each(|(byte, cosine)| *byte = cosine);
-            bytes
-        });
+        let pose = touch.pose().map(|pose| pose_bytes(&pose));
         Self { times, pose }
     }
 }
@@ -320,11 +326,22 @@ impl From<&Touch> for TouchMessage {
 impl From<&TouchMessage> for Touch {
     fn from(message: &TouchMessage) -> Self {
         let touch = Self::new(message.times.map(ContactTime::from_micros));
-        let Some([a, b, c, d, e, f, g, h, i, j, k, l]) = message.pose else { return touch };
-        touch.with_pose(Pose {
-            direction: [[a, b], [c, d], [e, f]].map(i16::from_le_bytes),
-            alignment: [[g, h], [i, j], [k, l]].map(i16::from_le_bytes),
-        })
+        message.pose.map_or(touch, |pose| touch.with_pose(pose_of(pose)))
+    }
+}
+
+/// Direction and alignment, little endian.
+fn pose_bytes(pose: &Pose) -> [u8; 12] {
+    let mut bytes = [0; 12];
+    let cosines = pose.direction.into_iter().chain(pose.alignment).flat_map(i16::to_le_bytes);
+    bytes.iter_mut().zip(cosines).for_each(|(byte, cosine)| *byte = cosine);
+    bytes
+}
+
+fn pose_of([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> Pose {
+    Pose {
+        direction: [[a, b], [c, d], [e, f]].map(i16::from_le_bytes),
+        alignment: [[g, h], [i, j], [k, l]].map(i16::from_le_bytes),
     }
 }
 
@@ -353,6 +370,30 @@ pub enum Decision {
     Recognized(u8),
     /// Most likely no object of the model.
     Unknown,
+}
+
+/// An approach that a chip proposes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ApproachMessage {
+    /// The number of its pose.
+    pub pose: u16,
+    /// Its score in Q15.
+    pub score: i32,
+    /// The pose: direction and alignment, as in a [`TouchMessage`].
+    pub middle: [u8; 12],
+}
+
+impl ApproachMessage {
+    /// A proposal of this pose, whose middle is `middle`.
+    pub fn new(pose: u16, score: i32, middle: &Pose) -> Self {
+        Self { pose, score, middle: pose_bytes(middle) }
+    }
+
+    /// Where to come from: the direction, and the row's alignment.
+    pub fn middle(&self) -> Pose {
+        pose_of(self.middle)
+    }
 }
 
 /// Enough to see whether two recognizers agree in every bit.

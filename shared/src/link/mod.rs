@@ -15,7 +15,7 @@
 //! |---|---|---|
 //! | host | [`Command`]: touch, reset, load | numbered, executed exactly once and in order |
 //! | chip | [`Outcome`]: verdict, done, refused | repeated on demand for the last [`WINDOW`] commands |
-//! | host | [`Query`]: model, names, posteriors, statistics, snapshot | changes nothing, repeated until answered |
+//! | host | [`Query`]: model, names, posteriors, statistics, snapshot, next approach | changes nothing, repeated until answered |
 //! | chip | [`Answer`] | |
 //! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host knows how many it missed |
 //!
@@ -45,8 +45,8 @@ pub use device::{Device, DeviceEnd, NotStored, Progress};
 pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
 pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
 pub use message::{
-    Answer, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Payload, Query, Refusal,
-    Statistics, TouchMessage, VerdictMessage,
+    Answer, ApproachMessage, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Payload, Query,
+    Refusal, Statistics, TouchMessage, VerdictMessage,
 };
 
 /// Commands that may be under way at a time, and outcomes that the chip keeps.
@@ -54,6 +54,9 @@ pub const WINDOW: usize = 8;
 
 /// The most bytes of a model or snapshot in one message.
 pub const CHUNK: usize = 128;
+
+/// Bytes with a bit for each pose.
+pub const POSE_BYTES: usize = crate::MOST_POSES.div_ceil(8);
 
 /// Posteriors in one answer.
 pub const POSTERIORS: usize = CHUNK / 8;

@@ -5,7 +5,7 @@
 //! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.
 
 use super::*;
-use crate::Touch;
+use crate::{Pose, Touch};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::vec::Vec;
@@ -21,7 +21,7 @@ const LATEST: u32 = 6;
 enum Action {
     /// A host gives a touch.
     Submit(usize),
-    /// A host asks for a name, whose number is the question's.
+    /// A host asks for a name or an approach, whose number is the question's.
     Ask(usize),
     /// A host opens a session.
     Connect(usize),
@@ -111,6 +111,23 @@ impl Device for Notebook {
     fn snapshot(&mut self, _: u32, _: &mut [u8]) -> Result<(u32, usize), Refusal> {
         Err(Refusal::Unsupported)
     }
+
+    fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
+        Ok(approach(without[0]))
+    }
+}
+
+/// A question for an approach, with a number in it.
+fn next_approach(number: u8) -> Query {
+    let mut without = [0; POSE_BYTES];
+    without[0] = number;
+    Query::NextApproach { without }
+}
+
+/// The answer to the question with this number.
+fn approach(number: u8) -> ApproachMessage {
+    let middle = Pose { direction: [number.into(), -1, i16::MAX], alignment: [i16::MIN, 0, 7] };
+    ApproachMessage::new(number.into(), -i32::from(number), &middle)
 }
 
 const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "f", "g", "h"];
@@ -124,7 +141,7 @@ struct Host {
     given: Vec<u32>,
     /// How many of them have an outcome.
     answered: usize,
-    /// The object whose name was asked for.
+    /// The number of the name or approach that was asked for.
     asked: Option<u8>,
     /// The next event of each life of a chip that was heard.
     events: BTreeMap<u32, u32>,
@@ -225,7 +242,8 @@ impl World {
             Action::Ask(host) => {
                 self.names = (self.names + 1) % 8;
                 let (name, Host { end, asked, connected, .. }) = (self.names, &mut self.hosts[host]);
-                let query = Query::Name { object: name };
+                // Names and approaches in turn: the answer has the question's number.
+                let query = if name % 2 == 0 { Query::Name { object: name } } else { next_approach(name) };
                 if *connected && asked.is_none() && end.ask(query, now, |frame| frames.push(frame.to_vec())) {
                     *asked = Some(name);
                 }
@@ -347,7 +365,11 @@ impl World {
                     }
                     Incoming::Answer(answer) => {
                         let name = asked.take().expect("something was asked");
-                        assert_eq!(answer, Answer::Name(NAMES[usize::from(name)]), "the answer is another question's");
+                        let expected = match name % 2 {
+                            0 => Answer::Name(NAMES[usize::from(name)]),
+                            _ => Answer::NextApproach(approach(name)),
+                        };
+                        assert_eq!(answer, expected, "the answer is another question's");
                     }
                     Incoming::Event { event, missed } => {
                         let (life, sequence) = match event {

@@ -21,6 +21,8 @@ pub struct Status {
     pub touches: VecDeque<String>,
     /// The last verdict: `undecided`, `unknown`, or an object's name.
     pub verdict: String,
+    /// The approach that the chip proposes next, as a line.
+    pub next: Option<String>,
     /// Touches in all.
     pub count: u64,
     /// Touches per second, over the last second or so.
@@ -54,9 +56,11 @@ impl Status {
                 self.truth.clone_from(name);
                 self.verdict = "undecided".into();
                 self.posteriors.clear();
+                self.next = None;
             }
             Entry::Touch { verdict, posteriors, at, .. } => {
                 self.count += 1;
+                self.next = None;
                 self.verdict.clone_from(verdict);
                 if let Some(posteriors) = posteriors {
                     self.posteriors.clone_from(posteriors);
@@ -64,6 +68,7 @@ impl Status {
                 self.tick(*at);
                 self.keep(entry.to_string());
             }
+            Entry::Next { .. } => self.next = Some(entry.to_string()),
             Entry::Fault { .. } => self.keep(entry.to_string()),
             Entry::Link { resent, garbled, missed } => {
                 (self.resent, self.garbled, self.missed) = (*resent, *garbled, *missed);
@@ -90,6 +95,24 @@ impl Status {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_proposed_approach_is_shown_until_the_next_touch() {
+        let next = Entry::Next { pose: 48, direction: [0.0, 0.0, -1.0], alignment: [1.0, 0.0, 0.0], score: 0.25 };
+        let mut status = Status::new("chip");
+        status.take(&next);
+        let line = "next: pose 48, along 0.00 0.00 -1.00, row 1.00 0.00 0.00, separation 0.250";
+        assert_eq!(status.next.as_deref(), Some(line));
+        status.take(&Entry::Touch {
+            times: [Some(0); 3],
+            verdict: "undecided".into(),
+            best: "cup".into(),
+            touches: 1,
+            posteriors: None,
+            at: 0.0,
+        });
+        assert_eq!(status.next, None);
+    }
 
     #[test]
     fn another_journal_in_the_same_place_starts_from_nothing() {

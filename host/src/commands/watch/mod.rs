@@ -5,6 +5,7 @@ use crate::Result;
 use crate::chip::watch::{Follow, Status};
 use crate::chip::{ChipModel, Connection, Entry, Port, Received, Update, probability, stream};
 use crate::output::print;
+use palpate_shared::link::Event;
 use screen::Screen;
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -73,15 +74,23 @@ fn watch(arguments: &Arguments, port: &Port) -> Result<()> {
     match steps {
         Some(steps) => {
             let model = loaded.as_ref().map(|file| file.model());
-            stream(&mut connection, steps, &chip, model.as_ref(), &mut each)?;
+            stream(&mut connection, steps, &chip, model.as_ref(), arguments.chip.active, &mut each)?;
         }
         None => loop {
             let update = match connection.hear(Duration::from_millis(50))? {
                 Some(Received::Event(event, missed)) => Update::Event(event, missed),
                 _ => Update::Idle,
             };
+            let asks = arguments.chip.active
+                && matches!(&update, Update::Event(Event::Touch { .. } | Event::Refused { .. }, _));
             if each(&mut connection, update)?.is_break() {
                 return Ok(());
+            }
+            if asks {
+                let approach = connection.next_approach()?;
+                if each(&mut connection, Update::Next(approach))?.is_break() {
+                    return Ok(());
+                }
             }
         },
     }

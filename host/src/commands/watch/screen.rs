@@ -122,7 +122,7 @@ fn lines(status: &Status, width: usize, height: usize) -> Vec<Vec<Text>> {
         width,
     ));
     lines.extend(posteriors(status, shown, width));
-    lines.push(Vec::new());
+    lines.push(status.next.iter().map(|next| next.clone().stylize()).collect());
     lines.push(rule("  no.       first    middle      last ", width));
     lines.extend(status.touches.iter().map(|touch| vec![touch.clone().stylize()]));
     lines.resize(height.saturating_sub(1), Vec::new());

@@ -1,5 +1,5 @@
 //! Recognizes from three switches on three pins, and reports every touch and fault to a host over the UART
-//! (`palpate watch`). A verdict ends an object; the next touch begins another.
+//! (`palpate watch`). A verdict ends an object; the next touch begins another. What was touched is kept through resets.
 //!
 //! The model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`.
 #![no_std]
@@ -12,7 +12,7 @@ use palpate_firmware::chip::{self, Interrupt};
 use palpate_firmware::pins;
 use palpate_firmware::uart::{Port, Uart};
 use palpate_onboard::effector::Sensed;
-use palpate_onboard::station::{Board, NoStorage, ProbeSettings, ProbeStation};
+use palpate_onboard::station::{Board, Memory, ProbeSettings, ProbeStation, record_length};
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
 /// Objects that the model may have.
@@ -40,8 +40,11 @@ impl Board for Chip {
 #[entry]
 fn main() -> ! {
     let mut chip = Chip(Uart::take(Port::Link));
-    let settings = ProbeSettings { boot: chip::count_start(), ..ProbeSettings::default() };
-    let Ok(mut station) = ProbeStation::<OBJECTS>::open(MODEL, NoStorage, settings) else { palpate_firmware::fail() };
+    let (first, rest) = chip::take_retained().split_at_mut(record_length(OBJECTS));
+    let (second, _) = rest.split_at_mut(record_length(OBJECTS));
+    let memory = Memory { models: [&mut [], &mut []], records: [first, second] };
+    let settings = ProbeSettings::default();
+    let Ok(mut station) = ProbeStation::<OBJECTS, _>::open(MODEL, memory, settings) else { palpate_firmware::fail() };
     if station.model().is_none() {
         palpate_firmware::println!("no model is built in: build with PALPATE_MODEL=/path/to/model.palpate");
         palpate_firmware::fail()

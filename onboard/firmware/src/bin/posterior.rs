@@ -1,4 +1,4 @@
-//! The recognizer alone, with posteriors: links only if nothing in it can panic; its size is what recognition takes.
+//! The recognizer alone, with the posteriors of its verdicts: links only if nothing in it can panic; its size is what recognition takes.
 #![no_std]
 #![no_main]
 
@@ -21,8 +21,8 @@ fn main() -> ! {
             loop {
                 let touch = Touch::from_micros(black_box([0, 1, 2]));
                 let verdict = black_box(recognizer.push(&touch));
-                black_box(recognizer.posterior(recognizer.best()).q56());
                 if verdict != Ok(Verdict::Undecided) {
+                    black_box(verdict.ok().and_then(|verdict| verdict.posterior()));
                     recognizer.reset();
                 }
             }

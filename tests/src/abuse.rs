@@ -1,0 +1,365 @@
+//! Every way to abuse a model file: bytes that a reader must refuse, and why. `shared/FORMAT.md` lists them by name.
+
+use crate::random::{self, Shape};
+use crate::sections::{trained, with_sections};
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate_onboard::{Model, ModelError};
+use palpate_shared::format::{
+    Counted, HEADER_LENGTH, Header, Length, MUST_UNDERSTAND, Tag, Trained, TrainedNoise, TrainedProbe, TrainedTouches,
+    checksum, write_section,
+};
+use palpate_shared::{Descriptor, Patterns};
+
+/// Bytes that must be refused.
+#[derive(Clone, Debug)]
+pub struct Abuse {
+    /// What was done to a model.
+    pub name: String,
+    /// The kind of error, see [`kind`].
+    pub kind: &'static str,
+    /// Where it is, in bytes from the start.
+    pub offset: usize,
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// An error's kind, as the vectors name it.
+pub fn kind(error: &ModelError) -> &'static str {
+    match error {
+        ModelError::Length { .. } => "length",
+        ModelError::NotAModel => "magic",
+        ModelError::Version(_) => "version",
+        ModelError::Checksum { .. } => "checksum",
+        ModelError::Field { .. } => "field",
+        ModelError::Section { .. } => "section",
+        ModelError::NotUnderstood { .. } => "not-understood",
+        ModelError::MarginRange => "range",
+        _ => "not-built-in",
+    }
+}
+
+/// A small model.
+pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
+    // Tables by contact pattern have no other descriptor.
+    let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { Descriptor::Curvature };
+    let shape = Shape { descriptor, objects: 3, trees: 4, depth: 2, each, thresholds: 6, leaf: 1.0 };
+    let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+    compile(&random::ensemble(shape, 5), &settings).expect("a small ensemble").bytes
+}
+
+/// Puts the checksum right.
+pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let body = bytes.len() - 4;
+    let sum = checksum(&bytes[..body]);
+    bytes[body..].copy_from_slice(&sum.to_le_bytes());
+    bytes
+}
+
+/// The model with these bytes at an offset, and its checksum right.
+pub fn changed(model: &[u8], offset: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut model = model.to_vec();
+    model[offset..offset + bytes.len()].copy_from_slice(bytes);
+    sealed(model)
+}
+
+/// The model with bytes put in before its checksum, and its length and checksum right.
+fn longer(model: &[u8], more: &[u8]) -> Vec<u8> {
+    let mut bytes = [&model[..model.len() - 4], more, &[0; 4]].concat();
+    let length = u32::try_from(bytes.len()).expect("a small model");
+    bytes[8..12].copy_from_slice(&length.to_le_bytes());
+    sealed(bytes)
+}
+
+/// Where the parts of a model start: optional sections, base margins, axes, thresholds, groups, splits, leaves, checksum.
+pub fn places(model: &[u8]) -> [usize; 8] {
+    let (header, _) = Header::split(model).expect("a model");
+    let objects = usize::from(header.last_object()) + 1;
+    let mut end = HEADER_LENGTH;
+    [
+        header.text_length() as usize,
+        header.optional_length() as usize,
+        8 * objects,
+        4 * usize::from(header.axes()),
+        header.cuts_length() as usize,
+        8 * usize::from(header.groups()),
+        header.nodes_length() as usize,
+        header.leaves_length() as usize,
+    ]
+    .map(|length| {
+        end += length;
+        end
+    })
+}
+
+/// What models state here.
+pub const TRAINED: Trained = Trained {
+    probe: Some(TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Millimeter }),
+    touches: Some(TrainedTouches {
+        patterns: Patterns::CONTACTS,
+        counted: Counted::Contacts,
+        needs_pose: false,
+        largest_spread: 1_050_000,
+    }),
+    noise: Some(TrainedNoise { least: 0, largest: 5_000, timer: 1_000, pose: 0 }),
+    shares: None,
+};
+
+/// A section of any tag.
+pub fn section(tag: u16, content: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write_section(Tag::FeatureNames, false, content, &mut |part| bytes.extend_from_slice(part));
+    bytes[..2].copy_from_slice(&tag.to_le_bytes());
+    bytes
+}
+
+/// A snapshot with this content, whatever it says.
+pub fn snapshot(model: &Model<'_>, touches: u32, verdict: u8, object: u8, evidence: &[i64]) -> Vec<u8> {
+    let mut buffer = [0; 32];
+    let head = (model.checksum(), touches, verdict, object);
+    let mut bytes = postcard::to_slice(&head, &mut buffer).expect("a long buffer").to_vec();
+    for evidence in evidence {
+        bytes.extend_from_slice(postcard::to_slice(evidence, &mut [0; 10]).expect("a long buffer"));
+    }
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes
+}
+
+/// All of them, in the order of the table in `FORMAT.md`.
+pub fn cases() -> Vec<Abuse> {
+    let mut cases = Vec::new();
+    let mut put = |name: &str, kind, offset, bytes| cases.push(Abuse { name: name.into(), kind, offset, bytes });
+    whole(&mut put);
+    header(&mut put);
+    parts(&mut put);
+    sections(&mut put);
+    axes(&mut put);
+    groups(&mut put);
+    tables(&mut put);
+    cases
+}
+
+type Put<'a> = &'a mut dyn FnMut(&str, &'static str, usize, Vec<u8>);
+
+/// What is wrong with all of the bytes.
+fn whole(put: Put<'_>) {
+    let good = model(Layout::Compact, Leaf::I8, true);
+    let length = good.len();
+    put("nothing at all", "length", 0, Vec::new());
+    put("something else", "magic", 0, b"{\"learner\":{}}".to_vec());
+    put("cut in the header", "length", 95, good[..95].to_vec());
+    put("cut at the end", "length", length - 1, good[..length - 1].to_vec());
+    put("a byte after the end", "length", length, [&good[..], &[0]].concat());
+    put("a length of 4 GB", "length", length, changed(&good, 8, &[0xff; 4]));
+    put("version 0", "version", 4, changed(&good, 4, &[0, 0]));
+    put("a later version", "version", 4, changed(&good, 4, &[3, 0]));
+    let mut bytes = good.clone();
+    bytes[length - 5] ^= 1;
+    put("a bit that has changed", "checksum", 8, bytes);
+}
+
+/// Numbers of the header.
+fn header(put: Put<'_>) {
+    let good = model(Layout::Compact, Leaf::I8, true);
+    let mut at = |name: &str, offset, bytes: &[u8]| put(name, "field", offset, changed(&good, offset, bytes));
+    at("an unknown layout", 6, &[5]);
+    at("an unknown type of leaf", 7, &[3]);
+    at("an unknown descriptor", 12, &[7]);
+    at("another number of features than the descriptor's", 15, &[2]);
+    at("keys of f32 values with a descriptor", 13, &[1]);
+    at("a unit that never decides", 32, &1e-9_f32.to_le_bytes());
+    at("a unit that is too coarse", 32, &1.0_f32.to_le_bytes());
+    at("a unit that is not a number", 32, &f32::NAN.to_le_bytes());
+    at("a negative unit", 32, &(-0.01_f32).to_le_bytes());
+    at("unit bits of another unit", 36, &[good[36] ^ 0x10]);
+    at("a unit shift beyond 63", 40, &[64]);
+    at("a threshold that a tie passes", 48, &(1_u64 << 56).to_le_bytes());
+    at("no touch at all", 56, &[0; 4]);
+    let raw = changed(&good, 12, &[255]);
+    put("an unknown key of rows of features", "field", 13, changed(&raw, 13, &[2]));
+}
+
+/// Lengths of parts.
+fn parts(put: Put<'_>) {
+    let good = trained(&model(Layout::Compact, Leaf::I8, true), &TRAINED);
+    let [optional, base, axes, _, groups, splits, leaves, end] = places(&good);
+    let huge = u32::MAX.to_le_bytes();
+    put("a text beyond the end", "section", HEADER_LENGTH, changed(&good, 68, &huge));
+    put("optional sections beyond the end", "section", optional, changed(&good, 92, &huge));
+    put("objects beyond the end", "section", base, changed(&good, 14, &[255]));
+    put("axes beyond the end", "section", axes, changed(&good, 16, &[0xff; 2]));
+    // Axes and thresholds are one part.
+    put("thresholds beyond the end", "section", axes, changed(&good, 80, &huge));
+    put("groups beyond the end", "section", groups, changed(&good, 18, &[0xff; 2]));
+    put("splits beyond the end", "section", splits, changed(&good, 84, &huge));
+    put("leaves beyond the end", "section", leaves, changed(&good, 88, &huge));
+    put("bytes between leaves and checksum", "section", end, longer(&good, &[0; 4]));
+    let more = |field: usize| {
+        let length = u32::from_le_bytes(good[field..field + 4].try_into().expect("four bytes")) + 4;
+        changed(&longer(&good, &[0; 4]), field, &length.to_le_bytes())
+    };
+    put("leaves that belong to no tree", "section", end, more(88));
+    let wide = model(Layout::Wide, Leaf::I8, true);
+    let [.., splits, leaves, _] = places(&wide);
+    put("splits that belong to no tree", "section", leaves, {
+        let mut bytes = wide.clone();
+        bytes.splice(leaves..leaves, [0; 6]);
+        let splits_length = (leaves - splits + 6) as u32;
+        bytes[84..88].copy_from_slice(&splits_length.to_le_bytes());
+        longer(&bytes, &[])
+    });
+    put("a tree with more splits than there are", "section", splits, changed(&wide, splits, &[0xff, 0xff]));
+}
+
+/// Optional sections.
+fn sections(put: Put<'_>) {
+    let plain = model(Layout::Compact, Leaf::I8, true);
+    let [optional, ..] = places(&plain);
+    let [probe, touches, noise] = [
+        TRAINED.probe.expect("stated").to_bytes().to_vec(),
+        TRAINED.touches.expect("stated").to_bytes().to_vec(),
+        TRAINED.noise.expect("stated").to_bytes().to_vec(),
+    ];
+    let touches_tag = Tag::Touches.code() | MUST_UNDERSTAND;
+    let with = |sections: &[Vec<u8>]| with_sections(&plain, &sections.concat());
+    let [touches_section, noise_section] = [section(touches_tag, &touches), section(3, &noise)];
+    put(
+        "sections in the wrong order",
+        "field",
+        optional + noise_section.len(),
+        with(&[noise_section.clone(), touches_section.clone()]),
+    );
+    put(
+        "a section twice",
+        "field",
+        optional + noise_section.len(),
+        with(&[noise_section.clone(), noise_section.clone()]),
+    );
+    put("a section with tag 0", "field", optional, with(&[section(0, &[])]));
+    put("a section that is cut in its head", "section", optional, with(&[noise_section[..7].to_vec()]));
+    put("a section that is cut in its content", "section", optional, with(&[noise_section[..20].to_vec()]));
+    put("a section without its last zeros", "section", optional, with(&[section(77, &[1; 5])[..14].to_vec()]));
+    put("a section of 4 GB", "section", optional, {
+        let mut bytes = noise_section.clone();
+        bytes[4..8].copy_from_slice(&[0xff; 4]);
+        with(&[bytes])
+    });
+    put(
+        "an unknown section that must be understood",
+        "not-understood",
+        optional,
+        with(&[section(77 | MUST_UNDERSTAND, &[])]),
+    );
+    put("a probe that is too short", "field", optional, with(&[section(1, &probe[..15])]));
+    put("a noise that is too short", "field", optional, with(&[section(3, &noise[..15])]));
+    let stated = |position: usize, value: u8| {
+        let mut bytes = touches.clone();
+        bytes[position] = value;
+        with(&[section(touches_tag, &bytes)])
+    };
+    put("touches that are too short", "field", optional, with(&[section(touches_tag, &touches[..7])]));
+    put("touches of no pattern", "field", optional, stated(0, 0));
+    put("touches of a pattern that does not exist", "field", optional, stated(0, 64));
+    put("touches of a pattern that does not count", "field", optional, stated(0, 0b11_1111));
+    put("touches that count in an unknown way", "field", optional, stated(1, 3));
+    put("touches that need two poses", "field", optional, stated(2, 2));
+}
+
+/// Axes and thresholds.
+fn axes(put: Put<'_>) {
+    let good = model(Layout::Compact, Leaf::I8, true);
+    let [_, _, axes, cuts, ..] = places(&good);
+    put("an axis of a feature that does not exist", "field", axes, changed(&good, axes, &[2]));
+    put("an axis without columns", "field", axes, changed(&good, axes + 1, &[0]));
+    put("an axis with unknown columns", "field", axes, changed(&good, axes + 1, &[4]));
+    put("thresholds of no byte", "field", axes, changed(&good, axes + 2, &[0]));
+    put("thresholds of five bytes", "field", axes, changed(&good, axes + 2, &[5]));
+    put("more thresholds than there are", "section", cuts, changed(&good, axes + 3, &[255]));
+    let count = good[axes + 3];
+    let width = usize::from(good[axes + 2]);
+    let last = usize::from(good[axes + 7]) * usize::from(good[axes + 6]);
+    put(
+        "thresholds that belong to no axis",
+        "section",
+        cuts + (usize::from(count) - 1) * width + last,
+        changed(&good, axes + 3, &[count - 1]),
+    );
+    let mut many = vec![0_u8; 0];
+    for _ in 0..129 {
+        many.extend([0, 3, 1, 0]);
+    }
+    let mut bytes = good.clone();
+    bytes.splice(axes..axes, many);
+    bytes[16..18].copy_from_slice(&(u16::from_le_bytes([good[16], good[17]]) + 129).to_le_bytes());
+    put("more than 256 columns", "field", axes + 4 * 128, longer(&bytes, &[]));
+    let wide = model(Layout::Wide, Leaf::I8, true);
+    let [_, _, axes, cuts, groups, ..] = places(&wide);
+    let mut bytes = wide.clone();
+    bytes.splice(axes..axes, [0, 1, 1, 0]);
+    bytes[16] = 1;
+    put("axes of wide trees", "section", cuts + 4, longer(&bytes, &[]));
+    let mut bytes = wide.clone();
+    bytes.splice(groups..groups, [0; 2]);
+    bytes[80..84].copy_from_slice(&((groups - cuts + 2) as u32).to_le_bytes());
+    put("a threshold of wide trees that is cut", "section", cuts, longer(&bytes, &[]));
+}
+
+/// Groups and what they count for.
+fn groups(put: Put<'_>) {
+    for (layout, name) in [(Layout::Compact, "compact"), (Layout::Complete, "complete"), (Layout::Wide, "wide")] {
+        let good = model(layout, Leaf::I8, true);
+        let [.., groups, splits, _, _] = places(&good);
+        let depth = if layout == Layout::Complete { [0, 9] } else { [1, 255] };
+        for depth in depth {
+            put(&format!("{name} trees of depth {depth}"), "field", groups, changed(&good, groups, &[depth]));
+        }
+        let few = [0, 0, 1, 0];
+        put(&format!("65,536 {name} trees"), "section", splits, changed(&good, groups + 4, &few));
+    }
+    let good = model(Layout::Compact, Leaf::I8, false);
+    let [_, base, _, _, groups, ..] = places(&good);
+    put("a leaf for an object that does not exist", "field", groups, changed(&good, groups + 3, &[3]));
+    put("a leaf with an unknown number of values", "field", groups, changed(&good, groups + 2, &[2]));
+    put("a shift beyond 24", "field", groups, changed(&good, groups + 1, &[25]));
+    put("a shift above the one before", "field", groups + 8, changed(&good, groups + 9, &[24]));
+    put("leaves beyond the range of margins", "range", 8, changed(&good, groups + 1, &[24]));
+    put("4 billion trees", "range", 8, changed(&good, groups + 4, &[0xff; 4]));
+    put("a base margin beyond the range", "range", 8, changed(&good, base, &(1_i32 << 30).to_le_bytes()));
+    put("the least base margin", "range", 8, changed(&good, base, &i32::MIN.to_le_bytes()));
+    let good = model(Layout::Compact, Leaf::F32, true);
+    let [.., groups, _, _, _] = places(&good);
+    put("a shift of f32 leaves", "field", groups, changed(&good, groups + 1, &[1]));
+}
+
+/// Tables.
+fn tables(put: Put<'_>) {
+    let good = model(Layout::Grid, Leaf::I8, true);
+    let [_, _, axes, _, groups, _, leaves, end] = places(&good);
+    let table = |bytes: &mut Vec<u8>| {
+        bytes.splice(groups..groups, [0; 8]);
+        bytes[18] = 1;
+    };
+    let mut grouped = good.clone();
+    table(&mut grouped);
+    put("a grid with a group", "section", groups, longer(&grouped, &[]));
+    let mut split = good.clone();
+    split.splice(leaves..leaves, [0; 4]);
+    split[84] = 4;
+    put("a grid with splits", "section", leaves, longer(&split, &[]));
+    let mut cells = good.clone();
+    cells.remove(end - 1);
+    cells[88..92].copy_from_slice(&((end - leaves - 1) as u32).to_le_bytes());
+    put("a grid with a value too few", "section", leaves, longer(&cells, &[]));
+    put("a grid of another kind of trees", "section", axes, changed(&model(Layout::Compact, Leaf::I8, true), 6, &[4]));
+    let mut one = good.clone();
+    let gone = usize::from(one[axes + 6]) * usize::from(one[axes + 7]);
+    let last = groups - gone..groups;
+    one.drain(last);
+    one.drain(axes + 4..axes + 8);
+    one[16] = 1;
+    one[80..84].copy_from_slice(&((groups - axes - 8 - gone) as u32).to_le_bytes());
+    put("a grid over one axis", "section", axes, longer(&one, &[]));
+    let good = model(Layout::Patterns, Leaf::I8, true);
+    let [_, _, axes, ..] = places(&good);
+    put("tables by pattern with axes in another order", "section", axes, changed(&good, axes, &[2]));
+    put("tables by pattern of another descriptor", "section", axes, changed(&good, 12, &[Descriptor::Gravity.code()]));
+}

@@ -1,0 +1,366 @@
+//! Writes the test vectors of the model format, which `shared/vectors/README.md` describes:
+//! `cargo run -p palpate-tests --bin vectors > shared/vectors/vectors.txt`.
+//!
+//! They are committed, and stay as they are: models that earlier releases made have to give the same. Write them again
+//! only where something is to be added.
+
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
+use palpate_shared::format::{Counted, PatternShares, Trained, TrainedTouches, checksum, f32_key};
+use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, Touch};
+use palpate_tests::abuse::{self, changed, section};
+use palpate_tests::random::{self, Shape};
+use palpate_tests::sections::{trained, with_sections};
+use palpate_tests::vectors::{hex, numbers, refusal, touch_words};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+fn main() {
+    let mut text = String::from("# See README.md.\nvectors 1\n");
+    functions(&mut text);
+    layouts(&mut text);
+    descriptors(&mut text);
+    sections(&mut text);
+    rows(&mut text);
+    decisions(&mut text);
+    refused(&mut text);
+    assert!(text.lines().all(|line| line.len() < 16_384), "a line is too long");
+    print!("{text}");
+}
+
+/// What is the same in every model.
+fn functions(text: &mut String) {
+    let mut put = |line: String| *text += &format!("{line}\n");
+    for bytes in [&b"123456789"[..], b"PLPT", &[0], &[0xff; 32]] {
+        put(format!("crc {} {:08x}", hex(bytes), checksum(bytes)));
+    }
+    let mut rng = SmallRng::seed_from_u64(1);
+    let edges = [0, 1, 1 << 28, (1 << 28) - 1, (1 << 32) - 1, 1 << 32, (58 << 32) - 1, 58 << 32, 57 << 32, u64::MAX];
+    let some = (0..60).map(|_| rng.random_range(0..20_u64 << 32));
+    for exponent in edges.into_iter().chain(some) {
+        put(format!("exp2 {exponent} {}", exp2_negative(exponent)));
+    }
+    let special = [0.0, -0.0, 1.0, -1.5, 1e-45, f32::MAX, f32::MIN, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+    for value in special {
+        let key = f32_key(value);
+        put(format!("key {:08x} {}", value.to_bits(), numbers(&[key])));
+    }
+}
+
+/// A shape of curvature.
+const SHAPE: Shape =
+    Shape { descriptor: Descriptor::Curvature, objects: 3, trees: 4, depth: 3, each: true, thresholds: 12, leaf: 1.0 };
+
+/// Every approach counts.
+const ALL: TrainedTouches =
+    TrainedTouches { patterns: Patterns::ALL, counted: Counted::All, needs_pose: false, largest_spread: u32::MAX };
+
+fn stated(model: &[u8], touches: TrainedTouches) -> Vec<u8> {
+    trained(model, &Trained { touches: Some(touches), ..Trained::default() })
+}
+
+fn compiled(shape: Shape, seed: u64, leaf: Leaf, layout: Layout) -> Vec<u8> {
+    // Tables by contact pattern have no other descriptor.
+    let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };
+    let ensemble = random::ensemble(Shape { descriptor, ..shape }, seed);
+    compile(&ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() }).expect("it fits").bytes
+}
+
+/// Touches that reach all over a model, and those at the limits of features.
+fn touches(count: usize, seed: u64) -> Vec<Touch> {
+    let limits = [
+        [u32::MAX; 3],
+        [0, 0, 0],
+        [0, (1 << 28) + 1, u32::MAX - 1],
+        [(1 << 24) + 5, 0, u32::MAX],
+        [0, u32::MAX, 1 << 25],
+    ];
+    let limits = limits.map(|times| Touch::new(times.map(ContactTime::from_micros)));
+    random::touches(count, seed).into_iter().chain(limits).collect()
+}
+
+/// A model, and what it makes of touches. After a decision one more touch, then a reset.
+fn play(text: &mut String, name: &str, bytes: &[u8], touches: &[Touch]) {
+    let model = Model::new(bytes).expect("a model");
+    *text += &format!("model {} {name}\n", hex(bytes));
+    if model.object_count() <= 4 {
+        for object in 0..model.object_count() {
+            *text += &format!("name {object} {}\n", model.object_name(object));
+        }
+    }
+    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
+    for (index, touch) in touches.iter().enumerate() {
+        let decided = recognizer.verdict() != Verdict::Undecided;
+        *text += &format!("touch {}\n", touch_words(touch));
+        match recognizer.push(touch) {
+            Err(refused) => *text += &format!("refused {}\n", refusal(refused)),
+            Ok(verdict) => {
+                let features = model.descriptor().expect("it takes touches").features(touch);
+                known(text, &model, &recognizer, features.as_slice(), verdict);
+            }
+        }
+        if index == 1 || decided {
+            snapshot(text, &recognizer);
+        }
+        if decided {
+            recognizer.reset();
+            *text += "reset\n";
+        }
+    }
+}
+
+/// What is known after a touch or a row.
+fn known(text: &mut String, model: &Model<'_>, recognizer: &Recognizer<'_, 256>, features: &[i32], verdict: Verdict) {
+    let mut sums = vec![0.0; model.object_count()];
+    *text += &format!("features {}\n", numbers(features));
+    if model.f32_margins_of(features, &mut sums) && sums.iter().all(|sum| sum.is_finite()) {
+        let bits: Vec<String> = sums.iter().map(|sum| format!("{:08x}", sum.to_bits())).collect();
+        *text += &format!("sums {}\n", bits.join(" "));
+    }
+    let mut margins = vec![0; model.object_count()];
+    model.margins_of(features, &mut margins);
+    let evidence: Vec<String> = recognizer.evidence().iter().map(i64::to_string).collect();
+    *text += &format!("margins {}\nevidence {}\n", numbers(&margins), evidence.join(" "));
+    *text += &match verdict {
+        Verdict::Undecided => "verdict undecided\n".to_string(),
+        Verdict::Recognized { object, touches, .. } => format!("verdict recognized {object} {touches}\n"),
+        Verdict::Unknown => "verdict unknown\n".to_string(),
+    };
+    // The leader's, and now and then the last one's.
+    let last = recognizer.touches().is_multiple_of(3).then(|| model.object_count() - 1);
+    for object in [Some(recognizer.best()), last].into_iter().flatten() {
+        *text += &format!("posterior {object} {}\n", recognizer.posterior(object).q56());
+    }
+}
+
+fn snapshot(text: &mut String, recognizer: &Recognizer<'_, 256>) {
+    let mut buffer = [0; SNAPSHOT_LENGTH + 2_560];
+    *text += &format!("snapshot {}\n", hex(recognizer.snapshot(&mut buffer).expect("a long buffer")));
+}
+
+/// Every layout, with every type of leaf.
+fn layouts(text: &mut String) {
+    for each in [true, false] {
+        for &leaf in Leaf::ALL {
+            for &layout in Layout::ALL {
+                let name = format!("{} {} {}", layout.name(), leaf.name(), if each { "each" } else { "one" });
+                let bytes = stated(&compiled(Shape { each, ..SHAPE }, 5, leaf, layout), ALL);
+                play(text, &name, &bytes, &touches(5, 1));
+            }
+        }
+    }
+    for (objects, leaf, layout) in [
+        (1, Leaf::I8, Layout::Compact),
+        (11, Leaf::I8, Layout::Complete),
+        (13, Leaf::I16, Layout::Complete),
+        (7, Leaf::F32, Layout::Complete),
+        (12, Leaf::I8, Layout::Patterns),
+        (11, Leaf::I8, Layout::Grid),
+    ] {
+        let bytes = compiled(Shape { objects, ..SHAPE }, 6, leaf, layout);
+        play(text, &format!("{} {} of {objects} objects", layout.name(), leaf.name()), &bytes, &touches(5, 2));
+    }
+    for depth in 1..=8 {
+        let shape = Shape { depth, trees: 2, objects: 2, thresholds: 40, ..SHAPE };
+        let bytes = compiled(shape, 7, Leaf::I8, Layout::Complete);
+        play(text, &format!("complete of depth {depth}"), &stated(&bytes, ALL), &touches(6, depth as u64));
+    }
+    let many = Shape { trees: 70, depth: 1, ..SHAPE };
+    for &layout in &[Layout::Complete, Layout::Compact, Layout::Wide] {
+        play(text, &format!("{} of 70 trees", layout.name()), &compiled(many, 8, Leaf::I8, layout), &touches(8, 3));
+    }
+    let axes = Shape { trees: 60, depth: 4, objects: 2, thresholds: 900, ..SHAPE };
+    let bytes = stated(&compiled(axes, 9, Leaf::I8, Layout::Compact), ALL);
+    play(text, "several axes of a feature", &bytes, &touches(12, 4));
+    let stumps = Shape { thresholds: 0, ..SHAPE };
+    play(text, "trees without splits", &compiled(stumps, 10, Leaf::I16, Layout::Compact), &touches(3, 5));
+    let most = Shape { objects: 256, trees: 1, depth: 1, ..SHAPE };
+    play(text, "256 objects", &compiled(most, 11, Leaf::I8, Layout::Compact), &touches(4, 6));
+    let bytes = palpate_tests::unaligned::model();
+    // The touch of the worked example comes first.
+    let touches: Vec<Touch> = [Touch::from_micros([30_000, 0, 50_000])].into_iter().chain(touches(8, 7)).collect();
+    play(text, "not aligned, thresholds of 3 bytes and of 1", &bytes, &touches);
+}
+
+/// Every descriptor, with poses.
+fn descriptors(text: &mut String) {
+    let pose = |direction, alignment| Pose { direction, alignment };
+    let poses = [
+        // Ends that touched at once: a component says which is first.
+        ([5, 0, 5], pose([1, -2, 3], [-4, 5, 6])),
+        ([5, 0, 5], pose([1, -2, 3], [4, 5, -6])),
+        ([5, 0, 5], pose([-1, 2, -3], [0, 0, -7])),
+        ([5, 0, 5], pose([0, 0, 0], [0, -8, 0])),
+        ([u32::MAX, 0, u32::MAX], pose([9, 9, 9], [-9, 0, 9])),
+        ([u32::MAX, 3, 0], pose([9, 9, 9], [1, 2, 3])),
+        ([0, 3, u32::MAX], pose([9, 9, 9], [1, 2, 3])),
+        ([7, 3, 0], pose([9, 9, 9], [i16::MIN, 1, i16::MAX])),
+    ];
+    let poses = poses.map(|(times, pose)| Touch::new(times.map(ContactTime::from_micros)).with_pose(pose));
+    for descriptor in Descriptor::ALL {
+        let bytes = compiled(Shape { descriptor, trees: 6, ..SHAPE }, 12, Leaf::I16, Layout::Compact);
+        let touches: Vec<Touch> = poses.into_iter().chain(touches(8, 8)).collect();
+        play(text, descriptor.name(), &stated(&bytes, ALL), &touches);
+    }
+}
+
+/// What models state, and what they refuse.
+fn sections(text: &mut String) {
+    let plain = |descriptor| compiled(Shape { descriptor, ..SHAPE }, 13, Leaf::I16, Layout::Compact);
+    let contacts = plain(Descriptor::ContactsCurvature);
+    play(text, "no sections", &contacts, &touches(8, 9));
+    play(text, "no sections, but a pose", &plain(Descriptor::Gravity), &touches(8, 9));
+    let reserved = changed(&contacts, 92, &[8, 0, 0, 0]);
+    play(text, "version 1 with something in its reserved bytes", &reserved, &touches(3, 9));
+    let shares = Some(PatternShares([1, 2, 3, 4, 5, 65_520]));
+    play(text, "all sections", &trained(&contacts, &Trained { shares, ..abuse::TRAINED }), &touches(12, 10));
+    let some = Patterns::from_bits(0b01_0110).expect("patterns");
+    let limits = TrainedTouches { patterns: some, needs_pose: true, largest_spread: 20_000, ..ALL };
+    let spread = |last: u32| Touch::new([0, last, u32::MAX].map(ContactTime::from_micros));
+    let touches: Vec<Touch> = [20_000, 20_001].into_iter().map(spread).chain(touches(12, 11)).collect();
+    play(text, "some patterns, a pose, a spread", &stated(&contacts, limits), &touches);
+    let pairs =
+        TrainedTouches { patterns: Patterns::CONTACTS, counted: Counted::Contacts, needs_pose: false, ..limits };
+    play(text, "a largest spread", &stated(&contacts, pairs), &touches);
+    let grown = [&ALL.to_bytes()[..], &[1, 2, 3]].concat();
+    let sections = [section(2 | 1 << 15, &grown), section(77, b"unknown"), section(78, &[])].concat();
+    play(text, "a section that has grown, and unknown ones", &with_sections(&contacts, &sections), &touches);
+}
+
+/// The same trees over this many features of rows.
+fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
+    ensemble.inputs = Inputs::unnamed(features);
+    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
+        for (index, node) in tree.nodes.iter_mut().enumerate() {
+            if let Node::Split { feature, threshold, .. } = node {
+                *feature = (*feature * 37 + number * 11 + index) % features;
+                *threshold *= 1.000_001e-3;
+            }
+        }
+    }
+    ensemble
+}
+
+/// Models over rows of features.
+fn rows(text: &mut String) {
+    for (layout, leaf) in [
+        (Layout::Compact, Leaf::I16),
+        (Layout::Wide, Leaf::F32),
+        (Layout::Complete, Leaf::I8),
+        (Layout::Complete, Leaf::F32),
+    ] {
+        let ensemble = imported(random::ensemble(SHAPE, 14), 5);
+        let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+        let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
+        play_rows(text, &format!("rows of f32 features, {} {}", layout.name(), leaf.name()), &bytes, true);
+        play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);
+    }
+}
+
+fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
+    let model = Model::new(bytes).expect("a model");
+    *text += &format!("model {} {name}\ntouch 0 1 2\nrefused features\n", hex(bytes));
+    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
+    let mut rng = SmallRng::seed_from_u64(15);
+    for length in [5, 5, 5, 5, 5, 5, 5, 5, 4, 0, 6] {
+        let mut value = || match rng.random_range(0..6) {
+            0 => f32::NAN,
+            1 => 0.0,
+            2 => f32::INFINITY,
+            _ => rng.random_range(-200.0..200.0_f32),
+        };
+        let row: Vec<i32> = (0..length)
+            .map(|_| {
+                let value = value();
+                if real {
+                    f32_key(value)
+                } else if value.is_nan() {
+                    MISSING_FEATURE
+                } else {
+                    value as i32
+                }
+            })
+            .collect();
+        *text += &format!("row {}\n", numbers(&row));
+        let verdict = recognizer.push_features(&row).expect("it takes rows");
+        known(text, &model, &recognizer, &row, verdict);
+    }
+}
+
+/// Evidence, ties, thresholds, limits.
+fn decisions(text: &mut String) {
+    let ensemble = random::ensemble(Shape { leaf: 0.6, ..SHAPE }, 16);
+    for (error_rate, max_touches) in [(0.3, 3), (0.01, 200), (1e-9, 200), (1e-15, 6)] {
+        let priors = Some(vec![0.5, 0.3, 0.2]);
+        let settings = Settings { leaf: Leaf::I8, error_rate, max_touches, priors, ..Settings::default() };
+        let bytes = stated(&compile(&ensemble, &settings).expect("it fits").bytes, ALL);
+        play(text, &format!("error rate {error_rate}, at most {max_touches} touches"), &bytes, &touches(20, 17));
+    }
+    let mut level = ensemble.clone();
+    level.base_margins.fill(0.0);
+    for node in level.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+        if let Node::Leaf(values) = node {
+            let first = values[0];
+            values.fill(first);
+        }
+    }
+    let settings = Settings { leaf: Leaf::I8, error_rate: 0.49, max_touches: 4, ..Settings::default() };
+    let bytes = stated(&compile(&level, &settings).expect("it fits").bytes, ALL);
+    play(text, "objects that are level", &bytes, &touches(6, 18));
+    // Sums that are no finite numbers, or beyond the range of margins.
+    let f32_leaves = stated(&compiled(SHAPE, 19, Leaf::F32, Layout::Compact), ALL);
+    let [.., leaves, _] = abuse::places(&f32_leaves);
+    let mut wild = f32_leaves.clone();
+    for (value, bytes) in wild[leaves..].chunks_mut(4).zip([f32::NAN, f32::INFINITY, 1e30, -1e30, 16_384.1].repeat(3)) {
+        value.copy_from_slice(&bytes.to_le_bytes());
+    }
+    play(text, "f32 leaves beyond reason", &abuse::sealed(wild), &touches(16, 20));
+    limits(text);
+}
+
+/// Evidence at the limits of 64 bits, which only a snapshot can bring about.
+fn limits(text: &mut String) {
+    let bytes = stated(&compiled(SHAPE, 21, Leaf::I16, Layout::Compact), ALL);
+    let model = Model::new(&bytes).expect("a model");
+    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
+    *text += &format!("model {} evidence at its limits\n", hex(&bytes));
+    for evidence in [[i64::MAX - 5; 3], [i64::MIN + 5; 3], [i64::MAX, 0, i64::MIN], [1 << 40, 0, 5]] {
+        let bytes = abuse::snapshot(&model, 7, 0, 0, &evidence);
+        recognizer.restore(&bytes).expect("a snapshot");
+        *text += &format!("restore {} ok\n", hex(&bytes));
+        for touch in random::touches(3, 22) {
+            *text += &format!("touch {}\n", touch_words(&touch));
+            let verdict = recognizer.push(&touch).expect("every approach counts");
+            let features = Descriptor::Curvature.features(&touch);
+            known(text, &model, &recognizer, features.as_slice(), verdict);
+        }
+    }
+    let own = abuse::snapshot(&model, 7, 0, 0, &[1, 2, 3]);
+    let mut changed = own.clone();
+    changed[6] ^= 1;
+    let other = Model::new(palpate_tests::unaligned::model().leak()).expect("a model");
+    for (bytes, answer) in [
+        (own[..own.len() - 1].to_vec(), "damaged"),
+        (changed, "damaged"),
+        (abuse::snapshot(&model, 7, 3, 0, &[1, 2, 3]), "damaged"),
+        (abuse::snapshot(&model, 7, 1, 0, &[1, 2, 3]), "damaged"),
+        (abuse::snapshot(&model, 7, 1, 3, &[1, 2, 3]), "damaged"),
+        (abuse::snapshot(&model, 0, 2, 0, &[1, 2, 3]), "damaged"),
+        (abuse::snapshot(&model, 7, 0, 0, &[1, 2]), "damaged"),
+        (abuse::snapshot(&model, 7, 0, 0, &[1, 2, 3, 4]), "damaged"),
+        (abuse::snapshot(&other, 7, 0, 0, &[1, 2, 3]), "other"),
+        (abuse::snapshot(&model, 7, 1, 2, &[1, 2, 30_000]), "ok"),
+        (abuse::snapshot(&model, 0, 0, 0, &[1, 2, 3]), "ok"),
+    ] {
+        assert_eq!(recognizer.restore(&bytes).is_ok(), answer == "ok");
+        *text += &format!("restore {} {answer}\n", hex(&bytes));
+    }
+}
+
+/// Bytes that are no model.
+fn refused(text: &mut String) {
+    for abuse::Abuse { name, kind, offset, bytes } in abuse::cases() {
+        *text += &format!("refuse {} {kind} {offset} {name}\n", hex(&bytes));
+    }
+}

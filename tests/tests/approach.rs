@@ -1,0 +1,252 @@
+//! Where to touch next, and what recent touches say against the evidence.
+
+use palpate::compile::{Leaf, Restated, Settings, compile, restate};
+use palpate_onboard::station::Station;
+use palpate_onboard::{Forgetting, Model, Proposal, Recognizer, Stopping, Verdict};
+use palpate_shared::format::{Plan, Tag};
+use palpate_shared::link::{ApproachMessage, Device, POSE_BYTES, Query, Refusal};
+use palpate_shared::{Descriptor, Poses, Touch};
+use palpate_tests::desk::{Desk, OBJECTS, Step, push};
+use palpate_tests::random::{self, Shape};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+fn model(objects: usize) -> Vec<u8> {
+    let shape = Shape {
+        descriptor: Descriptor::ContactsOriented,
+        objects,
+        trees: 8,
+        depth: 4,
+        each: true,
+        thresholds: 100,
+        leaf: 0.1,
+    };
+    compile(&random::ensemble(shape, 1), &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap().bytes
+}
+
+/// The model with a plan of random separations; every pose whose number is 3 modulo 10 never touches.
+fn planned(model: &[u8], rolls: u8, seed: u64) -> Vec<u8> {
+    let mut rng = SmallRng::seed_from_u64(seed);
+    let poses = Poses::with_rolls(rolls).unwrap();
+    let model = Model::new(model).unwrap();
+    let mut content = Plan::header(poses).to_vec();
+    for _ in 0..Plan::pairs(model.object_count()) {
+        content.extend((0..poses.count()).map(|pose| match pose % 10 {
+            3 => Plan::UNTOUCHED.cast_unsigned(),
+            _ => rng.random_range(-127..=127_i8).cast_unsigned(),
+        }));
+    }
+    with_section(&model, content)
+}
+
+fn with_section(model: &Model<'_>, content: Vec<u8>) -> Vec<u8> {
+    let sections = vec![(Tag::Plan, Some((false, content)))];
+    restate(model, &Restated { sections, ..Restated::default() }).unwrap()
+}
+
+fn recognizer<'m, const N: usize>(model: &Model<'m>) -> Recognizer<'m, N> {
+    Recognizer::new(model, Stopping::new(1e-15, u32::MAX).unwrap()).unwrap()
+}
+
+/// The mean separation of each pose, the others weighted by their posteriors, in f64.
+fn scores<const N: usize>(recognizer: &Recognizer<'_, N>) -> Vec<f64> {
+    let model = recognizer.model();
+    let (plan, evidence) = (model.plan().unwrap(), recognizer.evidence());
+    let leader = recognizer.best();
+    let others = || (0..evidence.len()).filter(|&object| object != leader);
+    let strongest = others().map(|object| evidence[object]).max().unwrap();
+    let weight = |object: usize| ((evidence[object] - strongest) as f64 * f64::from(model.unit())).exp();
+    let all: f64 = others().map(weight).sum();
+    let score = |pose: usize| {
+        let separation =
+            |object: usize| f64::from(plan.separations(leader, object)[pose].cast_signed()) / 128.0 * weight(object);
+        others().map(separation).sum::<f64>() / all
+    };
+    (0..usize::from(plan.poses().count())).map(score).collect()
+}
+
+#[test]
+fn the_proposed_approach_is_the_best_of_the_candidates_by_posterior_weights() {
+    for (objects, rolls) in [(2, 1), (3, 2), (10, 4), (200, 4)] {
+        let bytes = planned(&model(objects), rolls, 7);
+        let model = Model::new(&bytes).unwrap();
+        let mut recognizer = recognizer::<256>(&model);
+        let mut rng = SmallRng::seed_from_u64(3);
+        for touch in random::touches(200, 5) {
+            // Some of the touches have no pose or no contact: what is refused changes nothing.
+            let _ = recognizer.push(&touch);
+            let scores = scores(&recognizer);
+            let candidates: Vec<u16> = (0..130).filter(|_| rng.random_bool(0.5)).collect();
+            let may_touch = |pose: &u16| pose % 10 != 3 && usize::from(*pose) < scores.len();
+            let best = candidates.iter().filter(|pose| may_touch(pose)).map(|&pose| scores[usize::from(pose)]);
+            let best = best.fold(f64::NEG_INFINITY, f64::max);
+            let Some(Proposal { index, pose, score }) = recognizer.next_approach(candidates.iter().copied()) else {
+                assert_eq!(best, f64::NEG_INFINITY);
+                continue;
+            };
+            assert!(may_touch(&pose) && candidates[index] == pose);
+            // Weights are in Q15, and there are up to 255 of them.
+            let tolerance = 1e-4 * objects as f64;
+            assert!((f64::from(score) / 32_768.0 - scores[usize::from(pose)]).abs() < tolerance);
+            assert!(scores[usize::from(pose)] > best - tolerance, "{pose}: {} of {best}", scores[usize::from(pose)]);
+        }
+    }
+}
+
+#[test]
+fn without_a_plan_or_a_candidate_that_may_touch_nothing_is_proposed() {
+    let bytes = model(5);
+    let plain = Model::new(&bytes).unwrap();
+    assert_eq!(recognizer::<5>(&plain).next_approach(0..104), None);
+    let bytes = planned(&bytes, 4, 1);
+    let with_plan = Model::new(&bytes).unwrap();
+    let recognizer = recognizer::<5>(&with_plan);
+    assert_eq!(recognizer.next_approach([]), None);
+    assert_eq!(recognizer.next_approach([3, 13, 103, 104, u16::MAX]), None);
+    assert_eq!(recognizer.next_approach([3, 104, 50]).map(|proposal| (proposal.index, proposal.pose)), Some((2, 50)));
+    // Of several that are as good, the first.
+    let flat = with_section(&plain, [&Plan::header(Poses::with_rolls(1).unwrap())[..], &[5; 260]].concat());
+    let flat = Model::new(&flat).unwrap();
+    let proposal = self::recognizer::<5>(&flat).next_approach([9, 2, 4]).unwrap();
+    assert_eq!((proposal.index, proposal.pose, proposal.score), (0, 9, 5 * 256));
+}
+
+#[test]
+fn evidence_beyond_every_limit_weighs_without_overflow() {
+    let bytes = planned(&model(256), 4, 2);
+    let model = Model::new(&bytes).unwrap();
+    let mut recognizer = recognizer::<256>(&model);
+    let mut margins = [i32::MIN; 256];
+    for leader in [0, 255, 17] {
+        margins.fill(i32::MIN);
+        margins[leader] = i32::MAX;
+        recognizer.reset();
+        (0..3).for_each(|_| _ = recognizer.push_margins(&margins));
+        // All others are level, and count alike.
+        assert!(recognizer.next_approach(0..104).is_some());
+    }
+    let all = Plan::header(Poses::with_rolls(4).unwrap());
+    let full = with_section(&model, all.into_iter().chain(std::iter::repeat_n(127, 104 * 256 * 255 / 2)).collect());
+    let full = Model::new(&full).unwrap();
+    assert_eq!(self::recognizer::<256>(&full).next_approach(0..104).map(|best| best.score), Some(127 * 256));
+}
+
+#[test]
+fn a_plan_that_makes_no_sense_is_refused_when_the_model_is_opened() {
+    let bytes = model(4);
+    let opened = Model::new(&bytes).unwrap();
+    for content in [vec![], vec![0, 4, 0, 0], vec![1, 1, 0, 0], vec![0, 3, 0, 0]] {
+        let long = [content, vec![0; 200]].concat();
+        let sections = vec![(Tag::Plan, Some((false, long.clone())))];
+        let refused = restate(&opened, &Restated { sections, ..Restated::default() });
+        // 26 poses of 6 pairs fit; 104 do not, nor another kind or number of rolls.
+        assert!(refused.is_err(), "{:?}", &long[..4]);
+    }
+}
+
+/// What a chip answers, as the desk keeps it.
+fn answered(approach: Result<ApproachMessage, Refusal>) -> String {
+    approach.map_or_else(|refusal| format!("Refused({refusal:?})"), |approach| format!("NextApproach({approach:?})"))
+}
+
+#[test]
+fn a_chip_proposes_over_the_link_what_the_hosts_recognizer_proposes() {
+    let bytes = planned(&model(10), 4, 4);
+    let host = Model::new(&bytes).unwrap();
+    let mut mirror = Station::<OBJECTS>::new(&host);
+    let mut without = [0; POSE_BYTES];
+    let (mut script, mut expected) = (Vec::new(), Vec::new());
+    for (number, touch) in random::touches(60, 9).iter().enumerate() {
+        script.push(push(touch));
+        let _ = mirror.push(touch, false);
+        // Fewer and fewer poses can be reached, in the end none.
+        without[number % POSE_BYTES] |= 0x1f << (number / POSE_BYTES);
+        script.push(Step::Ask(Query::NextApproach { without }));
+        expected.push(answered(mirror.next_approach(&without)));
+    }
+    script.push(Step::Ask(Query::NextApproach { without: [0xff; POSE_BYTES] }));
+    expected.push(answered(Err(Refusal::NoPlan)));
+    let mut desk = Desk::new(script, 0);
+    let memory = palpate_onboard::station::NoStorage;
+    palpate_onboard::station::serve::<OBJECTS, _, _>(&bytes, memory, 0, &mut desk).unwrap();
+    assert_eq!(desk.answers, expected);
+    let different: std::collections::BTreeSet<&String> = desk.answers.iter().collect();
+    assert!(different.len() > 5, "{different:?}");
+}
+
+#[test]
+fn a_chip_without_a_plan_refuses_to_propose() {
+    let bytes = model(3);
+    let mut desk = Desk::new([Step::Ask(Query::NextApproach { without: [0; POSE_BYTES] })], 0);
+    palpate_onboard::station::serve::<OBJECTS, _, _>(&bytes, palpate_onboard::station::NoStorage, 0, &mut desk)
+        .unwrap();
+    assert_eq!(desk.answers, ["Refused(NoPlan)"]);
+}
+
+/// Units in a nat.
+fn units(model: &Model<'_>, nats: f32) -> i32 {
+    (nats / model.unit()) as i32
+}
+
+#[test]
+fn recent_touches_that_contradict_the_evidence_restart_it_and_become_it() {
+    let bytes = model(3);
+    let model = Model::new(&bytes).unwrap();
+    let (mut recognizer, mut forgetting) = (recognizer::<3>(&model), Forgetting::new(&model, 5.0));
+    let one = units(&model, 1.0);
+    for _ in 0..10 {
+        assert_eq!(recognizer.push_margins_forgetting(&[one, 0, 0], &mut forgetting), Verdict::Undecided);
+    }
+    assert_eq!((recognizer.best(), forgetting.restarts()), (0, 0));
+    for number in 1..=5 {
+        assert_eq!((recognizer.best(), forgetting.restarts()), (0, 0), "touch {number}");
+        recognizer.push_margins_forgetting(&[0, one, one / 2], &mut forgetting);
+    }
+    // Five nats against the leader: only what these touches said is left, with the prior.
+    let expected: Vec<i64> = [0, 5 * one, 5 * (one / 2)]
+        .into_iter()
+        .enumerate()
+        .map(|(object, evidence)| i64::from(evidence) + i64::from(model.prior(object)))
+        .collect();
+    assert_eq!((recognizer.best(), forgetting.restarts()), (1, 1));
+    assert_eq!(recognizer.evidence(), expected);
+    assert_eq!(recognizer.touches(), 15);
+    // A restart can decide at once, and after a verdict nothing changes.
+    let mut hasty = Recognizer::<3>::new(&model, Stopping::new(0.01, 100).unwrap()).unwrap();
+    hasty.push_margins_forgetting(&[one, 0, 0], &mut forgetting);
+    let verdict = hasty.push_margins_forgetting(&[0, 20 * one, 0], &mut forgetting);
+    assert!(matches!(verdict, Verdict::Recognized { object: 1, touches: 2, .. }), "{verdict:?}");
+    assert_eq!(hasty.push_margins_forgetting(&[90 * one, 0, 0], &mut forgetting), verdict);
+}
+
+#[test]
+fn touches_that_speak_for_the_leader_in_between_keep_the_evidence() {
+    let bytes = model(2);
+    let model = Model::new(&bytes).unwrap();
+    let (mut recognizer, mut forgetting) = (recognizer::<2>(&model), Forgetting::new(&model, 5.0));
+    let one = units(&model, 1.0);
+    let mut plain = self::recognizer::<2>(&model);
+    for margins in std::iter::repeat_n([[one, 0], [one, 0], [0, one], [one, 0], [0, one], [0, one]], 200).flatten() {
+        recognizer.push_margins_forgetting(&margins, &mut forgetting);
+        plain.push_margins(&margins);
+    }
+    assert_eq!(forgetting.restarts(), 0);
+    assert_eq!(recognizer.evidence(), plain.evidence());
+}
+
+#[test]
+fn no_limit_and_no_margin_makes_forgetting_panic() {
+    let bytes = model(4);
+    let model = Model::new(&bytes).unwrap();
+    for nats in [f32::NAN, f32::NEG_INFINITY, -1.0, 0.0, f32::MIN_POSITIVE, 1e30, f32::INFINITY] {
+        let (mut recognizer, mut forgetting) = (recognizer::<4>(&model), Forgetting::new(&model, nats));
+        for margins in [[i32::MIN, i32::MAX, 0, 1], [i32::MAX, i32::MIN, 0, 1]].into_iter().cycle().take(9) {
+            recognizer.push_margins_forgetting(&margins, &mut forgetting);
+        }
+        assert_eq!(recognizer.touches(), 9);
+    }
+    let refused =
+        recognizer::<4>(&model).push_forgetting(&Touch::from_micros([0, 1, 2]), &mut Forgetting::new(&model, 5.0));
+    // It needs a pose.
+    assert!(refused.is_err());
+}

@@ -1,0 +1,255 @@
+//! The test vectors of the model format: the chip's recognizer gives what they say, and so does one that was written from
+//! `FORMAT.md` alone.
+
+use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative};
+use palpate_shared::Touch;
+use palpate_shared::format::{checksum, f32_key};
+use palpate_tests::abuse;
+use palpate_tests::plain::{self, Approach, Decision, Plain};
+use palpate_tests::vectors::{bytes, hex, numbers, read_numbers, read_touch, refusal};
+use std::collections::BTreeSet;
+
+const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
+const FORMAT: &str = include_str!("../../shared/FORMAT.md");
+
+/// A recognizer and the other one, and what they said last.
+struct Both<'m> {
+    model: Model<'m>,
+    recognizer: Recognizer<'m, 256>,
+    plain: Plain<'m>,
+    touch: Option<Touch>,
+    features: Vec<i32>,
+    refused: Option<&'static str>,
+}
+
+impl<'m> Both<'m> {
+    fn new(bytes: &'m [u8]) -> Self {
+        let model = Model::new(bytes).unwrap();
+        let recognizer = Recognizer::new(&model, Stopping::from_model(&model)).unwrap();
+        Self { model, recognizer, plain: Plain::new(bytes), touch: None, features: Vec::new(), refused: None }
+    }
+
+    fn touch(&mut self, words: &str) {
+        let touch = read_touch(words);
+        let approach = approach(&touch);
+        self.refused = self.recognizer.push(&touch).err().map(refusal);
+        assert_eq!(self.plain.refused(&approach), self.refused);
+        self.touch = Some(touch);
+        if self.refused.is_none() {
+            self.features = self.model.descriptor().unwrap().features(&touch).as_slice().to_vec();
+            assert_eq!(self.plain.features(&approach), self.features);
+            self.plain.count(&self.plain.margins(&self.plain.sums(&self.features)));
+        }
+    }
+
+    fn row(&mut self, words: &str) {
+        self.features = read_numbers(words);
+        self.recognizer.push_features(&self.features).unwrap();
+        self.plain.count(&self.plain.margins(&self.plain.sums(&self.features)));
+    }
+
+    fn restore(&mut self, words: &str) {
+        let (digits, answer) = words.split_once(' ').unwrap();
+        let found = match self.recognizer.restore(&bytes(digits)) {
+            Ok(()) => "ok",
+            Err(SnapshotError::OtherModel) => "other",
+            Err(_) => "damaged",
+        };
+        assert_eq!(found, answer);
+        if found == "ok" {
+            self.plain.reset();
+            self.plain.touches = self.recognizer.touches();
+            if self.plain.touches > 0 {
+                self.plain.evidence = self.recognizer.evidence().to_vec();
+            }
+        }
+    }
+
+    fn check(&self, word: &str, words: &str) {
+        let sums = || self.plain.sums(&self.features);
+        match word {
+            "name" => {
+                let (object, name) = words.split_once(' ').unwrap();
+                assert_eq!(self.model.object_name(object.parse().unwrap()), name);
+            }
+            "refused" => assert_eq!(self.refused, Some(words)),
+            "features" => assert_eq!(numbers(&self.features), words),
+            "sums" => {
+                let mut sums_here = vec![0.0; self.model.object_count()];
+                assert!(self.model.f32_margins_of(&self.features, &mut sums_here));
+                let expected: Vec<u32> = words.split(' ').map(|bits| u32::from_str_radix(bits, 16).unwrap()).collect();
+                assert_eq!(sums_here.iter().map(|sum| sum.to_bits()).collect::<Vec<_>>(), expected);
+                assert_eq!(sums().iter().map(|&sum| sum as u32).collect::<Vec<_>>(), expected);
+            }
+            "margins" => {
+                let mut margins = vec![0; self.model.object_count()];
+                assert!(self.model.margins_of(&self.features, &mut margins));
+                assert_eq!((&margins, self.plain.margins(&sums())), (&read_numbers(words), read_numbers(words)));
+            }
+            "evidence" => {
+                let evidence: Vec<i64> = words.split(' ').map(|number| number.parse().unwrap()).collect();
+                assert_eq!((self.recognizer.evidence(), &self.plain.evidence), (&evidence[..], &evidence));
+            }
+            "verdict" => {
+                let (here, plain) = (said(self.recognizer.verdict()), self.plain.decision);
+                let plain = match plain {
+                    Decision::Undecided => "undecided".into(),
+                    Decision::Recognized(object, touches) => format!("recognized {object} {touches}"),
+                    Decision::Unknown => "unknown".into(),
+                };
+                assert_eq!((here.as_str(), plain.as_str()), (words, words));
+            }
+            "posterior" => {
+                let (object, posterior) = words.split_once(' ').unwrap();
+                let (object, posterior): (usize, u64) = (object.parse().unwrap(), posterior.parse().unwrap());
+                assert_eq!(self.recognizer.posterior(object).q56(), posterior);
+                assert_eq!(self.plain.posterior(object), posterior);
+                if let Verdict::Recognized { object: recognized, rivals, .. } = self.recognizer.verdict()
+                    && usize::from(recognized) == object
+                {
+                    assert_eq!(rivals.posterior().q56(), posterior);
+                }
+            }
+            "snapshot" => {
+                let mut buffer = [0; SNAPSHOT_LENGTH + 2_560];
+                assert_eq!(hex(self.recognizer.snapshot(&mut buffer).unwrap()), words);
+            }
+            _ => panic!("an unknown word"),
+        }
+    }
+}
+
+fn said(verdict: Verdict) -> String {
+    match verdict {
+        Verdict::Undecided => "undecided".into(),
+        Verdict::Recognized { object, touches, .. } => format!("recognized {object} {touches}"),
+        Verdict::Unknown => "unknown".into(),
+    }
+}
+
+fn approach(touch: &Touch) -> Approach {
+    let pose = touch.pose().map(|pose| {
+        let ([x, y, z], [u, v, w]) = (pose.direction, pose.alignment);
+        [x, y, z, u, v, w]
+    });
+    (touch.times().map(|time| time.micros()), pose)
+}
+
+/// Lines that stand for themselves.
+fn check_function(word: &str, words: &str) -> bool {
+    let two = || words.split_once(' ').unwrap();
+    match word {
+        "crc" => assert_eq!(format!("{:08x}", checksum(&bytes(two().0))), two().1),
+        "exp2" => {
+            let (exponent, result) = (two().0.parse().unwrap(), two().1.parse().unwrap());
+            assert_eq!((exp2_negative(exponent), plain::exp2(exponent)), (result, result));
+        }
+        "key" => {
+            let value = f32::from_bits(u32::from_str_radix(two().0, 16).unwrap());
+            let key = read_numbers(two().1)[0];
+            assert_eq!((f32_key(value), plain::key(value)), (key, key));
+        }
+        "refuse" => {
+            let [digits, kind, offset, _] = words.splitn(4, ' ').collect::<Vec<_>>()[..] else { panic!("four words") };
+            let error = Model::new(&bytes(digits)).map(|_| ()).unwrap_err();
+            assert_eq!((abuse::kind(&error), error.offset()), (kind, offset.parse().unwrap()));
+        }
+        _ => return false,
+    }
+    true
+}
+
+/// The vectors' lines with the number of each, and the words after its first one.
+fn lines() -> impl Iterator<Item = (usize, &'static str, &'static str)> {
+    let lines = VECTORS.lines().enumerate().filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    lines.map(|(index, line)| {
+        let (word, words) = line.split_once(' ').unwrap_or((line, ""));
+        (index + 1, word, words)
+    })
+}
+
+#[test]
+fn the_recognizer_and_a_plain_reading_of_the_specification_agree_with_the_vectors() {
+    let mut both: Option<Both<'_>> = None;
+    let mut counts = [0; 3];
+    for (number, word, words) in lines() {
+        let place = std::panic::AssertUnwindSafe(|| {
+            if word == "vectors" {
+                return assert_eq!(words, "1");
+            }
+            if word == "model" {
+                counts[0] += 1;
+                both = Some(Both::new(bytes(words.split(' ').next().unwrap()).leak()));
+                return;
+            }
+            if check_function(word, words) {
+                return;
+            }
+            let both = both.as_mut().expect("a model comes first");
+            match word {
+                "touch" => {
+                    counts[1] += 1;
+                    both.touch(words);
+                }
+                "row" => {
+                    counts[1] += 1;
+                    both.row(words);
+                }
+                "restore" => both.restore(words),
+                "reset" => {
+                    both.recognizer.reset();
+                    both.plain.reset();
+                }
+                _ => {
+                    counts[2] += 1;
+                    both.check(word, words);
+                }
+            }
+        });
+        if let Err(panic) = std::panic::catch_unwind(place) {
+            eprintln!("in line {number} of vectors.txt: {word}");
+            std::panic::resume_unwind(panic);
+        }
+    }
+    println!("{} models, {} touches, {} results", counts[0], counts[1], counts[2]);
+    assert!(counts[0] > 60 && counts[1] > 500 && counts[2] > 2_000, "{counts:?}");
+}
+
+#[test]
+fn the_vectors_have_every_layout_leaf_descriptor_and_verdict() {
+    let models: Vec<&[u8]> = lines()
+        .filter(|line| line.1 == "model")
+        .map(|line| &*bytes(line.2.split(' ').next().unwrap()).leak())
+        .collect();
+    let of = |at: usize| models.iter().map(|bytes| bytes[at]).collect::<BTreeSet<u8>>();
+    assert_eq!(of(4), BTreeSet::from([1, 2]));
+    assert_eq!(of(6), (0..5).collect());
+    assert_eq!(of(7), (0..3).collect());
+    assert_eq!(of(12), (0..7).chain([255]).collect());
+    assert_eq!(of(13), (0..2).collect());
+    let of = |word: &str| lines().filter(|line| line.1 == word).map(|line| line.2).collect::<BTreeSet<_>>();
+    let verdicts: BTreeSet<&str> = of("verdict").iter().map(|words| words.split(' ').next().unwrap()).collect();
+    assert_eq!(verdicts, BTreeSet::from(["recognized", "undecided", "unknown"]));
+    assert_eq!(of("refused"), BTreeSet::from(["features", "pattern", "pose", "spread"]));
+    assert!(VECTORS.len() < 500_000, "{} bytes", VECTORS.len());
+}
+
+#[test]
+fn every_abuse_of_a_model_is_refused_at_its_place() {
+    let cases = abuse::cases();
+    let wrong = cases.iter().filter_map(|case| {
+        let found = Model::new(&case.bytes).map(|_| ()).map_err(|error| (abuse::kind(&error), error.offset()));
+        (found != Err((case.kind, case.offset))).then(|| format!("{}: {:?}, not {:?}", case.name, found, case.offset))
+    });
+    assert_eq!(wrong.collect::<Vec<_>>(), Vec::<String>::new());
+    let names: BTreeSet<&str> = cases.iter().map(|case| case.name.as_str()).collect();
+    assert_eq!(names.len(), cases.len());
+    // Those of the vectors are the same, and the specification lists each.
+    let written: BTreeSet<&str> =
+        lines().filter(|line| line.1 == "refuse").map(|line| line.2.splitn(4, ' ').nth(3).unwrap()).collect();
+    assert_eq!(written, names);
+    for case in &cases {
+        let row = format!("| {} | {} |", case.name, case.kind);
+        assert!(FORMAT.contains(&row), "FORMAT.md has no row {row}");
+    }
+}
