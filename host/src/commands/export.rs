@@ -19,7 +19,7 @@ Leaves:
   i8   one byte per value: half the size, margins within hundredths of a nat
   f32  four bytes per value, added as the trainer adds them: the same margins
 
-Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most twice the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
+Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
 
 Instructions per touch are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
 
