@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let split = |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };
     let leaf = |flat: f32, round: f32| Node::Leaf(vec![flat, round]);
     let ensemble = Ensemble {
-        descriptor: Descriptor::Curvature,
+        inputs: Descriptor::Curvature.into(),
         objects: vec!["flat".into(), "round".into()],
         base_margins: vec![0.0, 0.0],
         trees: vec![
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The same touch through both: margins of the compiled model are whole numbers of `unit()` nats.
     let model = Model::new(&compiled.bytes)?;
     let touch = Touch::from_micros([31_000, 0, 42_000]);
-    println!("features {:?}", feature_row(ensemble.descriptor, &touch));
+    println!("features {:?}", feature_row(Descriptor::Curvature, &touch));
     let mut margins = [0; 2];
     model.margins(&touch, &mut margins);
     for ((name, full), compiled) in ensemble.objects.iter().zip(ensemble.margins(&touch)).zip(margins) {

@@ -61,7 +61,8 @@
 //! | [`probe`] | the simulator: scene, approach, first contact | [`probe::scene::Scene`] |
 //! | [`touches`] | touches in memory and on disk; noise; splits | [`touches::Dataset`] |
 //! | [`capture`] | touches objects, many times | [`capture::capture`](fn@capture::capture) |
-//! | [`ensemble`] | the full model: trees in `f32`, XGBoost JSON, training | [`ensemble::Ensemble`] |
+//! | [`ensemble`] | the full model: trees in `f32`, files of XGBoost, LightGBM, CatBoost and ONNX, training | [`ensemble::Ensemble`] |
+//! | [`rows`] | rows of features, for models that other libraries trained | [`rows::Rows`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
 //! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
@@ -100,6 +101,7 @@ pub mod touches;
 
 pub mod capture;
 pub mod ensemble;
+pub mod rows;
 
 pub mod compile;
 pub mod evaluate;

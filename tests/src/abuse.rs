@@ -256,6 +256,10 @@ fn sections(put: Put<'_>) {
         bytes[position] = value;
         with(&[section(touches_tag, &bytes)])
     };
+    let by_object = section(Tag::ThresholdsByObject.code() | MUST_UNDERSTAND, &[1; 11]);
+    put("thresholds for fewer objects than there are", "field", optional, with(&[by_object]));
+    put("a plan in poses that do not exist", "field", optional, with(&[section(7, &[1; 200])]));
+    put("a plan that is too short", "field", optional, with(&[section(7, &[0, 1, 0, 0, 5])]));
     put("touches that are too short", "field", optional, with(&[section(touches_tag, &touches[..7])]));
     put("touches of no pattern", "field", optional, stated(0, 0));
     put("touches of a pattern that does not exist", "field", optional, stated(0, 64));

@@ -34,6 +34,10 @@ pub struct Plain<'a> {
     unit_bits: u64,
     unit_shift: u32,
     odds: u64,
+    /// Each object's own, if the model has them.
+    odds_by_object: Vec<u64>,
+    /// One over the temperature in Q16.
+    sharpness: u64,
     limit: u32,
     patterns: u8,
     needs_pose: bool,
@@ -106,12 +110,17 @@ impl<'a> Plain<'a> {
             object: (group[2] == 1).then_some(group[3].into()),
             trees: number(&group[4..]) as usize,
         });
+        let (mut odds_by_object, mut sharpness) = (Vec::new(), 1 << 16);
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
             let length = number(&optional[4..8]) as usize;
-            if number(&optional[..2]) & 0x7fff == 2 {
-                (patterns, needs_pose, largest) = (optional[8], optional[10] == 1, number(&optional[12..16]) as u32);
+            let content = &optional[8..][..length];
+            match number(&optional[..2]) & 0x7fff {
+                2 => (patterns, needs_pose, largest) = (content[0], content[2] == 1, number(&content[4..8]) as u32),
+                5 => odds_by_object = content[..4 * objects].chunks(4).map(|odds| number(odds) << 24).collect(),
+                11 if (1 << 12..=1 << 20).contains(&number(&content[..4])) => sharpness = number(&content[..4]),
+                _ => {}
             }
             optional = &optional[8 + length.next_multiple_of(4)..];
         }
@@ -123,6 +132,8 @@ impl<'a> Plain<'a> {
             unit_bits: field(36, 4),
             unit_shift: bytes[40].into(),
             odds: field(48, 8),
+            odds_by_object,
+            sharpness,
             limit: field(56, 4) as u32,
             patterns,
             needs_pose,
@@ -275,7 +286,7 @@ impl<'a> Plain<'a> {
                 leaves = &leaves[count * length..];
             }
             if self.layout == 1 {
-                splits = &splits[2 * group.trees << group.depth..];
+                splits = &splits[(2 * group.trees) << group.depth..];
             }
         }
         sums
@@ -332,8 +343,8 @@ impl<'a> Plain<'a> {
         }
         self.touches += 1;
         let leader = self.leader();
-        let rivals = self.rivals();
-        if rivals <= u128::from(self.odds) {
+        let odds = self.odds_by_object.get(leader).copied().unwrap_or(self.odds);
+        if self.rivals(1 << 16) <= u128::from(odds) {
             self.decision = Decision::Recognized(leader, self.touches);
         } else if self.touches >= self.limit {
             self.decision = Decision::Unknown;
@@ -346,23 +357,25 @@ impl<'a> Plain<'a> {
         self.evidence.iter().position(|evidence| evidence == most).expect("it is there")
     }
 
-    fn weight(&self, object: usize) -> u64 {
+    fn weight(&self, object: usize, sharpness: u64) -> u64 {
         let behind = self.evidence[self.leader()].abs_diff(self.evidence[object]).min(u32::MAX.into());
-        exp2(((u128::from(behind) * u128::from(self.unit_bits)) >> self.unit_shift) as u64)
+        let u = (u128::from(behind) * u128::from(self.unit_bits)) >> self.unit_shift;
+        exp2(if sharpness == 1 << 16 { u as u64 } else { ((u.min(1 << 42) * u128::from(sharpness)) >> 16) as u64 })
     }
 
     /// What all objects but the leader weigh.
-    fn rivals(&self) -> u128 {
+    fn rivals(&self, sharpness: u64) -> u128 {
         let leader = self.leader();
-        (0..self.objects).filter(|&object| object != leader).map(|object| u128::from(self.weight(object))).sum()
+        let others = (0..self.objects).filter(|&object| object != leader);
+        others.map(|object| u128::from(self.weight(object, sharpness))).sum()
     }
 
     /// An object's posterior in Q56.
     pub fn posterior(&self, object: usize) -> u64 {
-        let (one, rivals) = (1_u128 << 56, self.rivals());
+        let (one, rivals) = (1_u128 << 56, self.rivals(self.sharpness));
         // Of 256 objects level with each other all but 2^-64 counts.
         let whole = (one + rivals).min(u64::MAX.into());
-        let part = if object == self.leader() { rivals } else { u128::from(self.weight(object)) };
+        let part = if object == self.leader() { rivals } else { u128::from(self.weight(object, self.sharpness)) };
         let ratio = ((part << 56) / whole) as u64;
         if object == self.leader() { (1 << 56) - ratio } else { ratio }
     }
@@ -421,7 +434,7 @@ pub fn exp2(u: u64) -> u64 {
     if u >> 32 > 57 {
         return 0;
     }
-    let times = |a: u64, b: u64| a * b >> 32;
+    let times = |a: u64, b: u64| (a * b) >> 32;
     let f = u & 0xffff_ffff;
     let (x, i) = (f << 4 & 0xffff_ffff, f >> 28);
     let s = 186_065_157 - times(x, 4_029_616 - times(x, 56_985));

@@ -38,7 +38,7 @@ pub fn ensemble(shape: Shape, seed: u64) -> Ensemble {
     let trees = trees.collect();
     let objects = (0..shape.objects).map(|object| format!("object {object}")).collect();
     let base_margins = (0..shape.objects).map(|_| rng.random_range(-0.5..=0.5)).collect();
-    Ensemble { descriptor: shape.descriptor, objects, base_margins, trees, origin: Origin::default() }
+    Ensemble { inputs: shape.descriptor.into(), objects, base_margins, trees, origin: Origin::default() }
 }
 
 fn threshold(rng: &mut SmallRng) -> f32 {

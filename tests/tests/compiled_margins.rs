@@ -1,7 +1,7 @@
 //! A compiled model's margins are those of its ensemble: exactly with f32 leaves, within the stated error otherwise.
 
 use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Node};
+use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate_onboard::Model;
 use palpate_shared::format::f32_key;
 use palpate_shared::{Descriptor, Touch};
@@ -48,7 +48,7 @@ fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
             }
         }
     }
-    ensemble
+    Ensemble { inputs: Inputs::unnamed(features), ..ensemble }
 }
 
 /// A row next to some of the thresholds, and with all that is special about f32.
@@ -121,7 +121,7 @@ proptest! {
         let mut margins = vec![0.0; shape.objects];
         let mut models = 0;
         for layout in [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)] {
-            let settings = Settings { leaf: Leaf::F32, layout, raw_features: Some(features), ..Settings::default() };
+            let settings = Settings { leaf: Leaf::F32, layout, ..Settings::default() };
             let Ok(compiled) = compile(&ensemble, &settings) else { continue };
             models += 1;
             let model = Model::new(&compiled.bytes).unwrap();

@@ -23,7 +23,7 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
     nodes.push(Node::Leaf(margins[steps.len()].to_vec()));
     let objects = margins[0].len();
     Ensemble {
-        descriptor: Descriptor::Curvature,
+        inputs: Descriptor::Curvature.into(),
         objects: (0..objects).map(|object| object.to_string()).collect(),
         base_margins: vec![0.0; objects],
         trees: vec![Tree { nodes, output: Output::Each }],

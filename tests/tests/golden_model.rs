@@ -19,7 +19,7 @@ fn ensemble() -> Ensemble {
     ];
     let second = vec![split(0, 70000.0, true, 1, 2), leaf(0.125, 0.0), leaf(-0.125, 0.0625)];
     Ensemble {
-        descriptor: Descriptor::Curvature,
+        inputs: Descriptor::Curvature.into(),
         objects: vec!["ab".into(), "c".into()],
         base_margins: vec![0.5, -0.5],
         trees: [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
@@ -42,7 +42,7 @@ fn over_patterns() -> Ensemble {
     ];
     let second = vec![split(3, 70000.0, false, 1, 2), leaf(0.125, 0.0), leaf(-0.125, 0.0625)];
     let trees = [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect();
-    Ensemble { descriptor: Descriptor::ContactsCurvature, trees, ..ensemble() }
+    Ensemble { inputs: Descriptor::ContactsCurvature.into(), trees, ..ensemble() }
 }
 
 /// Compiles with the version and the ensemble's hash, which may change with a release, set to zero.

@@ -1,5 +1,5 @@
-//! Firmware images made of the recognizer alone: they link although a panic could not, hold no float code, and take the
-//! flash that is stated.
+//! Firmware images that link although a panic could not, and take the flash that is stated; of the recognizer alone they hold
+//! no float code.
 //!
 //! They are built for thumbv6m-none-eabi, so these tests only run where they are asked for:
 //! `cargo test -p palpate-tests --test images -- --ignored --nocapture`, which `.ci/firmware` does.
@@ -20,6 +20,9 @@ const IMAGES: [(&str, [usize; 2]); 6] = [
     ("complete,i16-leaves", [7_300, 7_500]),
     ("compact,complete,grid,wide,i8-leaves,i16-leaves", [9_200, 9_400]),
 ];
+
+/// Images of other features of the crate, with compact trees of i8 leaves, and the most bytes of flash that they may take.
+const FEATURES: [(&str, usize); 3] = [("effector", 11_800), ("link", 24_200), ("station", 43_800)];
 
 /// Builds an image; it links only if nothing in it can panic, since its panic handler calls what is defined nowhere.
 fn image(name: &str, features: &str) -> Image {
@@ -106,6 +109,18 @@ fn holds_no_panic_and_no_float_code(name: &str, most: impl Fn([usize; 2]) -> usi
         );
         assert_eq!(image.float_code(), Vec::<&String>::new());
         assert!(image.flash <= most(limits), "{} bytes of flash", image.flash);
+    }
+}
+
+#[test]
+#[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
+fn switches_a_link_and_a_station_with_flash_cannot_panic_and_take_the_flash_that_is_stated() {
+    for (name, most) in FEATURES {
+        let image = image(name, "compact,i8-leaves");
+        println!("{name:9} {:50} {} bytes of flash", "compact,i8-leaves", image.flash);
+        assert!(image.symbols.iter().any(|name| name.contains("palpate_onboard")), "the image has no symbols");
+        assert!(!image.symbols.iter().any(|name| name.contains("panic")), "panicking code is linked");
+        assert!(image.flash <= most, "{} bytes of flash", image.flash);
     }
 }
 

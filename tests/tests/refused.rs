@@ -1,6 +1,7 @@
 //! What a model was not trained for is not counted, and changes nothing.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::ensemble::{Ensemble, Inputs};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::{ContactPattern, ContactTime, Descriptor, Patterns, Pose, Touch};
@@ -94,8 +95,7 @@ fn a_model_that_needs_a_pose_refuses_touches_without_one() {
 
 #[test]
 fn a_model_over_rows_refuses_touches_and_one_over_touches_refuses_rows() {
-    let settings =
-        Settings { leaf: Leaf::F32, layout: Some(Layout::Wide), raw_features: Some(2), ..Settings::default() };
+    let settings = Settings { leaf: Leaf::F32, layout: Some(Layout::Wide), ..Settings::default() };
     let shape = Shape {
         descriptor: Descriptor::Curvature,
         objects: 3,
@@ -105,7 +105,8 @@ fn a_model_over_rows_refuses_touches_and_one_over_touches_refuses_rows() {
         thresholds: 20,
         leaf: 0.5,
     };
-    let rows = compile(&random::ensemble(shape, 1), &settings).unwrap().bytes;
+    let ensemble = Ensemble { inputs: Inputs::unnamed(2), ..random::ensemble(shape, 1) };
+    let rows = compile(&ensemble, &settings).unwrap().bytes;
     let touches = model(Descriptor::Curvature);
     assert_eq!(push(&rows, &Touch::from_micros([0, 5, 9])), Err(Refused::NeedsFeatures));
     for (bytes, expected) in [(rows, Ok(Verdict::Undecided)), (touches, Err(Refused::NeedsTouches))] {

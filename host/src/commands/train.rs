@@ -157,7 +157,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     // A binary tree has one leaf more than splits.
     let splits = (nodes - trees) / 2;
     let trained = Trained {
-        descriptor: ensemble.descriptor.name(),
+        descriptor: ensemble.descriptor().map_or("", Descriptor::name),
         objects: ensemble.objects.len(),
         touches: dataset.len(),
         used: dataset.objects.iter().flat_map(|object| &object.touches).filter(is_used).count(),

@@ -1,6 +1,6 @@
 //! An ensemble that was checked, with thresholds as the integers that the chip compares.
 
-use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Output, Tree, check_leaf};
+use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output, Tree, check_leaf};
 use crate::error::{CompileProblem, Error, Result, TreeProblem};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{Key, f32_key};
@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 pub(super) const MARGIN_RANGE: f64 = 16384.0;
 
 /// Trees deeper than this are refused.
-const MAX_DEPTH: usize = 64;
+const MAX_DEPTH: usize = 256;
 
 /// A checked ensemble.
 pub(super) struct Forest<'a> {
@@ -49,17 +49,18 @@ pub(super) struct Split<'a> {
 }
 
 impl<'a> Forest<'a> {
-    pub(super) fn new(ensemble: &'a Ensemble, raw_features: Option<usize>) -> Result<Self> {
+    pub(super) fn new(ensemble: &'a Ensemble, scales: Option<&'a [f32]>) -> Result<Self> {
         let objects = ensemble.objects.len();
         let base_margins = ensemble.base_margins.len();
         if !(1..=MAX_OBJECTS).contains(&objects) || base_margins != objects {
             return Err(CompileProblem::Objects { objects, base_margins }.into());
         }
-        let features = raw_features.unwrap_or(ensemble.descriptor.feature_count());
-        if !(1..=256).contains(&features) {
-            return Err(Error::setting("raw_features", features, "1 to 256"));
+        let features = ensemble.inputs.count();
+        if !(1..=MAX_FEATURES).contains(&features) {
+            return Err(CompileProblem::Features { features, most: MAX_FEATURES }.into());
         }
-        let key = if raw_features.is_some() { Key::Real } else { Key::Whole };
+        let thresholds = Thresholds::new(&ensemble.inputs, scales)?;
+        thresholds.check_range(ensemble)?;
         let mut trees = Vec::with_capacity(ensemble.trees.len());
         for (index, tree) in ensemble.trees.iter().enumerate() {
             let place = |problem| CompileProblem::Tree { tree: index, problem };
@@ -70,7 +71,7 @@ impl<'a> Forest<'a> {
                 }
                 Output::Each => objects,
             };
-            let mut reader = Reader { tree, values, features, key, left: tree.nodes.len(), largest: 0.0 };
+            let mut reader = Reader { tree, values, features, thresholds, left: tree.nodes.len(), largest: 0.0 };
             let (root, splits, depth) = reader.branch(0, 0).map_err(place)?;
             trees.push(Branches { root, output: tree.output, depth, splits, largest: reader.largest });
         }
@@ -78,8 +79,8 @@ impl<'a> Forest<'a> {
             base: &ensemble.base_margins,
             trees,
             features,
-            key,
-            descriptor: raw_features.is_none().then_some(ensemble.descriptor),
+            key: thresholds.key(),
+            descriptor: ensemble.descriptor(),
         };
         forest.check_range()?;
         if let Some(descriptor) = forest.descriptor {
@@ -159,7 +160,7 @@ struct Reader<'a> {
     tree: &'a Tree,
     values: usize,
     features: usize,
-    key: Key,
+    thresholds: Thresholds<'a>,
     /// Nodes that may still be visited: one more is a node with two parents, or a loop.
     left: usize,
     largest: f32,
@@ -195,8 +196,8 @@ impl<'a> Reader<'a> {
                 }
                 let (left, left_splits, left_depth) = self.branch(left, depth + 1)?;
                 let (right, right_splits, right_depth) = self.branch(right, depth + 1)?;
-                let split =
-                    Split { feature: number, cut: cut(threshold, self.key), missing_left, left, right, left_splits };
+                let cut = self.thresholds.cut(feature, threshold);
+                let split = Split { feature: number, cut, missing_left, left, right, left_splits };
                 let depth = 1 + left_depth.max(right_depth);
                 Ok((Branch::Split(Box::new(split)), 1 + left_splits + right_splits, depth))
             }
@@ -204,12 +205,70 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The integer threshold that splits keys as `threshold` splits their features.
-fn cut(threshold: f32, key: Key) -> i32 {
-    match key {
-        // `as` keeps a value beyond an i32 at its limits, which features never reach.
-        Key::Whole => (threshold.ceil() as i32).max(i32::MIN + 1),
-        Key::Real => f32_key(threshold),
+/// How thresholds become integers.
+#[derive(Clone, Copy)]
+pub(super) enum Thresholds<'a> {
+    /// Features are whole numbers.
+    Whole,
+    /// Features are f32 values, compared by their keys.
+    Real,
+    /// Features are whole numbers, values times these scales.
+    Scaled(&'a [f32]),
+}
+
+impl<'a> Thresholds<'a> {
+    fn new(inputs: &Inputs, scales: Option<&'a [f32]>) -> Result<Self> {
+        let features = inputs.count();
+        match (inputs, scales) {
+            (Inputs::Touches(_), None) => Ok(Self::Whole),
+            (Inputs::Rows(_), None) => Ok(Self::Real),
+            (Inputs::Rows(_), Some(scales))
+                if scales.len() == features && scales.iter().all(|scale| scale.is_finite() && *scale > 0.0) =>
+            {
+                Ok(Self::Scaled(scales))
+            }
+            (_, Some(scales)) => {
+                let text = scales.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+                let allowed = match inputs {
+                    Inputs::Touches(_) => "none: features of touches are whole numbers".to_owned(),
+                    Inputs::Rows(_) => format!("{features} positive numbers, one for each feature"),
+                };
+                Err(Error::setting("scales", text, allowed))
+            }
+        }
+    }
+
+    /// Whether whole thresholds fit 32 bits: beyond, all values would be the same.
+    fn check_range(self, ensemble: &Ensemble) -> Result<()> {
+        let Self::Scaled(scales) = self else { return Ok(()) };
+        for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
+            let &Node::Split { feature, threshold, .. } = node else { continue };
+            let Some(&scale) = scales.get(feature) else { continue };
+            if threshold.is_finite() && (f64::from(threshold) * f64::from(scale)).abs() > f64::from(i32::MAX - 1) {
+                let name = ensemble.inputs.names().get(feature).map(ToString::to_string).unwrap_or_default();
+                let allowed = format!("a smaller scale: its threshold {threshold} is beyond 2^31 units");
+                return Err(Error::setting("scales", format!("{scale} for {name}"), allowed));
+            }
+        }
+        Ok(())
+    }
+
+    fn key(self) -> Key {
+        match self {
+            Self::Real => Key::Real,
+            Self::Whole | Self::Scaled(_) => Key::Whole,
+        }
+    }
+
+    /// The integer threshold that splits keys as `threshold` splits the values of `feature`.
+    fn cut(self, feature: usize, threshold: f32) -> i32 {
+        // `as` keeps a value beyond an i32 at its limits; -2^31 is a missing value.
+        let whole = |threshold: f64| (threshold.ceil() as i32).max(i32::MIN + 1);
+        match self {
+            Self::Whole => whole(f64::from(threshold)),
+            Self::Real => f32_key(threshold),
+            Self::Scaled(scales) => whole(f64::from(threshold) * f64::from(scales[feature])),
+        }
     }
 }
 
@@ -224,9 +283,9 @@ pub(super) fn each_leaf<'f>(branch: &'f Branch<'f>, see: &mut impl FnMut(&'f [f3
     }
 }
 
-/// Refuses an ensemble that was trained on fractions, such as times in seconds: its thresholds fall together when they
-/// become whole numbers. Trainers put thresholds at values of the data, which are whole, or halfway between two, so only
-/// thresholds elsewhere count; a few that fall together harm nothing.
+/// Refuses an ensemble that was trained on fractions, such as times in seconds: its thresholds move when they become
+/// whole numbers. Trainers put thresholds at values of the data, which are whole, or halfway between two; and XGBoost's
+/// outermost ones at twice a value and 1e-5 more.
 fn check_thresholds(ensemble: &Ensemble, descriptor: Descriptor) -> Result<()> {
     for (feature, &name) in descriptor.feature_names().iter().enumerate() {
         let splits = ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| match *node {
@@ -236,20 +295,21 @@ fn check_thresholds(ensemble: &Ensemble, descriptor: Descriptor) -> Result<()> {
         let mut thresholds: Vec<f32> = splits.collect();
         thresholds.sort_unstable_by(f32::total_cmp);
         thresholds.dedup();
-        let rounded = thresholds.iter().map(|&threshold| cut(threshold, Key::Whole)).collect::<BTreeSet<_>>().len();
-        let fell_together = |pair: &&[f32]| {
-            cut(pair[0], Key::Whole) == cut(pair[1], Key::Whole) && pair.iter().any(|&threshold| is_fraction(threshold))
-        };
-        let lost = thresholds.windows(2).filter(fell_together).count();
-        if 20 * lost > thresholds.len() {
-            return Err(CompileProblem::Thresholds { feature: name, thresholds: thresholds.len(), rounded }.into());
+        if let Some(&example) = thresholds.iter().find(|&&threshold| is_fraction(threshold)) {
+            let whole = thresholds.iter().map(|&threshold| Thresholds::Whole.cut(feature, threshold));
+            let rounded = whole.collect::<BTreeSet<_>>().len();
+            let thresholds = thresholds.len();
+            return Err(CompileProblem::Thresholds { feature: name, thresholds, rounded, example }.into());
         }
     }
     Ok(())
 }
 
-/// Whether a threshold is neither a whole number nor halfway between two, but for rounding in f32.
+/// Whether no trainer puts a threshold here in whole numbers, but for rounding in f32.
 fn is_fraction(threshold: f32) -> bool {
-    let twice = 2.0 * f64::from(threshold);
-    (twice - twice.round()).abs() > 1e-6 * twice.abs().max(1.0)
+    let from_whole = |number: f64| (number - number.round()).abs();
+    let value = f64::from(threshold);
+    let slack = 1e-6 * (2.0 * value).abs().max(1.0);
+    let outermost = (value.abs() - 1e-5) / 2.0;
+    from_whole(2.0 * value) > slack && from_whole(outermost) > slack
 }

@@ -20,7 +20,7 @@
 //!     Node::Leaf(vec![-0.5, 0.5]),
 //! ];
 //! let ensemble = Ensemble {
-//!     descriptor: Descriptor::Curvature,
+//!     inputs: Descriptor::Curvature.into(),
 //!     objects: vec!["bowl".into(), "fork".into()],
 //!     base_margins: vec![0.0; 2],
 //!     trees: vec![Tree { nodes, output: Output::Each }],
@@ -68,23 +68,62 @@ use palpate_onboard::Stopping;
 pub struct Settings {
     /// What leaves are stored as.
     pub leaf: Leaf,
-    /// How trees are laid out; `None` takes the layout with the least bytes² × instructions: a
-    /// table that is many times faster may be a few times larger.
+    /// How trees are laid out; `None` takes the layout that is best for `goal`.
     pub layout: Option<Layout>,
+    /// What a layout is chosen for, where none is asked for.
+    pub goal: Goal,
     /// The error rate that recognizers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
     /// The touches after which they give up.
     pub max_touches: u32,
     /// How likely each object is before any touch, in any common unit; `None` makes all equal.
     pub priors: Option<Vec<f64>>,
-    /// Compiles an ensemble over rows of this many f32 features instead of touches, whatever the ensemble's descriptor.
-    pub raw_features: Option<usize>,
+    /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
+    /// feature's scale; `None` compares f32 values.
+    pub scales: Option<Vec<f32>>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { leaf: Leaf::I16, layout: None, error_rate: 0.01, max_touches: 200, priors: None, raw_features: None }
+        Self {
+            leaf: Leaf::I16,
+            layout: None,
+            goal: Goal::Balanced(Core::M4F),
+            error_rate: 0.01,
+            max_touches: 200,
+            priors: None,
+            scales: None,
+        }
     }
+}
+
+/// What a layout is chosen for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// The fewest instructions of those layouts that have at most three times the bytes of the smallest.
+    Balanced(Core),
+    /// The fewest instructions.
+    Speed,
+    /// The fewest bytes.
+    Size,
+}
+
+/// What a layout comes to.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Candidate {
+    /// The layout.
+    #[serde(serialize_with = "name_of")]
+    pub layout: Layout,
+    /// Bytes of the model.
+    pub bytes: usize,
+    /// About how many instructions a touch takes.
+    pub instructions: Instructions,
+    /// The farthest that a margin can be from the ensemble's, in nats.
+    pub margin_error: f32,
+}
+
+fn name_of<S: serde::Serializer>(layout: &Layout, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(layout.name())
 }
 
 /// What [`compile`] made.
@@ -96,12 +135,14 @@ pub struct Compiled {
     pub splits: usize,
     /// Leaves of the ensemble.
     pub leaves: usize,
-    /// The farthest that a margin of a touch can be from the ensemble's, in nats.
+    /// The farthest that a margin can be from the ensemble's, and from that of the library that trained it, in nats.
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
     /// About how many instructions a touch takes.
     pub instructions: Instructions,
+    /// All layouts that were tried.
+    pub candidates: Vec<Candidate>,
 }
 
 /// When recognizers stop.
@@ -124,26 +165,54 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 /// the layout asked for; [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
-    let forest = Forest::new(ensemble, settings.raw_features)?;
+    let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
-    let mut candidates = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
-    // Where some layout holds the ensemble's very numbers, none that rounds them is worth a few bytes.
-    if candidates.iter().any(|(_, parts)| parts.margin_error == 0.0) {
-        candidates.retain(|(_, parts)| parts.margin_error == 0.0);
-    }
-    let mut best: Option<(u128, Layout, parts::Parts)> = None;
-    for (layout, parts) in candidates {
-        let bytes = parts.bytes() as u128;
-        let cost = bytes * bytes * u128::from(parts.instructions.m4f);
-        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-            best = Some((cost, layout, parts));
-        }
-    }
-    let Some((_, layout, parts)) = best else {
+    let made = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
+    let overhead = write::overhead(ensemble, settings, &forest)?;
+    let candidate = |(layout, parts): &(Layout, parts::Parts)| Candidate {
+        layout: *layout,
+        bytes: parts.bytes() + overhead,
+        instructions: parts.instructions,
+        margin_error: parts.margin_error,
+    };
+    let candidates: Vec<Candidate> = made.iter().map(candidate).collect();
+    let chosen = chosen(&candidates, settings.goal);
+    let Some((layout, parts)) = chosen.and_then(|chosen| made.into_iter().nth(chosen)) else {
         return Err(CompileProblem::FitsNoLayout.into());
     };
-    let (margin_error, instructions) = (parts.margin_error, parts.instructions);
-    let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts)?;
-    Ok(Compiled { bytes, splits: forest.splits(), leaves: forest.leaves(), margin_error, layout, instructions })
+    let instructions = parts.instructions;
+    let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
+    let margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding);
+    let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts, margin_error)?;
+    let (splits, leaves) = (forest.splits(), forest.leaves());
+    Ok(Compiled { bytes, splits, leaves, margin_error, layout, instructions, candidates })
+}
+
+/// The best of the candidates.
+fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
+    // Where some layout holds the ensemble's very numbers, none that rounds them is worth a few bytes.
+    let is_exact = candidates.iter().any(|candidate| candidate.margin_error == 0.0);
+    let eligible = || {
+        let all = candidates.iter().enumerate();
+        all.filter(move |(_, candidate)| !is_exact || candidate.margin_error == 0.0)
+    };
+    let smallest = eligible().map(|(_, candidate)| candidate.bytes).min()?;
+    let instructions =
+        |candidate: &Candidate, core: Core| candidate.instructions.on(core).unwrap_or(candidate.instructions.m4f);
+    let best = match goal {
+        Goal::Size => eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f)),
+        Goal::Speed => eligible().min_by_key(|(_, candidate)| (candidate.instructions.m4f, candidate.bytes)),
+        Goal::Balanced(core) => eligible()
+            .filter(|(_, candidate)| candidate.bytes <= 3 * smallest)
+            .min_by_key(|(_, candidate)| (instructions(candidate, core), candidate.bytes)),
+    };
+    best.map(|(index, _)| index)
+}
+
+/// The ensemble's trees in the order in which a model with such leaves has them.
+pub(crate) fn order_of_trees(ensemble: &Ensemble, leaf: Leaf) -> Result<Vec<usize>> {
+    let forest = Forest::new(ensemble, None)?;
+    let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
+    Ok(trees::order(&forest, leaf, &scale))
 }

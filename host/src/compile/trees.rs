@@ -78,6 +78,11 @@ pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale) -> Vec<Ru
     runs
 }
 
+/// The numbers of all trees, in the order in which they are written.
+pub(super) fn order(forest: &Forest<'_>, leaf: LeafType, scale: &Scale) -> Vec<usize> {
+    runs(forest, leaf, scale).into_iter().flat_map(|run| run.trees).collect()
+}
+
 /// Every tree filled up to its group's depth; `None` if some are too deep or have too many thresholds.
 pub(super) fn complete(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<'_>) -> Option<Sections> {
     if axes.columns > 256 || forest.trees.iter().any(|tree| tree.depth > usize::from(MAX_COMPLETE_DEPTH)) {

@@ -7,7 +7,9 @@ use crate::ensemble::{Ensemble, Node, Output};
 use crate::error::{CompileProblem, Error, Result};
 use crate::probe::approach::Probe;
 use palpate_onboard::Stopping;
-use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, Trained, checksum};
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, RAW_FEATURES, Tag, Trained, checksum, write_section,
+};
 
 /// The model's bytes.
 pub(super) fn write(
@@ -17,13 +19,14 @@ pub(super) fn write(
     stopping: Stopping,
     layout: Layout,
     parts: &Parts,
+    margin_error: f32,
 ) -> Result<Vec<u8>> {
     let mut text = text(ensemble)?;
     let priors = priors(settings, forest.objects(), parts.unit)?;
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
     // Where nothing is known, the published probe.
     let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
-    let optional = optional(ensemble, forest);
+    let optional = optional(ensemble, settings, forest)?;
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);
@@ -51,7 +54,7 @@ pub(super) fn write(
         .with_unit(parts.unit)
         .with_unit_bits(unit_bits)
         .with_unit_shift(unit_shift)
-        .with_margin_error(parts.margin_error)
+        .with_margin_error(margin_error)
         .with_odds(stopping.odds())
         .with_max_touches(stopping.max_touches())
         .with_spacing(probe.spacing as f32)
@@ -75,8 +78,13 @@ pub(super) fn write(
     Ok(bytes)
 }
 
+/// Bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
+pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
+    Ok(text(ensemble)?.len().next_multiple_of(4) + optional(ensemble, settings, forest)?.len() + CHECKSUM_LENGTH)
+}
+
 /// What the model states about its training.
-fn optional(ensemble: &Ensemble, forest: &Forest<'_>) -> Vec<u8> {
+fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let origin = &ensemble.origin;
     // Rows of features are no touches of any probe.
@@ -88,8 +96,17 @@ fn optional(ensemble: &Ensemble, forest: &Forest<'_>) -> Vec<u8> {
             shares: origin.trained.and_then(|trained| trained.pattern_shares()),
         };
         trained.write(|part| bytes.extend_from_slice(part));
+    } else if settings.scales.is_some() || ensemble.inputs.are_named() {
+        let mut features = Vec::new();
+        for (index, name) in ensemble.inputs.names().into_iter().enumerate() {
+            let scale = settings.scales.as_ref().map_or(1.0, |scales| scales[index]);
+            features.extend(scale.to_le_bytes());
+            features.push(u8::try_from(name.len()).map_err(|_| CompileProblem::NameTooLong { name: name.into() })?);
+            features.extend(name.bytes());
+        }
+        write_section(Tag::FeatureNames, false, &features, &mut |part: &[u8]| bytes.extend_from_slice(part));
     }
-    bytes
+    Ok(bytes)
 }
 
 /// The program's version and the objects' names, each with its length in a byte.
@@ -126,7 +143,7 @@ fn unit_bits(unit: f32) -> (u32, u8) {
 fn hash(ensemble: &Ensemble) -> u64 {
     const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let mut digest = CRC.digest();
-    digest.update(&[ensemble.descriptor.code()]);
+    digest.update(&[ensemble.descriptor().map_or(RAW_FEATURES, palpate_shared::Descriptor::code)]);
     for name in &ensemble.objects {
         digest.update(name.as_bytes());
         digest.update(&[0]);

@@ -1,23 +1,33 @@
 //! Whether an ensemble is sound: for what was not read from a file, which checks while it reads.
 
-use super::{Ensemble, Node, Output, Tree};
+use super::{Ensemble, Inputs, Node, Output, Tree};
 use crate::error::{EnsembleProblem, NameProblem, TreeProblem};
 use std::collections::HashSet;
 
 /// The most objects that a compiled model can distinguish.
 pub(crate) const MAX_OBJECTS: usize = 256;
+/// The most features that a compiled model can have.
+pub(crate) const MAX_FEATURES: usize = 256;
 /// The most bytes of an object's name: a compiled model has one byte for its length.
 const MAX_NAME: usize = 255;
 
 impl Ensemble {
-    /// Checks an ensemble that was put together by hand: 2 to 256 objects with names that a file can hold, a base margin
-    /// for each, at least one tree; in each tree a root, children and features in range, no node reached twice, finite
-    /// thresholds and leaves, and as many values in a leaf as the tree's [`Output`] says.
+    /// Checks an ensemble that was put together by hand: 2 to 256 objects (over rows of 1 to 256 features also one) with
+    /// names that a file can hold, a base margin for each, at least one tree; in each tree a root, children and features in range, no node reached twice, finite
+    /// leaves, thresholds that are numbers (over touches finite ones), and as many values in a leaf as the tree's [`Output`] says.
     ///
     /// # Errors
     /// The first thing that is wrong.
     pub fn check(&self) -> Result<(), EnsembleProblem> {
-        check_names(&self.objects)?;
+        match &self.inputs {
+            Inputs::Touches(_) => check_names(&self.objects)?,
+            Inputs::Rows(features) => {
+                if self.objects.len() != 1 {
+                    check_names(&self.objects)?;
+                }
+                check_features(features, self)?;
+            }
+        }
         let objects = self.objects.len();
         let finite = self.base_margins.iter().filter(|margin| margin.is_finite()).count();
         if finite != objects || self.base_margins.len() != objects {
@@ -26,16 +36,18 @@ impl Ensemble {
         if self.trees.is_empty() {
             return Err(EnsembleProblem::NoTrees);
         }
-        let features = self.descriptor.feature_count();
+        let features = self.inputs.count();
+        let infinite = self.descriptor().is_none();
         for (number, tree) in self.trees.iter().enumerate() {
-            tree.check(features, objects).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })?;
+            tree.check(features, objects, infinite)
+                .map_err(|problem| EnsembleProblem::Tree { tree: number, problem })?;
         }
         Ok(())
     }
 }
 
 impl Tree {
-    fn check(&self, features: usize, objects: usize) -> Result<(), TreeProblem> {
+    fn check(&self, features: usize, objects: usize, infinite: bool) -> Result<(), TreeProblem> {
         let nodes = self.nodes.len();
         let wanted = match self.output {
             Output::One(object) if object >= objects => {
@@ -59,7 +71,7 @@ impl Tree {
                     if feature >= features {
                         return Err(TreeProblem::Feature { node, feature: feature as u64, features });
                     }
-                    if !threshold.is_finite() {
+                    if threshold.is_nan() || !(infinite || threshold.is_finite()) {
                         return Err(TreeProblem::Threshold { node, threshold });
                     }
                     for (side, child) in [("right", right), ("left", left)] {
@@ -85,6 +97,24 @@ pub(crate) fn check_leaf(node: usize, values: &[f32], wanted: usize) -> Result<(
         Some(&value) => Err(TreeProblem::LeafValue { node, value }),
         None => Ok(()),
     }
+}
+
+/// Whether these can be the names of an ensemble's features.
+fn check_features(names: &[String], ensemble: &Ensemble) -> Result<(), EnsembleProblem> {
+    if !(1..=MAX_FEATURES).contains(&names.len()) {
+        let splits = ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| match node {
+            Node::Split { feature, .. } => Some(feature),
+            Node::Leaf(_) => None,
+        });
+        let used = splits.collect::<HashSet<_>>().len();
+        return Err(EnsembleProblem::FeatureCount { count: names.len(), used, most: MAX_FEATURES });
+    }
+    for name in names {
+        if name.len() > MAX_NAME || name.chars().any(char::is_control) {
+            return Err(EnsembleProblem::FeatureName { name: name.clone() });
+        }
+    }
+    Ok(())
 }
 
 /// Whether these names can be an ensemble's objects.
@@ -120,7 +150,7 @@ mod tests {
         let split = Node::Split { feature: 0, threshold: 5.0, missing_left: true, left: 1, right: 2 };
         let nodes = vec![split, Node::Leaf(vec![1.0, 2.0]), Node::Leaf(vec![3.0, 4.0])];
         Ensemble {
-            descriptor: Descriptor::Curvature,
+            inputs: Descriptor::Curvature.into(),
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],

@@ -1,27 +1,33 @@
 //! The full model: boosted trees in f32 as the trainer left them.
 //!
 //! [`train::train`] makes an [`Ensemble`] from a [`Dataset`](crate::touches::Dataset); [`Ensemble::save`] and
-//! [`Ensemble::load`] write and read it as XGBoost's JSON; [`compile`](crate::compile::compile) turns it into the bytes
+//! [`Ensemble::load`] write and read it as XGBoost's JSON; [`import`] reads what other libraries trained on rows of
+//! features of any kind; [`compile`](crate::compile::compile) turns it into the bytes
 //! that the chip reads.
 
 mod check;
+pub mod import;
+mod inputs;
+mod nodes;
 mod origin;
 #[cfg(feature = "train")]
 pub mod train;
 mod xgboost;
 
-pub(crate) use check::{MAX_OBJECTS, check_leaf};
-pub use origin::{Origin, StatedProbe, Trained};
+pub(crate) use check::{MAX_FEATURES, MAX_OBJECTS, check_leaf};
+pub use inputs::Inputs;
+pub use origin::{Imported, Origin, StatedProbe, Trained};
 
 use palpate_shared::format::TrainedTouches;
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
 
-/// Boosted trees over a descriptor's features, with one margin for each object.
+/// Boosted trees over features of touches or of rows, with one margin for each object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ensemble {
-    /// Which features a touch is turned into.
-    pub descriptor: Descriptor,
-    /// The objects' names; a margin's position is its object's position here.
+    /// What the features are.
+    pub inputs: Inputs,
+    /// The names of the objects (classes), or of the one output of a regression; a margin's position is its object's
+    /// position here.
     pub objects: Vec<String>,
     /// What every margin starts from, one for each object.
     pub base_margins: Vec<f32>,
@@ -54,7 +60,7 @@ pub enum Output {
 pub enum Node {
     /// Left if `feature < threshold` in f32; a missing value (NaN) follows `missing_left`.
     Split {
-        /// Index of the feature in the descriptor.
+        /// Index of the feature.
         feature: usize,
         /// The threshold.
         threshold: f32,
@@ -120,15 +126,23 @@ impl Ensemble {
     /// The margins of a touch.
     ///
     /// # Panics
-    /// If the ensemble is one that [`Ensemble::check`] refuses.
+    /// If the ensemble is not over features of touches, or one that [`Ensemble::check`] refuses.
     pub fn margins(&self, touch: &Touch) -> Vec<f32> {
-        self.margins_of_features(&feature_row(self.descriptor, touch))
+        match self.inputs {
+            Inputs::Touches(descriptor) => self.margins_of_features(&feature_row(descriptor, touch)),
+            Inputs::Rows(_) => panic!("an ensemble over rows of features has no margins of a touch"),
+        }
+    }
+
+    /// The descriptor, if the ensemble is over features of touches.
+    pub fn descriptor(&self) -> Option<Descriptor> {
+        self.inputs.descriptor()
     }
 
     /// The touches that are evidence: those that the ensemble states; full touches, with a pose if the descriptor needs
     /// one, where it states none. Every model compiled from it takes the same.
     pub fn trained_touches(&self) -> TrainedTouches {
-        let unstated = TrainedTouches::full(self.descriptor.needs_pose());
+        let unstated = TrainedTouches::full(self.descriptor().is_some_and(Descriptor::needs_pose));
         self.origin.trained.map_or(unstated, |trained| trained.touches)
     }
 }

@@ -20,6 +20,20 @@ pub struct Origin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
+    /// The file of another library that it was read from, if it was.
+    pub imported: Option<Imported>,
+}
+
+/// What is known about an ensemble that another library trained.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Imported {
+    /// The library and the kind of file, such as "LightGBM text".
+    pub kind: String,
+    /// The farthest that a margin can be from the library's own, since leaves and sums are f32 here and f64 there; 0
+    /// where the library adds the same f32 values in the same order.
+    pub rounding: f64,
+    /// What a user should know about it, each a sentence.
+    pub notes: Vec<String>,
 }
 
 /// The probe that a data set was made with, and the size of its objects.
@@ -162,7 +176,7 @@ const FINGERPRINTED: usize = 16;
 impl Origin {
     /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
-        Self { probe, trained, noise: None, touches: fingerprints(dataset) }
+        Self { probe, trained, touches: fingerprints(dataset), ..Self::default() }
     }
 
     /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of the

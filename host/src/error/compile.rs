@@ -41,9 +41,17 @@ pub enum CompileProblem {
         /// The most that there may be, in nats.
         most: f64,
     },
-    /// Different thresholds become the same when they are rounded up to whole numbers.
+    /// There are too few or too many features.
+    #[error("cannot compile an ensemble over {features} features, which is not 1 to {most}")]
+    Features {
+        /// Features.
+        features: usize,
+        /// The most that there may be.
+        most: usize,
+    },
+    /// Thresholds change when they are rounded up to whole numbers.
     #[error(
-        "the ensemble was not trained on whole numbers: of {thresholds} thresholds of {feature} only {rounded} stay different when rounded to the whole microseconds or Q15 units of touches"
+        "the ensemble was not trained on whole numbers: the threshold {example} of {feature} is neither whole nor halfway between two, and of {thresholds} thresholds {rounded} stay different when rounded to the whole microseconds or Q15 units of touches"
     )]
     Thresholds {
         /// The feature.
@@ -52,6 +60,8 @@ pub enum CompileProblem {
         thresholds: usize,
         /// Different thresholds after rounding.
         rounded: usize,
+        /// One that changes.
+        example: f32,
     },
     /// The ensemble does not fit the layout that was asked for.
     #[error("the ensemble does not fit the layout {}: {}", layout.name(), limit(*layout))]
@@ -63,7 +73,7 @@ pub enum CompileProblem {
     #[error("the ensemble fits no layout of the model format")]
     FitsNoLayout,
     /// A name is too long.
-    #[error("the object's name {name:?} is too long for a model")]
+    #[error("the name {name:?} is too long for a model")]
     NameTooLong {
         /// The name.
         name: String,
@@ -97,9 +107,13 @@ impl CompileProblem {
             }
             Self::Model(_) => "Export the model again with `palpate export`.",
             Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",
-            Self::Tree { .. } | Self::MarginRange { .. } => "Train it again, or check the program that wrote it.",
+            Self::Tree { .. } => "Train it again, or check the program that wrote it.",
+            Self::MarginRange { .. } => {
+                "Train it again, a regression on a target in a larger unit, or check the program that wrote it."
+            }
+            Self::Features { .. } => "Train on the features that matter, at most 256.",
             Self::Thresholds { .. } => {
-                "Train on features in whole units: times in microseconds, direction cosines times 32767."
+                "Train on features in whole units: times in microseconds, direction cosines times 32767. If it is not a model of touches, remove its attribute palpate_descriptor: then its features are compared as they are."
             }
             Self::DoesNotFit { .. } => "Choose another layout, or leave the choice to the compiler (auto).",
             Self::FitsNoLayout | Self::TooLarge => "Train fewer trees, or trees with fewer splits.",

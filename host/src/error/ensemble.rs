@@ -7,23 +7,63 @@ use palpate_shared::format::Counted;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnsembleProblem {
-    /// A file that should be JSON is binary.
-    #[error("not an ensemble in XGBoost's JSON format but a binary file")]
-    Binary,
+    /// The file is of a kind, or has something in it, that cannot be read.
+    #[error("{what}")]
+    Unsupported {
+        /// What.
+        what: String,
+        /// The way round, as a sentence.
+        way: String,
+    },
+    /// A file of another library contradicts itself.
+    #[error("not a whole model in the format {kind}: {what}")]
+    Damaged {
+        /// The format.
+        kind: &'static str,
+        /// What is wrong.
+        what: String,
+    },
+    /// There are too few or too many features.
+    #[error("it has {count} features, of which its trees use {used}, and not 1 to {most}")]
+    FeatureCount {
+        /// Features.
+        count: usize,
+        /// Those that some tree splits on.
+        used: usize,
+        /// The most that there may be.
+        most: usize,
+    },
+    /// A name that no feature can have.
+    #[error("the feature's name {name:?} is longer than 255 bytes or has a control character in it")]
+    FeatureName {
+        /// The name.
+        name: String,
+    },
+    /// There are other names than outputs.
+    #[error("{names} names were given for {outputs} outputs")]
+    Names {
+        /// Names.
+        names: usize,
+        /// Objects (classes), or the one output of a regression.
+        outputs: usize,
+    },
+    /// An ensemble over rows has no place in the file's format.
+    #[error("an ensemble over rows of features cannot be saved")]
+    Rows,
     /// A file is not JSON, or not of XGBoost's schema.
     #[error("not an ensemble in XGBoost's JSON format: {detail}")]
     NotJson {
         /// What the parser said.
         detail: String,
     },
-    /// The objective is not a multi-class one.
-    #[error("its objective is {found}, not multi:softprob")]
+    /// The objective is not one whose margins are known.
+    #[error("its objective is {found}")]
     Objective {
         /// What it is.
         found: String,
     },
-    /// The booster is not plain gbtree.
-    #[error("its booster is {found}, not plain gbtree")]
+    /// The booster has no trees.
+    #[error("its booster is {found}, which has no trees")]
     Booster {
         /// What it is.
         found: String,
@@ -107,6 +147,14 @@ pub enum EnsembleProblem {
     /// A list of XGBoost's has another length than there are trees.
     #[error("tree_info has {found} entries for {trees} trees")]
     TreeInfo {
+        /// Entries.
+        found: usize,
+        /// Trees.
+        trees: usize,
+    },
+    /// There are other weights of a dart booster than trees.
+    #[error("weight_drop has {found} entries for {trees} trees")]
+    WeightDrop {
         /// Entries.
         found: usize,
         /// Trees.
@@ -207,8 +255,11 @@ pub enum TreeProblem {
         text: String,
     },
     /// Splits by category.
-    #[error("it has categorical splits, which no descriptor needs")]
-    Categorical,
+    #[error("it splits on categories of the feature {feature}")]
+    Categorical {
+        /// The feature's name.
+        feature: String,
+    },
     /// It adds to an object that does not exist.
     #[error("it is for object {object} of {objects}")]
     Object {
@@ -310,12 +361,20 @@ impl EnsembleProblem {
     /// What to do about it, as a sentence.
     pub fn fix(&self) -> String {
         match self {
-            Self::Binary => "Save it as JSON: `booster.save_model(\"ensemble.json\")`.".into(),
+            Self::Unsupported { way, .. } => way.clone(),
+            Self::Damaged { .. } => "Save the model again with the library that trained it.".into(),
+            Self::FeatureCount { most, .. } => format!("Train on the features that matter, at most {most}."),
+            Self::FeatureName { .. } => "Give the feature a shorter name before training.".into(),
+            Self::Names { .. } => "Give one name for each class, in the order of the labels.".into(),
+            Self::Rows => "Keep the file that it was read from.".into(),
             Self::NotJson { .. } => {
                 "Give a file that `palpate train` or XGBoost's `save_model(\"….json\")` wrote.".into()
             }
-            Self::Objective { .. } => "Train with the objective multi:softprob.".into(),
-            Self::Booster { .. } => "Train with booster=gbtree.".into(),
+            Self::Objective { .. } => {
+                "Train with multi:softprob, binary:logistic or a regression of one target; a model of touches with multi:softprob."
+                    .into()
+            }
+            Self::Booster { .. } => "Train with booster=gbtree or dart.".into(),
             Self::NoAttribute { name, example } => {
                 format!("Before saving it in Python, set it: `booster.set_attr({name}={example})`.")
             }
@@ -328,13 +387,14 @@ impl EnsembleProblem {
             }
             Self::Classes { .. } => "Name every class once, in the order of the labels.".into(),
             Self::Features { .. } => "Train it on that descriptor's features, or name the right descriptor.".into(),
-            Self::Tree { problem: TreeProblem::Categorical, .. } => {
-                "Train on numbers: every feature of a touch is one.".into()
+            Self::Tree { problem: TreeProblem::Categorical { .. }, .. } => {
+                "Encode categories as numbers before training, one column of 0 and 1 for each (one-hot).".into()
             }
             Self::BaseScore { .. }
             | Self::BaseMargins { .. }
             | Self::NoTrees
             | Self::TreeInfo { .. }
+            | Self::WeightDrop { .. }
             | Self::Count { .. }
             | Self::Tree { .. } => "The ensemble is damaged or was changed by hand; train or export it again.".into(),
             Self::OneObject => "Capture at least two.".into(),

@@ -99,7 +99,9 @@ impl EvaluateProblem {
     pub fn fix(&self) -> String {
         match self {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
-            Self::RawFeatures => "Give a model that was exported from a Palpate ensemble.",
+            Self::RawFeatures => {
+                "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
+            }
             Self::NoPose { .. } => "Capture the touches with their pose.",
             Self::OtherModel => "Give the ensemble that the model was exported from.",
             Self::NoTouches => "Give at least one touch of each object.",

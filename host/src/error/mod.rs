@@ -10,6 +10,7 @@ mod mesh;
 mod page;
 mod probe;
 mod report;
+mod rows;
 mod touches;
 mod tune;
 
@@ -23,6 +24,7 @@ pub use mesh::MeshProblem;
 pub use page::PageProblem;
 pub use probe::ProbeProblem;
 pub use report::ReportProblem;
+pub use rows::RowsProblem;
 pub use touches::TouchesProblem;
 pub use tune::TuneProblem;
 
@@ -115,6 +117,9 @@ pub enum Problem {
     /// With calibrating.
     #[error(transparent)]
     Calibrate(#[from] CalibrateProblem),
+    /// With rows of features, and models over them.
+    #[error(transparent)]
+    Rows(#[from] RowsProblem),
     /// With searching for a model.
     #[error(transparent)]
     Tune(#[from] TuneProblem),
@@ -142,6 +147,7 @@ impl Problem {
             Self::Compile(problem) => problem.fix(),
             Self::Evaluate(problem) => problem.fix(),
             Self::Calibrate(problem) => problem.fix(),
+            Self::Rows(problem) => problem.fix(),
             Self::Tune(problem) => problem.fix(),
             Self::Chip(problem) => problem.fix(),
             Self::Page(problem) => problem.fix(),
@@ -202,6 +208,7 @@ problems!(
     CompileProblem,
     EvaluateProblem,
     CalibrateProblem,
+    RowsProblem,
     TuneProblem,
     ChipProblem,
     PageProblem,

@@ -1,32 +1,33 @@
 //! A model on disk: compiled, or still an ensemble.
 
 use crate::compile::CompiledModel;
-use crate::ensemble::Ensemble;
+use crate::ensemble::{Ensemble, import};
 use crate::error::{Error, Result};
 use crate::evaluate::Candidate;
+use palpate_shared::format::MAGIC;
 use std::path::Path;
 
 /// A model read from a file, of either kind.
 #[derive(Clone, Debug)]
 pub enum ModelFile {
-    /// The full model, from XGBoost JSON.
+    /// The full model, from a file of any kind that [`Ensemble::load`] reads.
     Full(Box<Ensemble>),
     /// The bytes that the chip reads, checked.
     Compiled(CompiledModel),
 }
 
 impl ModelFile {
-    /// Reads a model; JSON is an ensemble, anything else must be a compiled model.
+    /// Reads a model; its first bytes say whether it is a compiled one.
     ///
     /// # Errors
     /// As [`Ensemble::load`] and [`CompiledModel::read`].
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
-        if bytes.trim_ascii_start().starts_with(b"{") {
-            return Ensemble::load(path).map(|ensemble| Self::Full(Box::new(ensemble)));
+        if bytes.starts_with(&MAGIC) {
+            return CompiledModel::from_file(path, bytes).map(Self::Compiled);
         }
-        CompiledModel::from_file(path, bytes).map(Self::Compiled)
+        import::read(path, &bytes, None).map(|ensemble| Self::Full(Box::new(ensemble)))
     }
 
     /// Calls `evaluate` with the model, ready to be evaluated.

@@ -86,6 +86,7 @@ pub struct Difference {
 ///
 /// # Errors
 /// [`EvaluateProblem::OtherModel`] when the two are not of the same objects and descriptor;
+/// [`EvaluateProblem::RawFeatures`] for an ensemble over rows;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn difference(
     ensemble: &Ensemble,
@@ -93,8 +94,11 @@ pub fn difference(
     touches: &[&Touch],
     progress: &dyn Progress,
 ) -> Result<Difference> {
+    if ensemble.descriptor().is_none() {
+        return Err(EvaluateProblem::RawFeatures.into());
+    }
     let names = (0..model.object_count()).map(|object| model.object_name(object));
-    if model.descriptor() != Some(ensemble.descriptor) || !names.eq(ensemble.objects.iter().map(String::as_str)) {
+    if model.descriptor() != ensemble.descriptor() || !names.eq(ensemble.objects.iter().map(String::as_str)) {
         return Err(EvaluateProblem::OtherModel.into());
     }
     progress.begin("margins", Some(touches.len() as u64));
@@ -134,7 +138,7 @@ fn compare_verdicts<const N: usize>(
     let mut compiled = Recognizer::<N>::new(model, stopping)
         .map_err(|error| EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity })?;
     let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
-    let mut full = FullRecognizer::new((0..ensemble.objects.len()).map(prior).collect(), stopping);
+    let mut full = FullRecognizer::new((0..ensemble.objects.len()).map(prior).collect(), stopping, Some(model));
     // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict. Where hardly
     // any touch is one that the model was trained for, there may never be a verdict.
     let mut draws = 100 * u64::from(stopping.max_touches());

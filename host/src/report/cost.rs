@@ -128,7 +128,7 @@ fn member(
     let curve = margins.curve(100.min(margins.fewest_touches()), groups, settings.seed)?;
     Ok(Member {
         name: name.into(),
-        paper: ensemble.descriptor == palpate_shared::Descriptor::Times,
+        paper: ensemble.descriptor() == Some(palpate_shared::Descriptor::Times),
         leaf: leaf.name().into(),
         layout: compiled.layout.name().into(),
         bytes: compiled.bytes.len(),
@@ -335,7 +335,7 @@ mod tests {
         }
         nodes.push(Node::Leaf(vec![0.0, leaf]));
         Ensemble {
-            descriptor: palpate_shared::Descriptor::Curvature,
+            inputs: palpate_shared::Descriptor::Curvature.into(),
             objects: vec!["a".into(), "b".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],

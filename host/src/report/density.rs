@@ -42,7 +42,10 @@ pub(super) fn density_model(descriptor: Descriptor, train: &Dataset, held_out: &
     let objects = train.names();
     let tree = tree(&edges, &logs);
     let base_margins = vec![0.0; objects.len()];
-    Ok((Ensemble { descriptor, objects, base_margins, trees: vec![tree], origin: Origin::default() }, best))
+    Ok((
+        Ensemble { inputs: descriptor.into(), objects, base_margins, trees: vec![tree], origin: Origin::default() },
+        best,
+    ))
 }
 
 /// The features of every touch, one list per object.

@@ -29,7 +29,7 @@ pub(crate) fn ensemble() -> Ensemble {
     let split = Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 };
     let nodes = vec![split, leaf(0.7, -0.7), leaf(-0.7, 0.7)];
     Ensemble {
-        descriptor: Descriptor::Curvature,
+        inputs: Descriptor::Curvature.into(),
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0, 0.0],
         trees: vec![Tree { nodes, output: Output::Each }],
@@ -405,6 +405,6 @@ fn an_ensemble_trained_on_seconds_is_refused_at_export_with_its_feature() {
     seconds.save(place.path("seconds.json")).unwrap();
     let (code, message) = refusal(&["export", &place.text("seconds.json"), "-o", &place.text("seconds.palpate")]);
     assert_eq!(code, 1);
-    assert!(message.contains("seconds.json: ") && message.contains("8 thresholds of curvature"), "{message}");
+    assert!(message.contains("seconds.json: ") && message.contains("of curvature is neither whole"), "{message}");
     assert!(!place.path("seconds.palpate").exists());
 }

@@ -9,8 +9,10 @@ mod help;
 mod mesh;
 mod models;
 mod objects;
+mod plan;
 mod probe;
 mod reports;
+mod rows;
 mod support;
 mod view;
 

@@ -1,6 +1,6 @@
 //! What is checked when a model is opened, so that no later step can fail.
 
-use super::optional::{self, Stated};
+use super::{Stated, optional};
 use crate::bytes::{Wrong, take};
 use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
 use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};

@@ -1,14 +1,12 @@
 //! The header, and the sections that it says there are.
 
-use super::Model;
 use super::check;
-use super::optional::Stated;
+use super::{Model, Stated};
 use crate::bytes::{ModelError, Wrong, take};
 use crate::layouts::Sections;
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HEADER_LENGTH, Header, Key, Layout, LeafType, MAGIC, RAW_FEATURES, TrainedTouches, VERSION,
-    checksum,
+    CHECKSUM_LENGTH, HEADER_LENGTH, Header, Key, Layout, LeafType, MAGIC, RAW_FEATURES, VERSION, checksum,
 };
 
 /// Checks that bytes are a whole model of a version that is read, as it was written.
@@ -66,11 +64,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, Wrong> {
     let leaf = LeafType::from_code(header.leaf()).ok_or(Wrong::Field(7))?;
     let descriptor = descriptor(&header).map_err(Wrong::Field)?;
     let sections = Sections { bytes, margins, ranked, groups, nodes, leaves, axis_count, layout, leaf };
-    let touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
-    let mut stated = Stated { touches, by_object: 0 };
+    let mut stated = Stated::new(descriptor);
     check::check(&sections, optional, &mut stated)?;
-    let Stated { touches, by_object } = stated;
-    Ok(Model { sections, descriptor, touches, by_object })
+    Ok(Model { sections, stated })
 }
 
 /// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.

@@ -14,7 +14,7 @@ impl Model<'_> {
     /// Cost: the ensemble's; see the layouts. Cannot fail otherwise; a model over rows of features takes every feature
     /// of a touch as missing.
     pub fn margins(&self, touch: &Touch, margins: &mut [i32]) -> bool {
-        let features = self.descriptor.map(|descriptor| descriptor.features(touch));
+        let features = self.descriptor().map(|descriptor| descriptor.features(touch));
         self.margins_of(features.as_ref().map_or(&[], Features::as_slice), margins)
     }
 

@@ -11,11 +11,11 @@ pub use refused::Refused;
 
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
-use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise, Section, Tag,
-    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+    Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
+    Section, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
 };
+use palpate_shared::{Descriptor, Patterns};
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
 ///
@@ -23,10 +23,41 @@ use palpate_shared::format::{
 #[derive(Clone, Copy, Debug)]
 pub struct Model<'a> {
     sections: Sections<'a>,
+    stated: Stated,
+}
+
+/// What a model states that recognition depends on. No more than 12 bytes, as [`Sections`] has no more than 52: a model of more
+/// than 64 bytes is copied by a call that takes 700 bytes of flash.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stated {
     descriptor: Option<Descriptor>,
-    touches: TrainedTouches,
+    /// The fields of [`TrainedTouches`].
+    patterns: Patterns,
+    counted: Counted,
+    needs_pose: bool,
+    largest_spread: u32,
     /// Where thresholds by object stand; 0 if there are none.
     by_object: u32,
+}
+
+impl Stated {
+    /// What a model without optional sections states.
+    fn new(descriptor: Option<Descriptor>) -> Self {
+        let TrainedTouches { patterns, counted, needs_pose, largest_spread } =
+            TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
+        Self { descriptor, patterns, counted, needs_pose, largest_spread, by_object: 0 }
+    }
+
+    fn set_touches(&mut self, touches: TrainedTouches) {
+        let TrainedTouches { patterns, counted, needs_pose, largest_spread } = touches;
+        (self.patterns, self.counted, self.needs_pose) = (patterns, counted, needs_pose);
+        self.largest_spread = largest_spread;
+    }
+
+    const fn touches(&self) -> TrainedTouches {
+        let &Self { patterns, counted, needs_pose, largest_spread, .. } = self;
+        TrainedTouches { patterns, counted, needs_pose, largest_spread }
+    }
 }
 
 /// Where the parts of an opened model are: what a [`Model`] is without its bytes. For whoever keeps the bytes somewhere
@@ -34,25 +65,21 @@ pub struct Model<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Opened {
     places: Places,
-    descriptor: Option<Descriptor>,
-    touches: TrainedTouches,
-    by_object: u32,
+    stated: Stated,
 }
 
 impl Opened {
     /// The model in the bytes that it was opened from; `None` if there are fewer or more of them. Cost: about 100
     /// instructions. Other bytes of the same length give wrong margins, nothing worse.
     pub(crate) fn model<'a>(&self, bytes: &'a [u8]) -> Option<Model<'a>> {
-        let &Self { places, descriptor, touches, by_object } = self;
-        Some(Model { sections: Sections::at(bytes, &places)?, descriptor, touches, by_object })
+        Some(Model { sections: Sections::at(bytes, &self.places)?, stated: self.stated })
     }
 }
 
 impl<'a> Model<'a> {
     /// Where its parts are.
     pub(crate) fn opened(&self) -> Opened {
-        let &Self { descriptor, touches, by_object, .. } = self;
-        Opened { places: self.sections.places(), descriptor, touches, by_object }
+        Opened { places: self.sections.places(), stated: self.stated }
     }
 
     /// Opens a model, checking everything that reading it later relies on: after this nothing can fail.
@@ -89,7 +116,7 @@ impl<'a> Model<'a> {
 
     /// Which features a touch is turned into; `None` for a model over rows of features.
     pub const fn descriptor(&self) -> Option<Descriptor> {
-        self.descriptor
+        self.stated.descriptor
     }
 
     /// How the trees are laid out.
@@ -150,7 +177,7 @@ impl<'a> Model<'a> {
     /// The touches that the model was trained on, and so the only ones that count as evidence: full touches, with a pose
     /// if the descriptor needs one, unless the model states others.
     pub const fn trained_touches(&self) -> TrainedTouches {
-        self.touches
+        self.stated.touches()
     }
 
     /// What the weights of all other objects may come to, this one's being 1, for it to be recognized, in Q56: the
@@ -158,7 +185,7 @@ impl<'a> Model<'a> {
     ///
     /// Cost: about 15 instructions. Cannot fail.
     pub fn odds_of(&self, object: usize) -> Option<u64> {
-        let start = usize::try_from(self.by_object).ok().filter(|&start| start > 0)?;
+        let start = usize::try_from(self.stated.by_object).ok().filter(|&start| start > 0)?;
         let section = self.sections.bytes.get(start..)?;
         OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
     }
@@ -191,6 +218,12 @@ impl<'a> Model<'a> {
     /// Cost: about 30 instructions for each optional section.
     pub fn plan(&self) -> Option<Plan<'a>> {
         Plan::from_bytes(optional::find(self.optional(), Tag::Plan), self.object_count())
+    }
+
+    /// The features of a model over rows, in their order, as far as the model states them.
+    pub fn features(&self) -> impl Iterator<Item = Feature<'a>> {
+        let mut rest = optional::find(self.optional(), Tag::FeatureNames);
+        core::iter::from_fn(move || take_feature(&mut rest))
     }
 
     /// The optional sections, in the order of their tags; also those that this crate does not know.

@@ -1,18 +1,11 @@
 //! The optional sections: checked once, then found by their tags.
 
+use super::Stated;
 use crate::bytes::Wrong;
 use crate::layouts::Sections;
 use palpate_shared::format::{
     OddsByObject, Plan, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
 };
-
-/// What optional sections state that recognition depends on.
-pub(super) struct Stated {
-    /// What the model was trained on.
-    pub(super) touches: TrainedTouches,
-    /// Where thresholds by object stand; 0 if there are none.
-    pub(super) by_object: u32,
-}
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
 pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
@@ -36,7 +29,7 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if tag <= last => false,
             _ if tag == Tag::Probe.code() => content.len() >= TrainedProbe::LENGTH,
             _ if tag == Tag::Touches.code() => {
-                TrainedTouches::from_bytes(content).map(|touches| stated.touches = touches).is_some()
+                TrainedTouches::from_bytes(content).map(|touches| stated.set_touches(touches)).is_some()
             }
             _ if tag == Tag::ThresholdsByObject.code() => {
                 stated.by_object = u32::try_from(model.offset(content)).unwrap_or_default();

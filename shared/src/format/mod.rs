@@ -20,8 +20,8 @@ pub use plan::Plan;
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
 pub use trained::{
-    MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_section, write_section,
+    Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
+    TrainedTouches, take_feature, take_section, write_section,
 };
 
 /// Bytes of the checksum at the end.

@@ -22,7 +22,7 @@ pub enum Tag {
     FitTest,
     /// [`Plan`](super::Plan).
     Plan,
-    /// Reserved: the features' names, for models over rows of features.
+    /// The features' names and scales, for models over rows of features: see [`take_feature`].
     FeatureNames,
     /// [`PatternShares`].
     PatternShares,
@@ -204,6 +204,27 @@ impl PatternShares {
     }
 }
 
+/// What a model over rows states about one of its features.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Feature<'a> {
+    /// What a value is multiplied by, to be rounded to the nearest whole number; 1 where f32 values are compared.
+    pub scale: f32,
+    /// Its name.
+    pub name: &'a str,
+}
+
+/// Splits the first feature off the content of the section of features' names; `None` if it is not whole. What is left is
+/// in `bytes`.
+///
+/// Cost: about 30 instructions, and the check that the name is UTF-8. Cannot fail.
+pub fn take_feature<'a>(bytes: &mut &'a [u8]) -> Option<Feature<'a>> {
+    let (&[a, b, c, d, length], rest) = bytes.split_first_chunk()?;
+    let (name, rest) = rest.split_at_checked(usize::from(length))?;
+    let name = core::str::from_utf8(name).ok()?;
+    *bytes = rest;
+    Some(Feature { scale: f32::from_le_bytes([a, b, c, d]), name })
+}
+
 /// Everything that a model states about its training, to be written into it.
 ///
 /// ```
@@ -337,6 +358,17 @@ mod tests {
         for length in 0..16 {
             assert_eq!(take_section(&mut &bytes[..length]), None, "{length} bytes");
         }
+    }
+
+    #[test]
+    fn features_are_read_one_after_the_other_and_only_whole() {
+        let bytes = [&1.5_f32.to_le_bytes()[..], b"\x02ab", &1_f32.to_le_bytes(), b"\x00"].concat();
+        let mut rest = bytes.as_slice();
+        assert_eq!(take_feature(&mut rest), Some(Feature { scale: 1.5, name: "ab" }));
+        assert_eq!(take_feature(&mut rest), Some(Feature { scale: 1.0, name: "" }));
+        assert_eq!(take_feature(&mut rest), None);
+        assert_eq!(take_feature(&mut &bytes[..6]), None);
+        assert_eq!(take_feature(&mut &b"\0\0\0\0\x01\xff"[..]), None, "not UTF-8");
     }
 
     #[test]

@@ -47,7 +47,7 @@ fn main() {
 }
 
 fn compare(name: &str, ensemble: &Ensemble, touches: &[Touch]) {
-    let rows: Vec<Vec<f32>> = touches.iter().map(|touch| feature_row(ensemble.descriptor, touch)).collect();
+    let rows: Vec<Vec<f32>> = touches.iter().filter_map(|touch| Some(feature_row(ensemble.descriptor()?, touch))).collect();
     let expected: Vec<Vec<f32>> = touches.iter().map(|touch| ensemble.margins(touch)).collect();
     println!("\n{name}: {} touches", touches.len());
     let mut ours = f64::INFINITY;
@@ -192,7 +192,7 @@ fn random(settings: &train::Settings) -> Ensemble {
     };
     let objects = (0..10).map(|object| object.to_string()).collect();
     Ensemble {
-        descriptor: settings.descriptor,
+        inputs: settings.descriptor.into(),
         objects,
         base_margins: vec![0.5; 10],
         trees,
@@ -276,7 +276,7 @@ fn irithyll(ensemble: &Ensemble, object: usize) -> Words {
         }
     }
     let mut bytes = b"IRIT".to_vec();
-    let features = ensemble.descriptor.feature_count() as u16;
+    let features = ensemble.inputs.count() as u16;
     bytes.extend([1, count, features, 0].into_iter().flat_map(u16::to_le_bytes));
     bytes.extend(ensemble.base_margins[object].to_le_bytes());
     bytes.extend(table);

@@ -193,7 +193,7 @@ fn irithyll(ensemble: &Ensemble) -> Vec<u8> {
             }
         }
         let mut part = b"IRIT".to_vec();
-        for number in [1, trees.len() as u16, ensemble.descriptor.feature_count() as u16, 0] {
+        for number in [1, trees.len() as u16, ensemble.inputs.count() as u16, 0] {
             part.extend(number.to_le_bytes());
         }
         part.extend(ensemble.base_margins[object].to_le_bytes());

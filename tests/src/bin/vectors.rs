@@ -5,7 +5,7 @@
 //! only where something is to be added.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Node};
+use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{Counted, PatternShares, Trained, TrainedTouches, checksum, f32_key};
 use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, Touch};
@@ -178,7 +178,9 @@ fn layouts(text: &mut String) {
     let most = Shape { objects: 256, trees: 1, depth: 1, ..SHAPE };
     play(text, "256 objects", &compiled(most, 11, Leaf::I8, Layout::Compact), &touches(4, 6));
     let bytes = palpate_tests::unaligned::model();
-    play(text, "not aligned, thresholds of 3 bytes and of 1", &bytes, &touches(8, 7));
+    // The touch of the worked example comes first.
+    let touches: Vec<Touch> = [Touch::from_micros([30_000, 0, 50_000])].into_iter().chain(touches(8, 7)).collect();
+    play(text, "not aligned, thresholds of 3 bytes and of 1", &bytes, &touches);
 }
 
 /// Every descriptor, with poses.
@@ -224,10 +226,20 @@ fn sections(text: &mut String) {
     let grown = [&ALL.to_bytes()[..], &[1, 2, 3]].concat();
     let sections = [section(2 | 1 << 15, &grown), section(77, b"unknown"), section(78, &[])].concat();
     play(text, "a section that has grown, and unknown ones", &with_sections(&contacts, &sections), &touches);
+    let all = section(2 | 1 << 15, &ALL.to_bytes());
+    let odds = [1_u32 << 31, 1 << 20, 5].map(u32::to_le_bytes).concat();
+    let by_object = [&all[..], &section(5 | 1 << 15, &odds)].concat();
+    play(text, "thresholds by object", &with_sections(&contacts, &by_object), &touches);
+    for sharpness in [(1 << 16) / 3, 1 << 20, (1 << 20) + 1_u32] {
+        let temperature = [&all[..], &section(11, &sharpness.to_le_bytes())].concat();
+        let name = format!("a temperature of 65536 / {sharpness}");
+        play(text, &name, &with_sections(&contacts, &temperature), &touches[..8]);
+    }
 }
 
 /// The same trees over this many features of rows.
 fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
+    ensemble.inputs = Inputs::unnamed(features);
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {
         for (index, node) in tree.nodes.iter_mut().enumerate() {
             if let Node::Split { feature, threshold, .. } = node {
@@ -248,7 +260,7 @@ fn rows(text: &mut String) {
         (Layout::Complete, Leaf::F32),
     ] {
         let ensemble = imported(random::ensemble(SHAPE, 14), 5);
-        let settings = Settings { leaf, layout: Some(layout), raw_features: Some(5), ..Settings::default() };
+        let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         play_rows(text, &format!("rows of f32 features, {} {}", layout.name(), leaf.name()), &bytes, true);
         play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);

@@ -426,7 +426,7 @@ fn ensemble(model: &BoostedModel, descriptor: Descriptor, objects: Vec<String>) 
             .collect(),
     });
     let (base_margins, trees) = (model.base_scores().to_vec(), trees.collect());
-    Ensemble { descriptor, objects, base_margins, trees, origin: Origin::default() }
+    Ensemble { inputs: descriptor.into(), objects, base_margins, trees, origin: Origin::default() }
 }
 
 #[cfg(test)]

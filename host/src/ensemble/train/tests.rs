@@ -296,7 +296,7 @@ fn approaches_are_trained_on_by_their_contacts_unless_full_touches_or_all_are_as
         (None, Descriptor::Times, Descriptor::Times, Patterns::CONTACTS),
     ] {
         let ensemble = trained(counted, descriptor);
-        assert_eq!(ensemble.descriptor, expected);
+        assert_eq!(ensemble.descriptor(), Some(expected));
         let stated = ensemble.trained_touches();
         assert_eq!((stated.patterns, stated.needs_pose), (patterns, false), "{descriptor:?}");
         assert!((3_000..=3_400).contains(&stated.largest_spread), "{stated:?}");

@@ -14,38 +14,92 @@
 //! | `palpate_noise` | optional: what was added to the training touches ([`Noise`](crate::touches::noise::Noise)), a JSON object |
 //! | `palpate_touches` | optional: fingerprints of the training touches, a JSON object of hexadecimal numbers by object |
 //!
-//! What is read is checked as a whole before any of it is used: see [`Ensemble::load`].
+//! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
 
+mod objective;
 mod read;
 mod schema;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+mod trees;
 mod write;
 
-use super::Ensemble;
+use super::{Ensemble, Inputs};
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use crate::output;
 use schema::Document;
+use std::borrow::Cow;
 use std::path::Path;
 
-impl Ensemble {
-    /// Reads an ensemble in XGBoost's JSON model schema, written by [`Ensemble::save`], by XGBoost or by another
-    /// trainer, with a `multi:softprob` or `multi:softmax` objective and the attributes `palpate_descriptor` and
-    /// `palpate_objects`.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or is not such a model ([`EnsembleProblem`]): not JSON; an unknown descriptor, or
-    /// another number of features than it has; fewer than two objects or more than 256, a name that is repeated, empty,
-    /// too long or has control characters, or another number of classes; columns of unequal length; a child, feature or
-    /// object out of range; a node that is reached twice (a cycle); a number that is not finite; categorical splits,
-    /// dropped trees (DART), or no trees at all. The error names the file, the tree and the node.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
-        let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
-        let document: Document = serde_json::from_slice(&bytes).map_err(|error| not_json(path, &bytes, &error))?;
-        document.into_ensemble().map_err(|problem| Error::at(Place::file(path), problem))
-    }
+/// Reads XGBoost's JSON.
+pub(super) fn from_json(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
+    check_booster(&serde_json::from_slice(&without_literals(bytes)).unwrap_or_default())
+        .map_err(|problem| Error::at(Place::file(path), problem))?;
+    let document: Document =
+        serde_json::from_slice(&without_literals(bytes)).map_err(|error| not_json(path, &error))?;
+    document.into_ensemble(names, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
+}
 
+/// Reads XGBoost's UBJSON, which holds the same as its JSON.
+pub(super) fn from_ubjson(path: &Path, value: serde_json::Value, names: Option<&[String]>) -> Result<Ensemble> {
+    let wrong = |problem| Error::at(Place::file(path), problem);
+    check_booster(&serde_json::from_value(value.clone()).unwrap_or_default()).map_err(wrong)?;
+    let damaged =
+        |error: serde_json::Error| EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
+    let document: Document = serde_json::from_value(value).map_err(|error| wrong(damaged(error)))?;
+    document.into_ensemble(names, "UBJSON").map_err(wrong)
+}
+
+/// What is looked at before the rest: a booster without trees has another schema.
+#[derive(Default, serde::Deserialize)]
+struct Peek {
+    #[serde(default)]
+    learner: PeekLearner,
+}
+
+#[derive(Default, serde::Deserialize)]
+struct PeekLearner {
+    #[serde(default)]
+    gradient_booster: PeekBooster,
+}
+
+#[derive(Default, serde::Deserialize)]
+struct PeekBooster {
+    #[serde(default)]
+    name: String,
+}
+
+fn check_booster(peek: &Peek) -> Result<(), EnsembleProblem> {
+    let name = &peek.learner.gradient_booster.name;
+    if name == "gblinear" { Err(EnsembleProblem::Booster { found: name.clone() }) } else { Ok(()) }
+}
+
+/// The text with `null` for the numbers that XGBoost writes and JSON does not have: NaN and the infinities.
+fn without_literals(bytes: &[u8]) -> Cow<'_, [u8]> {
+    const LITERALS: [&[u8]; 3] = [b"-Infinity", b"Infinity", b"NaN"];
+    let mut text: Option<Vec<u8>> = None;
+    let mut is_string = false;
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        let rest = &bytes[at..];
+        let literal = LITERALS.iter().find(|literal| !is_string && rest.starts_with(literal));
+        let length = match (byte, literal) {
+            (_, Some(literal)) => literal.len(),
+            (b'\\', None) if is_string => 2.min(rest.len()),
+            _ => 1,
+        };
+        is_string ^= byte == b'"';
+        if literal.is_some() {
+            text.get_or_insert_with(|| bytes[..at].to_vec()).extend(b"null");
+        } else if let Some(text) = &mut text {
+            text.extend(&rest[..length]);
+        }
+        at += length;
+    }
+    text.map_or(Cow::Borrowed(bytes), Cow::Owned)
+}
+
+impl Ensemble {
     /// What XGBoost itself has just trained on `descriptor`'s features of `objects`.
     #[cfg(feature = "xgboost")]
     pub(crate) fn from_xgboost(
@@ -54,9 +108,10 @@ impl Ensemble {
         objects: Vec<String>,
     ) -> Result<Self> {
         let path = Path::new("XGBoost's model");
-        let mut document: Document = serde_json::from_slice(json).map_err(|error| not_json(path, json, &error))?;
+        let mut document: Document =
+            serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;
         document.learner.attributes = write::attributes(descriptor, &objects, &super::Origin::default());
-        document.into_ensemble().map_err(|problem| Error::at(Place::file(path), problem))
+        document.into_ensemble(None, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
     }
 
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be
@@ -64,11 +119,14 @@ impl Ensemble {
     ///
     /// # Errors
     /// [`Error::Io`] naming `path`; [`EnsembleProblem`] for an ensemble that [`check`](Self::check) refuses, which none
-    /// that was trained or loaded is.
+    /// that was trained or loaded is, and for one over rows of features.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
         self.check().map_err(|problem| Error::at(Place::file(path), problem))?;
-        let document = Document::new(self);
+        let Inputs::Touches(descriptor) = self.inputs else {
+            return Err(Error::at(Place::file(path), EnsembleProblem::Rows));
+        };
+        let document = Document::new(self, descriptor);
         output::write_whole(path, |out| {
             serde_json::to_writer(&mut *out, &document)?;
             out.write_all(b"\n")
@@ -76,11 +134,8 @@ impl Ensemble {
     }
 }
 
-fn not_json(path: &Path, bytes: &[u8], error: &serde_json::Error) -> Error {
-    let looks_binary = bytes.iter().take(64).any(|&byte| byte == 0) || bytes.starts_with(b"{L");
-    if looks_binary {
-        return Error::at(Place::file(path), EnsembleProblem::Binary);
-    }
+/// What the parser said, at its line.
+pub(super) fn not_json(path: &Path, error: &serde_json::Error) -> Error {
     let place = match u64::try_from(error.line()) {
         Ok(line) if line > 0 => Place::line(path, line),
         _ => Place::file(path),

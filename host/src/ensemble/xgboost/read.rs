@@ -1,69 +1,163 @@
 //! From XGBoost's schema to an ensemble, everything checked.
 
-use super::schema::{Document, Forest, Learner, TreeColumns};
+use super::objective::{Kind, Objective};
+use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
+use super::trees::{Shape, tree};
 use crate::ensemble::check::check_names;
-use crate::ensemble::{Ensemble, Node, Origin, Output, Tree};
-use crate::error::{EnsembleProblem, TreeProblem};
+use crate::ensemble::import::{default_names, named};
+use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, Node, Origin};
+use crate::error::EnsembleProblem;
 use palpate_shared::Descriptor;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 type Attributes = BTreeMap<String, String>;
 
 impl Document {
-    /// The ensemble in the document.
-    pub(super) fn into_ensemble(self) -> Result<Ensemble, EnsembleProblem> {
-        let Learner { attributes, gradient_booster, learner_model_param, objective, .. } = self.learner;
-        if !matches!(objective.name.as_str(), "multi:softprob" | "multi:softmax") {
-            return Err(EnsembleProblem::Objective { found: objective.name });
-        }
-        if gradient_booster.name != "gbtree" || gradient_booster.model.weight_drop.is_some() {
-            return Err(EnsembleProblem::Booster { found: gradient_booster.name });
-        }
-        let descriptor = descriptor(&attributes)?;
-        let objects = object_names(&attributes)?;
+    /// The ensemble in the document: over touches if it names a descriptor, else over rows. `names` are the objects'
+    /// names; `kind` is JSON or UBJSON.
+    pub(super) fn into_ensemble(self, names: Option<&[String]>, kind: &str) -> Result<Ensemble, EnsembleProblem> {
+        let version = self.version.map(|number| number.to_string()).join(".");
+        let Learner { attributes, feature_names, gradient_booster, learner_model_param, objective, .. } = self.learner;
+        let (forest, weights) = forest(gradient_booster)?;
+        let Objective { kind: outputs, link } = Objective::named(&objective.name)?;
         let classes = count("num_class", &learner_model_param.num_class)?;
-        if classes != objects.len() {
-            return Err(EnsembleProblem::Classes { classes, objects: objects.len() });
-        }
+        let targets = count("num_target", &learner_model_param.num_target)?;
+        let groups = match outputs {
+            Kind::Classes => classes,
+            Kind::Binary | Kind::One if targets > 1 => {
+                return Err(EnsembleProblem::Unsupported {
+                    what: format!("it has {targets} targets, which are no classes of one object"),
+                    way: "Train a model for each target.".into(),
+                });
+            }
+            Kind::Binary | Kind::One => 1,
+        };
+        let first = usize::from(outputs == Kind::Binary);
+        let objects = groups + first;
         let features = count("num_feature", &learner_model_param.num_feature)?;
-        if features != descriptor.feature_count() {
-            return Err(EnsembleProblem::Features { found: features, descriptor });
+        let (inputs, objects) = match attributes.get("palpate_descriptor") {
+            Some(name) => {
+                if outputs != Kind::Classes {
+                    return Err(EnsembleProblem::Objective { found: objective.name });
+                }
+                let descriptor = descriptor(name)?;
+                if features != descriptor.feature_count() {
+                    return Err(EnsembleProblem::Features { found: features, descriptor });
+                }
+                let own = object_names(&attributes)?.ok_or(EnsembleProblem::NoAttribute {
+                    name: "palpate_objects",
+                    example: "'[\"bowl\", \"fork\"]'",
+                })?;
+                if classes != own.len() {
+                    return Err(EnsembleProblem::Classes { classes, objects: own.len() });
+                }
+                (Inputs::Touches(descriptor), named(names, own)?)
+            }
+            None => {
+                let own = object_names(&attributes)?.unwrap_or_else(|| default_names(objects));
+                if own.len() != objects {
+                    return Err(EnsembleProblem::Classes { classes: objects, objects: own.len() });
+                }
+                check_feature_count(features, &forest)?;
+                let are_named = feature_names.len() == features;
+                let inputs = if are_named { Inputs::Rows(feature_names) } else { Inputs::unnamed(features) };
+                (inputs, named(names, own)?)
+            }
+        };
+        let mut base_margins = vec![0.0; first];
+        base_margins.extend(base_scores(&learner_model_param.base_score, groups)?.into_iter().map(|b| link.margin(b)));
+        if base_margins.iter().any(|margin| !margin.is_finite()) {
+            return Err(EnsembleProblem::BaseScore { text: learner_model_param.base_score, objects: groups });
         }
-        let base_margins = base_margins(&learner_model_param.base_score, classes)?;
-        let Forest { tree_info, trees, .. } = gradient_booster.model;
+        let Forest { tree_info, trees, .. } = forest;
         if trees.is_empty() {
             return Err(EnsembleProblem::NoTrees);
         }
         if tree_info.len() != trees.len() {
             return Err(EnsembleProblem::TreeInfo { found: tree_info.len(), trees: trees.len() });
         }
+        if let Some(found) = weights.as_ref().map(Vec::len).filter(|&found| found != trees.len()) {
+            return Err(EnsembleProblem::WeightDrop { found, trees: trees.len() });
+        }
+        let shape = Shape {
+            features: inputs.names().into_iter().map(String::from).collect(),
+            groups,
+            first,
+            infinite: inputs.descriptor().is_none(),
+        };
         let read = |((number, columns), group): ((usize, &TreeColumns), u64)| {
-            tree(columns, group, features, classes).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
+            tree(columns, group, &shape).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
         };
         let trees = trees.iter().enumerate().zip(tree_info).map(read).collect::<Result<_, _>>()?;
-        Ok(Ensemble { descriptor, objects, base_margins, trees, origin: origin(&attributes)? })
+        let mut origin = origin(&attributes)?;
+        if inputs.descriptor().is_none() {
+            let mut notes = Vec::new();
+            if let Some(best) = attributes.get("best_iteration") {
+                notes.push(format!(
+                    "Training stopped early at iteration {best}. All trees are used, as by Booster.predict; XGBClassifier \
+                     uses those up to the best one: save booster[:best_iteration + 1] for that."
+                ));
+            }
+            let kind = format!("XGBoost {version} {kind}");
+            origin.imported = Some(Imported { kind, rounding: 0.0, notes });
+        }
+        let mut ensemble = Ensemble { inputs, objects, base_margins, trees, origin };
+        if let Some(weights) = weights {
+            weigh(&mut ensemble, &weights);
+        }
+        // Rows may have any number of features, and names; touches and trees were checked above.
+        ensemble.check()?;
+        Ok(ensemble)
     }
 }
 
-fn attribute<'a>(
-    attributes: &'a Attributes,
-    name: &'static str,
-    example: &'static str,
-) -> Result<&'a str, EnsembleProblem> {
-    attributes.get(name).map(String::as_str).ok_or(EnsembleProblem::NoAttribute { name, example })
+/// The trees, and the weight of each in a dart booster: up to 3.2 it wraps another booster, then weights stand beside the
+/// model, then in it.
+fn forest(booster: GradientBooster) -> Result<(Forest, Option<Vec<f32>>), EnsembleProblem> {
+    let found = booster.name;
+    if !matches!(found.as_str(), "gbtree" | "dart") {
+        return Err(EnsembleProblem::Booster { found });
+    }
+    let inner = booster.gbtree.map_or((None, None), |inner| (inner.model, inner.weight_drop));
+    let Some(mut forest) = booster.model.or(inner.0) else { return Err(EnsembleProblem::NoTrees) };
+    let weights = booster.weight_drop.or(inner.1).or(forest.weight_drop.take());
+    // gbtree writes no weights, or none for its trees.
+    Ok((forest, weights.filter(|weights| !weights.is_empty())))
 }
 
-fn descriptor(attributes: &Attributes) -> Result<Descriptor, EnsembleProblem> {
-    let name = attribute(attributes, "palpate_descriptor", "\"curvature\"")?;
+fn check_feature_count(count: usize, forest: &Forest) -> Result<(), EnsembleProblem> {
+    if (1..=MAX_FEATURES).contains(&count) {
+        return Ok(());
+    }
+    let splits = |tree: &TreeColumns| {
+        let splits = tree.left_children.iter().zip(&tree.split_indices).filter(|(left, _)| **left != -1);
+        splits.map(|(_, &feature)| feature).collect::<Vec<_>>()
+    };
+    let used = forest.trees.iter().flat_map(splits).collect::<BTreeSet<_>>().len();
+    Err(EnsembleProblem::FeatureCount { count, used, most: MAX_FEATURES })
+}
+
+/// Multiplies leaves by their tree's weight, in f32 as XGBoost does.
+fn weigh(ensemble: &mut Ensemble, weights: &[f32]) {
+    for (tree, weight) in ensemble.trees.iter_mut().zip(weights) {
+        for node in &mut tree.nodes {
+            if let Node::Leaf(values) = node {
+                values.iter_mut().for_each(|value| *value *= weight);
+            }
+        }
+    }
+}
+
+fn descriptor(name: &str) -> Result<Descriptor, EnsembleProblem> {
     Descriptor::from_name(name).ok_or_else(|| EnsembleProblem::UnknownDescriptor { found: name.into() })
 }
 
-fn object_names(attributes: &Attributes) -> Result<Vec<String>, EnsembleProblem> {
+fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, EnsembleProblem> {
     let name = "palpate_objects";
-    let text = attribute(attributes, name, "'[\"bowl\", \"fork\"]'")?;
+    let Some(text) = attributes.get(name) else { return Ok(None) };
     let names: Vec<String> = parsed(name, "a JSON array of names", text)?;
     check_names(&names)?;
-    Ok(names)
+    Ok(Some(names))
 }
 
 /// What the optional attributes say about the training touches.
@@ -94,6 +188,7 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         trained: trained.transpose()?,
         noise: noise.transpose()?,
         touches: touches.transpose()?.unwrap_or_default(),
+        imported: None,
     })
 }
 
@@ -105,11 +200,15 @@ fn parsed<'t, T: serde::Deserialize<'t>>(
     serde_json::from_str(text).map_err(|error| EnsembleProblem::Attribute { name, expected, detail: error.to_string() })
 }
 
+/// A count; XGBoost leaves out some that older versions did not know.
 fn count(name: &'static str, text: &str) -> Result<usize, EnsembleProblem> {
+    if text.is_empty() {
+        return Ok(0);
+    }
     text.parse().map_err(|_| EnsembleProblem::Count { name, text: text.into() })
 }
 
-fn base_margins(text: &str, objects: usize) -> Result<Vec<f32>, EnsembleProblem> {
+fn base_scores(text: &str, objects: usize) -> Result<Vec<f32>, EnsembleProblem> {
     let list = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
     let parsed: Result<Vec<f32>, _> = list.unwrap_or(text).split(',').map(|number| number.trim().parse()).collect();
     match parsed {
@@ -119,123 +218,4 @@ fn base_margins(text: &str, objects: usize) -> Result<Vec<f32>, EnsembleProblem>
         _ => {}
     }
     Err(EnsembleProblem::BaseScore { text: text.into(), objects })
-}
-
-/// A column must have one entry for each node; XGBoost leaves some columns out, which read as empty.
-fn whole(column: &'static str, found: usize, wanted: usize) -> Result<(), TreeProblem> {
-    if found == wanted { Ok(()) } else { Err(TreeProblem::Column { column, found, wanted }) }
-}
-
-fn tree(columns: &TreeColumns, group: u64, features: usize, objects: usize) -> Result<Tree, TreeProblem> {
-    let number = |name, text: &str| text.parse().map_err(|_| TreeProblem::Count { name, text: text.into() });
-    let nodes = columns.left_children.len();
-    let stated = number("num_nodes", &columns.tree_param.num_nodes)?;
-    whole("left_children", nodes, stated)?;
-    whole("right_children", columns.right_children.len(), nodes)?;
-    whole("split_indices", columns.split_indices.len(), nodes)?;
-    whole("split_conditions", columns.split_conditions.len(), nodes)?;
-    whole("default_left", columns.default_left.len(), nodes)?;
-    if nodes == 0 {
-        return Err(TreeProblem::NoNodes);
-    }
-    if columns.split_type.iter().any(|&kind| kind != 0) || !columns.categories.is_empty() {
-        return Err(TreeProblem::Categorical);
-    }
-    let values = number("size_leaf_vector", &columns.tree_param.size_leaf_vector)?.max(1);
-    let output = match usize::try_from(group) {
-        _ if values == objects => Output::Each,
-        Ok(object) if values == 1 && object < objects => Output::One(object),
-        _ if values == 1 => return Err(TreeProblem::Object { object: group, objects }),
-        _ => return Err(TreeProblem::LeafWidth { values, objects }),
-    };
-    let read = |position: usize| node(columns, position, output, features, objects);
-    let nodes = reachable(nodes, read)?;
-    Ok(Tree { nodes, output })
-}
-
-/// Node `position` as the file has it, its values and its feature checked, its children checked for range only.
-fn node(
-    columns: &TreeColumns,
-    position: usize,
-    output: Output,
-    features: usize,
-    objects: usize,
-) -> Result<Node, TreeProblem> {
-    let left = columns.left_children[position];
-    if left == -1 {
-        return leaf(columns, position, output, objects).map(Node::Leaf);
-    }
-    let nodes = columns.left_children.len();
-    let child = |side: &'static str, child: i64| {
-        let in_range = usize::try_from(child).ok().filter(|&child| child < nodes);
-        in_range.ok_or(TreeProblem::Child { node: position, side, child, nodes })
-    };
-    let feature = columns.split_indices[position];
-    let threshold = columns.split_conditions[position];
-    if !threshold.is_finite() {
-        return Err(TreeProblem::Threshold { node: position, threshold });
-    }
-    Ok(Node::Split {
-        feature: usize::try_from(feature).ok().filter(|&index| index < features).ok_or(TreeProblem::Feature {
-            node: position,
-            feature,
-            features,
-        })?,
-        threshold,
-        missing_left: columns.default_left[position].is_set(),
-        left: child("left", left)?,
-        right: child("right", columns.right_children[position])?,
-    })
-}
-
-fn leaf(columns: &TreeColumns, position: usize, output: Output, objects: usize) -> Result<Vec<f32>, TreeProblem> {
-    let no_values = |column| TreeProblem::NoValues { node: position, column, values: objects };
-    let values = match (output, &columns.leaf_weights) {
-        (Output::One(_), _) => vec![columns.split_conditions[position]],
-        (Output::Each, None) => {
-            let start = position * objects;
-            let values = columns.base_weights.get(start..start + objects);
-            values.ok_or(no_values("base_weights"))?.to_vec()
-        }
-        (Output::Each, Some(weights)) => {
-            let number = columns.right_children[position];
-            let start = usize::try_from(number).ok().and_then(|number| number.checked_mul(objects));
-            let values = start.and_then(|start| weights.get(start..start.checked_add(objects)?));
-            values.ok_or(no_values("leaf_weights"))?.to_vec()
-        }
-    };
-    match values.iter().find(|value| !value.is_finite()) {
-        Some(&value) => Err(TreeProblem::LeafValue { node: position, value }),
-        None => Ok(values),
-    }
-}
-
-/// The nodes that the root leads to, in the file's order and numbered again: XGBoost leaves pruned nodes behind. Each
-/// may be reached once only, which rules out cycles.
-fn reachable(count: usize, read: impl Fn(usize) -> Result<Node, TreeProblem>) -> Result<Vec<Node>, TreeProblem> {
-    let mut found: Vec<Option<Node>> = vec![None; count];
-    let mut waiting = vec![0];
-    while let Some(position) = waiting.pop() {
-        if found[position].is_some() {
-            return Err(TreeProblem::ReachedTwice { node: position });
-        }
-        let node = read(position)?;
-        if let Node::Split { left, right, .. } = node {
-            waiting.extend([right, left]);
-        }
-        found[position] = Some(node);
-    }
-    let mut numbers = Vec::with_capacity(count);
-    let mut next = 0;
-    for node in &found {
-        numbers.push(next);
-        next += usize::from(node.is_some());
-    }
-    let renumbered = |node| match node {
-        Node::Split { feature, threshold, missing_left, left, right } => {
-            Node::Split { feature, threshold, missing_left, left: numbers[left], right: numbers[right] }
-        }
-        leaf @ Node::Leaf(_) => leaf,
-    };
-    Ok(found.into_iter().flatten().map(renumbered).collect())
 }

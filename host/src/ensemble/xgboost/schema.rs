@@ -1,6 +1,6 @@
 //! XGBoost's JSON model schema, as far as it is used.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
 /// XGBoost's value for "no such node" in a one-output tree's `parents`.
@@ -29,8 +29,15 @@ pub(super) struct Learner {
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct GradientBooster {
-    pub(super) model: Forest,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) model: Option<Forest>,
     pub(super) name: String,
+    /// Of dart up to 3.2, the booster that holds the trees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) gbtree: Option<Box<GradientBooster>>,
+    /// Of dart up to 3.3; later it is in the model.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_floats")]
+    pub(super) weight_drop: Option<Vec<f32>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -40,12 +47,13 @@ pub(super) struct Forest {
     pub(super) iteration_indptr: Vec<u64>,
     pub(super) tree_info: Vec<u64>,
     pub(super) trees: Vec<TreeColumns>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_floats")]
     pub(super) weight_drop: Option<Vec<f32>>,
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct ForestParameters {
+    #[serde(default)]
     pub(super) num_parallel_tree: String,
     pub(super) num_trees: String,
 }
@@ -55,6 +63,7 @@ pub(super) struct LearnerParameters {
     pub(super) base_score: String,
     #[serde(default)]
     pub(super) boost_from_average: String,
+    #[serde(default)]
     pub(super) num_class: String,
     pub(super) num_feature: String,
     #[serde(default)]
@@ -76,6 +85,7 @@ pub(super) struct SoftmaxParameters {
 /// A tree as XGBoost stores it: one array per property, indexed by node.
 #[derive(Default, Serialize, Deserialize)]
 pub(super) struct TreeColumns {
+    #[serde(deserialize_with = "floats")]
     pub(super) base_weights: Vec<f32>,
     #[serde(default)]
     pub(super) categories: Vec<i64>,
@@ -87,19 +97,20 @@ pub(super) struct TreeColumns {
     pub(super) categories_sizes: Vec<i64>,
     pub(super) default_left: Vec<Flag>,
     pub(super) id: u64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_floats")]
     pub(super) leaf_weights: Option<Vec<f32>>,
     pub(super) left_children: Vec<i64>,
-    #[serde(default)]
+    #[serde(default, skip_deserializing)]
     pub(super) loss_changes: Vec<f32>,
-    #[serde(default)]
+    #[serde(default, skip_deserializing)]
     pub(super) parents: Vec<i64>,
     pub(super) right_children: Vec<i64>,
+    #[serde(deserialize_with = "floats")]
     pub(super) split_conditions: Vec<f32>,
     pub(super) split_indices: Vec<u64>,
     #[serde(default)]
     pub(super) split_type: Vec<u8>,
-    #[serde(default)]
+    #[serde(default, skip_deserializing)]
     pub(super) sum_hessian: Vec<f32>,
     pub(super) tree_param: TreeParameters,
 }
@@ -110,6 +121,16 @@ pub(super) struct TreeParameters {
     pub(super) num_feature: String,
     pub(super) num_nodes: String,
     pub(super) size_leaf_vector: String,
+}
+
+/// Numbers, of which those that JSON cannot write are null.
+fn floats<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f32>, D::Error> {
+    let numbers = Vec::<Option<f32>>::deserialize(deserializer)?;
+    Ok(numbers.into_iter().map(|number| number.unwrap_or(f32::NAN)).collect())
+}
+
+fn optional_floats<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<f32>>, D::Error> {
+    floats(deserializer).map(Some)
 }
 
 /// A truth value: a number since XGBoost 1.6, `true` or `false` before.

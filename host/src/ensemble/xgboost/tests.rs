@@ -11,7 +11,7 @@ fn ensemble(multi_output: bool) -> Ensemble {
 }
 
 fn document(multi_output: bool) -> Value {
-    serde_json::to_value(Document::new(&ensemble(multi_output))).unwrap()
+    serde_json::to_value(Document::new(&ensemble(multi_output), Descriptor::Curvature)).unwrap()
 }
 
 fn load(text: &[u8]) -> Result<Ensemble> {
@@ -62,7 +62,7 @@ fn a_model_that_xgboost_wrote_is_read() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/ensemble/xgboost/xgboost-3.2.json");
     let ensemble = Ensemble::load(file).unwrap();
     assert_eq!(ensemble.objects, ["bowl", "fork", "mouse"]);
-    assert_eq!(ensemble.descriptor, Descriptor::Curvature);
+    assert_eq!(ensemble.descriptor(), Some(Descriptor::Curvature));
     // `booster.predict(..., output_margin=True)` of XGBoost 3.2.0 on the same rows.
     let expected = include_str!("xgboost-3.2.margins.json");
     let expected: Vec<(Vec<Option<f32>>, Vec<f32>)> = serde_json::from_str(expected).unwrap();
@@ -104,15 +104,20 @@ fn what_contradicts_itself_is_refused_and_the_place_named() {
     let trees = format!("{model}/trees");
     let cases = [
         (true, "/learner/attributes/palpate_descriptor", json!("shape"), "its descriptor \"shape\" is unknown"),
-        (true, "/learner/attributes", json!({}), "no attribute palpate_descriptor"),
+        (true, "/learner/attributes", json!({"palpate_descriptor": "curvature"}), "no attribute palpate_objects"),
         (true, "/learner/attributes/palpate_objects", json!("bowl"), "palpate_objects is not a JSON array"),
         (true, "/learner/attributes/palpate_objects", json!("[\"a\"]"), "names 1 objects"),
         (true, "/learner/attributes/palpate_objects", json!("[\"a\",\"a\",\"b\"]"), "\"a\" twice"),
         (true, "/learner/attributes/palpate_objects", json!("[\"a\",\"b\"]"), "it has 3 classes"),
         (true, "/learner/learner_model_param/base_score", json!("[1,2]"), "base_score"),
         (true, "/learner/learner_model_param/base_score", json!("NaN"), "not finite"),
-        (true, "/learner/objective/name", json!("reg:squarederror"), "not multi:softprob"),
-        (true, "/learner/gradient_booster/name", json!("dart"), "booster is dart"),
+        (
+            true,
+            "/learner/objective/name",
+            json!("reg:squarederror"),
+            "its objective is reg:squarederror. Train with multi:softprob",
+        ),
+        (true, "/learner/gradient_booster/name", json!("gblinear"), "booster is gblinear"),
         (true, &format!("{model}/tree_info"), json!([0]), "tree_info has 1 entries for 4 trees"),
         (false, &format!("{model}/tree_info/5"), json!(3), "tree 5: it is for object 3 of 3"),
         (true, &trees, json!([]), "no trees"),
@@ -121,7 +126,12 @@ fn what_contradicts_itself_is_refused_and_the_place_named() {
         (true, &format!("{trees}/1/left_children/1"), json!(0), "tree 1: node 0 is reached twice"),
         (true, &format!("{trees}/2/split_indices/0"), json!(2), "tree 2: node 0: it splits on feature 2"),
         (true, &format!("{trees}/2/split_indices"), json!([0]), "tree 2: split_indices has 1 entries"),
-        (true, &format!("{trees}/2/split_type/0"), json!(1), "categorical"),
+        (
+            true,
+            &format!("{trees}/2/split_type/0"),
+            json!(1),
+            "tree 2: it splits on categories of the feature curvature",
+        ),
         (true, &format!("{trees}/0/leaf_weights"), json!([0.5]), "leaf_weights has no 3 values"),
         (true, &format!("{trees}/0/leaf_weights/0"), json!(1e39), "number out of range"),
         (false, &format!("{trees}/0/split_conditions/0"), json!("x"), "expected f32"),
@@ -138,9 +148,9 @@ fn what_contradicts_itself_is_refused_and_the_place_named() {
 fn what_is_no_json_is_refused_with_its_line() {
     for (text, expected) in [
         (&b"{\n  \"learner\": [\n"[..], ":3: not an ensemble in XGBoost's JSON format"),
-        (b"", "not an ensemble in XGBoost's JSON format"),
-        (b"[1, 2]", "not an ensemble in XGBoost's JSON format"),
-        (b"{L\x00\x00\x00learner", "a binary file"),
+        (b"", "it is empty"),
+        (b"[1, 2]", "it is a list"),
+        (b"{L\x00\x00\x00learner", "byte 10: not a whole model in the format XGBoost UBJSON"),
         (b"{\"version\":[3,2,0],\"learner\":{}}", "missing field"),
     ] {
         let complaint = load(text).unwrap_err().to_string();
@@ -156,4 +166,47 @@ fn every_truncation_is_an_error_and_no_panic() {
     for end in (0..text.len()).step_by(97) {
         assert!(load(&text.as_bytes()[..end]).is_err());
     }
+}
+
+#[test]
+fn weights_of_dropped_trees_are_read_where_each_version_puts_them() {
+    let plain = ensemble(true);
+    let weights = json!([0.5, 1.0, 0.25, 2.0]);
+    let mut beside = document(true);
+    beside["learner"]["gradient_booster"]["weight_drop"] = weights.clone();
+    let mut inside = document(true);
+    inside["learner"]["gradient_booster"]["model"]["weight_drop"] = weights.clone();
+    let mut nested = document(true);
+    let booster = nested["learner"]["gradient_booster"].take();
+    nested["learner"]["gradient_booster"] = json!({"name": "dart", "gbtree": booster, "weight_drop": weights});
+    let leaf = |ensemble: &Ensemble, tree: usize| ensemble.trees[tree].nodes.last().unwrap().leaf().unwrap()[0];
+    for document in [beside, inside, nested] {
+        let weighted = load(document.to_string().as_bytes()).unwrap();
+        for (tree, weight) in [0.5, 1.0, 0.25, 2.0].into_iter().enumerate() {
+            assert_eq!(leaf(&weighted, tree), leaf(&plain, tree) * weight);
+        }
+    }
+    let mut few = document(true);
+    few["learner"]["gradient_booster"]["weight_drop"] = json!([1.0]);
+    assert!(
+        load(few.to_string().as_bytes()).unwrap_err().to_string().contains("weight_drop has 1 entries for 4 trees")
+    );
+}
+
+#[test]
+fn an_ensemble_without_a_descriptor_is_over_rows_and_names_may_be_given() {
+    let mut rows = document(true);
+    rows["learner"]["attributes"] = json!({});
+    rows["learner"]["feature_names"] = json!(["width", "height"]);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), rows.to_string()).unwrap();
+    let read = Ensemble::load(file.path()).unwrap();
+    assert_eq!(read.inputs, Inputs::Rows(vec!["width".into(), "height".into()]));
+    assert_eq!((&read.trees, &read.objects[..]), (&ensemble(true).trees, &["0", "1", "2"].map(String::from)[..]));
+    let names = ["a", "b", "c"].map(String::from);
+    assert_eq!(Ensemble::load_named(file.path(), Some(&names)).unwrap().objects, names);
+    let error = Ensemble::load_named(file.path(), Some(&names[..2])).unwrap_err().to_string();
+    assert!(error.contains("2 names were given for 3 outputs"), "{error}");
+    let error = read.save(file.path()).unwrap_err().to_string();
+    assert!(error.contains("rows of features cannot be saved"), "{error}");
 }

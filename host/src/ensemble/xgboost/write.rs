@@ -10,18 +10,18 @@ use std::collections::BTreeMap;
 
 impl Document {
     /// The document of an ensemble that [`Ensemble::check`] accepts.
-    pub(super) fn new(ensemble: &Ensemble) -> Self {
+    pub(super) fn new(ensemble: &Ensemble, descriptor: Descriptor) -> Self {
         let objects = ensemble.objects.len();
-        let features = ensemble.descriptor.feature_count();
+        let features = descriptor.feature_count();
         let trees = &ensemble.trees;
         let num_class = objects.to_string();
         Self {
             learner: Learner {
-                attributes: attributes(ensemble.descriptor, &ensemble.objects, &ensemble.origin),
+                attributes: attributes(descriptor, &ensemble.objects, &ensemble.origin),
                 feature_names: Vec::new(),
                 feature_types: Vec::new(),
                 gradient_booster: GradientBooster {
-                    model: Forest {
+                    model: Some(Forest {
                         gbtree_model_param: ForestParameters {
                             num_parallel_tree: "1".into(),
                             num_trees: trees.len().to_string(),
@@ -30,8 +30,10 @@ impl Document {
                         tree_info: trees.iter().map(|tree| group(tree.output)).collect(),
                         trees: trees.iter().zip(0..).map(|(tree, id)| columns(tree, id, features, objects)).collect(),
                         weight_drop: None,
-                    },
+                    }),
                     name: "gbtree".into(),
+                    gbtree: None,
+                    weight_drop: None,
                 },
                 learner_model_param: LearnerParameters {
                     base_score: base_score(&ensemble.base_margins),

@@ -1,0 +1,273 @@
+//! CatBoost's JSON: `save_model("model.json", format="json")`, symmetric trees (`oblivious_trees`) and others (`trees`).
+//!
+//! A value goes right if it is above the border, in f32.
+
+use super::draft::{Draft, DraftNode, DraftTree};
+use super::unsupported;
+use crate::ensemble::nodes::after;
+use crate::ensemble::{Ensemble, Output};
+use crate::error::EnsembleProblem;
+use serde::Deserialize;
+use serde_json::Value;
+
+type Result<T, E = EnsembleProblem> = std::result::Result<T, E>;
+
+/// CatBoost's own limit.
+const MAX_DEPTH: usize = 16;
+
+#[derive(Deserialize)]
+struct Document {
+    features_info: FeaturesInfo,
+    #[serde(default)]
+    model_info: ModelInfo,
+    #[serde(default)]
+    oblivious_trees: Vec<Oblivious>,
+    #[serde(default)]
+    trees: Vec<Branch>,
+    #[serde(default)]
+    scale_and_bias: Option<(f64, Bias)>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Bias {
+    One(f64),
+    Each(Vec<f64>),
+}
+
+#[derive(Deserialize)]
+struct FeaturesInfo {
+    #[serde(default)]
+    float_features: Vec<FloatFeature>,
+    #[serde(default)]
+    categorical_features: Vec<OtherFeature>,
+    #[serde(default)]
+    text_features: Vec<OtherFeature>,
+    #[serde(default)]
+    embedding_features: Vec<OtherFeature>,
+}
+
+#[derive(Deserialize)]
+struct FloatFeature {
+    #[serde(default)]
+    feature_id: String,
+    flat_feature_index: usize,
+    #[serde(default)]
+    nan_value_treatment: String,
+}
+
+#[derive(Deserialize)]
+struct OtherFeature {
+    #[serde(default)]
+    feature_id: String,
+    #[serde(default)]
+    flat_feature_index: usize,
+}
+
+#[derive(Default, Deserialize)]
+struct ModelInfo {
+    #[serde(default)]
+    catboost_version_info: String,
+    #[serde(default)]
+    class_params: Value,
+    #[serde(default)]
+    params: Value,
+}
+
+#[derive(Deserialize)]
+struct Oblivious {
+    leaf_values: Vec<f64>,
+    #[serde(default)]
+    splits: Option<Vec<Split>>,
+}
+
+#[derive(Deserialize)]
+struct Branch {
+    split: Option<Split>,
+    left: Option<Box<Branch>>,
+    right: Option<Box<Branch>>,
+    value: Option<OneOrEach>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum OneOrEach {
+    One(f64),
+    Each(Vec<f64>),
+}
+
+#[derive(Deserialize)]
+struct Split {
+    #[serde(default)]
+    border: f64,
+    float_feature_index: Option<usize>,
+    #[serde(default)]
+    split_type: String,
+}
+
+fn damaged(what: impl Into<String>) -> EnsembleProblem {
+    EnsembleProblem::Damaged { kind: "CatBoost JSON", what: what.into() }
+}
+
+/// Reads CatBoost's JSON.
+pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
+    let document: Document = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
+    let info = &document.features_info;
+    let others = [&info.categorical_features, &info.text_features, &info.embedding_features];
+    let others = others.into_iter().flatten();
+    let of_floats = info.float_features.iter().map(|feature| (feature.flat_feature_index, &feature.feature_id));
+    let all: Vec<(usize, &String)> =
+        of_floats.chain(others.map(|feature| (feature.flat_feature_index, &feature.feature_id))).collect();
+    let mut features = vec![String::new(); all.len()];
+    for (index, name) in &all {
+        let slot = features.get_mut(*index);
+        let slot = slot.ok_or_else(|| damaged(format!("feature {index} of {}", all.len())))?;
+        // A name that is only the feature's number is none.
+        *slot = if **name == index.to_string() { String::new() } else { name.to_string() };
+    }
+    let (scale, bias) = match document.scale_and_bias {
+        None => (1.0, vec![0.0]),
+        Some((scale, Bias::One(bias))) => (scale, vec![bias]),
+        Some((scale, Bias::Each(bias))) => (scale, bias),
+    };
+    let loss = document.model_info.params.pointer("/loss_function/type").and_then(Value::as_str).unwrap_or_default();
+    let classes = class_names(&document.model_info.class_params);
+    let values = values_per_leaf(&document.oblivious_trees, &document.trees)?;
+    let is_multiclass = matches!(loss, "MultiClass" | "MultiClassOneVsAll") || (loss.is_empty() && classes.len() > 2);
+    if values > 1 && !is_multiclass {
+        return Err(unsupported(
+            format!("it has {values} targets, which are no classes of one object (its loss is {loss})"),
+            "Train a model for each target.",
+        ));
+    }
+    let is_binary = values == 1 && (classes.len() == 2 || matches!(loss, "Logloss" | "CrossEntropy"));
+    let first = usize::from(is_binary);
+    let outputs = values + first;
+    let version = document.model_info.catboost_version_info.lines().find_map(|line| line.split("release ").nth(1));
+    let version = version.and_then(|text| text.split(". ").next()).map(|v| format!(" {v}")).unwrap_or_default();
+    let mut draft = Draft { features, kind: format!("CatBoost{version} JSON"), ..Draft::default() };
+    if classes.len() == outputs {
+        draft.names = classes;
+    }
+    if loss == "MultiClassOneVsAll" {
+        draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
+    }
+    draft.base = vec![0.0; outputs];
+    if bias.len() != values && bias.len() != 1 {
+        return Err(damaged(format!("scale_and_bias has {} numbers for {values} outputs", bias.len())));
+    }
+    for value in 0..values {
+        draft.base[first + value] = if bias.len() == 1 { bias[0] } else { bias[value] };
+    }
+    let reader = Reader { info, values, scale };
+    let output = if values > 1 { Output::Each } else { Output::One(first) };
+    for (number, tree) in document.oblivious_trees.iter().enumerate() {
+        let nodes = reader.oblivious(tree, number)?;
+        draft.trees.push(DraftTree { nodes, output });
+    }
+    for (number, tree) in document.trees.iter().enumerate() {
+        let nodes = reader.branches(tree, number)?;
+        draft.trees.push(DraftTree { nodes, output });
+    }
+    draft.finish(names)
+}
+
+fn class_names(params: &Value) -> Vec<String> {
+    let text = |name: &Value| name.as_str().map_or_else(|| name.to_string(), String::from);
+    params.get("class_names").and_then(Value::as_array).into_iter().flatten().map(text).collect()
+}
+
+fn values_per_leaf(oblivious: &[Oblivious], trees: &[Branch]) -> Result<usize> {
+    if let Some(tree) = oblivious.first() {
+        let depth = tree.splits.as_ref().map_or(0, Vec::len);
+        let leaves = (depth <= MAX_DEPTH).then(|| 1_usize << depth);
+        let values = leaves.filter(|leaves| tree.leaf_values.len().is_multiple_of(*leaves));
+        let values = values.map(|leaves| tree.leaf_values.len() / leaves).filter(|&values| values > 0);
+        return values.ok_or_else(|| damaged("tree 0: leaf_values has another length than its splits ask for"));
+    }
+    let Some(mut branch) = trees.first() else { return Err(EnsembleProblem::NoTrees) };
+    loop {
+        match (&branch.value, &branch.left) {
+            (Some(OneOrEach::One(_)), _) => return Ok(1),
+            (Some(OneOrEach::Each(values)), _) if !values.is_empty() => return Ok(values.len()),
+            (None, Some(left)) => branch = left,
+            _ => return Err(damaged("tree 0: a leaf has no value")),
+        }
+    }
+}
+
+struct Reader<'a> {
+    info: &'a FeaturesInfo,
+    values: usize,
+    scale: f64,
+}
+
+impl Reader<'_> {
+    /// A split's feature in a row, its threshold, and where a missing value goes.
+    fn split(&self, split: &Split, tree: usize) -> Result<(usize, f32, bool)> {
+        let index = split.float_feature_index.filter(|_| matches!(split.split_type.as_str(), "FloatFeature" | ""));
+        let Some(index) = index else {
+            let others = &self.info.categorical_features;
+            let names: Vec<&str> = others.iter().map(|feature| feature.feature_id.as_str()).collect();
+            return Err(unsupported(
+                format!("tree {tree} splits on categories ({}: {})", split.split_type, names.join(", ")),
+                "Encode categories as numbers before training, one column of 0 and 1 for each (one-hot).",
+            ));
+        };
+        let feature = self.info.float_features.get(index);
+        let feature = feature.ok_or_else(|| damaged(format!("tree {tree}: it has no feature {index}")))?;
+        // A comparison with NaN is false; or missing values count as above all borders.
+        let missing_left = feature.nan_value_treatment != "AsTrue";
+        Ok((feature.flat_feature_index, after(f64::from(split.border as f32)), missing_left))
+    }
+
+    fn leaf(&self, values: &[f64]) -> DraftNode {
+        DraftNode::Leaf(values.iter().map(|value| value * self.scale).collect())
+    }
+
+    /// A tree whose levels have one split each: the first decides the lowest bit of the leaf's number.
+    fn oblivious(&self, tree: &Oblivious, number: usize) -> Result<Vec<DraftNode>> {
+        let splits = tree.splits.as_deref().unwrap_or_default();
+        let depth = splits.len();
+        if depth > MAX_DEPTH || tree.leaf_values.len() != self.values << depth {
+            let found = tree.leaf_values.len();
+            return Err(damaged(format!("tree {number}: leaf_values has {found} entries for {depth} splits")));
+        }
+        let splits: Vec<_> = splits.iter().map(|split| self.split(split, number)).collect::<Result<_>>()?;
+        let mut nodes = Vec::with_capacity((2 << depth) - 1);
+        // Level by level: node i of a level has the children 2 i and 2 i + 1 of the next.
+        for (level, &(feature, threshold, missing_left)) in splits.iter().enumerate() {
+            let next = (2 << level) - 1;
+            for index in 0..1 << level {
+                let left = next + 2 * index;
+                nodes.push(DraftNode::Split { feature, threshold, missing_left, left, right: left + 1 });
+            }
+        }
+        for position in 0..1_usize << depth {
+            // The first split is the highest bit of the position, and the lowest of the leaf's number.
+            let number = (0..depth).fold(0, |leaf, level| leaf | (position >> (depth - 1 - level) & 1) << level);
+            nodes.push(self.leaf(&tree.leaf_values[number * self.values..(number + 1) * self.values]));
+        }
+        Ok(nodes)
+    }
+
+    fn branches(&self, root: &Branch, number: usize) -> Result<Vec<DraftNode>> {
+        let mut nodes = vec![DraftNode::Leaf(Vec::new())];
+        let mut waiting = vec![(root, 0)];
+        while let Some((branch, to)) = waiting.pop() {
+            nodes[to] = match branch {
+                Branch { split: Some(split), left: Some(left), right: Some(right), .. } => {
+                    let (feature, threshold, missing_left) = self.split(split, number)?;
+                    let first = nodes.len();
+                    nodes.extend([DraftNode::Leaf(Vec::new()), DraftNode::Leaf(Vec::new())]);
+                    waiting.extend([(&**right, first + 1), (&**left, first)]);
+                    DraftNode::Split { feature, threshold, missing_left, left: first, right: first + 1 }
+                }
+                Branch { value: Some(OneOrEach::One(value)), .. } => self.leaf(&[*value]),
+                Branch { value: Some(OneOrEach::Each(values)), .. } => self.leaf(values),
+                _ => return Err(damaged(format!("tree {number}: a node is neither a split nor a leaf"))),
+            };
+        }
+        Ok(nodes)
+    }
+}

@@ -1,0 +1,323 @@
+//! LightGBM's text: `save_model("model.txt")`, versions 3 and 4 of the library.
+//!
+//! A value goes left if it is at or below the threshold, in f64. What counts as missing is each split's own: nothing
+//! (NaN is 0 then), zero (and NaN), or NaN.
+
+use super::draft::{Draft, DraftNode, DraftTree};
+use super::unsupported;
+use crate::ensemble::nodes::after;
+use crate::ensemble::{Ensemble, Output};
+use crate::error::EnsembleProblem;
+use std::collections::BTreeMap;
+
+/// Why a file was refused, and the line.
+pub(super) struct Refused {
+    pub(super) line: Option<u64>,
+    pub(super) problem: EnsembleProblem,
+}
+
+impl From<EnsembleProblem> for Refused {
+    fn from(problem: EnsembleProblem) -> Self {
+        Self { line: None, problem }
+    }
+}
+
+type Result<T, E = Refused> = std::result::Result<T, E>;
+
+/// Zero, to LightGBM: everything up to this.
+const ZERO: f32 = 1e-35;
+/// Nodes of a tree whose zeros are told from other numbers by splits of their own, for each node in the file.
+const MAX_GROWTH: usize = 16;
+
+/// `key=value` lines, each with its number.
+#[derive(Default)]
+struct Block<'a> {
+    line: u64,
+    values: BTreeMap<&'a str, (u64, &'a str)>,
+}
+
+impl<'a> Block<'a> {
+    fn damaged(&self, key: &str, what: &str) -> Refused {
+        let line = self.values.get(key).map_or(self.line, |(line, _)| *line);
+        damaged(line, format!("{key} {what}"))
+    }
+
+    fn text(&self, key: &str) -> Option<&'a str> {
+        self.values.get(key).map(|(_, text)| *text)
+    }
+
+    fn count(&self, key: &str) -> Result<usize> {
+        let text = self.text(key).ok_or_else(|| self.damaged(key, "is missing"))?;
+        text.trim().parse().map_err(|_| self.damaged(key, "is not a count"))
+    }
+
+    /// A list of exactly `wanted` numbers.
+    fn list<T: std::str::FromStr>(&self, key: &str, wanted: usize) -> Result<Vec<T>> {
+        let text = self.text(key).unwrap_or_default();
+        let parsed: Option<Vec<T>> = text.split_ascii_whitespace().map(|number| number.parse().ok()).collect();
+        let list = parsed.ok_or_else(|| self.damaged(key, "is not a list of numbers"))?;
+        if list.len() != wanted {
+            return Err(self.damaged(key, &format!("has {} entries instead of {wanted}", list.len())));
+        }
+        Ok(list)
+    }
+}
+
+fn damaged(line: u64, what: String) -> Refused {
+    Refused { line: Some(line), problem: EnsembleProblem::Damaged { kind: "LightGBM text", what } }
+}
+
+/// Reads LightGBM's text.
+pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
+    let text = std::str::from_utf8(bytes).map_err(|_| damaged(1, "it is not UTF-8".into()))?;
+    let (head, blocks) = blocks(text)?;
+    let outputs = head.count("num_tree_per_iteration")?;
+    if outputs == 0 || outputs > 256 {
+        return Err(EnsembleProblem::ObjectCount { count: outputs }.into());
+    }
+    let features = head.count("max_feature_idx")?.saturating_add(1);
+    let own: Vec<String> = head.text("feature_names").unwrap_or_default().split(' ').map(String::from).collect();
+    if own.len() != features {
+        return Err(head.damaged("feature_names", &format!("has {} names for {features} features", own.len())));
+    }
+    let version = head.text("version").unwrap_or_default();
+    let mut draft = Draft { features: own, kind: format!("LightGBM text {version}"), ..Draft::default() };
+    let first = objective(head.text("objective"), outputs, &mut draft)?;
+    draft.base = vec![0.0; outputs + first];
+    for (index, block) in blocks.iter().enumerate() {
+        let output = Output::One(index % outputs + first);
+        let nodes = tree(block, index, features, &draft.features)?;
+        draft.trees.push(DraftTree { nodes, output });
+    }
+    if head.values.contains_key("average_output") {
+        let rounds = (blocks.len() / outputs).max(1);
+        draft.notes.push(format!(
+            "A random forest: margins are the library's raw scores, which are sums. Its probabilities are those of averages: \
+             posteriors here are as if margins were {rounds} times as large."
+        ));
+    }
+    Ok(draft.finish(names)?)
+}
+
+/// The lines before the first tree, and those of each tree.
+fn blocks(text: &str) -> Result<(Block<'_>, Vec<Block<'_>>)> {
+    let mut head = Block::default();
+    let mut trees: Vec<Block<'_>> = Vec::new();
+    for (line, text) in (1..).zip(text.lines()) {
+        let text = text.trim_end();
+        if text == "end of trees" {
+            return Ok((head, trees));
+        }
+        let (key, value) = text.split_once('=').unwrap_or((text, ""));
+        if key == "Tree" {
+            trees.push(Block { line, values: BTreeMap::new() });
+        } else if !key.is_empty() {
+            let block = trees.last_mut().unwrap_or(&mut head);
+            block.values.insert(key, (line, value));
+        }
+    }
+    Err(damaged(text.lines().count() as u64, "it ends before the line \"end of trees\"".into()))
+}
+
+/// The first tree's object: 1 for a binary model. Says what is unusual about the objective.
+fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<usize> {
+    let text = text.unwrap_or("custom");
+    let mut words = text.split_ascii_whitespace();
+    let name = words.next().unwrap_or("custom");
+    let sigmoid = words.find_map(|word| word.strip_prefix("sigmoid:")).unwrap_or("1");
+    let is_classes = matches!(name, "multiclass" | "multiclassova");
+    if outputs > 1 && !is_classes && name != "custom" {
+        return Err(EnsembleProblem::Objective { found: name.into() }.into());
+    }
+    if matches!(name, "binary" | "multiclassova") && sigmoid.parse() != Ok(1.0) {
+        draft
+            .notes
+            .push(format!("Posteriors take margins as log-odds, but the model's are to be multiplied by {sigmoid}."));
+    }
+    if name == "multiclassova" {
+        draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
+    }
+    Ok(usize::from(name == "binary"))
+}
+
+/// A split as the file has it.
+#[derive(Clone, Copy)]
+struct Split {
+    feature: usize,
+    threshold: f64,
+    default_left: bool,
+    missing: Missing,
+    left: i64,
+    right: i64,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Missing {
+    Nothing,
+    Zero,
+    NaN,
+}
+
+fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> Result<Vec<DraftNode>> {
+    let leaves = block.count("num_leaves")?;
+    let values: Vec<f64> = block.list("leaf_value", leaves)?;
+    if leaves == 0 {
+        return Err(block.damaged("num_leaves", "is 0"));
+    }
+    if block.text("is_linear").is_some_and(|text| text.trim() == "1") {
+        return Err(unsupported(
+            format!("tree {number} has linear functions of the features at its leaves"),
+            "Train with linear_tree=false.",
+        )
+        .into());
+    }
+    let splits = leaves - 1;
+    let selected: Vec<usize> = block.list("split_feature", splits)?;
+    let thresholds: Vec<f64> = block.list("threshold", splits)?;
+    let decisions: Vec<u8> = block.list("decision_type", splits)?;
+    let lefts: Vec<i64> = block.list("left_child", splits)?;
+    let rights: Vec<i64> = block.list("right_child", splits)?;
+    let mut read = Vec::with_capacity(splits);
+    for (index, &decision) in decisions.iter().enumerate() {
+        let feature = selected[index];
+        let Some(name) = names.get(feature).filter(|_| feature < features) else {
+            return Err(block.damaged("split_feature", &format!("has {feature}, but there are {features} features")));
+        };
+        if decision & 1 != 0 {
+            return Err(EnsembleProblem::Tree {
+                tree: number,
+                problem: crate::error::TreeProblem::Categorical { feature: name.clone() },
+            }
+            .into());
+        }
+        let missing = match decision >> 2 & 3 {
+            0 => Missing::Nothing,
+            1 => Missing::Zero,
+            2 => Missing::NaN,
+            _ => return Err(block.damaged("decision_type", &format!("{decision} is unknown"))),
+        };
+        let default_left = decision & 2 != 0;
+        let threshold = thresholds[index];
+        if !threshold.is_finite() {
+            return Err(block.damaged("threshold", "is not finite"));
+        }
+        let (left, right) = (lefts[index], rights[index]);
+        read.push(Split { feature, threshold, default_left, missing, left, right });
+    }
+    check_structure(block, &read, values.len())?;
+    let mut grower = Grower { splits: &read, values: &values, nodes: Vec::new() };
+    grower.grow(number, names)?;
+    Ok(grower.nodes)
+}
+
+/// Whether every split and every leaf is reached once at most.
+fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result<()> {
+    let (mut of_splits, mut of_leaves) = (vec![false; splits.len()], vec![false; leaves]);
+    let mut waiting: Vec<(&str, i64)> = vec![("num_leaves", if splits.is_empty() { -1 } else { 0 })];
+    while let Some((column, child)) = waiting.pop() {
+        let position = if child < 0 { child.checked_add(1).and_then(i64::checked_neg) } else { Some(child) };
+        let position = position.and_then(|position| usize::try_from(position).ok());
+        let seen = if child < 0 { &mut of_leaves } else { &mut of_splits };
+        let Some((position, seen)) = position.and_then(|position| Some((position, seen.get_mut(position)?))) else {
+            return Err(block.damaged(column, &format!("names the node {child}, which does not exist")));
+        };
+        if std::mem::replace(seen, true) {
+            return Err(block.damaged(column, &format!("leads to the node {child} a second time")));
+        }
+        if child >= 0 {
+            waiting.extend([("right_child", splits[position].right), ("left_child", splits[position].left)]);
+        }
+    }
+    Ok(())
+}
+
+/// Copies a tree, writing splits that LightGBM has and other trees do not as several.
+struct Grower<'a> {
+    splits: &'a [Split],
+    values: &'a [f64],
+    nodes: Vec<DraftNode>,
+}
+
+impl Grower<'_> {
+    /// Copies the file's nodes from the root on, each where its parent expects it.
+    fn grow(&mut self, number: usize, names: &[String]) -> Result<()> {
+        // Of the file's tree: split i, or leaf -1 - i; and where it goes.
+        let root = if self.splits.is_empty() { -1 } else { 0 };
+        let mut waiting = vec![(root, self.reserve())];
+        let most = MAX_GROWTH * (self.splits.len() + self.values.len());
+        while let Some((from, to)) = waiting.pop() {
+            // The structure was checked.
+            let position = usize::try_from(if from < 0 { -1 - from } else { from }).unwrap_or(usize::MAX);
+            let Some(&split) = self.splits.get(position).filter(|_| from >= 0) else {
+                self.nodes[to] = DraftNode::Leaf(self.values.get(position).copied().into_iter().collect());
+                continue;
+            };
+            self.split(split, to, &mut waiting);
+            if self.nodes.len() > most {
+                let name = names.get(split.feature).map_or("", String::as_str);
+                return Err(unsupported(
+                    format!(
+                        "tree {number} takes zeros of features such as {name:?} as missing in so many places that it \
+                         would become {MAX_GROWTH} times as large"
+                    ),
+                    "Train with zero_as_missing=false, or with fewer leaves.",
+                )
+                .into());
+            }
+        }
+        Ok(())
+    }
+
+    fn reserve(&mut self) -> usize {
+        self.nodes.push(DraftNode::Leaf(Vec::new()));
+        self.nodes.len() - 1
+    }
+
+    /// Writes one split, or three where zero goes another way than its neighbors.
+    fn split(&mut self, split: Split, to: usize, waiting: &mut Vec<(i64, usize)>) {
+        let Split { feature, threshold, default_left, missing, left, right } = split;
+        let zero_is_left = threshold >= 0.0;
+        // LightGBM reads everything from -ZERO to ZERO as 0: all of it goes one way.
+        let above_zero = after(f64::from(ZERO));
+        let whole = if zero_is_left { after(threshold).max(above_zero) } else { after(threshold).min(-ZERO) };
+        let mut put = |nodes: &mut Self, at: usize, threshold: f32, missing_left: bool, sides: [Side; 2]| {
+            let [left, right] = sides.map(|side| match side {
+                Side::Copy(from) => {
+                    let to = nodes.reserve();
+                    waiting.push((from, to));
+                    to
+                }
+                Side::At(to) => to,
+            });
+            nodes.nodes[at] = DraftNode::Split { feature, threshold, missing_left, left, right };
+        };
+        let (left, right) = (Side::Copy(left), Side::Copy(right));
+        match missing {
+            Missing::NaN => put(self, to, whole, default_left, [left, right]),
+            Missing::Nothing => put(self, to, whole, zero_is_left, [left, right]),
+            // Zeros go where the comparison sends them.
+            Missing::Zero if default_left == zero_is_left => put(self, to, whole, default_left, [left, right]),
+            Missing::Zero => {
+                // Below zero, then zero, then above it: each side of zero is compared with the threshold as usual.
+                let (above, zero_or_above) = (self.reserve(), self.reserve());
+                let side = |goes_left: bool| if goes_left { left } else { right };
+                let (below, over) = if zero_is_left {
+                    // All of what is below zero goes left.
+                    (left, Side::At(above))
+                } else {
+                    (Side::At(above), right)
+                };
+                put(self, to, -ZERO, false, [below, Side::At(zero_or_above)]);
+                put(self, zero_or_above, above_zero, true, [side(default_left), over]);
+                put(self, above, after(threshold), default_left, [left, right]);
+            }
+        }
+    }
+}
+
+/// A child: a node of the file to be copied, or one that was reserved.
+#[derive(Clone, Copy)]
+enum Side {
+    Copy(i64),
+    At(usize),
+}

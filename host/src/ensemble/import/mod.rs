@@ -1,0 +1,178 @@
+//! Ensembles that other libraries trained, told apart by the content of their files.
+//!
+//! | library | file | exactness of margins |
+//! |---|---|---|
+//! | XGBoost 1.6 and later | JSON or UBJSON of `save_model` | every bit |
+//! | LightGBM 3 and later | text of `save_model` | within 1e-5: the library adds f64, and this f32 |
+//! | CatBoost 1 | JSON of `save_model(…, format="json")` | the same |
+//! | scikit-learn and others | ONNX: `TreeEnsembleClassifier`, `TreeEnsembleRegressor`, `TreeEnsemble` | the same |
+//!
+//! All of them become an [`Ensemble`] over rows of f32 features, with the features' names and the classes' where the file
+//! has them. Comparisons are exact: `x <= t` is `x < c` with the next f32 c, whatever t's precision. How far margins can
+//! be from the library's own is computed from the leaves and stated in [`Imported::rounding`]. What cannot be taken over
+//! exactly is refused by name: categorical splits, linear leaves, several targets.
+
+mod catboost;
+mod draft;
+mod lightgbm;
+mod onnx;
+mod ubjson;
+
+use super::{Ensemble, Imported, xgboost};
+use crate::error::{EnsembleProblem, Error, Place, Result};
+use std::path::Path;
+
+impl Ensemble {
+    /// Reads an ensemble: XGBoost's JSON, which [`Ensemble::save`] and `palpate train` write, over features of touches
+    /// if it has the attribute `palpate_descriptor`; else a file of XGBoost, LightGBM, CatBoost or an ONNX file, over
+    /// rows of features: see [`import`](self). The kind is told by the content.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is of no such kind, or has something in it that no compiled model can do
+    /// ([`EnsembleProblem`]): an unknown descriptor, or another number of features than it has; fewer than two objects
+    /// (over rows none) or more than 256, a name that is repeated, empty, too long or has control characters, or another
+    /// number of classes; columns of unequal length; a child, feature or object out of range; a node that is reached
+    /// twice (a cycle); a leaf that is not finite; categorical splits, or no trees at all. The error names the file, the
+    /// tree and the node.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        Self::load_named(path, None)
+    }
+
+    /// As [`load`](Self::load), with other names for its objects: one for each class, or for the one output of a
+    /// regression.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load); [`EnsembleProblem::Names`] if their number is not that of the outputs.
+    pub fn load_named(path: impl AsRef<Path>, names: Option<&[String]>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
+        read(path, &bytes, names)
+    }
+}
+
+/// Reads an ensemble from a file's bytes; `path` is for errors only.
+///
+/// Memory: some 50 bytes for each byte of the file at most.
+///
+/// # Errors
+/// As [`Ensemble::load`], but for reading the file.
+pub fn read(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
+    let wrong = |problem| Error::at(Place::file(path), problem);
+    match kind(bytes).map_err(wrong)? {
+        Kind::Json => match json_kind(bytes) {
+            JsonKind::CatBoost => catboost::read(bytes, names).map_err(wrong),
+            JsonKind::LightGbmDump => Err(wrong(unsupported(
+                "it is what LightGBM's dump_model wrote, which rounds numbers",
+                "Save the model with `booster.save_model(\"model.txt\")`.",
+            ))),
+            JsonKind::XgBoostDump => Err(wrong(unsupported(
+                "it is a list, such as XGBoost's dump_model writes, which lacks what margins start from",
+                "Save the model with `booster.save_model(\"model.json\")`.",
+            ))),
+            JsonKind::XgBoost => xgboost::from_json(path, bytes, names),
+        },
+        Kind::Ubjson => match ubjson::read(bytes) {
+            Ok(value) => xgboost::from_ubjson(path, value, names),
+            Err(at) => Err(Error::at(
+                Place::byte(path, at),
+                EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "no UBJSON from here on".into() },
+            )),
+        },
+        Kind::LightGbm => lightgbm::read(bytes, names).map_err(|refused| {
+            Error::at(refused.line.map_or(Place::file(path), |line| Place::line(path, line)), refused.problem)
+        }),
+        Kind::Onnx => onnx::read(bytes, names).map_err(wrong),
+    }
+}
+
+enum Kind {
+    Json,
+    Ubjson,
+    LightGbm,
+    Onnx,
+}
+
+/// What a file is, by its first bytes.
+fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
+    let text = bytes.trim_ascii_start();
+    let starts = |prefix: &[u8]| bytes.starts_with(prefix);
+    let refused = |what: &str, way: &str| Err(unsupported(what, way));
+    match bytes {
+        // `{` and the length of the first key, in one of UBJSON's integers; or `{$` and `{#`, of typed objects.
+        [b'{', b'i' | b'U' | b'I' | b'u' | b'l' | b'm' | b'L' | b'$' | b'#', ..] => Ok(Kind::Ubjson),
+        _ if text.starts_with(b"{") || text.starts_with(b"[") => Ok(Kind::Json),
+        _ if text.starts_with(b"tree\n") || text.starts_with(b"tree\r\n") => Ok(Kind::LightGbm),
+        _ if starts(b"PLPT") => {
+            refused("it is a compiled model already", "Give the ensemble that it was exported from.")
+        }
+        _ if starts(b"CBM1") => refused(
+            "it is CatBoost's binary format",
+            "Save the model with `model.save_model(\"model.json\", format=\"json\")`.",
+        ),
+        _ if starts(b"binf") || starts(b"CONFIG-offset:") => {
+            refused("it is XGBoost's old binary format", "Save the model with `booster.save_model(\"model.json\")`.")
+        }
+        [0x80, 2..=5, ..] => refused(
+            "it is a Python pickle, which only Python can open",
+            "Convert a scikit-learn model with `skl2onnx.to_onnx(model, X[:1])`, and save the bytes of its \
+             SerializeToString(); a model of another library with its own save_model. HistGradientBoosting cannot be \
+             converted: train XGBoost or LightGBM with the same settings.",
+        ),
+        [0x1f, 0x8b, ..] | [b'P', b'K', 3, 4, ..] | [0x28, 0xb5, 0x2f, 0xfd, ..] => {
+            refused("it is compressed", "Unpack it first.")
+        }
+        _ if onnx::is_onnx(bytes) => Ok(Kind::Onnx),
+        [] => refused("it is empty", KINDS),
+        _ => refused("it is no ensemble in a format that can be read", KINDS),
+    }
+}
+
+/// What can be read.
+const KINDS: &str = "Give what `palpate train` wrote, XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or an \
+                     ONNX file of trees.";
+
+enum JsonKind {
+    XgBoost,
+    XgBoostDump,
+    CatBoost,
+    LightGbmDump,
+}
+
+/// Whose JSON a text is; XGBoost's where nothing says otherwise.
+fn json_kind(bytes: &[u8]) -> JsonKind {
+    #[derive(Default, serde::Deserialize)]
+    struct Keys {
+        learner: Option<serde::de::IgnoredAny>,
+        oblivious_trees: Option<serde::de::IgnoredAny>,
+        features_info: Option<serde::de::IgnoredAny>,
+        tree_info: Option<serde::de::IgnoredAny>,
+    }
+    if bytes.trim_ascii_start().starts_with(b"[") {
+        return JsonKind::XgBoostDump;
+    }
+    match serde_json::from_slice(bytes).unwrap_or_default() {
+        Keys { learner: Some(_), .. } => JsonKind::XgBoost,
+        Keys { oblivious_trees: Some(_), .. } | Keys { features_info: Some(_), .. } => JsonKind::CatBoost,
+        Keys { tree_info: Some(_), .. } => JsonKind::LightGbmDump,
+        _ => JsonKind::XgBoost,
+    }
+}
+
+/// A kind of file, or something in one, that is refused.
+fn unsupported(what: impl Into<String>, way: impl Into<String>) -> EnsembleProblem {
+    EnsembleProblem::Unsupported { what: what.into(), way: way.into() }
+}
+
+/// The names of outputs that have none: the labels 0, 1 and so on, or the value of a regression.
+pub(super) fn default_names(outputs: usize) -> Vec<String> {
+    if outputs == 1 { vec!["value".into()] } else { (0..outputs).map(|label| label.to_string()).collect() }
+}
+
+/// The given names, if there are some, instead of a file's own.
+pub(super) fn named(given: Option<&[String]>, own: Vec<String>) -> Result<Vec<String>, EnsembleProblem> {
+    match given {
+        None => Ok(own),
+        Some(given) if given.len() == own.len() => Ok(given.to_vec()),
+        Some(given) => Err(EnsembleProblem::Names { names: given.len(), outputs: own.len() }),
+    }
+}

@@ -1,0 +1,189 @@
+//! `TreeEnsembleClassifier` and `TreeEnsembleRegressor`: lists of nodes that name their tree and themselves.
+
+use super::wire::Node;
+use super::{Comparison, Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use crate::ensemble::import::unsupported;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+/// Reads the trees into `draft`; returns the number of features that they use, counted to the last.
+pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
+    let integers = |name: &str, wanted: Option<usize>| list(node, name, wanted, |attribute| &attribute.integers);
+    let ids = integers("nodes_nodeids", None)?;
+    let count = ids.len();
+    let trees = integers("nodes_treeids", Some(count))?;
+    let features = integers("nodes_featureids", Some(count))?;
+    let trues = integers("nodes_truenodeids", Some(count))?;
+    let falses = integers("nodes_falsenodeids", Some(count))?;
+    let tracks = integers("nodes_missing_value_tracks_true", None)?;
+    let modes = list(node, "nodes_modes", Some(count), |attribute| &attribute.texts)?;
+    let values = numbers(node, "nodes_values", Some(count))?;
+    if !tracks.is_empty() && tracks.len() != count {
+        return Err(damaged(format!("nodes_missing_value_tracks_true has {} entries for {count} nodes", tracks.len())));
+    }
+    let places: HashMap<(i64, i64), usize> = trees.iter().copied().zip(ids.iter().copied()).zip(0..).collect();
+    if places.len() != count {
+        return Err(damaged("two nodes of a tree have the same number"));
+    }
+    let mut weights = Weights::read(node, draft)?;
+    // The root of a tree is the node that is no child.
+    let mut roots: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
+    let is_leaf = |position: usize| modes[position] == "LEAF";
+    let splits = (0..count).filter(|&position| !is_leaf(position));
+    let children: BTreeSet<(i64, i64)> =
+        splits.flat_map(|at| [(trees[at], trues[at]), (trees[at], falses[at])]).collect();
+    let mut order = Vec::new();
+    for position in 0..count {
+        let roots = roots.entry(trees[position]).or_insert_with(|| {
+            order.push(trees[position]);
+            Vec::new()
+        });
+        if !children.contains(&(trees[position], ids[position])) {
+            roots.push(position);
+        }
+    }
+    let divisor = divisor(text(node, "aggregate_function").unwrap_or("SUM"), order.len())?;
+    weights.divide(divisor);
+    let mut most = 0;
+    let mut seen = vec![false; count];
+    for tree in order {
+        let [root] = roots[&tree][..] else {
+            return Err(damaged(format!("tree {tree} has {} roots", roots[&tree].len())));
+        };
+        add_tree(draft, root, &mut seen, |at| {
+            if is_leaf(at) {
+                return Ok(Targeted::Leaf(weights.of.remove(&(trees[at], ids[at])).unwrap_or_default()));
+            }
+            let child = |id: i64| {
+                let place = places.get(&(tree, id)).copied();
+                place.ok_or_else(|| damaged(format!("tree {tree}: there is no node {id}")))
+            };
+            let mode = modes[at].strip_prefix("BRANCH_").unwrap_or(modes[at]);
+            let missing_is_true = tracks.get(at).is_some_and(|&flag| flag != 0);
+            let Comparison { threshold, swapped, missing_left } = comparison(mode, values[at], missing_is_true)?;
+            let (mut left, mut right) = (child(trues[at])?, child(falses[at])?);
+            if swapped {
+                (left, right) = (right, left);
+            }
+            let feature = index(features[at], "a feature's number")?;
+            most = most.max(feature.saturating_add(1));
+            Ok(Targeted::Split { feature, threshold, missing_left, left, right })
+        })?;
+    }
+    Ok(most)
+}
+
+/// Leaves' values by tree and node, for the outputs of the draft.
+struct Weights {
+    of: HashMap<(i64, i64), Vec<(usize, f64)>>,
+}
+
+impl Weights {
+    /// Reads leaves' values, what margins start from, and the names of classes.
+    fn read(node: &Node<'_>, draft: &mut Draft) -> Result<Self> {
+        let is_classifier = node.operation == "TreeEnsembleClassifier";
+        let prefix = if is_classifier { "class" } else { "target" };
+        let integers = |name: &str, wanted| list(node, &format!("{prefix}_{name}"), wanted, |a| &a.integers);
+        let targets = integers("ids", None)?;
+        let count = targets.len();
+        let (trees, nodes) = (integers("treeids", Some(count))?, integers("nodeids", Some(count))?);
+        let values = numbers(node, &format!("{prefix}_weights"), Some(count))?;
+        let base = numbers(node, "base_values", None)?;
+        let transform = text(node, "post_transform").unwrap_or("NONE");
+        let map: Map = if is_classifier {
+            classes(node, draft, targets, values, base, transform)?
+        } else {
+            let wanted =
+                outputs(node.attributes.get("n_targets").and_then(|attribute| attribute.integer).unwrap_or(1))?;
+            if wanted > 1 {
+                return Err(unsupported(
+                    format!("it has {wanted} targets, which are no classes of one object"),
+                    "Train a model for each target.",
+                ));
+            }
+            draft.base = if base.is_empty() { vec![0.0] } else { base.to_vec() };
+            Map::Same
+        };
+        let outputs = draft.base.len();
+        let mut of: HashMap<(i64, i64), Vec<(usize, f64)>> = HashMap::new();
+        for (((&tree, &node), &target), &value) in trees.iter().zip(nodes).zip(targets).zip(values) {
+            let slot = of.entry((tree, node)).or_default();
+            match map {
+                Map::Same => {
+                    let target = index(target, "a target's number")?;
+                    if target >= outputs {
+                        return Err(damaged(format!("a leaf is for output {target} of {outputs}")));
+                    }
+                    slot.push((target, value));
+                }
+                Map::Second => slot.push((1, value)),
+                Map::Votes => slot.extend([(0, -value), (1, value)]),
+            }
+        }
+        Ok(Self { of })
+    }
+
+    fn divide(&mut self, divisor: f64) {
+        self.of.values_mut().flatten().for_each(|(_, value)| *value /= divisor);
+    }
+}
+
+/// Which output a leaf's value is for.
+#[derive(Clone, Copy)]
+enum Map {
+    /// The one that it names.
+    Same,
+    /// Of two classes, whose file has one number: log-odds of the second.
+    Second,
+    /// The same, but the number is the share of votes for the second.
+    Votes,
+}
+
+fn classes(
+    node: &Node<'_>,
+    draft: &mut Draft,
+    targets: &[i64],
+    weights: &[f64],
+    base: &[f64],
+    transform: &str,
+) -> Result<Map> {
+    let texts = list(node, "classlabels_strings", None, |attribute| &attribute.texts)?;
+    let numbers = list(node, "classlabels_int64s", None, |attribute| &attribute.integers)?;
+    let texts = texts.iter().map(ToString::to_string);
+    draft.names = texts.chain(numbers.iter().map(ToString::to_string)).collect();
+    let classes = outputs(draft.names.len() as i64)?;
+    let named: BTreeSet<i64> = targets.iter().copied().collect();
+    let is_votes = transform == "NONE" && weights.iter().all(|&weight| weight >= 0.0);
+    if is_votes {
+        draft.notes.push(
+            "Margins are shares of votes (probabilities), not log-odds: classes are right, posteriors are not calibrated."
+                .into(),
+        );
+    }
+    if classes == 2 && named.len() == 1 {
+        let base = match base {
+            [] => 0.0,
+            [base] => *base,
+            _ => return Err(damaged("base_values has two numbers, but leaves are for one class")),
+        };
+        draft.base = vec![if is_votes { 1.0 - base } else { 0.0 }, base];
+        return Ok(if is_votes { Map::Votes } else { Map::Second });
+    }
+    draft.base = match base {
+        [] => vec![0.0; classes],
+        [one] => vec![*one; classes],
+        each if each.len() == classes => each.to_vec(),
+        _ => return Err(damaged(format!("base_values has {} numbers for {classes} classes", base.len()))),
+    };
+    Ok(Map::Same)
+}
+
+/// f32 numbers, or those of the attribute's double of this name.
+fn numbers<'n>(node: &'n Node<'_>, name: &str, wanted: Option<usize>) -> Result<&'n [f64]> {
+    let double = format!("{name}_as_tensor");
+    let name = if node.attributes.contains_key(double.as_str()) { &double } else { name };
+    list(node, name, wanted, |attribute| &attribute.numbers)
+}
+
+fn text<'n>(node: &'n Node<'_>, name: &str) -> Option<&'n str> {
+    node.attributes.get(name).and_then(|attribute| attribute.text)
+}

@@ -1,0 +1,62 @@
+//! What an ensemble's features are.
+
+use palpate_shared::Descriptor;
+
+/// What an ensemble's features are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Inputs {
+    /// Those that a descriptor turns touches into: whole numbers.
+    Touches(Descriptor),
+    /// Rows of f32 values with these names, NaN where one is missing: an ensemble that was trained elsewhere.
+    Rows(Vec<String>),
+}
+
+impl Inputs {
+    /// Rows of `count` features that have no names of their own: f0, f1 and so on.
+    pub fn unnamed(count: usize) -> Self {
+        Self::Rows((0..count).map(Self::default_name).collect())
+    }
+
+    /// The name of a feature that has none of its own.
+    pub fn default_name(index: usize) -> String {
+        format!("f{index}")
+    }
+
+    /// The descriptor, if the features are those of touches.
+    pub fn descriptor(&self) -> Option<Descriptor> {
+        match self {
+            Self::Touches(descriptor) => Some(*descriptor),
+            Self::Rows(_) => None,
+        }
+    }
+
+    /// How many features there are.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Touches(descriptor) => descriptor.feature_count(),
+            Self::Rows(names) => names.len(),
+        }
+    }
+
+    /// The features' names, in order.
+    pub fn names(&self) -> Vec<&str> {
+        match self {
+            Self::Touches(descriptor) => descriptor.feature_names().to_vec(),
+            Self::Rows(names) => names.iter().map(String::as_str).collect(),
+        }
+    }
+
+    /// Whether features have names of their own.
+    pub fn are_named(&self) -> bool {
+        match self {
+            Self::Touches(_) => true,
+            Self::Rows(names) => names.iter().enumerate().any(|(index, name)| *name != Self::default_name(index)),
+        }
+    }
+}
+
+impl From<Descriptor> for Inputs {
+    fn from(descriptor: Descriptor) -> Self {
+        Self::Touches(descriptor)
+    }
+}

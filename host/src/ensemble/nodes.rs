@@ -1,0 +1,76 @@
+//! What readers of other libraries' trees share.
+
+use super::Node;
+use crate::error::TreeProblem;
+
+/// The threshold c with which `x < c` is `x <= threshold` for every f32 x: the f32 after the largest one that is not
+/// above the threshold.
+pub(super) fn after(threshold: f64) -> f32 {
+    // `as` rounds to nearest, and to infinity what is beyond.
+    let near = threshold as f32;
+    let below = if f64::from(near) > threshold { near.next_down() } else { near };
+    below.next_up()
+}
+
+/// The threshold c with which `x < c` is `x < threshold` for every f32 x: the smallest f32 that is not below it.
+pub(super) fn from(threshold: f64) -> f32 {
+    let near = threshold as f32;
+    if f64::from(near) < threshold { near.next_up() } else { near }
+}
+
+/// The nodes that the root leads to, in the file's order and numbered again: XGBoost leaves pruned nodes behind. Each
+/// may be reached once only, which rules out cycles.
+pub(super) fn reachable(
+    count: usize,
+    read: impl Fn(usize) -> Result<Node, TreeProblem>,
+) -> Result<Vec<Node>, TreeProblem> {
+    let mut found: Vec<Option<Node>> = vec![None; count];
+    let mut waiting = vec![0];
+    while let Some(position) = waiting.pop() {
+        let Some(slot) = found.get_mut(position) else { return Err(TreeProblem::NoNodes) };
+        if slot.is_some() {
+            return Err(TreeProblem::ReachedTwice { node: position });
+        }
+        let node = read(position)?;
+        if let Node::Split { left, right, .. } = node {
+            waiting.extend([right, left]);
+        }
+        *slot = Some(node);
+    }
+    let mut numbers = Vec::with_capacity(count);
+    let mut next = 0;
+    for node in &found {
+        numbers.push(next);
+        next += usize::from(node.is_some());
+    }
+    let renumbered = |node| match node {
+        Node::Split { feature, threshold, missing_left, left, right } => {
+            Node::Split { feature, threshold, missing_left, left: numbers[left], right: numbers[right] }
+        }
+        leaf @ Node::Leaf(_) => leaf,
+    };
+    Ok(found.into_iter().flatten().map(renumbered).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_or_below_a_double_is_below_the_next_single() {
+        let cases = [0.0, -0.0, 1.0, 0.1, -0.1, 3.500_000_000_000_000_4, 1e-35, 1e-46, -1e-46, 3.4e38, 1e300, -1e300];
+        for threshold in cases {
+            let (at_most, below) = (after(threshold), from(threshold));
+            let near = threshold as f32;
+            let around =
+                [near.next_down().next_down(), near.next_down(), near, near.next_up(), near.next_up().next_up()];
+            for x in around.into_iter().chain([f32::MIN, f32::MAX, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0]) {
+                if x.is_nan() {
+                    continue;
+                }
+                assert_eq!(x < at_most, f64::from(x) <= threshold, "{x:e} <= {threshold:e}");
+                assert_eq!(x < below, f64::from(x) < threshold, "{x:e} < {threshold:e}");
+            }
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What XGBoost's objectives say about margins.
+
+use crate::error::EnsembleProblem;
+
+/// An objective.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Objective {
+    pub(super) kind: Kind,
+    pub(super) link: Link,
+}
+
+/// What the outputs are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// A margin for each class.
+    Classes,
+    /// A margin for the second class of two; that of the first is 0.
+    Binary,
+    /// One number: a regression or a ranking.
+    One,
+}
+
+/// How the base score, which is in the space of predictions, becomes a margin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Link {
+    Identity,
+    Logit,
+    Log,
+}
+
+impl Objective {
+    /// The objective with XGBoost's name.
+    pub(super) fn named(name: &str) -> Result<Self, EnsembleProblem> {
+        let (kind, link) = match name {
+            "multi:softprob" | "multi:softmax" => (Kind::Classes, Link::Identity),
+            "binary:logistic" => (Kind::Binary, Link::Logit),
+            "binary:logitraw" | "binary:hinge" => (Kind::Binary, Link::Identity),
+            "reg:logistic" => (Kind::One, Link::Logit),
+            "count:poisson" | "reg:gamma" | "reg:tweedie" | "survival:cox" | "survival:aft" => (Kind::One, Link::Log),
+            "reg:squarederror"
+            | "reg:linear"
+            | "reg:squaredlogerror"
+            | "reg:pseudohubererror"
+            | "reg:absoluteerror"
+            | "reg:quantileerror"
+            | "reg:expectileerror"
+            | "rank:pairwise"
+            | "rank:ndcg"
+            | "rank:map" => (Kind::One, Link::Identity),
+            _ => return Err(EnsembleProblem::Objective { found: name.into() }),
+        };
+        Ok(Self { kind, link })
+    }
+}
+
+impl Link {
+    /// The margin of a base score, in f32 as XGBoost computes it. C libraries' logarithms of f32 are the nearest f32
+    /// nearly always; that of an f64, rounded, is always.
+    pub(super) fn margin(self, base_score: f32) -> f32 {
+        let ln = |value: f32| f64::from(value).ln() as f32;
+        match self {
+            Self::Identity => base_score,
+            Self::Logit => -ln(1.0 / base_score - 1.0),
+            Self::Log => ln(base_score),
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Which tree of a compiled model adds another leaf than the ensemble's: trees are tried one by one, in copies of the model
+//! in which all other leaves are 0.
+
+use super::verify::Reference;
+use crate::compile;
+use crate::ensemble::{Ensemble, Output};
+use palpate_onboard::Model;
+use palpate_shared::format::{Axis, CHECKSUM_LENGTH, Group, HEADER_LENGTH, Layout, LeafType, checksum};
+use std::ops::Range;
+
+/// The first tree, in the ensemble's order, of which the model adds another leaf for this row than the ensemble does.
+/// `None` if there is none, or the model is a table and has no trees.
+pub(super) fn first_different_tree(
+    model: &Model<'_>,
+    reference: &Reference<'_>,
+    ensemble: &Ensemble,
+    row: &[f32],
+) -> Option<usize> {
+    let order = compile::order_of_trees(ensemble, model.leaf_type()).ok()?;
+    let leaves = leaves(model)?;
+    if order.len() != leaves.len() {
+        return None;
+    }
+    let encoded = crate::rows::Encoder::of(model).row(row);
+    let mut different = order.iter().zip(&leaves).filter_map(|(&number, leaves)| {
+        let tree = ensemble.trees.get(number)?;
+        let bytes = isolated(model, &leaves.bytes);
+        let own = super::verify::margins(&Model::new(&bytes).ok()?, &encoded);
+        let leaf = reference.leaf(tree, row, &encoded);
+        // Half a unit of the tree's leaves, or nothing.
+        let slack = match model.leaf_type() {
+            LeafType::F32 => 0.0,
+            LeafType::I8 | LeafType::I16 => 0.501 * f64::from(model.unit()) * f64::from(leaves.shift).exp2(),
+        };
+        let expected = |object: usize| match tree.output {
+            Output::One(own) => {
+                if own == object {
+                    leaf[0]
+                } else {
+                    0.0
+                }
+            }
+            Output::Each => leaf[object],
+        };
+        let differs = own.iter().enumerate().any(|(object, own)| (own - f64::from(expected(object))).abs() > slack);
+        differs.then_some(number)
+    });
+    let first = different.next()?;
+    Some(different.fold(first, usize::min))
+}
+
+/// Where the leaves of a tree are, and their shift.
+struct Leaves {
+    bytes: Range<usize>,
+    shift: u8,
+}
+
+/// The leaves of each tree, in the model's order.
+fn leaves(model: &Model<'_>) -> Option<Vec<Leaves>> {
+    if matches!(model.layout(), Layout::Grid | Layout::Patterns) {
+        return None;
+    }
+    let header = model.header();
+    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
+    let groups = HEADER_LENGTH
+        + length(header.text_length())
+        + length(header.optional_length())
+        + 8 * model.object_count()
+        + Axis::LENGTH * usize::from(header.axes())
+        + length(header.cuts_length());
+    let nodes = groups + Group::LENGTH * usize::from(header.groups());
+    let mut rest = model.bytes().get(nodes..nodes + length(header.nodes_length()))?;
+    let mut at = nodes + rest.len();
+    let mut found = Vec::new();
+    for bytes in model.bytes().get(groups..nodes)?.as_chunks().0 {
+        let group = Group::from_bytes(*bytes)?;
+        let values = if group.object.is_some() { 1 } else { model.object_count() };
+        for _ in 0..group.trees {
+            let leaves = match model.layout() {
+                Layout::Complete => 1_usize << group.depth,
+                layout => {
+                    let (splits, after) = rest.split_first_chunk()?;
+                    let splits = usize::from(u16::from_le_bytes(*splits));
+                    rest = after.get(splits * if layout == Layout::Wide { 6 } else { 3 }..)?;
+                    splits + 1
+                }
+            };
+            let end = at + leaves * values * model.leaf_type().size();
+            found.push(Leaves { bytes: at..end, shift: group.shift });
+            at = end;
+        }
+    }
+    Some(found)
+}
+
+/// The model with no leaves but these, and margins that start from 0.
+fn isolated(model: &Model<'_>, keep: &Range<usize>) -> Vec<u8> {
+    let mut bytes = model.bytes().to_vec();
+    let header = model.header();
+    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
+    let base = HEADER_LENGTH + length(header.text_length()) + length(header.optional_length());
+    bytes[base..base + 4 * model.object_count()].fill(0);
+    let end = bytes.len() - CHECKSUM_LENGTH;
+    let start = end - length(header.leaves_length());
+    // Bytes are stored with 128 added.
+    let zero = if model.leaf_type() == LeafType::I8 { 128 } else { 0 };
+    bytes[start..keep.start].fill(zero);
+    bytes[keep.end..end].fill(zero);
+    let sum = checksum(&bytes[..end]).to_le_bytes();
+    bytes[end..].copy_from_slice(&sum);
+    bytes
+}

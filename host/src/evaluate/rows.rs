@@ -1,0 +1,112 @@
+//! How often a model over rows is right, row by row, or how far a regression is off.
+
+use super::Candidate;
+use super::estimate::Estimate;
+use super::margins::best;
+use super::verify::margins;
+use crate::error::{Result, RowsProblem};
+use crate::rows::{Encoder, Rows};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// What a model makes of labeled rows.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct RowsEvaluation {
+    /// Rows.
+    pub rows: usize,
+    /// What a model of classes comes to.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub classes: Option<Classes>,
+    /// What a model with one output comes to.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub regression: Option<Regression>,
+}
+
+/// What a model of classes comes to, each row taken alone.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Classes {
+    /// Share of the rows whose class has the largest margin.
+    pub accuracy: f64,
+    /// Its standard error.
+    pub accuracy_standard_error: f64,
+    /// The same for the rows of each class that there are.
+    pub per_class: BTreeMap<String, f64>,
+    /// The classes, in the model's order.
+    pub names: Vec<String>,
+    /// How many rows of each class (outer) were taken for each (inner).
+    pub confusion: Vec<Vec<usize>>,
+}
+
+/// How far a regression is off: its margins as they are, before any transformation that the library makes of them.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Regression {
+    /// The mean of the absolute differences.
+    pub mean_absolute_error: f64,
+    /// The root of the mean of their squares.
+    pub root_mean_square_error: f64,
+}
+
+/// Compares a model's answers with the rows' labels: names of classes or their numbers, or for one output numbers.
+///
+/// # Errors
+/// [`RowsProblem`] for a model over touches, rows of another number of features, and labels that are none.
+pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvaluation> {
+    let (features, names) = match candidate {
+        Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.clone()),
+        Candidate::Compiled(model) => (model.feature_count(), crate::compile::names(model)),
+    };
+    if candidate.is_of_touches() {
+        return Err(RowsProblem::Touches.into());
+    }
+    if features != rows.features {
+        let missing = "features".into();
+        return Err(RowsProblem::Columns { found: rows.features, wanted: features, missing }.into());
+    }
+    let all: Vec<Vec<f64>> = match candidate {
+        Candidate::Full(ensemble) => rows
+            .values
+            .par_chunks_exact(features)
+            .map(|row| ensemble.margins_of_features(row).into_iter().map(f64::from).collect())
+            .collect(),
+        Candidate::Compiled(model) => {
+            let encoder = Encoder::of(model);
+            rows.values.par_chunks_exact(features).map(|row| margins(model, &encoder.row(row))).collect()
+        }
+    };
+    let label = |row: usize| rows.labels.get(row).map_or("", String::as_str);
+    let wrong = |row: usize, known: &[String]| RowsProblem::Label {
+        label: label(row).into(),
+        row: row + 1,
+        known: known.to_vec(),
+    };
+    if names.len() == 1 {
+        let (mut absolute, mut squares) = (0.0, 0.0);
+        for (row, margins) in all.iter().enumerate() {
+            let truth: f64 = label(row).parse().map_err(|_| wrong(row, &["numbers".into()]))?;
+            let difference = margins[0] - truth;
+            absolute += difference.abs();
+            squares += difference * difference;
+        }
+        let count = all.len() as f64;
+        let regression =
+            Regression { mean_absolute_error: absolute / count, root_mean_square_error: (squares / count).sqrt() };
+        return Ok(RowsEvaluation { rows: all.len(), classes: None, regression: Some(regression) });
+    }
+    let mut confusion = vec![vec![0; names.len()]; names.len()];
+    for (row, margins) in all.iter().enumerate() {
+        let by_name = names.iter().position(|name| name == label(row));
+        let by_number = || label(row).parse().ok().filter(|number| *number < names.len());
+        let truth = by_name.or_else(by_number).ok_or_else(|| wrong(row, &names))?;
+        confusion[truth][best(margins)] += 1;
+    }
+    let right: usize = (0..names.len()).map(|class| confusion[class][class]).sum();
+    let accuracy = Estimate::share(right, all.len());
+    let of_class = |(class, name): (usize, &String)| {
+        let count: usize = confusion[class].iter().sum();
+        (count > 0).then(|| (name.clone(), confusion[class][class] as f64 / count as f64))
+    };
+    let per_class = names.iter().enumerate().filter_map(of_class).collect();
+    let (accuracy, accuracy_standard_error) = (accuracy.value, accuracy.standard_error);
+    let classes = Classes { accuracy, accuracy_standard_error, per_class, names, confusion };
+    Ok(RowsEvaluation { rows: all.len(), classes: Some(classes), regression: None })
+}

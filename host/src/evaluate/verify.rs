@@ -1,0 +1,292 @@
+//! A compiled model over rows compared with its ensemble, and with the library that trained it: on given rows, and on rows
+//! made at every threshold.
+
+use super::isolated::first_different_tree;
+pub(crate) use super::margins::best;
+use crate::ensemble::{Ensemble, Node, Output, Tree};
+use crate::error::{Result, RowsProblem};
+use crate::progress::{self, Progress};
+use crate::rows::{Encoder, Rows, generate};
+use palpate_onboard::Model;
+use palpate_shared::format::LeafType;
+use rayon::prelude::*;
+
+/// How far a model is from what it was made of.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Verified {
+    /// Rows that were given.
+    pub rows: usize,
+    /// Rows that were made at the ensemble's thresholds.
+    pub generated_rows: usize,
+    /// The largest difference of a margin to the ensemble's, in nats, on all rows.
+    pub max_margin_error: f64,
+    /// The largest difference that the model states, in nats.
+    pub stated_bound: f64,
+    /// Rows of all for which another class is the best than for the ensemble.
+    pub class_differs: usize,
+    /// The largest difference of a margin to the library's own, on the given rows; `None` without its margins.
+    pub library_max_margin_error: Option<f64>,
+    /// Given rows for which another class is the best than by the library's margins; `None` without these.
+    pub library_class_differs: Option<usize>,
+    /// The first tree of which another leaf is added, where margins differ by more than is stated.
+    #[serde(skip)]
+    pub first_tree: Option<String>,
+    /// Given rows that, measured in whole numbers of the features' units, reach another leaf than with their own values:
+    /// the largest difference of a margin, and rows with another class. `None` for a model that compares f32.
+    #[serde(skip)]
+    pub scaling: Option<(f64, usize)>,
+}
+
+impl Verified {
+    /// What is wrong, if differences are larger than the model states.
+    ///
+    /// # Errors
+    /// [`RowsProblem::Beyond`].
+    pub fn check(&self) -> Result<(), RowsProblem> {
+        let bound = self.stated_bound;
+        let beyond = |whose, error, tree| Err(RowsProblem::Beyond { whose, error, bound, tree });
+        if self.max_margin_error > bound {
+            return beyond("the ensemble's", self.max_margin_error, self.first_tree.clone());
+        }
+        match self.library_max_margin_error {
+            Some(error) if error > bound => beyond("the library's", error, None),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The ensemble as a model compares: values as they are, or as whole numbers of the features' units.
+pub(super) struct Reference<'a> {
+    ensemble: &'a Ensemble,
+    encoder: Encoder,
+}
+
+impl Reference<'_> {
+    /// The margins of what the model gets.
+    fn margins(&self, row: &[f32], encoded: &[i32]) -> Vec<f32> {
+        let Encoder::Scaled(scales) = &self.encoder else { return self.ensemble.margins_of_features(row) };
+        let mut margins = self.ensemble.base_margins.clone();
+        for tree in &self.ensemble.trees {
+            let leaf = scaled_leaf(tree, encoded, scales);
+            match tree.output {
+                Output::One(object) => margins[object] += leaf[0],
+                Output::Each => margins.iter_mut().zip(leaf).for_each(|(margin, value)| *margin += value),
+            }
+        }
+        margins
+    }
+
+    /// The leaf of a tree that a row reaches.
+    pub(super) fn leaf<'t>(&self, tree: &'t Tree, row: &[f32], encoded: &[i32]) -> &'t [f32] {
+        match &self.encoder {
+            Encoder::Real => tree.leaf(row),
+            Encoder::Scaled(scales) => scaled_leaf(tree, encoded, scales),
+        }
+    }
+}
+
+/// The leaf that whole numbers reach: left if the number is below the threshold in the feature's units.
+fn scaled_leaf<'t>(tree: &'t Tree, encoded: &[i32], scales: &[f32]) -> &'t [f32] {
+    let mut index = 0;
+    loop {
+        match &tree.nodes[index] {
+            Node::Leaf(values) => return values,
+            Node::Split { feature, threshold, missing_left, left, right } => {
+                let goes_left = match encoded[*feature] {
+                    palpate_shared::MISSING_FEATURE => *missing_left,
+                    number => f64::from(number) < f64::from(*threshold) * f64::from(scales[*feature]),
+                };
+                index = if goes_left { *left } else { *right };
+            }
+        }
+    }
+}
+
+/// What comparing rows comes to.
+#[derive(Clone, Default)]
+struct Difference {
+    margin_error: f64,
+    class_differs: usize,
+    /// A row whose margins differ by more than the model states, and its number.
+    example: Option<(usize, Vec<f32>)>,
+}
+
+impl Difference {
+    fn with(self, other: Self) -> Self {
+        let example = match (self.example, other.example) {
+            (Some(one), Some(two)) => Some(if one.0 <= two.0 { one } else { two }),
+            (one, two) => one.or(two),
+        };
+        Self {
+            margin_error: self.margin_error.max(other.margin_error),
+            class_differs: self.class_differs + other.class_differs,
+            example,
+        }
+    }
+}
+
+/// A model's margins in nats: the trainer's own f32, if the model adds those.
+pub fn margins(model: &Model<'_>, encoded: &[i32]) -> Vec<f64> {
+    let objects = model.object_count();
+    if model.leaf_type() == LeafType::F32 {
+        let mut margins = vec![0.0_f32; objects];
+        model.f32_margins_of(encoded, &mut margins);
+        return margins.into_iter().map(f64::from).collect();
+    }
+    let mut margins = vec![0; objects];
+    model.margins_of(encoded, &mut margins);
+    margins.into_iter().map(|margin| f64::from(margin) * f64::from(model.unit())).collect()
+}
+
+/// Rows compared at once.
+const BATCH: usize = 4096;
+
+/// Compares a model with its ensemble on `rows` and on rows made at every threshold, and with `library`, the library's own
+/// margins of `rows`: one for each output, or one for a binary model, that of its second class.
+///
+/// # Errors
+/// [`RowsProblem`] if model, ensemble, rows and margins do not belong together;
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn verify(
+    model: &Model<'_>,
+    ensemble: &Ensemble,
+    rows: &Rows,
+    library: Option<&[Vec<f64>]>,
+    progress: &dyn Progress,
+) -> Result<Verified> {
+    if model.descriptor().is_some() || ensemble.descriptor().is_some() {
+        return Err(RowsProblem::Touches.into());
+    }
+    let trees = usize::try_from(model.header().trees()).unwrap_or(usize::MAX);
+    let own = [model.feature_count(), model.object_count(), trees];
+    let of_ensemble = [ensemble.inputs.count(), ensemble.objects.len(), ensemble.trees.len()];
+    if own != of_ensemble {
+        return Err(RowsProblem::OtherModel { model: own, ensemble: of_ensemble }.into());
+    }
+    let reference = Reference { ensemble, encoder: Encoder::of(model) };
+    progress.begin("comparing", None);
+    let mut difference = compare_all(model, &reference, &rows.values, 0, progress)?;
+    let mut generated = 0;
+    let mut batch: Vec<f32> = Vec::new();
+    let mut result = Ok(());
+    generate(
+        ensemble,
+        &rows.values,
+        |feature, threshold| around(&reference.encoder, feature, threshold),
+        |row| {
+            batch.extend(row);
+            generated += 1;
+            if generated % BATCH == 0 && result.is_ok() {
+                let done = compare_all(model, &reference, &batch, rows.len() + generated - BATCH, progress);
+                result = done.map(|done| difference = std::mem::take(&mut difference).with(done));
+                batch.clear();
+            }
+        },
+    );
+    result?;
+    let rest = compare_all(model, &reference, &batch, rows.len() + generated - generated % BATCH, progress)?;
+    difference = difference.with(rest);
+    let library = library.map(|library| compare_library(model, &reference, rows, library)).transpose()?;
+    let first_tree = difference.example.as_ref().and_then(|(number, row)| {
+        let tree = first_different_tree(model, &reference, ensemble, row)?;
+        let place = match number.checked_sub(rows.len()) {
+            None => format!("row {}", number + 1),
+            Some(generated) => format!("generated row {}", generated + 1),
+        };
+        Some(format!("the first of them is {place}, where tree {tree} is the first that adds another leaf"))
+    });
+    Ok(Verified {
+        rows: rows.len(),
+        generated_rows: generated,
+        max_margin_error: difference.margin_error,
+        stated_bound: f64::from(model.margin_error()),
+        class_differs: difference.class_differs,
+        library_max_margin_error: library.map(|(error, _)| error),
+        library_class_differs: library.map(|(_, classes)| classes),
+        first_tree,
+        scaling: scaling(&reference, rows),
+    })
+}
+
+/// The values next to a threshold and at it: the nearest f32, or whole numbers of the feature's units.
+fn around(encoder: &Encoder, feature: usize, threshold: f32) -> [f32; 3] {
+    match encoder {
+        Encoder::Real => [threshold.next_down(), threshold, threshold.next_up()],
+        Encoder::Scaled(scales) => {
+            let scale = f64::from(scales[feature]);
+            let cut = (f64::from(threshold) * scale).ceil();
+            [cut - 1.0, cut, cut + 1.0].map(|number| (number / scale) as f32)
+        }
+    }
+}
+
+fn compare_all(
+    model: &Model<'_>,
+    reference: &Reference<'_>,
+    values: &[f32],
+    first: usize,
+    progress: &dyn Progress,
+) -> Result<Difference> {
+    let bound = f64::from(model.margin_error());
+    let rows = values.par_chunks_exact(model.feature_count()).enumerate();
+    let compared = rows.map(|(index, row)| -> Result<_> {
+        progress::advance(progress, 1)?;
+        let encoded = reference.encoder.row(row);
+        let own = margins(model, &encoded);
+        let full: Vec<f64> = reference.margins(row, &encoded).into_iter().map(f64::from).collect();
+        let margin_error = largest_difference(&own, &full);
+        let class_differs = usize::from(best(&own) != best(&full));
+        let example = (margin_error > bound).then(|| (first + index, row.to_vec()));
+        Ok(Difference { margin_error, class_differs, example })
+    });
+    compared.try_reduce(Difference::default, |one, other| Ok(one.with(other)))
+}
+
+fn largest_difference(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+}
+
+/// The largest difference to the library's margins, and the rows with another class.
+fn compare_library(
+    model: &Model<'_>,
+    reference: &Reference<'_>,
+    rows: &Rows,
+    library: &[Vec<f64>],
+) -> Result<(f64, usize)> {
+    if library.len() != rows.len() {
+        return Err(RowsProblem::MarginRows { margins: library.len(), rows: rows.len() }.into());
+    }
+    let outputs = model.object_count();
+    // The first class's margin of a binary model is 0, or in a vote what the second one's leaves of 1.
+    let is_vote = reference.ensemble.trees.iter().any(|tree| tree.output != Output::One(1));
+    let (mut error, mut classes) = (0.0_f64, 0);
+    for (number, (row, expected)) in rows.iter().zip(library).enumerate() {
+        let own = margins(model, &reference.encoder.row(row));
+        let expected = match expected[..] {
+            [second] if outputs == 2 => vec![if is_vote { 1.0 - second } else { 0.0 }, second],
+            _ if expected.len() == outputs => expected.clone(),
+            _ => {
+                let found = expected.len();
+                return Err(RowsProblem::MarginColumns { row: number + 1, found, outputs }.into());
+            }
+        };
+        error = error.max(largest_difference(&own, &expected));
+        classes += usize::from(best(&own) != best(&expected));
+    }
+    Ok((error, classes))
+}
+
+/// What measuring in whole numbers changes on the given rows.
+fn scaling(reference: &Reference<'_>, rows: &Rows) -> Option<(f64, usize)> {
+    if reference.encoder == Encoder::Real {
+        return None;
+    }
+    let changes = rows.iter().map(|row| {
+        let as_they_are = reference.ensemble.margins_of_features(row);
+        let measured = reference.margins(row, &reference.encoder.row(row));
+        let nats = |margins: &[f32]| margins.iter().copied().map(f64::from).collect::<Vec<_>>();
+        let change = largest_difference(&nats(&as_they_are), &nats(&measured));
+        (change, usize::from(best(&as_they_are) != best(&measured)))
+    });
+    Some(changes.fold((0.0, 0), |(most, classes), (change, class)| (f64::max(most, change), classes + class)))
+}

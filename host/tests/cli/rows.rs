@@ -1,0 +1,310 @@
+//! Models of other libraries, as a user calls the commands: export, verify, recognize.
+
+use crate::{json, run, stderr, stdout};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Real files of other libraries; see `make.py` there.
+fn data(name: &str) -> String {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/import");
+    directory.join(name).to_str().unwrap().to_owned()
+}
+
+/// A directory, and a file's path in it.
+fn place() -> (TempDir, impl Fn(&str) -> String) {
+    let directory = tempfile::tempdir().unwrap();
+    let root: PathBuf = directory.path().into();
+    (directory, move |name: &str| root.join(name).to_str().unwrap().to_owned())
+}
+
+/// Kinds that are told by their content.
+const MODELS: [&str; 8] = [
+    "xgboost-1.6-binary.json",
+    "xgboost-3.4-softprob.ubj",
+    "xgboost-3.4-dart.json",
+    "xgboost-2.1-squarederror.ubj",
+    "lightgbm-4.7-zero-as-missing.txt",
+    "catboost-1.2-lossguide.json",
+    "sklearn-1.9-forest-binary.onnx",
+    "onnx-opset5.onnx",
+];
+
+#[test]
+fn every_kind_exports_and_verifies_against_its_librarys_own_margins() {
+    let (_directory, path) = place();
+    for model in MODELS {
+        let name = model.rsplit_once('.').unwrap().0;
+        let (rows, margins) = (data(&format!("{name}.rows.csv")), data(&format!("{name}.margins.csv")));
+        for leaf in ["f32", "i16"] {
+            let output = path("model.palpate");
+            let exported = json(run(["export", &data(model), "-o", &output, "--leaf", leaf, "--json"]));
+            assert_eq!(
+                exported["features"],
+                serde_json::json!(["width", "height", "count", "angle"]).filter_names(model)
+            );
+            let verified = json(run(["verify", &output, &data(model), &rows, "--library-margins", &margins, "--json"]));
+            let mut keys: Vec<&str> = verified.as_object().unwrap().keys().map(String::as_str).collect();
+            keys.sort_unstable();
+            let expected = [
+                "class_differs",
+                "generated_rows",
+                "library_class_differs",
+                "library_max_margin_error",
+                "max_margin_error",
+                "rows",
+                "stated_bound",
+            ];
+            assert_eq!(keys, expected);
+            assert_eq!(verified["rows"], 60);
+            assert!(verified["generated_rows"].as_u64() > Some(50), "{verified}");
+            let number = |key: &str| verified[key].as_f64().unwrap();
+            assert!(number("library_max_margin_error") <= number("stated_bound"), "{name}, {leaf}: {verified}");
+            assert_eq!(verified["library_class_differs"], 0, "{name}, {leaf}: {verified}");
+            if leaf == "f32" {
+                assert_eq!((number("max_margin_error"), &verified["class_differs"]), (0.0, &Value::from(0)), "{name}");
+            }
+        }
+    }
+}
+
+/// Names in a file that has none.
+trait FilterNames {
+    fn filter_names(self, model: &str) -> Value;
+}
+
+impl FilterNames for Value {
+    fn filter_names(self, model: &str) -> Value {
+        if model.ends_with(".onnx") { serde_json::json!(["f0", "f1", "f2", "f3"]) } else { self }
+    }
+}
+
+#[test]
+fn a_model_of_another_file_is_told_with_the_first_tree_that_differs() {
+    let (_directory, path) = place();
+    let model = data("xgboost-3.4-binary.json");
+    let rows = data("xgboost-3.4-binary.rows.csv");
+    stdout(run(["export", &model, "-o", &path("model.palpate"), "--layout", "compact"]));
+    // Another leaf in tree 1, as a library of another version may have.
+    let mut document: Value = serde_json::from_str(&std::fs::read_to_string(&model).unwrap()).unwrap();
+    let tree = document.pointer_mut("/learner/gradient_booster/model/trees/1").unwrap();
+    let leaf = tree["left_children"].as_array().unwrap().iter().position(|child| *child == -1).unwrap();
+    tree["split_conditions"][leaf] = 0.75.into();
+    std::fs::write(path("changed.json"), document.to_string()).unwrap();
+    for layout in ["compact", "complete", "wide"] {
+        stdout(run(["export", &model, "-o", &path("model.palpate"), "--layout", layout]));
+        let refused = run(["verify", &path("model.palpate"), &path("changed.json"), &rows, "--json"]);
+        let verified: Value = serde_json::from_slice(&refused.stdout).unwrap();
+        assert!(verified["max_margin_error"].as_f64() > verified["stated_bound"].as_f64());
+        assert_eq!(verified["library_max_margin_error"], Value::Null);
+        let message = stderr(refused, 1);
+        assert!(message.contains("where tree 1 is the first that adds another leaf"), "{message}");
+    }
+    let other = data("xgboost-3.4-softprob.ubj");
+    let message = stderr(run(["verify", &path("model.palpate"), &other, &rows]), 1);
+    assert!(message.contains("4 features, 2 outputs and 3 trees, the ensemble 4 features, 3 outputs"), "{message}");
+    // Margins of other rows.
+    std::fs::write(path("margins.csv"), "0.5\n").unwrap();
+    let with = ["verify", &path("model.palpate"), &model, &rows, "--library-margins", &path("margins.csv")];
+    let message = stderr(run(with), 1);
+    assert!(message.contains("margins.csv: it has margins of 1 rows, but there are 60 rows"), "{message}");
+}
+
+#[test]
+fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
+    let (_directory, path) = place();
+    let name = "xgboost-2.1-softprob";
+    let model = path("model.palpate");
+    stdout(run(["export", &data(&format!("{name}.ubj")), "-o", &model, "--names", "cup,jug,pan"]));
+    let rows = data(&format!("{name}.rows.csv"));
+    let text = stdout(run(["recognize", &model, &rows, "--features", "--json"]));
+    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let margins = std::fs::read_to_string(data(&format!("{name}.margins.csv"))).unwrap();
+    assert_eq!(lines.len(), margins.lines().count());
+    for (line, margins) in lines.iter().zip(margins.lines()) {
+        let margins: Vec<f64> = margins.split(',').map(|margin| margin.parse().unwrap()).collect();
+        let best = (0..3).fold(0, |best, object| if margins[object] > margins[best] { object } else { best });
+        assert_eq!(line["object"], ["cup", "jug", "pan"][best], "{line}");
+        let sum: f64 = margins.iter().map(|margin| (margin - margins[best]).exp()).sum();
+        assert!((line["posterior"].as_f64().unwrap() - 1.0 / sum).abs() < 1e-3, "{line}");
+    }
+    let text = stdout(run(["recognize", &model, &rows, "--features", "--add-up", "--json"]));
+    assert_eq!(text.lines().count(), lines.len());
+    let most = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["rows"].as_u64().unwrap()).max();
+    assert!(most > Some(1));
+    // Nothing but a note where names differ and their number is right.
+    std::fs::write(path("unnamed.csv"), "a,b,c,d\n1,990,2,0.5\n").unwrap();
+    let by_position = run(["recognize", &model, &path("unnamed.csv"), "--features"]);
+    assert!(String::from_utf8_lossy(&by_position.stderr).contains("by their position"));
+    std::fs::write(path("few.csv"), "a,b,c\n1,990,2\n").unwrap();
+    let message = stderr(run(["recognize", &model, &path("few.csv"), "--features"]), 1);
+    assert!(message.contains("3 columns for 4 features, and no column \"width\""), "{message}");
+}
+
+#[test]
+fn labeled_rows_are_evaluated_one_by_one() {
+    let (_directory, path) = place();
+    let name = "xgboost-2.1-softprob";
+    let model = path("model.palpate");
+    stdout(run(["export", &data(&format!("{name}.ubj")), "-o", &model, "--names", "cup,jug,pan"]));
+    // Labels by name and by number; the first row's are wrong.
+    let rows = std::fs::read_to_string(data(&format!("{name}.rows.csv"))).unwrap();
+    let margins = std::fs::read_to_string(data(&format!("{name}.margins.csv"))).unwrap();
+    let mut labeled = format!("{},kind\n", rows.lines().next().unwrap());
+    for (number, (row, margins)) in rows.lines().skip(1).zip(margins.lines()).enumerate() {
+        let margins: Vec<f64> = margins.split(',').map(|margin| margin.parse().unwrap()).collect();
+        let best = (0..3).fold(0, |best, object| if margins[object] > margins[best] { object } else { best });
+        let label = (best + usize::from(number == 0)) % 3;
+        labeled +=
+            &format!("{row},{}\n", if number % 2 == 0 { ["cup", "jug", "pan"][label] } else { ["0", "1", "2"][label] });
+    }
+    std::fs::write(path("labeled.csv"), labeled).unwrap();
+    for file in [model.clone(), data(&format!("{name}.ubj"))] {
+        let evaluated = run(["evaluate", &file, &path("labeled.csv"), "--label", "kind", "--json"]);
+        if file == model {
+            let evaluated = json(evaluated);
+            assert_eq!(evaluated["rows"], 60);
+            assert!((evaluated["accuracy"].as_f64().unwrap() - 59.0 / 60.0).abs() < 1e-12, "{evaluated}");
+        } else {
+            // The file's own classes have no such names.
+            let message = stderr(evaluated, 1);
+            assert!(
+                message.contains("labeled.csv: the label") && message.contains("none of the model's classes"),
+                "{message}"
+            );
+        }
+    }
+    let message = stderr(run(["evaluate", &model, &path("labeled.csv"), "--label", "color"]), 1);
+    assert!(message.contains("no column \"color\""), "{message}");
+    // A regression's labels are numbers.
+    let name = "catboost-1.2-regression";
+    stdout(run(["export", &data(&format!("{name}.json")), "-o", &model, "--leaf", "f32"]));
+    std::fs::write(path("labeled.csv"), "width,height,count,angle,amount\n1,990,2,0.5,2\n").unwrap();
+    let evaluated = json(run(["evaluate", &model, &path("labeled.csv"), "--label", "amount", "--json"]));
+    assert_eq!(evaluated["mean_absolute_error"], evaluated["root_mean_square_error"]);
+}
+
+#[test]
+fn a_regression_gives_its_value_and_no_verdict() {
+    let (_directory, path) = place();
+    let name = "catboost-1.2-regression";
+    stdout(run(["export", &data(&format!("{name}.json")), "-o", &path("model.palpate"), "--leaf", "f32"]));
+    let rows = data(&format!("{name}.rows.csv"));
+    let text = stdout(run(["recognize", &path("model.palpate"), &rows, "--features", "--json"]));
+    let margins = std::fs::read_to_string(data(&format!("{name}.margins.csv"))).unwrap();
+    for (line, margin) in text.lines().zip(margins.lines()) {
+        let line: Value = serde_json::from_str(line).unwrap();
+        assert!((line["margins"][0].as_f64().unwrap() - margin.parse::<f64>().unwrap()).abs() < 1e-5);
+        assert_eq!(line.get("verdict"), None);
+    }
+}
+
+#[test]
+fn recognize_on_a_model_of_rows_does_not_answer_touches() {
+    let (_directory, path) = place();
+    stdout(run(["export", &data("xgboost-2.1-softprob.ubj"), "-o", &path("model.palpate")]));
+    std::fs::write(path("touches.txt"), "0 0 0.08\n").unwrap();
+    let message = stderr(run(["recognize", &path("model.palpate"), &path("touches.txt")]), 1);
+    assert!(message.contains("works on rows of features, not on touches"), "{message}");
+    // And the other way round.
+    let touches = crate::compiled::Place::new();
+    std::fs::write(path("rows.csv"), "curvature,slope\n1,2\n").unwrap();
+    let message = stderr(run(["recognize", &touches.text("model.palpate"), &path("rows.csv"), "--features"]), 1);
+    assert!(message.contains("is over touches, not over rows"), "{message}");
+}
+
+#[test]
+fn a_model_of_fractions_with_a_touch_descriptor_is_refused_instead_of_rounded() {
+    let (_directory, path) = place();
+    let text = std::fs::read_to_string(data("xgboost-1.6-softmax.json")).unwrap();
+    let mut document: Value = serde_json::from_str(&text).unwrap();
+    // Four features, as gravity has.
+    document["learner"]["attributes"] =
+        serde_json::json!({"palpate_descriptor": "gravity", "palpate_objects": "[\"a\",\"b\",\"c\"]"});
+    std::fs::write(path("labeled.json"), document.to_string()).unwrap();
+    let message = stderr(run(["export", &path("labeled.json"), "-o", &path("model.palpate")]), 1);
+    assert!(message.contains("not trained on whole numbers") && message.contains("remove its attribute"), "{message}");
+    assert!(!Path::new(&path("model.palpate")).exists());
+}
+
+#[test]
+fn what_cannot_be_taken_over_is_refused_by_name_with_the_way_round() {
+    let (_directory, path) = place();
+    for (bytes, what, way) in [
+        (&b"\x80\x04\x95pickle"[..], "a Python pickle", "skl2onnx"),
+        (b"CBM1....", "CatBoost's binary format", "format=\"json\""),
+        (b"PLPT....", "a compiled model already", "exported from"),
+        (b"binf....", "XGBoost's old binary format", "model.json"),
+        (b"\x1f\x8b....", "compressed", "Unpack"),
+        (b"<?xml version=\"1.0\"?>", "no ensemble in a format", "ONNX"),
+        (b"{\"name\": \"tree\", \"tree_info\": []}", "LightGBM's dump_model", "model.txt"),
+        (b"{\"learner\": {\"gradient_booster\": {\"name\": \"gblinear\"}}}", "gblinear, which has no trees", "gbtree"),
+    ] {
+        std::fs::write(path("foreign"), bytes).unwrap();
+        let message = stderr(run(["export", &path("foreign"), "-o", &path("model.palpate")]), 1);
+        assert!(message.contains(what) && message.contains(way), "{message}");
+    }
+    for (model, what, way) in [
+        ("lightgbm-4.7-categorical.txt", "splits on categories of the feature count", "one-hot"),
+        ("lightgbm-4.7-linear.txt", "tree 0 has linear functions", "linear_tree=false"),
+    ] {
+        let message = stderr(run(["export", &data(model), "-o", &path("model.palpate")]), 1);
+        assert!(message.contains(what) && message.contains(way), "{message}");
+    }
+    let message = stderr(run(["export", &data("lightgbm-4.7-binary.txt"), "-o", &path("m"), "--names", "a,b,c"]), 1);
+    assert!(message.contains("3 names were given for 2 outputs"), "{message}");
+}
+
+#[test]
+fn the_layout_is_chosen_for_what_is_asked_and_all_candidates_are_named() {
+    let (_directory, path) = place();
+    let export = |goal: &str| {
+        json(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m"), "--for", goal, "--json"]))
+    };
+    let (size, speed, balanced) = (export("size"), export("speed"), export("balanced"));
+    let candidates = size["candidates"].as_array().unwrap();
+    assert!(candidates.len() >= 2, "{size}");
+    assert_eq!((&speed["candidates"], &balanced["candidates"]), (&size["candidates"], &size["candidates"]));
+    let least = |key: fn(&Value) -> Option<u64>| candidates.iter().min_by_key(|candidate| key(candidate)).unwrap();
+    assert_eq!(size["layout"], least(|candidate| candidate["bytes"].as_u64())["layout"]);
+    assert_eq!(speed["layout"], least(|candidate| candidate["instructions"]["m4f"].as_u64())["layout"]);
+    assert_eq!(size["bytes"], least(|candidate| candidate["bytes"].as_u64())["bytes"]);
+    let smallest = least(|candidate| candidate["bytes"].as_u64())["bytes"].as_u64().unwrap();
+    let small = candidates.iter().filter(|candidate| candidate["bytes"].as_u64().unwrap() <= 3 * smallest);
+    let fastest = small.min_by_key(|candidate| candidate["instructions"]["m4f"].as_u64()).unwrap();
+    assert_eq!(balanced["layout"], fastest["layout"]);
+    let text = stdout(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m")]));
+    assert!(text.contains("compact") && text.contains("complete") && text.contains(" *"), "{text}");
+}
+
+#[test]
+fn whole_numbers_in_the_users_units_split_as_the_values_do_and_say_what_they_change() {
+    let (_directory, path) = place();
+    let name = "xgboost-3.4-softprob";
+    let (model, rows) = (data(&format!("{name}.ubj")), data(&format!("{name}.rows.csv")));
+    let scales = "width=10000,height=1000,count=1,angle=10000";
+    let exported = json(run(["export", &model, "-o", &path("m"), "--scale", scales, "--json"]));
+    let effects = exported["scales"].as_array().unwrap();
+    let height = effects.iter().find(|effect| effect["feature"] == "height").unwrap();
+    assert_eq!((height["scale"].as_f64(), &height["different"]), (Some(1000.0), &height["thresholds"]));
+    assert!(height["largest_step"].as_f64() <= Some(0.000_5), "{height}");
+    let verified = json(run(["verify", &path("m"), &model, &rows, "--json"]));
+    assert_eq!(verified["class_differs"], 0, "{verified}");
+    assert!(verified["max_margin_error"].as_f64() <= verified["stated_bound"].as_f64(), "{verified}");
+    let inspected = json(run(["inspect", &path("m"), "--json"]));
+    assert_eq!(inspected["feature_names"][1], serde_json::json!({"name": "height", "scale": 1000.0}));
+    let parts = inspected["bytes_by_part"].as_object().unwrap().values();
+    assert_eq!(inspected["bytes"], parts.map(|bytes| bytes.as_u64().unwrap()).sum::<u64>());
+    let fitted = json(run(["export", &model, "-o", &path("m"), "--fit-scales", &rows, "--json"]));
+    assert!(fitted["scales"].as_array().unwrap().iter().any(|effect| effect["scale"].as_f64() > Some(1.0)), "{fitted}");
+    json(run(["verify", &path("m"), &model, &rows, "--json"]));
+    // A feature with fractions, of which nothing was said, and one that there is not; units beyond 32 bits.
+    for (scale, expected) in [
+        ("width=100", "a scale for height too"),
+        ("depth=100", "--scale is depth=100. Use a feature: width, height, count, angle"),
+        ("width=1,height=1e9,count=1,angle=1", "scales is 1000000000 for height"),
+    ] {
+        let message = stderr(run(["export", &model, "-o", &path("m"), "--scale", scale]), 2);
+        assert!(message.contains(expected), "{message}");
+    }
+}

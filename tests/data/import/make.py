@@ -1,0 +1,338 @@
+"""Makes the files of this directory: small models of other libraries, rows, and the libraries' own margins.
+
+    python3.11 -m venv xgboost-2.1 && xgboost-2.1/bin/pip install xgboost==2.1.4 numpy scipy
+    xgboost-2.1/bin/python make.py xgboost
+
+and the same with XGBoost 1.6.2, 1.7.6, 3.0.5, 3.2.0 and (Python 3.12) 3.4.0, then, each with the packages that it imports,
+`make.py lightgbm`, `make.py catboost`, `make.py onnx` (scikit-learn, skl2onnx, onnx, onnxruntime) and `make.py onnxmltools`
+(onnxmltools, xgboost, lightgbm). Every model gets two files beside it:
+
+NAME.rows.csv     a header with the features' names, then 20 rows like the training's, 20 with values that equal thresholds
+                  of the model, the numbers beside them or zero, and 20 with missing values (empty)
+NAME.margins.csv  the library's raw scores of these rows: one column per output, one for a binary model. f32 scores have as
+                  many digits as distinguish them, f64 scores seventeen
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parent
+NAMES = ["width", "height", "count", "angle"]
+ROWS = 20
+
+
+def data(classes, seed=7, rows=400):
+    """Rows of four features: two real, one a small whole number with many zeros, one with a tenth missing."""
+    random = np.random.default_rng(seed)
+    label = random.integers(0, classes, rows)
+    x = np.empty((rows, 4), np.float32)
+    x[:, 0] = random.normal(0.4 * label, 1.0)
+    x[:, 1] = random.normal(1000.0 - 30.0 * label, 40.0)
+    x[:, 2] = np.maximum(random.poisson(1.0 + label) - 1, 0)
+    x[:, 3] = random.uniform(-3.0, 3.0, rows) + 0.3 * (label == 1)
+    return x, label
+
+
+def with_missing(x, seed=3):
+    x = x.copy()
+    x[np.random.default_rng(seed).uniform(size=len(x)) < 0.1, 3] = np.nan
+    return x
+
+
+def rows(thresholds, missing, classes=3):
+    """Plain, tied and missing rows; `thresholds` is a list for each feature."""
+    random = np.random.default_rng(11)
+    plain = data(classes, seed=12, rows=ROWS)[0]
+    tied = data(classes, seed=13, rows=ROWS)[0]
+    for row in tied:
+        for feature, own in enumerate(thresholds):
+            if len(own) and random.uniform() < 0.8:
+                at = np.float32(own[random.integers(len(own))])
+                near = [at, np.nextafter(at, np.float32(-np.inf)), np.nextafter(at, np.float32(np.inf)), np.float32(0)]
+                row[feature] = near[random.integers(4)]
+    if not missing:
+        return np.vstack([plain, tied])
+    gone = data(classes, seed=14, rows=ROWS)[0]
+    gone[random.uniform(size=gone.shape) < 0.4] = np.nan
+    gone[-1] = np.nan
+    return np.vstack([plain, tied, gone])
+
+
+def text(value):
+    if np.isnan(value):
+        return ""
+    return repr(float(value)) if isinstance(value, np.float64) else str(value)
+
+
+def write(name, x, margins, names=NAMES):
+    margins = np.asarray(margins)
+    margins = margins.reshape(len(x), -1)
+    lines = [",".join(names)] + [",".join(text(value) for value in row) for row in x]
+    (HERE / f"{name}.rows.csv").write_text("\n".join(lines) + "\n")
+    lines = [",".join(text(value) for value in row) for row in margins]
+    (HERE / f"{name}.margins.csv").write_text("\n".join(lines) + "\n")
+    print(name, margins.dtype, margins.shape)
+
+
+def xgboost_thresholds(booster):
+    frame = {index: [] for index in range(4)}
+    for dump in booster.get_dump():
+        for line in dump.splitlines():
+            if "[" in line:
+                feature, threshold = line.split("[")[1].split("]")[0].split("<")
+                frame[NAMES.index(feature)].append(float(threshold))
+    return [frame[index] for index in range(4)]
+
+
+def make_xgboost():
+    import json
+
+    import xgboost as xgb
+
+    version = ".".join(xgb.__version__.split(".")[:2])
+    release = tuple(int(part) for part in version.split("."))
+    plain = {"max_depth": 2, "eta": 0.4, "tree_method": "hist", "max_bin": 16, "seed": 1, "nthread": 1}
+
+    def save(kind, extension, classes, settings, rounds=3, missing=True, label=None):
+        x, y = data(max(classes, 2))
+        x = with_missing(x) if missing else x
+        y = y if label is None else label(x, y)
+        train = xgb.DMatrix(x, y, feature_names=NAMES)
+        booster = xgb.train({**plain, **settings}, train, rounds)
+        name = f"xgboost-{version}-{kind}"
+        booster.save_model(HERE / f"{name}.{extension}")
+        thresholds = xgboost_thresholds(booster) if settings.get("multi_strategy") is None else json_thresholds(booster)
+        test = rows(thresholds, True, max(classes, 2))
+        margins = booster.predict(xgb.DMatrix(test, feature_names=NAMES), output_margin=True)
+        write(name, test, margins)
+
+    def json_thresholds(booster):
+        model = json.loads(booster.save_raw("json"))["learner"]["gradient_booster"]["model"]
+        thresholds = [[] for _ in range(4)]
+        for tree in model["trees"]:
+            for left, feature, at in zip(tree["left_children"], tree["split_indices"], tree["split_conditions"]):
+                if left != -1:
+                    thresholds[feature].append(at)
+        return thresholds
+
+    binary = {"objective": "binary:logistic", "base_score": 0.3}
+    softprob = {"objective": "multi:softprob", "num_class": 3}
+    amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
+    dart = {"booster": "dart", "rate_drop": 0.5, "one_drop": 1, "skip_drop": 0.0}
+    save("binary", "json", 2, binary)
+    if release in [(1, 6), (2, 1), (3, 2), (3, 4)]:
+        save("softprob", "ubj", 3, softprob, rounds=2)
+    if release in [(1, 6), (3, 2), (3, 4)]:
+        save("dart", "json", 3, {**softprob, **dart}, rounds=2)
+    if release in [(1, 6), (2, 1), (3, 4)]:
+        save("dart-binary", "ubj", 2, {**binary, **dart}, rounds=5)
+    if release in [(1, 6), (3, 4)]:
+        save("softmax", "json", 3, {**softprob, "objective": "multi:softmax", "base_score": 0.25}, rounds=2)
+        save("poisson", "json", 0, {"objective": "count:poisson", "base_score": 2.5}, label=amount)
+        save("logitraw", "ubj", 2, {**binary, "objective": "binary:logitraw"})
+    if release == (2, 1):
+        save("forest", "json", 2, {**binary, "num_parallel_tree": 3, "subsample": 0.7, "eta": 1}, rounds=2)
+        save("squarederror", "ubj", 0, {"objective": "reg:squarederror"}, label=amount)
+    if release >= (2, 0):
+        save("vector-leaves", "json", 3, {**softprob, "multi_strategy": "multi_output_tree"})
+    if release >= (3, 1):
+        # A vector of intercepts, fitted to the labels.
+        save("intercepts", "ubj", 3, softprob, label=lambda x, y: np.where(y == 2, 0, y), rounds=2)
+
+
+def make_lightgbm():
+    import lightgbm as lgb
+
+    plain = {"num_leaves": 4, "learning_rate": 0.4, "max_bin": 15, "verbose": -1, "seed": 1, "num_threads": 1,
+             "min_data_in_leaf": 5, "deterministic": True}
+
+    def save(kind, classes, settings, rounds=3, missing=False, label=None, change=lambda x: x):
+        x, y = data(max(classes, 2))
+        x = change(with_missing(x) if missing else x)
+        y = y if label is None else label(x, y)
+        booster = lgb.train({**plain, **settings}, lgb.Dataset(x, y, feature_name=NAMES), rounds)
+        name = f"lightgbm-{lgb.__version__.rsplit('.', 1)[0]}-{kind}"
+        # The same without the parameters of the training (half of the file).
+        booster.save_model(HERE / f"{name}.txt")
+        path = HERE / f"{name}.txt"
+        path.write_text(path.read_text().split("\nparameters:")[0] + "\n")
+        frame = booster.trees_to_dataframe()
+        thresholds = [[] for _ in range(4)]
+        for feature, threshold in zip(frame["split_feature"], frame["threshold"]):
+            if isinstance(feature, str) and isinstance(threshold, (int, float)):
+                at = np.float32(threshold)
+                thresholds[NAMES.index(feature)].append(at)
+        test = rows(thresholds, True, max(classes, 2))
+        write(name, test, booster.predict(test, raw_score=True))
+
+    save("binary", 2, {"objective": "binary"}, missing=True)
+    save("multiclass", 3, {"objective": "multiclass", "num_class": 3})
+    save("zero-as-missing", 2, {"objective": "binary", "zero_as_missing": True}, rounds=6)
+    save("forest", 2, {"objective": "binary", "boosting": "rf", "bagging_fraction": 0.6, "bagging_freq": 1}, missing=True)
+    save("regression", 0, {"objective": "regression"}, label=lambda x, y: np.abs(x[:, 0]) * 3 + y)
+    save("dart", 3, {"objective": "multiclass", "num_class": 3, "boosting": "dart", "drop_rate": 0.5}, missing=True)
+    save("categorical", 2, {"objective": "binary", "categorical_feature": [2], "min_data_per_group": 5,
+                            "max_cat_to_onehot": 1, "cat_smooth": 1}, rounds=6)
+    save("linear", 0, {"objective": "regression", "linear_tree": True}, rounds=2,
+         label=lambda x, y: np.abs(x[:, 0]) * 3 + y)
+
+
+def make_catboost():
+    import json
+
+    import catboost
+
+    version = ".".join(catboost.__version__.split(".")[:2])
+
+    def save(kind, model, classes, settings, missing=True, label=None):
+        x, y = data(max(classes, 2))
+        x = with_missing(x) if missing else x
+        y = y if label is None else label(x, y)
+        settings = {"iterations": 3, "depth": 2, "learning_rate": 0.4, "border_count": 12, "random_seed": 1,
+                    "thread_count": 1, "verbose": False, "allow_writing_files": False, **settings}
+        booster = model(**settings)
+        booster.fit(catboost.Pool(x, y, feature_names=NAMES))
+        name = f"catboost-{version}-{kind}"
+        booster.save_model(str(HERE / f"{name}.json"), format="json")
+        # The same without what is known about the training (5 of 8 KB) and without indentation.
+        path = HERE / f"{name}.json"
+        document = json.loads(path.read_text())
+        about = document["model_info"]
+        about["params"] = {"loss_function": about["params"]["loss_function"]}
+        del about["output_options"], about["training"]
+        path.write_text(json.dumps(document, separators=(",", ":")) + "\n")
+        borders = booster.get_borders()
+        test = rows([borders[index] for index in range(4)], missing, max(classes, 2))
+        write(name, test, booster.predict(test, prediction_type="RawFormulaVal"))
+
+    amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
+    words = np.array(["cup", "jug", "pan"])
+    save("binary", catboost.CatBoostClassifier, 2, {})
+    save("multiclass", catboost.CatBoostClassifier, 3, {}, label=lambda x, y: words[y])
+    save("max-missing", catboost.CatBoostClassifier, 2, {"nan_mode": "Max"})
+    save("lossguide", catboost.CatBoostClassifier, 3, {"grow_policy": "Lossguide", "max_leaves": 5, "depth": 4})
+    save("depthwise", catboost.CatBoostClassifier, 2, {"grow_policy": "Depthwise"})
+    save("regression", catboost.CatBoostRegressor, 0, {}, label=amount)
+
+
+def onnx_raw(model):
+    """The same model without its last transformation: its output are raw scores."""
+    import copy
+
+    import onnx
+
+    raw = copy.deepcopy(model)
+    for node in raw.graph.node:
+        for attribute in node.attribute:
+            if attribute.name == "post_transform" and node.op_type != "TreeEnsemble":
+                attribute.s = b"NONE"
+    # Only the ensemble: what is behind it needs other shapes.
+    for node in raw.graph.node:
+        if node.op_type.startswith("TreeEnsemble"):
+            del raw.graph.output[:]
+            raw.graph.output.append(onnx.helper.make_tensor_value_info(node.output[-1], onnx.TensorProto.FLOAT, None))
+    return raw
+
+
+def save_onnx(name, model, classes, pick=lambda scores: scores, missing=True):
+    import onnx
+    import onnxruntime
+
+    thresholds = [[] for _ in range(4)]
+    for node in model.graph.node:
+        found = {a.name: onnx.helper.get_attribute_value(a) for a in node.attribute}
+        if "nodes_modes" not in found:
+            continue
+        values = found.get("nodes_values")
+        for key in ("nodes_values_as_tensor", "nodes_splits"):
+            if key in found:
+                values = onnx.numpy_helper.to_array(found[key])
+        modes = found["nodes_modes"]
+        leaves = [mode == b"LEAF" for mode in modes] if isinstance(modes, list) else [False] * len(values)
+        for feature, value, leaf in zip(found["nodes_featureids"], values, leaves):
+            if not leaf:
+                thresholds[feature].append(np.float32(value))
+    (HERE / f"{name}.onnx").write_bytes(model.SerializeToString())
+    test = rows(thresholds, missing, max(classes, 2))
+    session = onnxruntime.InferenceSession(onnx_raw(model).SerializeToString())
+    kind = session.get_inputs()[0].type
+    given = test.astype(np.float64 if "double" in kind else np.float32)
+    (scores,) = session.run(None, {session.get_inputs()[0].name: given})
+    write(name, test, pick(scores))
+
+
+def make_onnx():
+    import onnx
+    import sklearn
+    from onnx import helper
+    from skl2onnx import to_onnx
+    from sklearn import ensemble
+
+    version = ".".join(sklearn.__version__.split(".")[:2])
+    second = lambda scores: scores[:, 1]
+
+    def convert(kind, model, classes, pick=lambda scores: scores, label=None, **options):
+        x, y = data(max(classes, 2))
+        y = y if label is None else label(x, y)
+        model.fit(x, y)
+        save_onnx(f"sklearn-{version}-{kind}", to_onnx(model, x[:1], **options), classes, pick)
+
+    amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
+    words = np.array(["cup", "jug", "pan"])
+    few = {"n_estimators": 3, "max_depth": 2, "random_state": 1}
+    convert("forest", ensemble.RandomForestClassifier(**few), 3, label=lambda x, y: words[y])
+    convert("forest-binary", ensemble.RandomForestClassifier(**few), 2, second)
+    convert("forest-regression", ensemble.RandomForestRegressor(**few), 0, label=amount)
+    convert("boosting", ensemble.GradientBoostingClassifier(**few), 3)
+    convert("boosting-binary", ensemble.GradientBoostingClassifier(**few), 2, second)
+    convert("boosting-regression", ensemble.GradientBoostingRegressor(**few), 0, label=amount)
+    convert("extra-trees-opset1", ensemble.ExtraTreesClassifier(**few), 3, target_opset={"": 12, "ai.onnx.ml": 1})
+
+    # No exporter writes this yet: two trees over two targets, every comparison, missing values both ways.
+    f32 = lambda name, values: helper.make_tensor(name, onnx.TensorProto.FLOAT, [len(values)], values)
+    u8 = lambda name, values: helper.make_tensor(name, onnx.TensorProto.UINT8, [len(values)], values)
+    node = helper.make_node(
+        "TreeEnsemble", ["X"], ["Y"], domain="ai.onnx.ml", n_targets=2, aggregate_function=1, post_transform=0,
+        tree_roots=[0, 3],
+        nodes_featureids=[0, 1, 2, 3, 0],
+        nodes_splits=f32("nodes_splits", [0.25, 990.5, 1.0, -0.5, 1.5]),
+        nodes_modes=u8("nodes_modes", [0, 1, 2, 3, 0]),
+        nodes_truenodeids=[1, 0, 2, 4, 5],
+        nodes_trueleafs=[0, 1, 1, 0, 1],
+        nodes_falsenodeids=[2, 1, 3, 4, 6],
+        nodes_falseleafs=[0, 1, 1, 1, 1],
+        nodes_missing_value_tracks_true=[1, 0, 1, 0, 0],
+        leaf_targetids=[0, 1, 0, 1, 1, 1, 1],
+        leaf_weights=f32("leaf_weights", [0.5, -0.25, 1.5, 0.75, -1.25, 2.5, -0.125]),
+    )
+    opset = [helper.make_opsetid("", 20), helper.make_opsetid("ai.onnx.ml", 5)]
+    graph = helper.make_graph(
+        [node], "by hand",
+        [helper.make_tensor_value_info("X", onnx.TensorProto.FLOAT, [None, 4])],
+        [helper.make_tensor_value_info("Y", onnx.TensorProto.FLOAT, [None, 2])],
+    )
+    save_onnx("onnx-opset5", helper.make_model(graph, opset_imports=opset, ir_version=10), 2)
+
+
+def make_onnxmltools():
+    import lightgbm
+    import onnxmltools
+    import xgboost
+    from onnxmltools.convert.common.data_types import FloatTensorType
+
+    shape = [("X", FloatTensorType([None, 4]))]
+    second = lambda scores: scores[:, 1] if scores.shape[1] == 2 else scores[:, 0]
+    x, y = data(2)
+    booster = xgboost.XGBClassifier(n_estimators=3, max_depth=2, base_score=0.5).fit(x, y)
+    save_onnx("onnxmltools-xgboost-binary", onnxmltools.convert_xgboost(booster, initial_types=shape), 2, second)
+    x, y = data(3)
+    booster = xgboost.XGBClassifier(n_estimators=2, max_depth=2).fit(x, y)
+    save_onnx("onnxmltools-xgboost-softprob", onnxmltools.convert_xgboost(booster, initial_types=shape), 3)
+    booster = lightgbm.LGBMClassifier(n_estimators=2, num_leaves=4, verbose=-1).fit(x, y)
+    save_onnx("onnxmltools-lightgbm-multiclass", onnxmltools.convert_lightgbm(booster, initial_types=shape), 3)
+
+
+if __name__ == "__main__":
+    globals()[f"make_{sys.argv[1]}"]()
