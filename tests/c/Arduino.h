@@ -14,7 +14,7 @@ struct Printer {
 extern Printer Serial;
 void pinMode(uint8_t pin, uint8_t mode);
 int digitalRead(uint8_t pin);
-unsigned long micros();
+uint32_t micros();
 void delay(unsigned long milliseconds);
 
 #endif
