@@ -1,9 +1,8 @@
 //! `onboard/c/palpate.h` gives the bits that the crate gives: on this machine, under sanitizers, and on emulated chips.
 
+use palpate::compile::{Language, emit};
 use palpate_onboard::Model;
-use palpate_shared::format::{
-    MUST_UNDERSTAND, OddsByObject, Plan, Section, Tag, Temperature, f32_key, write_section,
-};
+use palpate_shared::format::{MUST_UNDERSTAND, OddsByObject, Plan, Section, Tag, Temperature, f32_key, write_section};
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use palpate_tests::replay::{Script, is_specified};
 use palpate_tests::sections::with_sections;
@@ -226,7 +225,8 @@ fn mutant(models: &[Vec<u8>], rng: &mut SmallRng) -> Vec<u8> {
             3..5 => bytes[at] = bytes[at].wrapping_add(1),
             5..7 => bytes[at] = bytes[at].wrapping_sub(1),
             7 => {
-                let number: u32 = [0, u32::MAX, 1 << 31, rng.random(), rng.random_range(0..300)][rng.random_range(0..5)];
+                let number: u32 =
+                    [0, u32::MAX, 1 << 31, rng.random(), rng.random_range(0..300)][rng.random_range(0..5)];
                 let at = at & !3;
                 bytes.iter_mut().skip(at).zip(number.to_le_bytes()).for_each(|(to, from)| *to = from);
             }
@@ -312,6 +312,30 @@ fn the_bytes_of_the_vectors_that_are_no_models_are_refused() {
     compare(&run(&program, &script.commands), &script);
 }
 
+#[test]
+fn a_model_that_export_emits_compiles_without_warnings_and_is_opened() {
+    let directory = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    put("palpate.h", palpate_onboard::C_HEADER);
+    for (index, bytes) in models().iter().enumerate().filter(|(index, _)| index % 8 == 0) {
+        let model = Model::new(bytes).unwrap();
+        put("a_model.h", &emit(&model, "a model", Language::C));
+        let checks = "palpate_open(&model, a_model_model, sizeof a_model_model) || palpate_start(&recognizer, &model)";
+        put(
+            "program.c",
+            &format!(
+                "#include \"a_model.h\"\nstatic palpate_model model;\nstatic palpate_recognizer recognizer;\n\
+                 int main(void)\n{{\n    return {checks} || model.objects != {};\n}}\n",
+                model.object_count()
+            ),
+        );
+        let program = directory.path().join("program");
+        let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+        compile(&compiler, &[], directory.path().join("program.c").to_str().unwrap(), &program).unwrap();
+        assert!(Command::new(&program).status().unwrap().success(), "model {index}");
+    }
+}
+
 /// A bare chip: compiler, flags, emulator.
 const CHIPS: [(&str, &str, &str, &str); 3] = [
     (
@@ -346,7 +370,8 @@ fn emulated_chips_give_the_bits_of_the_crate() {
     for (chip, compiler, flags, emulator) in CHIPS {
         let directory = tempfile::tempdir().unwrap();
         let program = directory.path().join("replay");
-        let linker: Vec<String> = flags.split(' ').map(|flag| flag.replace("tests/c", &format!("{ROOT}/tests/c"))).collect();
+        let linker: Vec<String> =
+            flags.split(' ').map(|flag| flag.replace("tests/c", &format!("{ROOT}/tests/c"))).collect();
         let mut all = vec!["-Os", "-ffreestanding", "-nostdlib", "-static", "-Wl,--no-warn-rwx-segments"];
         all.extend(linker.iter().map(String::as_str));
         compile(compiler, &all, "chip.c", &program).unwrap();
