@@ -161,13 +161,13 @@ static int replay(void)
     static uint8_t snapshot[PALPATE_SNAPSHOT_LENGTH(PALPATE_MAX_OBJECTS)];
     int is_open = 0, command;
     uint16_t i, count;
-    uint32_t length, at;
+    size_t length, at;
     uint8_t *bytes;
     while ((command = replay_get()) >= 0) {
         switch (command) {
         case 'M':
         case 'L':
-            length = replay_number(4);
+            length = (size_t)replay_number(4);
             bytes = replay_room(command != 'M', length);
             for (at = 0; at < length; at++) {
                 bytes[at] = (uint8_t)replay_get();

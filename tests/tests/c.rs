@@ -167,8 +167,8 @@ fn here(flags: &[&str], directory: &Path) -> Result<PathBuf, String> {
 }
 
 /// What the program writes.
-fn run(program: &Path, commands: &[u8]) -> String {
-    let mut child = Command::new(program).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+fn run(program: &mut Command, commands: &[u8]) -> String {
+    let mut child = program.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
     let mut input = child.stdin.take().expect("a pipe");
     let output = std::thread::scope(|scope| {
         scope.spawn(move || input.write_all(commands).expect("it reads everything"));
@@ -200,7 +200,7 @@ fn touches_and_rows_give_the_bits_of_the_crate() {
     let mut rng = SmallRng::seed_from_u64(1);
     let models = all_models(&mut rng);
     let script = script(&models, 120_000, 100_000, &mut rng);
-    compare(&run(&program, &script.commands), &script);
+    compare(&run(&mut Command::new(&program), &script.commands), &script);
     let counted = [count(&script, "touch"), count(&script, "features"), count(&script, "verdict")];
     println!("{counted:?} touches, features, verdicts; {} sums in f32", count(&script, "sums"));
     let verdicts = |verdict: &str| script.expected.lines().filter(|line| line.starts_with(verdict)).count();
@@ -295,7 +295,7 @@ fn bytes_that_the_crate_refuses_are_refused_at_the_same_place_and_no_others() {
         for line in script.expected.lines().filter_map(|line| line.strip_prefix("open ")) {
             refused[line.split(' ').next().unwrap().parse::<usize>().unwrap()] += 1;
         }
-        compare(&run(&program, &script.commands), &script);
+        compare(&run(&mut Command::new(&program), &script.commands), &script);
     }
     println!("{accepted} of 200,000 mutants accepted; by error: {refused:?}");
     assert!(accepted > 10_000 && refused.iter().all(|&count| count > 100), "{accepted} {refused:?}");
@@ -309,7 +309,7 @@ fn the_bytes_of_the_vectors_that_are_no_models_are_refused() {
     let abuses: Vec<Vec<u8>> = words.map(|words| vectors::bytes(words.split(' ').next().unwrap())).collect();
     let mut script = Script::default();
     assert!(abuses.len() > 60 && abuses.iter().all(|bytes| !script.open(bytes)));
-    compare(&run(&program, &script.commands), &script);
+    compare(&run(&mut Command::new(&program), &script.commands), &script);
 }
 
 #[test]
@@ -384,4 +384,69 @@ fn emulated_chips_give_the_bits_of_the_crate() {
         compare(&std::fs::read_to_string(directory.path().join("results")).unwrap(), &script);
         println!("{chip}: {} touches, {} results", count(&script, "touch"), count(&script, "verdict"));
     }
+}
+
+#[test]
+#[ignore = "needs a cross compiler and an emulator: .ci/run c"]
+fn a_big_endian_machine_gives_the_bits_of_the_crate() {
+    let directory = tempfile::tempdir().unwrap();
+    let program = directory.path().join("replay");
+    // With strict C99 this machine would add in f64, which the header refuses.
+    compile("s390x-linux-gnu-gcc", &["-fexcess-precision=fast", "-static"], "host.c", &program).unwrap();
+    let mut rng = SmallRng::seed_from_u64(5);
+    let models = all_models(&mut rng);
+    let script = script(&models, 20_000, 20_000, &mut rng);
+    compare(&run(Command::new("qemu-s390x").arg(&program), &script.commands), &script);
+    println!("s390x: {} touches, {} results", count(&script, "touch"), count(&script, "verdict"));
+}
+
+/// What an ATmega2560 writes until the 0 at the end.
+fn run_avr(program: &Path, directory: &Path) -> String {
+    let results = directory.join("results");
+    std::fs::write(&results, []).unwrap();
+    let serial = format!("file:{}", results.display());
+    let mut command = Command::new("qemu-system-avr");
+    command.args(["-machine", "mega2560", "-nographic", "-monitor", "none", "-serial", &serial, "-bios"]).arg(program);
+    let mut child = command.stdin(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    loop {
+        let found = std::fs::read(&results).unwrap();
+        if let Some((0, text)) = found.split_last() {
+            // The machine has no end of its own.
+            child.kill().and_then(|()| child.wait()).unwrap();
+            return String::from_utf8(text.to_vec()).unwrap();
+        }
+        assert!(child.try_wait().unwrap().is_none(), "it ended early");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+}
+
+#[test]
+#[ignore = "needs avr-gcc and an emulator: .ci/run c"]
+fn an_emulated_avr_gives_the_bits_of_the_crate() {
+    let directory = tempfile::tempdir().unwrap();
+    let program = directory.path().join("replay");
+    let mut rng = SmallRng::seed_from_u64(4);
+    let mut models = all_models(&mut rng);
+    models.retain(|bytes| bytes.len() < 3_000 && bytes[14] < 12);
+    // An array of avr-gcc has at most 32 KB.
+    let mut batches: Vec<Vec<Vec<u8>>> = vec![Vec::new()];
+    for model in models {
+        let taken: usize = batches.last().unwrap().iter().map(|model| model.len() + 2_500).sum();
+        if taken + model.len() + 2_500 > 32_000 {
+            batches.push(Vec::new());
+        }
+        batches.last_mut().unwrap().push(model);
+    }
+    let mut counted = [0; 2];
+    for batch in &batches {
+        let script = script(batch, 25 * batch.len(), 25 * batch.len(), &mut rng);
+        let bytes: Vec<String> = script.commands.iter().map(u8::to_string).collect();
+        let source = format!("static const uint8_t commands[] PROGMEM = {{{}}};\n", bytes.join(","));
+        std::fs::write(directory.path().join("commands.h"), source).unwrap();
+        let include = format!("-I{}", directory.path().display());
+        compile("avr-gcc", &["-mmcu=atmega2560", &include], "avr.c", &program).unwrap();
+        compare(&run_avr(&program, directory.path()), &script);
+        counted = [counted[0] + count(&script, "touch"), counted[1] + count(&script, "verdict")];
+    }
+    println!("AVR: {} touches, {} results, {} images", counted[0], counted[1], batches.len());
 }
