@@ -41,7 +41,8 @@ fn recognize(bytes: &[u8], touches: impl Iterator<Item = palpate::Result<Touch>>
                 let posterior = recognizer.posterior(object).to_f64();
                 println!("{} after {touches} touches, posterior {posterior:.4}", model.object_name(object));
             }
-            Ok(Verdict::Unknown) => println!("unknown"),
+            Ok(Verdict::Unknown) => println!("unknown: the touches fit no object of the model"),
+            Ok(Verdict::GaveUp) => println!("undecided after the limit of touches"),
         }
         recognizer.reset();
     }

@@ -25,7 +25,8 @@
 //!     Ok(Verdict::Recognized { object, touches }) => {
 //!         let _ = (model.object_name(object.into()), touches);
 //!     }
-//!     Ok(Verdict::Unknown) => { /* the limit of touches was reached */ }
+//!     Ok(Verdict::Unknown) => { /* the touches fit no object that the model knows */ }
+//!     Ok(Verdict::GaveUp) => { /* the limit of touches was reached */ }
 //!     Err(refused) => { /* the model was not trained for such touches: not counted, touch again */
 //! #       let _ = refused;
 //!     }
@@ -68,7 +69,7 @@ mod model;
 pub mod station;
 
 pub use bytes::{Aligned, ModelError};
-pub use decide::{CapacityError, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
+pub use decide::{CapacityError, Fit, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use model::{Model, Refused};

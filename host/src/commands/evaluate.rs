@@ -2,11 +2,13 @@ use super::noise::NoiseArguments;
 use super::numbers::share;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
-use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings};
+use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings, Strangers};
 use crate::output;
 use crate::progress::Progress;
+use crate::touches::Dataset;
 use crate::touches::noise::Noise;
 use crate::{Error, Result};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -28,6 +30,7 @@ Examples:
   palpate evaluate model.palpate unseen --noise 5ms
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
   palpate evaluate model.palpate unseen --confusion 20
+  palpate evaluate model.palpate unseen --strangers others
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02")]
 pub(crate) struct Arguments {
@@ -35,6 +38,9 @@ pub(crate) struct Arguments {
     model: PathBuf,
     /// Directory that `palpate capture` filled
     directory: PathBuf,
+    /// Touches of objects that the model does not know, a directory as DIR: say as well how many are found out
+    #[arg(long, value_name = "DIR2")]
+    strangers: Option<PathBuf>,
     /// Numbers of touches after which to give the accuracy [default: 5,10,20,30,60, as far as the touches go]
     #[arg(long, value_delimiter = ',', value_name = "TOUCHES,…")]
     at: Option<Vec<usize>>,
@@ -71,6 +77,9 @@ struct Evaluated {
     trained_on: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     confusion: Option<Confusion>,
+    /// What is said to objects that the model does not know.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strangers: Option<Strangers>,
 }
 
 /// How often each object was taken for each.
@@ -96,7 +105,13 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let (evaluation, confusion) = file.with(|candidate| {
+    let unknown = arguments.strangers.as_deref().map(|directory| -> Result<_> {
+        let mut dataset = super::checked(Dataset::read_any(directory)?);
+        evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
+        Ok((directory, dataset))
+    });
+    let unknown = unknown.transpose()?;
+    let (evaluation, confusion, strangers) = file.with(|candidate| {
         let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
@@ -115,10 +130,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
                 counts: margins.confusion(touches, arguments.groups, arguments.seed)?,
             })
         });
-        Ok((evaluate::evaluate(&margins, &settings)?, confusion.transpose()?))
+        let evaluation = evaluate::evaluate(&margins, &settings)?;
+        let strangers = unknown.as_ref().map(|(directory, dataset)| {
+            let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
+            let known = (&margins, &evaluation.sequential);
+            evaluate::strangers(known, &unknown.of_robots(robots), &settings.sequential())
+        });
+        Ok((evaluation, confusion.transpose()?, strangers.transpose()?))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, robots, trained_on, confusion };
+    let evaluated = Evaluated { evaluation, robots, trained_on, confusion, strangers };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -169,6 +190,9 @@ fn text(evaluated: &Evaluated) -> String {
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);
     }
+    if let Some(strangers) = &evaluated.strangers {
+        text += &strangers_table(strangers);
+    }
     if !evaluated.trained_on.is_empty() {
         let objects = evaluated.trained_on.join(", ");
         // Writing to a string cannot fail.
@@ -196,7 +220,7 @@ fn table(evaluation: &Evaluation) -> String {
     for (name, accuracy) in &evaluation.per_object {
         _ = write!(text, "{name:width$}");
         cells(&mut text, &mut accuracy.values().map(percent));
-        let of = |shares: &std::collections::BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
         _ = writeln!(
             text,
             " {:>9.1} {:>9} {:>9}",
@@ -239,7 +263,7 @@ fn table(evaluation: &Evaluation) -> String {
 }
 
 /// What approaches come to: one row per object, one column per number of approaches; then the sequential figures.
-fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeMap<&str, f64>) -> String {
+fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> String {
     let names = approaches.per_object.keys().map(|name| name.chars().count());
     let width = names.max().unwrap_or(0).max("approaches".len());
     let sequential = &approaches.sequential;
@@ -254,7 +278,7 @@ fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeM
         _ = writeln!(text, " {stop:>9.1} {:>9} {:>9} {:>9}", percent(wrong), percent(undecided), percent(used));
     };
     for (name, accuracy) in &approaches.per_object {
-        let of = |shares: &std::collections::BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
         let stopping = [
             of(&sequential.per_object),
             of(&sequential.error_per_object),
@@ -278,6 +302,33 @@ fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeM
         100.0 * sequential.error_standard_error,
         100.0 * sequential.undecided,
         shares.collect::<Vec<_>>().join(", "),
+    );
+    text
+}
+
+/// What is said to strangers, in percent: one row per object.
+fn strangers_table(strangers: &Strangers) -> String {
+    let names = strangers.detected_per_object.keys().map(|name| name.chars().count());
+    let width = names.max().unwrap_or(0).max("found out by".len());
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut text = format!("\n{:width$}", "found out by");
+    // Writing to a string cannot fail.
+    strangers.detected.keys().for_each(|at| _ = write!(text, " {at:>8}"));
+    _ = writeln!(text, " {:>9}", "named");
+    let mut line = |name: &str, detected: &BTreeMap<usize, f64>, named: f64| {
+        _ = write!(text, "{name:width$}");
+        detected.values().for_each(|share| _ = write!(text, " {:>8}", percent(*share)));
+        _ = writeln!(text, " {:>9}", percent(named));
+    };
+    for (name, detected) in &strangers.detected_per_object {
+        line(name, detected, strangers.wrong_name_per_object.get(name).copied().unwrap_or(f64::NAN));
+    }
+    line("all", &strangers.detected, strangers.wrong_name);
+    let (alarms, undecided) = (percent(strangers.false_alarms), percent(strangers.undecided));
+    _ = writeln!(
+        text,
+        "\nObjects that the model does not know: the share found out by so many touches, and the share that got a name; \
+         {undecided} got no verdict.\nOf the objects that it knows, {alarms} were taken for unknown."
     );
     text
 }

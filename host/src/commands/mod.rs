@@ -182,11 +182,15 @@ fn message(error: &Error, command: &str) -> String {
 
 /// Reads a data set; its warnings go to stderr.
 fn dataset(directory: &Path) -> Result<Dataset> {
-    let dataset = Dataset::read(directory)?;
+    Dataset::read(directory).map(checked)
+}
+
+/// A data set whose warnings went to stderr.
+fn checked(dataset: Dataset) -> Dataset {
     for warning in &dataset.warnings {
         eprintln!("palpate: warning: {warning}");
     }
-    Ok(dataset)
+    dataset
 }
 
 /// The files that a data set consists of, as far as they can be found: what a command that reads it must not write.

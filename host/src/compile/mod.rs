@@ -43,6 +43,7 @@ mod layout;
 mod model;
 mod parts;
 mod quantize;
+mod restate;
 mod rounding;
 mod table;
 #[cfg(test)]
@@ -53,6 +54,7 @@ mod write;
 pub use cost::{Core, Instructions, Memory};
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
+pub use restate::{Restated, restate};
 
 use crate::ensemble::Ensemble;
 use crate::error::{CompileProblem, Error, Result};

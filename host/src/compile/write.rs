@@ -7,7 +7,7 @@ use crate::ensemble::{Ensemble, Node, Output};
 use crate::error::{CompileProblem, Error, Result};
 use crate::probe::approach::Probe;
 use palpate_onboard::Stopping;
-use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, Trained, checksum};
+use palpate_shared::format::{HeaderBuilder, Layout, RAW_FEATURES, Strangers, Tag, Trained, checksum, write_section};
 
 /// The model's bytes.
 pub(super) fn write(
@@ -87,7 +87,14 @@ fn optional(ensemble: &Ensemble, forest: &Forest<'_>) -> Vec<u8> {
             noise: origin.noise.map(|noise| noise.trained()),
             shares: origin.trained.and_then(|trained| trained.pattern_shares()),
         };
-        trained.write(|part| bytes.extend_from_slice(part));
+        // In the order of the tags.
+        Trained { shares: None, ..trained }.write(|part| bytes.extend_from_slice(part));
+        if origin.background {
+            // Whoever does not know it would name the background.
+            let section = Strangers::header(true, false);
+            write_section(Tag::Strangers, true, &section, &mut |part| bytes.extend_from_slice(part));
+        }
+        Trained { shares: trained.shares, ..Trained::default() }.write(|part| bytes.extend_from_slice(part));
     }
     bytes
 }

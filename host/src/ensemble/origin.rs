@@ -20,6 +20,9 @@ pub struct Origin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
+    /// The last object is a background: many other shapes, which stand for all that the ensemble does not know. It is a
+    /// rival of the others, and never named.
+    pub background: bool,
 }
 
 /// The probe that a data set was made with, and the size of its objects.
@@ -162,7 +165,7 @@ const FINGERPRINTED: usize = 16;
 impl Origin {
     /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
-        Self { probe, trained, noise: None, touches: fingerprints(dataset) }
+        Self { probe, trained, touches: fingerprints(dataset), ..Self::default() }
     }
 
     /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of the

@@ -14,6 +14,12 @@ pub enum EvaluateProblem {
         /// The objects that it knows.
         known: Vec<String>,
     },
+    /// The model knows an object that was to be one that it does not know.
+    #[error("the model knows the object {object}, so that it is no stranger")]
+    KnownObject {
+        /// The object.
+        object: String,
+    },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
     RawFeatures,
@@ -62,6 +68,7 @@ impl EvaluateProblem {
     pub fn fix(&self) -> String {
         match self {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
+            Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
             Self::RawFeatures => "Give a model that was exported from a Palpate ensemble.",
             Self::NoPose { .. } => "Capture the touches with their pose.",
             Self::OtherModel => "Give the ensemble that the model was exported from.",

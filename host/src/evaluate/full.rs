@@ -10,15 +10,18 @@ pub(super) struct FullRecognizer {
     stopping: Stopping,
     /// What the other objects' weights may come to, the best one's being 1.
     odds: f64,
+    /// How many objects can be named.
+    known: usize,
     touches: u32,
     verdict: Verdict,
 }
 
 impl FullRecognizer {
     /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats.
-    pub(super) fn new(prior: Vec<f64>, stopping: Stopping) -> Self {
+    /// The first `known` objects can be named.
+    pub(super) fn new(prior: Vec<f64>, known: usize, stopping: Stopping) -> Self {
         let odds = stopping.error_rate() / (1.0 - stopping.error_rate());
-        Self { evidence: prior, stopping, odds, touches: 0, verdict: Verdict::Undecided }
+        Self { evidence: prior, stopping, odds, known, touches: 0, verdict: Verdict::Undecided }
     }
 
     /// Takes in a touch by its margins, one for each object. After a verdict touches change nothing.
@@ -28,12 +31,12 @@ impl FullRecognizer {
         }
         self.evidence.iter_mut().zip(margins).for_each(|(evidence, &margin)| *evidence += f64::from(margin));
         self.touches += 1;
-        let best = best(&self.evidence);
+        let best = best(&self.evidence[..self.known]);
         if rivals(&self.evidence, best, 1.0) <= self.odds {
             // There are at most 256 objects.
             self.verdict = Verdict::Recognized { object: best as u8, touches: self.touches };
         } else if self.touches >= self.stopping.max_touches() {
-            self.verdict = Verdict::Unknown;
+            self.verdict = Verdict::GaveUp;
         }
         self.verdict
     }

@@ -24,8 +24,10 @@ pub enum Candidate<'m> {
 pub struct Margins<'m> {
     pub(super) candidate: Candidate<'m>,
     descriptor: Descriptor,
-    /// The objects that the model knows.
+    /// The objects that the model has margins for.
     objects: Vec<String>,
+    /// How many of them can be named: all but a background.
+    known: usize,
     /// The data set's objects.
     pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
@@ -35,9 +37,12 @@ pub struct Margins<'m> {
     robots: usize,
 }
 
+/// In place of the index of an object that the model does not know.
+const STRANGER: usize = usize::MAX;
+
 /// The margins of one object's test touches.
 pub(super) struct Tested<'m> {
-    /// The object's index in the model.
+    /// The object's index in the model, or [`STRANGER`].
     pub(super) object: usize,
     /// How many touches are evidence to the model.
     pub(super) touches: usize,
@@ -79,6 +84,14 @@ impl Candidate<'_> {
         }
     }
 
+    /// How many objects can be named: all but a background.
+    pub(super) fn known_count(&self) -> usize {
+        match self {
+            Self::Full(ensemble) => ensemble.known_count(),
+            Self::Compiled(model) => model.known_count(),
+        }
+    }
+
     fn objects(&self) -> Vec<String> {
         match self {
             Self::Full(ensemble) => ensemble.objects.clone(),
@@ -97,6 +110,30 @@ impl<'m> Margins<'m> {
     /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
+        let objects = &candidate.objects()[..candidate.known_count()];
+        Self::with(candidate, dataset, |name| {
+            let unknown = || EvaluateProblem::UnknownObject { object: name.into(), known: objects.to_vec() };
+            objects.iter().position(|object| object == name).ok_or_else(unknown)
+        })
+    }
+
+    /// The same for objects that the model does not know: no verdict on them is right.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
+    pub fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
+        let objects = &candidate.objects()[..candidate.known_count()];
+        Self::with(candidate, dataset, |name| match objects.iter().any(|object| object == name) {
+            true => Err(EvaluateProblem::KnownObject { object: name.into() }),
+            false => Ok(STRANGER),
+        })
+    }
+
+    fn with(
+        candidate: Candidate<'m>,
+        dataset: &Dataset,
+        index: impl Fn(&str) -> Result<usize, EvaluateProblem>,
+    ) -> Result<Self> {
         let objects = candidate.objects();
         let descriptor = candidate.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
         let trained = candidate.trained_touches();
@@ -108,8 +145,7 @@ impl<'m> Margins<'m> {
             StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
         }
         let tested = dataset.objects.iter().map(|touched| {
-            let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: objects.clone() };
-            let object = objects.iter().position(|name| *name == touched.name).ok_or_else(unknown)?;
+            let object = index(&touched.name)?;
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
             let evidence: Vec<&Touch> = touched.touches.iter().filter(is_evidence).collect();
             let mut position = 0..;
@@ -124,7 +160,9 @@ impl<'m> Margins<'m> {
         });
         let tested = tested.collect::<Result<_>>()?;
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
-        let margins = Self { candidate, descriptor, objects, tested, tested_names, hold_approaches, shares, robots: 1 };
+        let known = candidate.known_count();
+        let margins =
+            Self { candidate, descriptor, objects, known, tested, tested_names, hold_approaches, shares, robots: 1 };
         Ok(margins.of_robots(1))
     }
 
@@ -144,9 +182,14 @@ impl<'m> Margins<'m> {
         self.descriptor
     }
 
-    /// The objects that the model knows, in its order.
+    /// The objects that the model has margins for, in its order; the last one may be a background.
     pub fn objects(&self) -> &[String] {
         &self.objects
+    }
+
+    /// Of the objects that can be named, the one with the most evidence.
+    pub(super) fn best(&self, evidence: &[f64]) -> usize {
+        best(&evidence[..self.known])
     }
 
     /// The objects of the data set, in its order.

@@ -43,6 +43,7 @@ pub mod model_file;
 mod noisy;
 pub mod parity;
 mod sequential;
+mod strangers;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
@@ -54,6 +55,7 @@ pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
 pub use sequential::{Outcome, Sequential, SequentialSettings};
+pub use strangers::{DETECTED_BY, Strangers, strangers};
 
 use crate::error::{Error, Result};
 use palpate_shared::ContactPattern;
@@ -87,6 +89,14 @@ impl Default for Settings {
     fn default() -> Self {
         let (at, at_approaches) = (vec![5, 10, 20, 30, 60], vec![10, 20, 60]);
         Self { at, at_approaches, groups: 1000, error_rate: 0.01, max_touches: None, seed: 1 }
+    }
+}
+
+impl Settings {
+    /// How sequences are drawn and stopped.
+    pub fn sequential(&self) -> SequentialSettings {
+        let &Self { error_rate, max_touches, groups, seed, .. } = self;
+        SequentialSettings { error_rate, max_touches, sequences: groups, seed }
     }
 }
 
@@ -127,12 +137,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     if settings.at.contains(&0) {
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
     }
-    let stopping = SequentialSettings {
-        error_rate: settings.error_rate,
-        max_touches: settings.max_touches,
-        sequences: settings.groups,
-        seed: settings.seed,
-    };
+    let stopping = settings.sequential();
     let sequential = margins.sequential(&stopping)?;
     let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));

@@ -1,4 +1,4 @@
-//! Margins to a verdict: evidence, its exponential, when to stop, and the state as bytes.
+//! Margins to a verdict: evidence, its exponential, when to stop, what fits no object, and the state as bytes.
 
 mod evidence;
 mod exponential;
@@ -6,6 +6,7 @@ mod recognizer;
 #[cfg(feature = "link")]
 mod snapshot;
 mod stopping;
+mod strangers;
 
 pub use evidence::Posterior;
 pub use exponential::exp2_negative;
@@ -15,3 +16,4 @@ pub use recognizer::{CapacityError, Recognizer, Verdict};
 #[cfg(feature = "link")]
 pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;
+pub use strangers::Fit;

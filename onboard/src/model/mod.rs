@@ -13,7 +13,7 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Tag, TrainedNoise, TrainedProbe,
+    HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Strangers, Tag, TrainedNoise, TrainedProbe,
     TrainedTouches, take_section,
 };
 
@@ -88,9 +88,29 @@ impl<'a> Model<'a> {
         self.sections.bytes
     }
 
-    /// How many objects the model knows: 1 to 256.
+    /// How many objects the model has margins for: 1 to 256. The last of them may be the
+    /// [background](Model::background).
     pub fn object_count(&self) -> usize {
         usize::from(self.sections.objects)
+    }
+
+    /// What the model knows about objects that it does not know, if it states it.
+    ///
+    /// Cost: about 30 instructions for each optional section, and 100 for its own. Cannot fail.
+    pub fn strangers(&self) -> Option<Strangers<'a>> {
+        Strangers::opened(optional::find(self.sections.optional, Tag::Strangers))
+    }
+
+    /// The object that stands for all that the model does not know: the last one, if the model was trained with a
+    /// background. It is a rival of the others, and never named.
+    pub fn background(&self) -> Option<usize> {
+        self.strangers().filter(|strangers| strangers.background).map(|_| self.known_count())
+    }
+
+    /// How many objects can be named: all but the background.
+    pub fn known_count(&self) -> usize {
+        let background = self.strangers().is_some_and(|strangers| strangers.background);
+        self.object_count().saturating_sub(background.into())
     }
 
     /// How many features a row has: 1 to 256.

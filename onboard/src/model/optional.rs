@@ -2,7 +2,7 @@
 
 use crate::bytes::ModelError;
 use crate::layouts::Sections;
-use palpate_shared::format::{Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
+use palpate_shared::format::{Section, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
 pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
@@ -31,6 +31,7 @@ pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Resul
                 TrainedTouches::from_bytes(content).map(|stated| *touches = stated).is_some()
             }
             _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
+            _ if tag == Tag::Strangers.code() => Strangers::from_bytes(content, model.objects.into()).is_some(),
             _ if must_understand => return Err(ModelError::NotUnderstood { tag, offset }),
             _ => true,
         };

@@ -122,6 +122,13 @@ impl Default for HeaderBuilder {
     }
 }
 
+/// A header to be changed.
+impl From<Header<'_>> for HeaderBuilder {
+    fn from(header: Header<'_>) -> Self {
+        Self(*header.0)
+    }
+}
+
 impl HeaderBuilder {
     /// A model with optional sections of `length` bytes together; without any it stays one of version 1.
     pub fn with_sections(self, length: u32) -> Self {

@@ -8,13 +8,15 @@ mod codes;
 mod header;
 mod key;
 mod records;
+mod strangers;
 mod trained;
 
 pub use crate::checksum::checksum;
-pub use codes::{Counted, Key, Layout, LeafType, Length, RAW_FEATURES};
+pub use codes::{Counted, Held, Key, Layout, LeafType, Length, RAW_FEATURES};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
 pub use records::{Axis, Columns, Group};
+pub use strangers::{FitTerms, FitTest, ObjectFit, Strangers};
 pub use trained::{
     MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
     TrainedTouches, take_section, write_section,

@@ -18,8 +18,8 @@ pub enum Tag {
     ThresholdsByTouches,
     /// Reserved: stopping thresholds by object.
     ThresholdsByObject,
-    /// Reserved: a test for objects that the model does not know.
-    FitTest,
+    /// A test for objects that the model does not know: [`Strangers`](super::Strangers).
+    Strangers,
     /// Reserved: a plan of approaches.
     Plan,
     /// Reserved: the features' names, for models over rows of features.
@@ -37,7 +37,7 @@ impl Tag {
             Self::Noise => 3,
             Self::ThresholdsByTouches => 4,
             Self::ThresholdsByObject => 5,
-            Self::FitTest => 6,
+            Self::Strangers => 6,
             Self::Plan => 7,
             Self::FeatureNames => 8,
             Self::PatternShares => 9,
@@ -254,15 +254,7 @@ impl Trained {
 ///
 /// A content of 4 GB or more is cut there.
 pub fn write_section(tag: Tag, must_understand: bool, content: &[u8], put: &mut impl FnMut(&[u8])) {
-    let tag = tag.code() | if must_understand { MUST_UNDERSTAND } else { 0 };
-    let length = u32::try_from(content.len()).unwrap_or(u32::MAX);
-    let content = content.get(..usize::try_from(length).unwrap_or(usize::MAX)).unwrap_or(content);
-    put(&tag.to_le_bytes());
-    put(&[0; 2]);
-    put(&length.to_le_bytes());
-    put(content);
-    let zeros = content.len().wrapping_neg() % 4;
-    put([0; 3].get(..zeros).unwrap_or_default());
+    Section { tag: tag.code(), must_understand, content }.write(put);
 }
 
 /// A section as it is found in a model.
@@ -274,6 +266,21 @@ pub struct Section<'a> {
     pub must_understand: bool,
     /// The content, without the zeros after it.
     pub content: &'a [u8],
+}
+
+impl Section<'_> {
+    /// Hands its bytes to `put`, as [`write_section`].
+    pub fn write(&self, put: &mut impl FnMut(&[u8])) {
+        let tag = self.tag | if self.must_understand { MUST_UNDERSTAND } else { 0 };
+        let length = u32::try_from(self.content.len()).unwrap_or(u32::MAX);
+        let content = self.content.get(..usize::try_from(length).unwrap_or(usize::MAX)).unwrap_or(self.content);
+        put(&tag.to_le_bytes());
+        put(&[0; 2]);
+        put(&length.to_le_bytes());
+        put(content);
+        let zeros = content.len().wrapping_neg() % 4;
+        put([0; 3].get(..zeros).unwrap_or_default());
+    }
 }
 
 /// Splits the first section off `bytes`; `None` if it is not whole. What is left is in `bytes`.
