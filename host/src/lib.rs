@@ -64,6 +64,7 @@
 //! | [`ensemble`] | the full model: trees in `f32`, XGBoost JSON, training | [`ensemble::Ensemble`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
+//! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
@@ -105,6 +106,9 @@ pub mod evaluate;
 
 #[cfg(feature = "train")]
 pub mod tune;
+
+#[cfg(feature = "train")]
+pub mod strangers;
 
 pub mod chip;
 

@@ -28,6 +28,8 @@ pub(crate) enum Purpose {
     Casts,
     /// Groups and sequences of approaches that an evaluation draws.
     Approaches,
+    /// The order in which touches are used to calibrate a test of fit.
+    Fit,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -47,6 +49,7 @@ impl Purpose {
             Self::View => Some(4),
             Self::Casts => Some(5),
             Self::Approaches => Some(7),
+            Self::Fit => Some(11),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }

@@ -20,6 +20,26 @@ pub enum EvaluateProblem {
         /// The object.
         object: String,
     },
+    /// An object that the model knows is not in a data set that must hold all of them.
+    #[error("there are no touches of {object}, which the model knows")]
+    MissingObject {
+        /// The object.
+        object: String,
+    },
+    /// An object has too few touches to say what its touches give.
+    #[error("an object has only {found} touches to learn from what its touches give, or they are all alike")]
+    TooFewForFit {
+        /// How many there are.
+        found: usize,
+    },
+    /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
+    #[error("the touches make only {object_sequences} sequences of an object, and the promise takes at least {needed}")]
+    TooFewForAlarms {
+        /// Sequences of the object with the fewest.
+        object_sequences: usize,
+        /// How many of each object it takes.
+        needed: usize,
+    },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
     RawFeatures,
@@ -69,6 +89,8 @@ impl EvaluateProblem {
         match self {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
             Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
+            Self::MissingObject { .. } => "Capture touches of every object that the model knows.",
+            Self::TooFewForFit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
             Self::RawFeatures => "Give a model that was exported from a Palpate ensemble.",
             Self::NoPose { .. } => "Capture the touches with their pose.",
             Self::OtherModel => "Give the ensemble that the model was exported from.",

@@ -49,8 +49,19 @@ pub(crate) fn fit(model: &Model<'_>, evidence: &[i64], leader: usize, touches: u
     }
 }
 
+impl Model<'_> {
+    /// How badly evidence for each object, priors included, of so many touches fits the object with the most, in 2^-16
+    /// nats: what the model's test compares with its limits. `None` without a test.
+    ///
+    /// Cost: as the test in [`Recognizer::push`](crate::Recognizer::push). Cannot fail.
+    pub fn misfit(&self, evidence: &[i64], touches: u32) -> Option<i64> {
+        let test = self.strangers()?.test?;
+        misfit(&test, self, evidence, leader(self, evidence).0, touches)
+    }
+}
+
 /// How badly the touches fit the leader, in 2^-16 nats. `None` for an object without a record, which no valid model has.
-pub(crate) fn misfit(
+fn misfit(
     test: &FitTest<'_>,
     model: &Model<'_>,
     evidence: &[i64],
