@@ -15,11 +15,15 @@
 mod fit;
 mod fixed;
 mod follow;
+mod leave_one_out;
 mod shapes;
 #[cfg(test)]
 mod tests;
 
-pub use shapes::{Shapes, captured, of_dataset};
+pub use leave_one_out::{LeftOut, Sets, leave_one_out};
+#[cfg(feature = "objects")]
+pub use shapes::captured;
+pub use shapes::{Shapes, of_dataset};
 
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
