@@ -34,7 +34,7 @@
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = Model::new(&compiled.bytes)?;
 //! let mut recognizer = Recognizer::<2>::new(&model, Stopping::from_model(&model))?;
-//! let scene = Scene::new(objects[0].mesh(), origin.length)?;
+//! let scene = [Scene::new(objects[0].mesh(), origin.length)?];
 //! let unseen = Origin { seed: 2, ..origin };
 //! let mut verdict = Verdict::Undecided;
 //! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {
@@ -64,6 +64,7 @@
 //! | [`ensemble`] | the full model: trees in `f32`, XGBoost JSON, training | [`ensemble::Ensemble`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
+//! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
@@ -103,6 +104,8 @@ pub mod ensemble;
 
 pub mod compile;
 pub mod evaluate;
+
+pub mod calibrate;
 
 #[cfg(feature = "train")]
 pub mod tune;

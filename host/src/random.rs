@@ -28,6 +28,8 @@ pub(crate) enum Purpose {
     Casts,
     /// Groups and sequences of approaches that an evaluation draws.
     Approaches,
+    /// The order in which touches are put into sequences of a calibration.
+    Calibration,
     /// The order in which touches are used to calibrate a test of fit.
     Fit,
     /// Made-up touches for tests.
@@ -49,6 +51,7 @@ impl Purpose {
             Self::View => Some(4),
             Self::Casts => Some(5),
             Self::Approaches => Some(7),
+            Self::Calibration => Some(9),
             Self::Fit => Some(11),
             #[cfg(test)]
             Self::Synthetic => Some(6),
@@ -85,8 +88,8 @@ mod tests {
 
     #[test]
     fn folds_noise_and_groups_of_one_seed_share_no_stream() {
-        use Purpose::{Casts, Folds, Groups, Noise, Robot, Sensor, Sequences, Synthetic, View};
-        let purposes = [Folds, Noise, Sensor, Robot, Groups, Sequences, View, Casts, Synthetic];
+        use Purpose::{Calibration, Casts, Folds, Groups, Noise, Robot, Sensor, Sequences, Synthetic, View};
+        let purposes = [Folds, Noise, Sensor, Robot, Groups, Sequences, View, Casts, Calibration, Synthetic];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();
         assert_eq!(purposes.map(draw).into_iter().collect::<BTreeSet<_>>().len(), purposes.len());
     }

@@ -306,7 +306,7 @@ impl Trial {
                 at: AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS).collect(),
                 at_approaches: Vec::new(),
                 groups: settings.groups,
-                error_rate: settings.error_rate,
+                error_rate: None,
                 max_touches: None,
                 seed,
             },
@@ -314,8 +314,7 @@ impl Trial {
         let approached = Margins::new(Candidate::Compiled(&model), approaches)?.of_robots(robots);
         let fewest_approaches = approached.fewest_approaches();
         let at: Vec<usize> = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect();
-        let stopping =
-            SequentialSettings { error_rate: settings.error_rate, max_touches: None, sequences: settings.groups, seed };
+        let stopping = SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed };
         evaluation.approaches = Some(approached.approaches(&at, &stopping)?);
         let curve = margins.curve(MOST.min(largest_group(fewest)), settings.groups, seed)?;
         let parity = parity::parity(&ensemble, &model, &split.test, PARITY_SEQUENCES, seed, progress)?;

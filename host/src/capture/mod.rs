@@ -177,13 +177,14 @@ pub(crate) fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progre
     objects.par_iter().map(of).collect()
 }
 
-/// The touches of one object with these sample numbers, in memory: the same that [`capture`] writes.
+/// The touches of one object with these sample numbers, in memory: the same that [`capture`] writes. The object's
+/// instances, one scene for each, are touched in turn.
 ///
 /// # Errors
 /// When a setting is wrong, or the object cannot be touched with all three fingers.
-pub fn touches(scene: &Scene, name: &str, origin: &Origin, samples: Range<u64>) -> Result<Vec<Touch>> {
+pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64>) -> Result<Vec<Touch>> {
     origin.check()?;
-    let sampler = Sampler::new(scene, name, origin);
+    let sampler = Sampler::of_instances(scenes, name, origin);
     samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)).collect()
 }
 
@@ -245,7 +246,7 @@ mod tests {
         let one = files(&settings());
         let other = files(&with(Origin { seed: 2, ..origin(1500) }));
         assert_ne!(one["disc.txt"], other["disc.txt"]);
-        let scene = Scene::new(objects()[0].mesh(), 10.0).unwrap();
+        let scene = [Scene::new(objects()[0].mesh(), 10.0).unwrap()];
         let disc = touches(&scene, "disc", &origin(1500), 0..9).unwrap();
         assert_ne!(disc, touches(&scene, "disk", &origin(1500), 0..9).unwrap());
     }
@@ -278,7 +279,7 @@ mod tests {
         let summary = capture(&objects(), &settings, directory.path(), &()).unwrap();
         let dataset = Dataset::read(directory.path()).unwrap();
         for (object, read) in objects().iter().zip(&dataset.objects) {
-            let scene = Scene::new(object.mesh(), origin.length).unwrap();
+            let scene = [Scene::new(object.mesh(), origin.length).unwrap()];
             assert_eq!(read.touches, touches(&scene, &object.name, &origin, 0..1500).unwrap());
             assert!(read.touches.iter().all(|touch| touch.is_full() && touch.pose().is_some()));
         }
@@ -577,7 +578,7 @@ mod tests {
         // Written by `palpate capture` of that version: data sets are resumed, added to and compared across versions.
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mesh = Mesh { vertices, triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] };
-        let scene = Scene::new(&mesh, 10.0).unwrap();
+        let scene = [Scene::new(&mesh, 10.0).unwrap()];
         let text = |origin: &Origin, samples| {
             let mut text = String::new();
             for touch in touches(&scene, "tetrahedron", origin, samples).unwrap() {
@@ -648,7 +649,7 @@ mod tests {
         let touches = |unit| {
             let origin = Origin { unit, ..origin(100) };
             let scenes = scenes(&[&object], &origin, &()).unwrap();
-            touches(&scenes[0][0], "globe", &origin, 0..100).unwrap()
+            touches(&scenes[0], "globe", &origin, 0..100).unwrap()
         };
         assert_eq!(touches(Length::Millimeter), touches(Length::Tenth));
     }

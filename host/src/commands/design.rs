@@ -1,9 +1,11 @@
 //! `palpate probe design`.
 
 use super::numbers::share;
+use super::probe::UnitArguments;
 use super::progress::Bar;
 use crate::Result;
-use crate::mesh::source;
+use crate::error::Error;
+use crate::mesh::Object;
 use crate::output;
 use crate::probe::approach::Aim;
 use crate::report;
@@ -29,11 +31,12 @@ enum Command {
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Tries probes in the simulator: spacing and radius of the fingers, tilt, and where approaches aim. For each, a model is trained and tested on other approaches; the best probe needs the fewest approaches at the error rate. Lengths are in units, a tenth of the object's longest side. DIR gets probe.toml, the best probe, and design.html, what another one would cost.
+Tries probes in the simulator: spacing and radius of the fingers, tilt, and where approaches aim. For each, a model is trained and tested on other approaches; the best probe needs the fewest approaches at the error rate. Lengths are in units, a tenth of the object's longest side, or with --true-size in millimeters. DIR gets probe.toml, the best probe, and design.html, what another one would cost.
 
 Examples:
   palpate probe design meshes/ -o design
   palpate probe design builtin -o design --spacing 1..2 --radius 0.2
+  palpate probe design meshes/ -o design --true-size --unit m --spacing 8..30 --radius 2
   palpate probe design meshes/ -o design --aim box --noise 5ms
   palpate probe design meshes/ -o design --error-rate 0.1% --approaches 20000")]
 struct DesignArguments {
@@ -43,21 +46,21 @@ struct DesignArguments {
     /// Directory for probe.toml and design.html, such as design; created if it is missing
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Distances between neighboring fingers to search, in units, such as 0.5..3, or one number
-    #[arg(long, value_name = "A..B", value_parser = range, default_value = "0.5..3")]
-    spacing: RangeInclusive<f64>,
-    /// Radii of the fingers to search, in units, such as 0.1..0.3, or one number
-    #[arg(long, value_name = "A..B", value_parser = range, default_value = "0.1..0.3")]
-    radius: RangeInclusive<f64>,
+    /// Distances between neighboring fingers to search, in units or millimeters, such as 0.5..3, or one number [default: 0.5 to 3 units; at true size a unit of the median object]
+    #[arg(long, value_name = "A..B", value_parser = range)]
+    spacing: Option<RangeInclusive<f64>>,
+    /// Radii of the fingers to search, in units or millimeters, such as 0.1..0.3, or one number [default: 0.1 to 0.3 units]
+    #[arg(long, value_name = "A..B", value_parser = range)]
+    radius: Option<RangeInclusive<f64>>,
     /// Largest tilts of the row of fingers to search, in degrees, such as 0..20, or one number
     #[arg(long, value_name = "A..B", value_parser = range, default_value = "0..20")]
     tilt: RangeInclusive<f64>,
     /// Where approaches may aim: anywhere in the bounding box, in its middle, or near the center of mass, such as box,middle
     #[arg(long, value_name = "AIM[,AIM…]", value_delimiter = ',', value_parser = super::capture::aim, default_value = "box,middle,mass")]
     aim: Vec<Aim>,
-    /// The probe's speed, in units per second, such as 5
-    #[arg(long, value_name = "UNITS", default_value_t = Settings::default().speed)]
-    speed: f64,
+    /// The probe's speed, in units or millimeters per second, such as 5 [default: 10 units]
+    #[arg(long, value_name = "UNITS")]
+    speed: Option<f64>,
     /// Standard deviation of the noise on contact times, such as 1ms for a switch polled every few ms; 0ms for none
     #[arg(long, value_name = "DURATION", value_parser = super::noise::duration, default_value = "1ms")]
     noise: f64,
@@ -82,16 +85,19 @@ struct DesignArguments {
     /// Print all probes tried, and the best, as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    units: UnitArguments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let Command::Design(arguments) = arguments.command;
     output::refuse_stdout(&arguments.output)?;
-    let objects = source::objects(&arguments.sources)?;
-    let found = design(&objects, &arguments.settings(), &Bar::new())?;
+    let objects = arguments.units.objects(&arguments.sources, arguments.seed)?;
+    let settings = arguments.settings(&objects)?;
+    let found = design(&objects, &settings, &Bar::new())?;
     let files = [arguments.output.join("probe.toml"), arguments.output.join("design.html")];
     output::write_bytes(&files[0], found.toml().as_bytes())?;
-    report::design::page(&found, &arguments.words())?.write(&files[1])?;
+    report::design::page(&found, &arguments.words(&settings))?.write(&files[1])?;
     if arguments.json {
         return output::print_json(&found);
     }
@@ -104,13 +110,18 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 }
 
 impl DesignArguments {
-    fn settings(&self) -> Settings {
-        Settings {
-            spacing: self.spacing.clone(),
-            radius: self.radius.clone(),
+    fn settings(&self, objects: &[Object]) -> Result<Settings> {
+        let unknown = || Error::setting("true-size", "given", "meshes of a known unit, such as with --unit mm");
+        let usual = match self.units.is_true_size() {
+            true => Settings::at_true_size(objects).ok_or_else(unknown)?,
+            false => Settings::default(),
+        };
+        Ok(Settings {
+            spacing: self.spacing.clone().unwrap_or_else(|| usual.spacing.clone()),
+            radius: self.radius.clone().unwrap_or_else(|| usual.radius.clone()),
             tilt: self.tilt.clone(),
             aims: self.aim.clone(),
-            speed: self.speed,
+            speed: self.speed.unwrap_or(usual.speed),
             noise: self.noise,
             descriptor: self.descriptor,
             counted: self.touches,
@@ -118,23 +129,24 @@ impl DesignArguments {
             approaches: self.approaches,
             sequences: self.sequences,
             seed: self.seed,
-        }
+            ..usual
+        })
     }
 
     /// The command that remakes the page, with every option that changes it.
-    fn words(&self) -> String {
+    fn words(&self, settings: &Settings) -> String {
         let range = |range: &RangeInclusive<f64>| format!("{}..{}", range.start(), range.end());
         let aims: Vec<&str> = self.aim.iter().map(|aim| aim.name()).collect();
         format!(
             "palpate probe design {} -o {} --spacing {} --radius {} --tilt {} --aim {} --speed {} --noise {}us \
-             --error-rate {} --descriptor {} --touches {} --approaches {} --sequences {} --seed {}",
+             --error-rate {} --descriptor {} --touches {} --approaches {} --sequences {} --seed {}{}",
             self.sources.join(" "),
             self.output.display(),
-            range(&self.spacing),
-            range(&self.radius),
+            range(&settings.spacing),
+            range(&settings.radius),
             range(&self.tilt),
             aims.join(","),
-            self.speed,
+            settings.speed,
             self.noise,
             self.error_rate,
             self.descriptor.name(),
@@ -142,6 +154,7 @@ impl DesignArguments {
             self.approaches,
             self.sequences,
             self.seed,
+            self.units.words().iter().map(|word| format!(" {word}")).collect::<String>(),
         )
     }
 }
@@ -159,15 +172,16 @@ fn table(design: &Design) -> String {
     for trial in &design.by_spacing {
         line(&mut text, if trial == best { "*" } else { "" }, trial);
     }
-    head(&mut text, "The published probe", std::slice::from_ref(&design.published));
+    head(&mut text, report::design::published(design), std::slice::from_ref(&design.published));
     line(&mut text, "", &design.published);
     _ = write!(
         text,
         "\n* the best: {}. Approaches are to {} % wrong verdicts; > where more were wrong or missing.\n\
-         Assumed: {} units per second, Gaussian noise of {} ms on contact times; evidence: {}, {}.\n",
+         Assumed: {} {} per second, Gaussian noise of {} ms on contact times; evidence: {}, {}.\n",
         report::design::described(best).to_lowercase(),
         100.0 * design.error_rate,
         best.probe.speed,
+        report::design::unit(design),
         design.noise / 1e3,
         design.counted,
         design.descriptor,

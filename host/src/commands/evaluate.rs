@@ -1,5 +1,6 @@
 use super::noise::NoiseArguments;
 use super::numbers::share;
+use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
 use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings, Strangers};
@@ -19,6 +20,8 @@ The model is a compiled one (model.palpate), evaluated by the code that runs on 
 
 Evaluate on touches that the model was not trained on: capture them with another seed. An ensemble knows its training touches again; a compiled model does not.
 
+With --probe, what the file says under [real] is added to the touches, and the data set must have been captured with the probe of the file.
+
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
 
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
@@ -29,6 +32,7 @@ Examples:
   palpate evaluate ensemble.json unseen --at 10,30 --json
   palpate evaluate model.palpate unseen --noise 5ms
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
+  palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --confusion 20
   palpate evaluate model.palpate unseen --strangers others
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
@@ -47,9 +51,10 @@ pub(crate) struct Arguments {
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]
     groups: usize,
-    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%
-    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
-    error_rate: f64,
+    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%, which nothing promises [default: the
+    /// model's own thresholds; 1% for an ensemble]
+    #[arg(long, value_name = "RATE", value_parser = share)]
+    error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
     max_touches: Option<u32>,
@@ -63,6 +68,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    probe: ProbeArguments,
+    #[command(flatten)]
     noise: NoiseArguments,
 }
 
@@ -73,6 +80,9 @@ struct Evaluated {
     evaluation: Evaluation,
     /// Robots that made the touches in turn, each with its own bias.
     robots: usize,
+    /// How many instances the objects have that have several: each group is of touches of one.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    instances: BTreeMap<String, usize>,
     /// Objects whose touches are those that the model was trained on.
     trained_on: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -101,7 +111,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
         ModelFile::Compiled(_) => Vec::new(),
     };
-    let noise = arguments.noise.over(Noise::default());
+    let probe = arguments.probe.read()?;
+    arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
+    let noise = arguments.noise.over(probe.map_or_else(Noise::default, |file| file.real));
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
@@ -139,7 +151,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         Ok((evaluation, confusion.transpose()?, strangers.transpose()?))
     })?;
     drop(progress);
-    let evaluated = Evaluated { evaluation, robots, trained_on, confusion, strangers };
+    let instances = dataset.instances;
+    let evaluated = Evaluated { evaluation, robots, instances, trained_on, confusion, strangers };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -186,6 +199,9 @@ fn text(evaluated: &Evaluated) -> String {
     if evaluated.robots > 1 {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
+    }
+    if let Some(most) = evaluated.instances.values().max() {
+        _ = writeln!(text, "Objects have up to {most} instances; each group is of touches of one instance.");
     }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);

@@ -50,6 +50,13 @@ impl ProbeArguments {
 pub(crate) struct SizeArguments {
     #[command(flatten)]
     pub(crate) probe: ProbeArguments,
+    #[command(flatten)]
+    pub(crate) units: UnitArguments,
+}
+
+/// Whether objects keep their true sizes, and whether they have instances.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct UnitArguments {
     /// Touch objects at their true size, with a probe in millimeters; built-in objects have one, for others say --unit
     #[arg(long)]
     true_size: bool,
@@ -61,7 +68,7 @@ pub(crate) struct SizeArguments {
     instances: Option<usize>,
 }
 
-impl SizeArguments {
+impl UnitArguments {
     /// The objects of the sources, with their true sizes as far as they are known.
     pub(crate) fn objects(&self, sources: &[String], seed: u64) -> Result<Vec<Object>> {
         let mut objects = match self.instances {
@@ -132,12 +139,45 @@ impl SizeArguments {
         Ok(())
     }
 
+    /// Whether objects are touched at their true size.
+    pub(crate) fn is_true_size(&self) -> bool {
+        self.true_size
+    }
+
+    /// The options as words of a command line, to repeat them.
+    pub(crate) fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        words.extend(self.true_size.then(|| "--true-size".to_owned()));
+        for (name, millimeters) in &self.unit {
+            let unit = UNITS.into_iter().find(|(_, own)| own == millimeters).map_or("mm", |(unit, _)| unit);
+            let name = name.as_ref().map_or_else(String::new, |name| format!("{name}="));
+            words.extend(["--unit".to_owned(), format!("{name}{unit}")]);
+        }
+        if let Some(count) = self.instances {
+            words.push("--instances".to_owned());
+            words.extend((count > 0).then(|| count.to_string()));
+        }
+        words
+    }
+}
+
+impl SizeArguments {
+    /// The objects of the sources, with their true sizes as far as they are known.
+    pub(crate) fn objects(&self, sources: &[String], seed: u64) -> Result<Vec<Object>> {
+        self.units.objects(sources, seed)
+    }
+
+    /// One object, with its true size as far as it is known.
+    pub(crate) fn object(&self, source: &str) -> Result<Object> {
+        self.units.object(source)
+    }
+
     /// Probe and unit of a capture: those of the file, or else of `base`.
     ///
     /// # Errors
     /// If the file cannot be used, or is in another unit than objects are touched in.
     pub(crate) fn origin(&self, base: Origin) -> Result<Origin> {
-        let unit = if self.true_size { Length::Millimeter } else { base.unit };
+        let unit = if self.units.true_size { Length::Millimeter } else { base.unit };
         let Some(file) = self.probe.read()? else { return Ok(Origin { unit, ..base }) };
         let problem = |message: &str| {
             let path = self.probe.probe.clone().unwrap_or_default();
@@ -156,23 +196,12 @@ impl SizeArguments {
 
     /// Whether objects are touched at their true size with a probe that was not stated: the published one is in units.
     pub(crate) fn lacks_probe(&self) -> bool {
-        self.true_size && self.probe.probe.is_none()
+        self.units.true_size && self.probe.probe.is_none()
     }
 
     /// The options as words of a command line, to repeat them.
     pub(crate) fn words(&self) -> Vec<String> {
-        let mut words = self.probe.words();
-        words.extend(self.true_size.then(|| "--true-size".to_owned()));
-        for (name, millimeters) in &self.unit {
-            let unit = UNITS.into_iter().find(|(_, own)| own == millimeters).map_or("mm", |(unit, _)| unit);
-            let name = name.as_ref().map_or_else(String::new, |name| format!("{name}="));
-            words.extend(["--unit".to_owned(), format!("{name}{unit}")]);
-        }
-        if let Some(count) = self.instances {
-            words.push("--instances".to_owned());
-            words.extend((count > 0).then(|| count.to_string()));
-        }
-        words
+        [self.probe.words(), self.units.words()].concat()
     }
 }
 

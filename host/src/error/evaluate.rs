@@ -38,7 +38,7 @@ pub enum EvaluateProblem {
         /// Sequences of the object with the fewest.
         object_sequences: usize,
         /// How many of each object it takes.
-        needed: usize,
+        needed: u64,
     },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]

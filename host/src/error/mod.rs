@@ -1,5 +1,6 @@
 //! What can go wrong, said so that the user knows where and what to do next.
 
+mod calibrate;
 mod capture;
 mod chip;
 mod compile;
@@ -12,6 +13,7 @@ mod report;
 mod touches;
 mod tune;
 
+pub use calibrate::CalibrateProblem;
 pub use capture::CaptureProblem;
 pub use chip::ChipProblem;
 pub use compile::CompileProblem;
@@ -110,6 +112,9 @@ pub enum Problem {
     /// With evaluating.
     #[error(transparent)]
     Evaluate(#[from] EvaluateProblem),
+    /// With calibrating.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateProblem),
     /// With searching for a model.
     #[error(transparent)]
     Tune(#[from] TuneProblem),
@@ -136,6 +141,7 @@ impl Problem {
             Self::Ensemble(problem) => problem.fix(),
             Self::Compile(problem) => problem.fix(),
             Self::Evaluate(problem) => problem.fix(),
+            Self::Calibrate(problem) => problem.fix(),
             Self::Tune(problem) => problem.fix(),
             Self::Chip(problem) => problem.fix(),
             Self::Page(problem) => problem.fix(),
@@ -195,6 +201,7 @@ problems!(
     EnsembleProblem,
     CompileProblem,
     EvaluateProblem,
+    CalibrateProblem,
     TuneProblem,
     ChipProblem,
     PageProblem,

@@ -2,7 +2,7 @@
 
 use super::estimate::Estimate;
 use super::margins::Margins;
-use super::sequential::{Outcome, SequentialSettings};
+use super::sequential::{Outcome, SequentialSettings, Stated};
 use crate::error::{Error, Result};
 use crate::random::{self, Purpose};
 use rand::RngExt;
@@ -32,8 +32,12 @@ pub struct Approaches {
 /// What a recognizer does with approaches that stops by itself. Each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ApproachSequential {
-    /// What it was asked to stay below.
+    /// What it was asked to stay below: the promised rate, or that of the posterior.
     pub error_rate: f64,
+    /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
+    pub promised: Option<f64>,
+    /// Of what it is promised: "average", "name" or "object".
+    pub per: Option<&'static str>,
     /// Touches that are evidence, after which it gave up.
     pub max_touches: u32,
     /// Approaches used on average, also where it gave up.
@@ -103,7 +107,7 @@ impl Margins<'_> {
             accuracy: by_number(&|index| accuracy(index).value),
             accuracy_standard_error: by_number(&|index| accuracy(index).standard_error),
             per_object: names().zip(&correct).map(|(name, of)| (name, by_number(&|index| of[index].value))).collect(),
-            sequential: self.summary(&outcomes, settings.error_rate, stopping.max_touches()),
+            sequential: self.summary(&outcomes, self.stated(settings, stopping), stopping.max_touches()),
         })
     }
 
@@ -130,12 +134,15 @@ impl Margins<'_> {
         correct.into_iter().map(|correct| Estimate::share(correct, groups)).collect()
     }
 
-    fn summary(&self, outcomes: &[Vec<Outcome>], error_rate: f64, max_touches: u32) -> ApproachSequential {
+    fn summary(&self, outcomes: &[Vec<Outcome>], stated: Stated, max_touches: u32) -> ApproachSequential {
+        let Stated { error_rate, promised, per } = stated;
         let approaches = self.mean(outcomes, |outcome| outcome.approaches);
         let error = self.wrong(outcomes);
         let undecided = self.undecided(outcomes);
         ApproachSequential {
             error_rate,
+            promised,
+            per,
             max_touches,
             mean_approaches: approaches.all.value,
             mean_approaches_standard_error: approaches.all.standard_error,

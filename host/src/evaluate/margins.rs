@@ -4,7 +4,7 @@ use crate::compile;
 use crate::ensemble::{Ensemble, StatedProbe, feature_row};
 use crate::error::{EvaluateProblem, Result};
 use crate::random::{self, Purpose};
-use crate::touches::Dataset;
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused};
 use palpate_shared::format::{TrainedProbe, TrainedTouches};
 use palpate_shared::{Descriptor, Touch};
@@ -33,8 +33,6 @@ pub struct Margins<'m> {
     tested_names: Vec<String>,
     hold_approaches: bool,
     shares: [f64; 6],
-    /// How many robots made the touches, in turn.
-    robots: usize,
 }
 
 /// In place of the index of an object that the model does not know.
@@ -48,7 +46,11 @@ pub(super) struct Tested<'m> {
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
     pub(super) approaches: Vec<Option<u32>>,
-    /// For each robot the positions of its touches that are evidence, among all that are.
+    /// How many instances the object has, touched in turn.
+    instances: usize,
+    /// How many instances and robots there are together: touch i is of turn i modulo this, and so are groups.
+    turns: usize,
+    /// For each turn the positions of its touches that are evidence, among all that are.
     evidence: Vec<Vec<u32>>,
     /// Of the touches that are evidence.
     pub(super) values: Values<'m>,
@@ -98,6 +100,31 @@ impl Candidate<'_> {
             Self::Compiled(model) => compile::names(model),
         }
     }
+
+    /// The descriptor, if the data set's touches can be evidence; see [`Margins::new`].
+    fn takes(&self, dataset: &Dataset) -> Result<Descriptor> {
+        let descriptor = self.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
+        let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
+        if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
+            return Err(EvaluateProblem::NoPose { descriptor }.into());
+        }
+        if let Some((model, data)) = self.probe().zip(StatedProbe::of(dataset)) {
+            StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
+        }
+        Ok(descriptor)
+    }
+
+    /// The same, and for each object of a data set its index in the model.
+    pub(crate) fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
+        let descriptor = self.takes(dataset)?;
+        let mut known = self.objects();
+        known.truncate(self.known_count());
+        let index = |touched: &ObjectTouches| {
+            let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: known.clone() };
+            known.iter().position(|name| *name == touched.name).ok_or_else(|| unknown().into())
+        };
+        Ok((descriptor, dataset.objects.iter().map(index).collect::<Result<_>>()?))
+    }
 }
 
 impl<'m> Margins<'m> {
@@ -110,11 +137,8 @@ impl<'m> Margins<'m> {
     /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
-        let objects = &candidate.objects()[..candidate.known_count()];
-        Self::with(candidate, dataset, |name| {
-            let unknown = || EvaluateProblem::UnknownObject { object: name.into(), known: objects.to_vec() };
-            objects.iter().position(|object| object == name).ok_or_else(unknown)
-        })
+        let (descriptor, known) = candidate.of(dataset)?;
+        Ok(Self::with(candidate, descriptor, &known, dataset))
     }
 
     /// The same for objects that the model does not know: no verdict on them is right.
@@ -122,57 +146,48 @@ impl<'m> Margins<'m> {
     /// # Errors
     /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
     pub fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
-        let objects = &candidate.objects()[..candidate.known_count()];
-        Self::with(candidate, dataset, |name| match objects.iter().any(|object| object == name) {
-            true => Err(EvaluateProblem::KnownObject { object: name.into() }),
-            false => Ok(STRANGER),
-        })
+        let descriptor = candidate.takes(dataset)?;
+        let names = candidate.objects();
+        let known = &names[..candidate.known_count()];
+        if let Some(object) = dataset.objects.iter().map(|object| &object.name).find(|name| known.contains(name)) {
+            return Err(EvaluateProblem::KnownObject { object: object.clone() }.into());
+        }
+        Ok(Self::with(candidate, descriptor, &vec![STRANGER; dataset.objects.len()], dataset))
     }
 
-    fn with(
-        candidate: Candidate<'m>,
-        dataset: &Dataset,
-        index: impl Fn(&str) -> Result<usize, EvaluateProblem>,
-    ) -> Result<Self> {
+    fn with(candidate: Candidate<'m>, descriptor: Descriptor, indices: &[usize], dataset: &Dataset) -> Self {
         let objects = candidate.objects();
-        let descriptor = candidate.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
         let trained = candidate.trained_touches();
-        let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
-        if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
-            return Err(EvaluateProblem::NoPose { descriptor }.into());
-        }
-        if let Some((model, data)) = candidate.probe().zip(StatedProbe::of(dataset)) {
-            StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
-        }
-        let tested = dataset.objects.iter().map(|touched| {
-            let object = index(&touched.name)?;
+        let tested = dataset.objects.iter().zip(indices).map(|(touched, &object)| {
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
             let evidence: Vec<&Touch> = touched.touches.iter().filter(is_evidence).collect();
             let mut position = 0..;
             let approach = |touch| if is_evidence(&touch) { position.next() } else { None };
-            Ok(Tested {
+            Tested {
                 object,
                 touches: evidence.len(),
                 approaches: touched.touches.iter().map(approach).collect(),
+                instances: dataset.instances.get(&touched.name).copied().unwrap_or(1).max(1),
+                turns: 1,
                 evidence: Vec::new(),
                 values: values(candidate, descriptor, &evidence, objects.len()),
-            })
+            }
         });
-        let tested = tested.collect::<Result<_>>()?;
+        let tested = tested.collect();
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
         let known = candidate.known_count();
-        let margins =
-            Self { candidate, descriptor, objects, known, tested, tested_names, hold_approaches, shares, robots: 1 };
-        Ok(margins.of_robots(1))
+        let margins = Self { candidate, descriptor, objects, known, tested, tested_names, hold_approaches, shares };
+        margins.of_robots(1)
     }
 
     /// The same where `robots` robots made the touches of each object in turn (touch i by robot i modulo `robots`): every
-    /// group and sequence is then of one robot's touches. 0 means 1.
+    /// group and sequence is then of one robot's touches, as it is of one of the object's instances. 0 means 1.
     pub fn of_robots(mut self, robots: usize) -> Self {
-        self.robots = robots.max(1);
         for tested in &mut self.tested {
-            let of = |robot| tested.approaches.iter().skip(robot).step_by(self.robots).copied().flatten().collect();
-            tested.evidence = (0..self.robots).map(of).collect();
+            let turns = least_common_multiple(robots.max(1), tested.instances);
+            let of = |turn| tested.approaches.iter().skip(turn).step_by(turns).copied().flatten().collect();
+            tested.evidence = (0..turns).map(of).collect();
+            tested.turns = turns;
         }
         self
     }
@@ -224,12 +239,13 @@ impl<'m> Margins<'m> {
 
     /// The most approaches that a group of a tested object can have.
     pub(super) fn most_approaches(&self, position: usize) -> usize {
-        self.tested[position].approaches.len() / self.robots
+        self.tested[position].approaches.len() / self.tested[position].turns
     }
 
     /// What the `draw`-th approach of the robot of group `group` is to the model.
     pub(super) fn approach(&self, position: usize, group: usize, draw: usize) -> Option<u32> {
-        self.tested[position].approaches[draw * self.robots + group % self.robots]
+        let tested = &self.tested[position];
+        tested.approaches[draw * tested.turns + group % tested.turns]
     }
 
     /// The fewest touches that are evidence that a tested object has: the longest group that can be drawn from each.
@@ -277,11 +293,11 @@ impl<'m> Margins<'m> {
 
     /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
     pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> Vec<usize> {
-        let robot = group % self.robots;
+        let turn = group % self.tested[position].turns;
         let group = u64::try_from(group).unwrap_or(u64::MAX);
         let mut random = random::generator(seed, Purpose::Groups, &self.tested_names[position], group);
         let drawn = rand::seq::index::sample(&mut random, self.most_touches(position), count);
-        drawn.into_iter().map(|touch| self.tested[position].evidence[robot][touch] as usize).collect()
+        drawn.into_iter().map(|touch| self.tested[position].evidence[turn][touch] as usize).collect()
     }
 }
 
@@ -298,6 +314,14 @@ impl Tested<'_> {
             }
         }
     }
+}
+
+fn least_common_multiple(a: usize, b: usize) -> usize {
+    let (mut divisor, mut rest) = (a, b);
+    while rest > 0 {
+        (divisor, rest) = (rest, divisor % rest);
+    }
+    a / divisor * b
 }
 
 /// Where the margins of touch `touch` stand.

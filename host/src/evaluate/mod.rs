@@ -65,6 +65,9 @@ use std::collections::BTreeMap;
 /// Touches after which a recognizer gives up, unless its model says otherwise.
 pub const MAX_TOUCHES: u32 = 200;
 
+/// The error rate at which an ensemble's recognizer stops unless another is asked for.
+pub const ERROR_RATE: f64 = 0.01;
+
 /// Accuracies that rest on fewer different groups than this say little.
 pub const LEAST_GROUPS: u64 = 200;
 
@@ -77,8 +80,9 @@ pub struct Settings {
     pub at_approaches: Vec<usize>,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
-    /// The recognizer stops when the posterior passes one less this.
-    pub error_rate: f64,
+    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
+    /// ensemble.
+    pub error_rate: Option<f64>,
     /// Touches after which the recognizer gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble.
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
@@ -88,7 +92,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         let (at, at_approaches) = (vec![5, 10, 20, 30, 60], vec![10, 20, 60]);
-        Self { at, at_approaches, groups: 1000, error_rate: 0.01, max_touches: None, seed: 1 }
+        Self { at, at_approaches, groups: 1000, error_rate: None, max_touches: None, seed: 1 }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Touching until sure.
 
-use super::MAX_TOUCHES;
 use super::estimate::Estimate;
 use super::full::FullRecognizer;
 use super::margins::{Candidate, Margins, Values, row};
+use super::{ERROR_RATE, MAX_TOUCHES};
 use crate::compile;
 use crate::error::{Error, Result};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -14,8 +14,9 @@ use std::collections::BTreeMap;
 /// How sequences are drawn and stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SequentialSettings {
-    /// The recognizer stops when the posterior passes one less this.
-    pub error_rate: f64,
+    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
+    /// ensemble.
+    pub error_rate: Option<f64>,
     /// Touches after which it gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble. An object
     /// with fewer test touches gives up when they are used up.
     pub max_touches: Option<u32>,
@@ -28,8 +29,12 @@ pub struct SequentialSettings {
 /// What a recognizer does that stops by itself. Each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
-    /// What it was asked to stay below.
+    /// What it was asked to stay below: the promised rate, or that of the posterior.
     pub error_rate: f64,
+    /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
+    pub promised: Option<f64>,
+    /// Of what it is promised: "average", "name" or "object".
+    pub per: Option<&'static str>,
     /// Touches after which it gave up.
     pub max_touches: u32,
     /// Touches used on average, also where it gave up.
@@ -82,8 +87,9 @@ impl Margins<'_> {
     /// [`Problem::Setting`](crate::error::Problem::Setting) if there are no sequences, or the error rate or the limit of
     /// touches is out of its range.
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
-        let SequentialSettings { error_rate, sequences, seed, .. } = *settings;
+        let SequentialSettings { sequences, seed, .. } = *settings;
         let stopping = self.stopping(settings)?;
+        let Stated { error_rate, promised, per } = self.stated(settings, stopping);
         let outcomes: Vec<Vec<Outcome>> =
             (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
         let touches = self.mean(&outcomes, |outcome| outcome.touches);
@@ -91,6 +97,8 @@ impl Margins<'_> {
         let undecided = self.undecided(&outcomes);
         Ok(Sequential {
             error_rate,
+            promised,
+            per,
             max_touches: stopping.max_touches(),
             mean_touches: touches.all.value,
             mean_touches_standard_error: touches.all.standard_error,
@@ -164,7 +172,27 @@ impl Margins<'_> {
             Candidate::Full(_) => MAX_TOUCHES,
             Candidate::Compiled(model) => Stopping::from_model(model).max_touches(),
         };
-        compile::stopping(settings.error_rate, settings.max_touches.unwrap_or(own))
+        let max_touches = settings.max_touches.unwrap_or(own);
+        match (settings.error_rate, self.candidate) {
+            // The model's own thresholds stay as they are, to the last bit.
+            (None, Candidate::Compiled(model)) if max_touches > 0 => {
+                Ok(Stopping::from_model(model).with_max_touches(max_touches))
+            }
+            (error_rate, _) => compile::stopping(error_rate.unwrap_or(ERROR_RATE), max_touches),
+        }
+    }
+
+    /// What a recognizer that stops like this was asked to stay below, and what the model promises then.
+    pub(super) fn stated(&self, settings: &SequentialSettings, stopping: Stopping) -> Stated {
+        match (settings.error_rate, self.candidate) {
+            (None, Candidate::Compiled(model)) => match model.promise() {
+                Some(promise) => {
+                    Stated { error_rate: promise.rate, promised: Some(promise.rate), per: Some(promise.per.name()) }
+                }
+                None => Stated { error_rate: significant(stopping.error_rate()), promised: None, per: None },
+            },
+            (error_rate, _) => Stated { error_rate: error_rate.unwrap_or(ERROR_RATE), promised: None, per: None },
+        }
     }
 
     /// How a sequence of approaches of a tested object ends: each the position of a touch among those that are evidence,
@@ -192,6 +220,18 @@ impl Margins<'_> {
             }
         }
     }
+}
+
+/// What a model was asked to stay below, and what it promises.
+pub(super) struct Stated {
+    pub(super) error_rate: f64,
+    pub(super) promised: Option<f64>,
+    pub(super) per: Option<&'static str>,
+}
+
+/// A stored threshold holds an error rate to about sixteen digits; nine say what was meant.
+pub(crate) fn significant(rate: f64) -> f64 {
+    format!("{rate:.8e}").parse().unwrap_or(rate)
 }
 
 /// The onboard recognizer's verdict on margins that its model computed beforehand.

@@ -88,7 +88,8 @@ fn touches_to_an_error_rate_is_where_the_curve_passes_for_good() {
 fn the_sequential_errors_stay_below_the_error_rate() {
     full_and_compiled(|margins| {
         for error_rate in [0.2, 0.05, 0.01] {
-            let settings = SequentialSettings { error_rate, max_touches: None, sequences: 500, seed: 3 };
+            let settings =
+                SequentialSettings { error_rate: Some(error_rate), max_touches: None, sequences: 500, seed: 3 };
             let sequential = margins.sequential(&settings).unwrap();
             assert!(sequential.error <= error_rate + 3.0 * sequential.error_standard_error, "{sequential:?}");
             assert!(sequential.undecided < 0.05);
@@ -104,7 +105,7 @@ fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
     // Positions count touches that are evidence: here all, since this model takes every touch with a contact.
     let touches = test_touches();
     let margins = Margins::new(Candidate::Compiled(&model), &touches).unwrap();
-    let settings = SequentialSettings { error_rate: 0.01, max_touches: Some(40), sequences: 50, seed: 1 };
+    let settings = SequentialSettings { error_rate: Some(0.01), max_touches: Some(40), sequences: 50, seed: 1 };
     let sequential = margins.sequential(&settings).unwrap();
     for (position, outcomes) in sequential.outcomes.iter().enumerate() {
         for (sequence, outcome) in outcomes.iter().enumerate() {
@@ -141,10 +142,10 @@ fn full_and_compiled_model_are_measured_on_the_same_groups() {
 #[test]
 fn a_recognizer_that_runs_out_of_touches_is_undecided() {
     full_and_compiled(|margins| {
-        let settings = SequentialSettings { error_rate: 1e-12, max_touches: Some(2), sequences: 20, seed: 1 };
+        let settings = SequentialSettings { error_rate: Some(1e-12), max_touches: Some(2), sequences: 20, seed: 1 };
         let sequential = margins.sequential(&settings).unwrap();
         assert_eq!((sequential.undecided, sequential.mean_touches, sequential.max_touches), (1.0, 2.0, 2));
-        let settings = SequentialSettings { max_touches: Some(100_000), error_rate: 1e-15, ..settings };
+        let settings = SequentialSettings { max_touches: Some(100_000), error_rate: Some(1e-15), ..settings };
         let all = margins.sequential(&settings).unwrap();
         assert!(all.outcomes[1].iter().all(|outcome| outcome.touches <= 300));
     });
@@ -177,7 +178,7 @@ fn how_many_groups_differ_is_counted() {
 #[test]
 fn errors_and_undecided_sequences_of_objects_average_to_those_of_all() {
     full_and_compiled(|margins| {
-        let settings = SequentialSettings { error_rate: 0.2, max_touches: Some(4), sequences: 300, seed: 3 };
+        let settings = SequentialSettings { error_rate: Some(0.2), max_touches: Some(4), sequences: 300, seed: 3 };
         let sequential = margins.sequential(&settings).unwrap();
         let mean = |shares: &BTreeMap<String, f64>| shares.values().sum::<f64>() / 3.0;
         assert!((mean(&sequential.error_per_object) - sequential.error).abs() < 1e-12);
@@ -207,8 +208,11 @@ fn what_cannot_be_evaluated_says_so() {
         (Settings { at: vec![0], ..quick() }, "at is 0. Use numbers of touches of at least 1."),
         (Settings { at: vec![0, 5], ..quick() }, "at is 0. Use numbers of touches of at least 1."),
         (Settings { groups: 0, ..quick() }, "groups is 0. Use at least 1."),
-        (Settings { error_rate: 0.5, ..quick() }, "error_rate is 0.5. Use a number of at least 1e-15 and below 0.5."),
-        (Settings { error_rate: f64::NAN, ..quick() }, "error_rate is NaN."),
+        (
+            Settings { error_rate: Some(0.5), ..quick() },
+            "error_rate is 0.5. Use a number of at least 1e-15 and below 0.5.",
+        ),
+        (Settings { error_rate: Some(f64::NAN), ..quick() }, "error_rate is NaN."),
         (Settings { max_touches: Some(0), ..quick() }, "max_touches is 0. Use at least 1."),
     ] {
         let error = evaluate(&margins, &settings).unwrap_err();

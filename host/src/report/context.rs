@@ -170,6 +170,11 @@ impl<'a> Context<'a> {
         train::Settings { noise: self.settings.noise, ..self.ours() }
     }
 
+    /// The objects, ready to be touched: the scenes of each object's instances.
+    pub(super) fn all_scenes(&self) -> &[Vec<Scene>] {
+        &self.scenes
+    }
+
     /// The objects, ready to be touched; of each its first instance.
     pub(super) fn scenes(&self) -> Vec<&Scene> {
         self.scenes.iter().filter_map(|scenes| scenes.first()).collect()

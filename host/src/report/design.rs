@@ -8,6 +8,7 @@ use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
 use crate::probe::approach::Aim;
 use crate::tune::probe::{Design, Trial};
+use palpate_shared::format::Length;
 
 /// The page. `command` is what remakes it.
 ///
@@ -23,17 +24,37 @@ pub(crate) fn page(design: &Design, command: &str) -> Result<Page> {
     Ok(Page {
         title: "Which probe to build".into(),
         summary: format!(
-            "{}: {} approaches to {}\u{a0}% errors, against {} with the published probe. Lengths are in units: a tenth of the \
-             object's longest side.",
+            "{}: {} approaches to {}\u{a0}% errors, compared with {} with {}. {}",
             described(&design.best),
             approaches(&design.best),
             100.0 * design.error_rate,
-            approaches(&design.published)
+            approaches(&design.published),
+            published(design).to_lowercase(),
+            match design.unit {
+                Length::Tenth => "Lengths are in units: a tenth of the object's longest side.",
+                Length::Millimeter => "Lengths are in millimeters: objects have their true sizes.",
+            }
         ),
         sections: vec![result, trade, tried],
         facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
         files: false,
     })
+}
+
+/// What lengths are measured in.
+pub(crate) fn unit(design: &Design) -> &'static str {
+    match design.unit {
+        Length::Tenth => "units",
+        Length::Millimeter => "millimeters",
+    }
+}
+
+/// What the best probe is compared with.
+pub(crate) fn published(design: &Design) -> &'static str {
+    match design.unit {
+        Length::Tenth => "The published probe",
+        Length::Millimeter => "The published probe in millimeters, scaled to the median object",
+    }
 }
 
 /// A probe in a few words.
@@ -64,12 +85,13 @@ fn approaches(trial: &Trial) -> String {
 /// What the figures rest on.
 fn assumed(design: &Design) -> String {
     format!(
-        "Every probe touched the objects {} times each in the simulator at {} units per second, with Gaussian noise of {} \
+        "Every probe touched the objects {} times each in the simulator at {} {} per second, with Gaussian noise of {} \
          ms on every contact time. A model of the descriptor {} was trained on these approaches and tested on as many \
          others; evidence are {}. The stopping rule was varied until {} % of the verdicts on the test approaches were \
          wrong.",
         design.best.trained_on,
         design.best.probe.speed,
+        unit(design),
         design.noise / 1e3,
         design.descriptor,
         match design.counted {
@@ -182,7 +204,7 @@ fn by_spacing(design: &Design, command: &str) -> Result<Figure> {
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(1.0, f64::max));
     let spacings = || line.iter().map(|trial| trial.probe.spacing);
     let mut chart = Chart::new(
-        "distance between neighboring fingers (units)",
+        &format!("distance between neighboring fingers ({})", unit(design)),
         Axis::linear(spacings().fold(f64::INFINITY, f64::min), spacings().fold(0.0, f64::max), 6),
         "approaches to a verdict",
         Axis::logarithmic(0.9 * low, 1.1 * high),

@@ -3,6 +3,7 @@
 //! [`report`] measures every stage, or takes it from an interrupted report, and writes the page. [`view`] makes the page
 //! that shows an object and its touches. The page of [`crate::run`] is also drawn here.
 
+mod approaches;
 mod cache;
 mod calibration;
 mod confusion;

@@ -76,7 +76,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
         for rate in RATES {
             context.check()?;
             let sequential = margins.sequential(&SequentialSettings {
-                error_rate: rate,
+                error_rate: Some(rate),
                 max_touches: u32::try_from(most).ok(),
                 sequences: count,
                 seed: settings.seed,

@@ -38,6 +38,8 @@ pub struct Settings {
     pub noise: Noise,
     /// Folds of the noise figures.
     pub noise_folds: usize,
+    /// Approaches to each object that models are trained on which use every contact; a third as many test them.
+    pub approaches: u64,
     /// Full touches captured of each object, to estimate the limit.
     pub limit_touches: usize,
     /// Boosting rounds of the ensemble that estimates the limit.
@@ -79,6 +81,7 @@ impl Settings {
             noise_levels: 41,
             noise: Noise::gaussian(5_000.0),
             noise_folds: 10,
+            approaches: 60_000,
             limit_touches: 300_000,
             limit_rounds: 80,
             growth_objects: vec![2, 5, 10, 20, 50, 100],
@@ -101,6 +104,7 @@ impl Settings {
             many_groups: 200,
             noise_levels: 6,
             noise_folds: 1,
+            approaches: 8_000,
             limit_touches: 30_000,
             limit_rounds: 60,
             growth_objects: vec![2, 5, 10, 20],

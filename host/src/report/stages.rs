@@ -4,8 +4,8 @@ use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
-    calibration, cost, cross_validation, generalization, growth, limit, noise, objects, published, results, sequential,
-    simulator,
+    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, published, results,
+    sequential, simulator,
 };
 use crate::capture;
 use crate::compile;
@@ -117,6 +117,7 @@ pub fn report_on(
     let calibration = stages.stage("calibration", || calibration::measure(&context, get_large()?))?;
     let members = stages.stage("cost", || cost::measure(&context, get_large()?))?;
     drop(large);
+    let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
     let engines = stages.stage("simulator", || simulator::measure(&context))?;
     let grown = if settings.growth {
         let growth = stages.stage("growth", || growth::measure(&context))?;
@@ -137,6 +138,7 @@ pub fn report_on(
         first,
         objects::section(&context)?,
         cross_validation::section(&context, &folds)?,
+        approaches::section(&context, &by_approach)?,
         noise::section(&context, &noisy)?,
         limit::section(&context, &limit)?,
         sequential::section(&context, &sequences)?,
@@ -224,6 +226,7 @@ mod tests {
             levels: 4,
             many_groups: 20,
             noise_levels: 3,
+            approaches: 900,
             limit_touches: 1_000,
             limit_rounds: 3,
             growth: true,
@@ -251,6 +254,7 @@ mod tests {
             "curvature",
             "accuracy",
             "accuracy-objects",
+            "approaches-accuracy",
             "confusion",
             "signal-to-noise",
             "noise",
@@ -274,7 +278,7 @@ mod tests {
             }
         }
         let figures = html.matches("<figure id=").count();
-        assert_eq!(figures, 19, "a figure is not in the list above");
+        assert_eq!(figures, 20, "a figure is not in the list above");
         let mut ids: Vec<&str> = html.split(" id=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
         let count = ids.len();
         ids.sort_unstable();

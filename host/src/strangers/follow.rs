@@ -135,15 +135,16 @@ fn one<'r>(
 
 /// Whether the leader's posterior passes the model's threshold.
 fn is_decided(model: &Model<'_>, evidence: &[i64]) -> bool {
-    let leader = (0..model.known_count()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best });
+    let known = 0..model.known_count();
+    let leader = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best }).unwrap_or(0);
     let ahead = |other: i64| (other - evidence[leader]) as f64 * f64::from(model.unit());
     let others = evidence.iter().enumerate().filter(|(object, _)| *object != leader);
     let rivals: f64 = others.map(|(_, &other)| ahead(other).exp()).sum();
-    rivals <= Stopping::from_model(model).odds() as f64 / 2.0_f64.powi(56)
+    rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56)
 }
 
 /// The level that this share of sequences stays at or below, each object weighted equally.
-pub(super) fn quantile(sequences: &[Vec<Sequence>], share: f64, _: &Policy) -> f64 {
+pub(super) fn quantile(sequences: &[Vec<Sequence>], share: f64) -> f64 {
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
     let mut levels: Vec<f64> =
         sequences.iter().flat_map(|of| of.iter().take(fewest)).map(Sequence::highest).collect();

@@ -25,6 +25,7 @@ pub use leave_one_out::{LeftOut, Sets, leave_one_out};
 pub use shapes::captured;
 pub use shapes::{Shapes, of_dataset};
 
+use crate::calibrate::{allowed, needed};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::Candidate;
@@ -124,7 +125,7 @@ pub fn calibrate(model: &Model<'_>, dataset: &Dataset, shapes: &[Shapes], settin
     let follow = |rows: &[&[i32]], policy: &Policy| follow::sequences(&untested, rows, policy, settings.sequences);
 
     let free = Policy { until: follow::Until::Touches(MOST_HELD.min(model.header().max_touches())), least: FIRST };
-    let rough = follow::quantile(&follow(&learn, &free), 1.0 - settings.alarms, &free);
+    let rough = follow::quantile(&follow(&learn, &free), 1.0 - settings.alarms);
     let left_out = fit::left_out(&moments, &learn, rough, unit, free.last());
     let least = match settings.held {
         Held::Likely => FIRST,
@@ -180,13 +181,9 @@ fn learn_count(learn: &[&[i32]], objects: usize) -> usize {
 
 /// Touches of every known object, in the model's order, each in a random order.
 fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Supply>> {
-    // For its errors: another probe, a missing pose, an object that the model does not know.
-    crate::evaluate::Margins::new(Candidate::Compiled(model), &dataset.with(Vec::new()))?;
+    Candidate::Compiled(model).of(dataset)?;
     let names = compile::names(model);
     let known = &names[..model.known_count()];
-    if let Some(other) = dataset.objects.iter().find(|object| !known.contains(&object.name)) {
-        return Err(EvaluateProblem::UnknownObject { object: other.name.clone(), known: known.to_vec() }.into());
-    }
     let supply = |name: &String| {
         let missing = || EvaluateProblem::MissingObject { object: name.clone() };
         let touched = dataset.objects.iter().find(|object| object.name == *name).ok_or_else(missing)?;
@@ -299,19 +296,20 @@ fn threshold(
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
     let all: Vec<&Sequence> = sequences.iter().flat_map(|of| of.iter().take(fewest)).collect();
     let Settings { alarms, confidence, .. } = *settings;
-    let allowed = most_alarms(all.len(), alarms, confidence);
+    let allowed = allowed(all.len() as u64, alarms, confidence);
     let gap = doubt(settings.held);
     let ends = |threshold: f64| {
         let ends = all.par_iter().map(|sequence| sequence.end(threshold, threshold - gap, least));
         ends.map(|end| (usize::from(end.is_alarm), end.touches)).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
     };
-    let few = || EvaluateProblem::TooFewForAlarms { object_sequences: fewest, needed: needed(alarms, confidence).div_ceil(known) };
+    let needed = needed(alarms, confidence).div_ceil(known.max(1) as u64);
+    let few = || EvaluateProblem::TooFewForAlarms { object_sequences: fewest, needed };
     let allowed = allowed.ok_or_else(few)?;
     let mut kept = None;
     for step in 0..STEPS {
         let threshold = loosest + STEP * (STEPS - 1 - step) as f64;
         let (alarms, touches) = ends(threshold);
-        if alarms > allowed {
+        if alarms as u64 > allowed {
             break;
         }
         kept = Some((threshold, alarms, touches));
@@ -326,25 +324,4 @@ fn threshold(
         mean_touches: mean(touches),
         mean_touches_without: mean(without),
     })
-}
-
-/// The most events of so many trials that are unlikely (by one less the confidence) if each has at least the probability
-/// `rate`; none if there are too few trials to say.
-fn most_alarms(trials: usize, rate: f64, confidence: f64) -> Option<usize> {
-    let mut term = trials as f64 * libm::log1p(-rate);
-    let (mut tail, mut most) = (0.0, None);
-    for events in 0..=trials {
-        tail += libm::exp(term);
-        if tail > 1.0 - confidence {
-            break;
-        }
-        most = Some(events);
-        term += libm::log((trials - events) as f64 / (events + 1) as f64) + libm::log(rate) - libm::log1p(-rate);
-    }
-    most
-}
-
-/// The least number of trials of which some number of events is unlikely.
-fn needed(rate: f64, confidence: f64) -> usize {
-    (libm::log(1.0 - confidence) / libm::log1p(-rate)).ceil() as usize
 }

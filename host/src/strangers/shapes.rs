@@ -1,7 +1,9 @@
 //! Touches of many other shapes.
 
 use crate::error::Result;
-use crate::touches::{Dataset, Listing, Origin};
+#[cfg(feature = "objects")]
+use crate::touches::Origin;
+use crate::touches::{Dataset, Listing};
 use palpate_shared::Touch;
 use std::path::Path;
 

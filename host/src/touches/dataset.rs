@@ -5,6 +5,7 @@ use super::{Entry, Format, Listing, Origin};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
 use palpate_shared::Touch;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The touches of two or more objects, and how they were made.
@@ -14,6 +15,9 @@ pub struct Dataset {
     pub objects: Vec<ObjectTouches>,
     /// How the touches were made, where that is known: a directory without `dataset.json` does not say.
     pub origin: Option<Origin>,
+    /// How many instances the objects have that have several, by name: touch i is of instance i modulo their number.
+    /// Empty after a split, which shuffles touches.
+    pub instances: BTreeMap<String, usize>,
     /// What looked wrong when the data set was read, and may be meant.
     pub warnings: Vec<Warning>,
 }
@@ -42,12 +46,12 @@ pub enum Warning {
 impl Dataset {
     /// Touches that nothing is known about: no origin, no warnings. The objects are to be sorted by name.
     pub fn new(objects: Vec<ObjectTouches>) -> Self {
-        Self { objects, origin: None, warnings: Vec::new() }
+        Self { objects, ..Self::default() }
     }
 
     /// Other touches of the same origin, such as a part of these.
     pub fn with(&self, objects: Vec<ObjectTouches>) -> Self {
-        Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
+        Self { objects, origin: self.origin.clone(), ..Self::default() }
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
@@ -88,13 +92,17 @@ impl Dataset {
             return Err(Error::at(Place::file(directory), TouchesProblem::Incomplete));
         }
         let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
+        let mut instances = BTreeMap::new();
         for entry in listing.objects {
             let path = entry.file(directory, listing.origin.format);
             let touches = read_listed(&entry, listing.origin.format, &path, &mut warnings)?;
+            if entry.instances.len() > 1 {
+                instances.insert(entry.name.clone(), entry.instances.len());
+            }
             objects.push(ObjectTouches { name: entry.name, touches });
         }
         objects.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(Self { objects, origin: Some(listing.origin), warnings })
+        Ok(Self { objects, origin: Some(listing.origin), instances, warnings })
     }
 
     /// Every file of touches that there is.

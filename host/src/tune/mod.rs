@@ -266,7 +266,7 @@ fn evaluated(candidate: Candidate<'_>, (touches, robots): &Held, settings: &Sett
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),
         at_approaches: [10, 20, 60].into_iter().filter(|&at| at <= approaches).collect(),
         groups: settings.groups,
-        error_rate: settings.error_rate,
+        error_rate: Some(settings.error_rate),
         max_touches: None,
         seed: settings.seed,
     };

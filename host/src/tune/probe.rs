@@ -19,7 +19,7 @@
 
 use crate::capture;
 use crate::ensemble::train;
-use crate::error::{CaptureProblem, Error, Result, TuneProblem};
+use crate::error::{Error, Result, TuneProblem};
 use crate::evaluate::{Approaches, Candidate, Margins, SequentialSettings};
 use crate::mesh::Object;
 use crate::probe::approach::{Aim, Probe};
@@ -27,7 +27,7 @@ use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::noise::noisy;
 use crate::touches::{Dataset, ObjectTouches, Origin};
-use palpate_shared::format::Counted;
+use palpate_shared::format::{Counted, Length};
 use palpate_shared::{ContactPattern, Descriptor};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -47,16 +47,21 @@ const ODDS: [f64; 2] = [-16.0, -0.05];
 /// What probes are searched, and how each is measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Distances between neighboring fingers, in units (a tenth of the object's longest side).
+    /// What lengths are measured in: units, a tenth of the object's longest side, or millimeters, where objects have their
+    /// true sizes.
+    pub unit: Length,
+    /// Distances between neighboring fingers.
     pub spacing: RangeInclusive<f64>,
-    /// Radii of the fingers, in units.
+    /// Radii of the fingers.
     pub radius: RangeInclusive<f64>,
     /// Largest tilts of the row of fingers to either side, in degrees.
     pub tilt: RangeInclusive<f64>,
     /// Where approaches may aim, at least one.
     pub aims: Vec<Aim>,
-    /// The probe's speed, in units per second.
+    /// The probe's speed, per second.
     pub speed: f64,
+    /// What the best probe is compared with: the published one or, where objects have their true sizes, its likeness.
+    pub published: Probe,
     /// Standard deviation of the Gaussian noise of contact times, in microseconds, in training and testing.
     pub noise: f64,
     /// Which features a touch is turned into.
@@ -76,11 +81,13 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            unit: Length::Tenth,
             spacing: 0.5..=3.0,
             radius: 0.1..=0.3,
             tilt: 0.0..=20.0,
             aims: Aim::ALL.into(),
             speed: Probe::default().speed,
+            published: Probe::default(),
             noise: 1_000.0,
             descriptor: Descriptor::Curvature,
             counted: Counted::Contacts,
@@ -93,6 +100,18 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The usual search at the objects' true sizes, in millimeters: ranges, speed and published probe are scaled so that a
+    /// unit is a tenth of the longest side of the median object. None if the true size of an object is not known.
+    pub fn at_true_size(objects: &[Object]) -> Option<Self> {
+        let unit = median_length(objects)? / LENGTH;
+        let Self { spacing, radius, published, .. } = Self::default();
+        let scaled = |length: f64| hundredths(length * unit);
+        let range = |range: RangeInclusive<f64>| scaled(*range.start())..=scaled(*range.end());
+        let published = scaled_probe(&published, unit);
+        let (spacing, radius, speed) = (range(spacing), range(radius), published.speed);
+        Some(Self { unit: Length::Millimeter, spacing, radius, speed, published, ..Self::default() })
+    }
+
     /// Refuses settings out of their ranges.
     fn check(&self) -> Result<()> {
         for (name, range) in [("spacing", &self.spacing), ("radius", &self.radius), ("tilt", &self.tilt)] {
@@ -119,7 +138,8 @@ impl Settings {
         let corners = [(self.spacing.start(), self.radius.start()), (self.spacing.end(), self.radius.end())];
         for (&spacing, &radius) in corners {
             for tilt in [*self.tilt.start(), *self.tilt.end()] {
-                Probe { radius, spacing, speed: self.speed, tilt }.check(LENGTH)?;
+                let probe = Probe { radius, spacing, speed: self.speed, tilt };
+                probe.check(if self.unit == Length::Tenth { LENGTH } else { 1.0 })?;
             }
         }
         Ok(())
@@ -129,10 +149,25 @@ impl Settings {
 /// The longest side of every object, in units.
 const LENGTH: f64 = 10.0;
 
+/// The longest side of the median object in millimeters, by its first instance.
+pub(crate) fn median_length(objects: &[Object]) -> Option<f64> {
+    let length = |object: &Object| object.instances().next().and_then(|instance| object.true_length(instance));
+    let mut lengths: Vec<f64> = objects.iter().map(length).collect::<Option<_>>()?;
+    lengths.sort_by(f64::total_cmp);
+    lengths.get(lengths.len() / 2).copied()
+}
+
+/// The same probe where what was a unit is `unit`; lengths are rounded to hundredths.
+pub(crate) fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
+    let scaled = |length: f64| hundredths(length * unit);
+    let Probe { radius, spacing, speed, tilt } = *probe;
+    Probe { radius: scaled(radius), spacing: scaled(spacing), speed: scaled(speed), tilt }
+}
+
 /// A probe that was tried, and what it achieved.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
-    /// The probe's measures, in units.
+    /// The probe's measures.
     #[serde(flatten)]
     pub probe: Probe,
     /// Where its approaches aimed.
@@ -169,12 +204,15 @@ impl Trial {
 pub struct Design {
     /// The best probe.
     pub best: Trial,
-    /// The published probe, measured in the same way.
+    /// The published probe or its likeness, measured in the same way.
     pub published: Trial,
     /// The trade-off: probes of every spacing with the best radius, tilt and aim, by spacing; the best is one of them.
     pub by_spacing: Vec<Trial>,
     /// All probes tried in the rounds before, the best of each round first.
     pub rounds: Vec<Vec<Trial>>,
+    /// What lengths are measured in.
+    #[serde(with = "crate::touches::unit")]
+    pub unit: Length,
     /// The error rate that was asked for.
     pub error_rate: f64,
     /// Standard deviation of the noise of contact times that was assumed, in microseconds.
@@ -190,11 +228,14 @@ impl Design {
     pub fn toml(&self) -> String {
         let Trial { probe, aim, approaches, .. } = &self.best;
         let verdict = if self.best.reached { "" } else { "NOT REACHED: " };
+        let unit = match self.unit {
+            Length::Tenth => "# A unit is a tenth of the object's longest side.\nunit = \"unit\"\n",
+            Length::Millimeter => "unit = \"mm\"\n",
+        };
         format!(
             "# Found by `palpate probe design`: {verdict}{approaches:.1} approaches to {} % errors,\n\
              # aiming at: {} (`palpate capture --aim {}`). Assumed: noise of {} ms on contact times.\n\
-             # A unit is a tenth of the object's longest side.\n\
-             unit = \"unit\"\nradius = {:?}\nspacing = {:?}\nspeed = {:?}\ntilt = {:?}\n",
+             {unit}radius = {:?}\nspacing = {:?}\nspeed = {:?}\ntilt = {:?}\n",
             100.0 * self.error_rate,
             aim.name(),
             aim.name(),
@@ -212,14 +253,19 @@ impl Design {
 ///
 /// # Errors
 /// [`Problem::Setting`](crate::error::Problem::Setting) for a setting out of its range; [`TuneProblem::FewObjects`] for
-/// fewer than two objects; an object that cannot be touched, by its name; as [`train::train`]; [`Error::Cancelled`] if
+/// fewer than two objects; an object that cannot be touched or whose true size is not known, by its name; as [`train::train`]; [`Error::Cancelled`] if
 /// `progress` cancels it.
 pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Design> {
     settings.check()?;
     if objects.len() < 2 {
         return Err(TuneProblem::FewObjects { objects: objects.len() }.into());
     }
-    let search = Search { objects: scenes(objects)?, settings, progress };
+    let mut sorted: Vec<&Object> = objects.iter().collect();
+    sorted.sort_by(|a, b| a.name.cmp(&b.name));
+    let origin = Origin { length: LENGTH, unit: settings.unit, ..Origin::default() };
+    let scenes = capture::scenes(&sorted, &origin, &Quiet(progress))?;
+    let names = sorted.iter().map(|object| object.name.clone());
+    let search = Search { objects: names.zip(scenes).collect(), settings, progress };
     let coarse = search.coarse();
     // The second round has what was kept, and at most two neighbors in each of three directions; the third the spacings.
     progress.begin("trying probes", Some((coarse.len() + 2 * KEPT + SPACINGS) as u64));
@@ -236,13 +282,14 @@ pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) 
     let mut by_spacing = search.try_all(line, settings.approaches)?;
     let best = by_spacing[0].clone();
     by_spacing.sort_by(|a, b| a.probe.spacing.total_cmp(&b.probe.spacing));
-    let published = Probe { speed: settings.speed, ..Probe::default() };
+    let published = Probe { speed: settings.speed, ..settings.published };
     let published = search.attempt(published, Aim::Box, settings.approaches)?;
     Ok(Design {
         best,
         published,
         by_spacing,
         rounds: vec![first, second],
+        unit: settings.unit,
         error_rate: settings.error_rate,
         noise: settings.noise,
         descriptor: settings.descriptor.name(),
@@ -250,22 +297,9 @@ pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) 
     })
 }
 
-/// The objects, sorted by name, as scenes.
-fn scenes(objects: &[Object]) -> Result<Vec<(String, Scene)>> {
-    let scene = |object: &Object| match Scene::new(object.mesh(), LENGTH) {
-        Ok(scene) => Ok((object.name.clone(), scene)),
-        Err(Error::At { problem, .. }) => {
-            Err(CaptureProblem::Object { name: object.name.clone(), problem: Box::new(problem) }.into())
-        }
-        Err(other) => Err(other),
-    };
-    let mut scenes: Vec<(String, Scene)> = objects.iter().map(scene).collect::<Result<_>>()?;
-    scenes.sort_by(|a, b| a.0.cmp(&b.0));
-    Ok(scenes)
-}
-
 struct Search<'a> {
-    objects: Vec<(String, Scene)>,
+    /// Names, and the scenes of the instances.
+    objects: Vec<(String, Vec<Scene>)>,
     settings: &'a Settings,
     progress: &'a dyn Progress,
 }
@@ -352,13 +386,22 @@ impl Search<'_> {
 
     /// Approaches to every object in memory, with noise.
     fn touch(&self, probe: Probe, aim: Aim, samples: std::ops::Range<u64>) -> Result<Dataset> {
-        let Settings { seed, noise, .. } = *self.settings;
+        let Settings { seed, noise, unit, .. } = *self.settings;
         let touches = samples.end - samples.start;
-        let origin =
-            Origin { touches, seed, length: LENGTH, probe, aim, pose: true, approaches: true, ..Origin::default() };
-        let touch = |(name, scene): &(String, Scene)| {
+        let origin = Origin {
+            touches,
+            seed,
+            length: LENGTH,
+            unit,
+            probe,
+            aim,
+            pose: true,
+            approaches: true,
+            ..Origin::default()
+        };
+        let touch = |(name, scenes): &(String, Vec<Scene>)| {
             progress::check(self.progress)?;
-            let touches = capture::touches(scene, name, &origin, samples.clone())?;
+            let touches = capture::touches(scenes, name, &origin, samples.clone())?;
             // Other noise for other samples.
             let touches = if noise > 0.0 { noisy(name, &touches, noise, seed ^ samples.start) } else { touches };
             Ok(ObjectTouches { name: name.clone(), touches })
@@ -375,7 +418,7 @@ impl Search<'_> {
             progress::check(self.progress)?;
             let threshold = 1.0 / (1.0 + (-log_odds).exp());
             let settings =
-                SequentialSettings { error_rate: threshold, max_touches: Some(MAX_TOUCHES), sequences, seed };
+                SequentialSettings { error_rate: Some(threshold), max_touches: Some(MAX_TOUCHES), sequences, seed };
             Ok::<_, Error>((threshold, margins.approaches(&[], &settings)?))
         };
         let [mut strict, mut loose] = ODDS;

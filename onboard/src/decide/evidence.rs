@@ -35,13 +35,24 @@ impl Posterior {
 pub(crate) struct Unit {
     pub(crate) bits: u32,
     pub(crate) shift: u8,
+    /// What bits are multiplied by, in Q16: one over the temperature.
+    pub(crate) sharpness: u32,
 }
+
+/// That of a temperature of 1.
+pub(crate) const SHARPNESS: u32 = 1 << 16;
+/// The most bits that are multiplied, in Q32: there a weight is 0 at any sharpness, which is 2^12 to 2^20.
+const MOST_BITS: u64 = 1 << 42;
 
 impl Unit {
     /// e^-(`ahead` units) in Q56.
     fn weight(self, ahead: u64) -> u64 {
         let ahead = u64::from(u32::try_from(ahead).unwrap_or(u32::MAX));
-        exp2_negative((ahead * u64::from(self.bits)) >> (self.shift & 63))
+        let bits = (ahead * u64::from(self.bits)) >> (self.shift & 63);
+        if self.sharpness == SHARPNESS {
+            return exp2_negative(bits);
+        }
+        exp2_negative((bits.min(MOST_BITS) * u64::from(self.sharpness)) >> 16)
     }
 }
 
@@ -74,6 +85,14 @@ pub(crate) fn is_decided(evidence: &[i64], (winner, most): (usize, i64), odds: u
         }
     }
     true
+}
+
+/// What the weights of all objects but the best come to, the best one's being 1, in Q56.
+///
+/// Cost: an exponential for each object. Cannot overflow: there are at most 255 others.
+pub(crate) fn rivals(evidence: &[i64], (winner, most): (usize, i64), unit: Unit) -> u64 {
+    let others = evidence.iter().enumerate().filter(|(object, _)| *object != winner);
+    others.fold(0, |sum: u64, (_, &evidence)| sum.saturating_add(unit.weight(most.abs_diff(evidence))))
 }
 
 /// The posterior of one object.
@@ -122,7 +141,7 @@ mod tests {
     /// A unit of a thousandth of a nat.
     fn unit() -> Unit {
         let bits = core::f64::consts::LOG2_E / 1000.0 * 4_294_967_296.0;
-        Unit { bits: (bits * 256.0).round() as u32, shift: 8 }
+        Unit { bits: (bits * 256.0).round() as u32, shift: 8, sharpness: SHARPNESS }
     }
 
     #[test]
@@ -135,6 +154,29 @@ mod tests {
             assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {}", weight / sum);
         }
         assert_eq!(posterior(&evidence, 4, unit()), Posterior(0));
+    }
+
+    #[test]
+    fn posteriors_at_a_temperature_are_those_of_a_softmax_of_the_evidence_divided_by_it() {
+        for sharpness in [1 << 12, 40_960, 59_578, 100_000, 1 << 20] {
+            let evidence = [1000, 400, -2500, 999, i64::MIN];
+            let weights = evidence.map(|e| (e as f64 / 1000.0 * f64::from(sharpness) / 65_536.0).exp());
+            let sum: f64 = weights.iter().sum();
+            for (object, weight) in weights.iter().enumerate() {
+                let posterior = posterior(&evidence, object, Unit { sharpness, ..unit() }).to_f64();
+                assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {} at {sharpness}", weight / sum);
+            }
+        }
+    }
+
+    #[test]
+    fn rivals_are_what_a_decision_compares_with_the_odds() {
+        for evidence in [&[0, 3_000, -400][..], &[5], &[7, 7, 7], &[i64::MAX, i64::MIN], &[100; 256]] {
+            let best = best(evidence);
+            let rivals = rivals(evidence, best, unit());
+            assert!(is_decided(evidence, best, rivals, unit()));
+            assert!(rivals == 0 || !is_decided(evidence, best, rivals - 1, unit()));
+        }
     }
 
     #[test]

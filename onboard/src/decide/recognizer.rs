@@ -1,6 +1,6 @@
 //! Touch by touch to a verdict.
 
-use super::evidence::{self, Posterior, Unit};
+use super::evidence::{self, Posterior, SHARPNESS, Unit};
 use super::stopping::Stopping;
 use super::strangers::{self, Fit};
 use crate::model::{Model, Refused};
@@ -47,7 +47,7 @@ impl core::error::Error for CapacityError {}
 
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
-/// State: 8 bytes per object, and 40; and the model, which is copied: 68 bytes, not those that it is read from.
+/// State: 8 bytes per object, and 40; and the model, which is copied: 72 bytes, not those that it is read from.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: Model<'m>,
@@ -154,9 +154,24 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         }
     }
 
-    /// The posterior of an object; 0 for one that the model does not know.
+    /// What the weights of all objects but the [best](Self::best) come to, the best one's being 1, in Q56; the most
+    /// there is where the background has more. The best object is recognized once this is at most its
+    /// [threshold](Stopping::odds_of), and its touches [fit](Self::fit).
     ///
-    /// Cost: an exponential for each object, and about 800 instructions.
+    /// Cost: an exponential for each object.
+    pub fn rivals(&self) -> u64 {
+        let evidence = self.evidence();
+        let best = strangers::leader(&self.model, evidence);
+        match strangers::is_background(&self.model, evidence, best.1) {
+            true => u64::MAX,
+            false => evidence::rivals(evidence, best, unit(&self.model)),
+        }
+    }
+
+    /// The posterior of an object, of the evidence divided by the model's [temperature](Model::temperature); 0 for an
+    /// object that the model does not know.
+    ///
+    /// Cost: an exponential for each object, and about 1,000 instructions.
     pub fn posterior(&self, object: usize) -> Posterior {
         self.state.posterior(&self.model, object)
     }
@@ -199,9 +214,10 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.touches = self.state.touches.saturating_add(1);
         let best = strangers::leader(&self.model, self.evidence());
         let fit = strangers::fit(&self.model, self.evidence(), best.0, self.state.touches);
+        let odds = self.state.stopping.odds_of(best.0, &self.model);
         let is_decided = || {
             !strangers::is_background(&self.model, self.evidence(), best.1)
-                && evidence::is_decided(self.evidence(), best, self.state.stopping.odds, unit(&self.model))
+                && evidence::is_decided(self.evidence(), best, odds, unit(&self.model))
         };
         if fit == Fit::Stranger {
             self.state.verdict = Verdict::Unknown;
@@ -225,7 +241,8 @@ impl<const N: usize> State<N> {
     }
 
     pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
-        evidence::posterior(self.evidence(model), object, unit(model))
+        let sharpness = model.temperature().sharpness();
+        evidence::posterior(self.evidence(model), object, Unit { sharpness, ..unit(model) })
     }
 
     pub(crate) const fn touches(&self) -> u32 {
@@ -246,5 +263,5 @@ impl<const N: usize> State<N> {
 
 fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
-    Unit { bits: header.unit_bits(), shift: header.unit_shift() }
+    Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }

@@ -1,16 +1,20 @@
 //! What is checked when a model is opened, so that no later step can fail.
 
-use super::optional;
+use super::{Model, optional};
 use crate::bytes::{ModelError, take};
-use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
-use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, TrainedTouches};
+use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
+use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
 
-/// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves.
+/// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves. Sets what the optional
+/// sections state.
 #[inline(never)]
-pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
+pub(super) fn check(opened: &mut Model<'_>) -> Result<(), ModelError> {
+    optional::check(opened)?;
+    let model = &opened.sections;
+    let header = &model.header();
     if Key::from_code(header.key()).is_none() {
         return Err(ModelError::Field { offset: 13 });
     }
@@ -21,7 +25,6 @@ pub(super) fn check(model: &Sections<'_>, header: &Header<'_>, touches: &mut Tra
     if !built_in || !built_in::leaf(model.leaf) {
         return Err(ModelError::NotBuiltIn { offset: if built_in { 7 } else { 6 } });
     }
-    optional::check(model, touches)?;
     ranks::check(model, header.last_feature())?;
     let section =
         |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(ModelError::Section { offset: model.offset(part) }) };

@@ -57,7 +57,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
     }
     let touches = TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
     let sections = Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf };
-    Ok(Model { sections, descriptor, touches })
+    Ok(Model { sections, descriptor, touches, by_object: 0 })
 }
 
 /// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.

@@ -13,8 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    HEADER_LENGTH, Header, Key, Layout, LeafType, PatternShares, Section, Strangers, Tag, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_section,
+    HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Promise, Section, Strangers, Tag,
+    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
 };
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
@@ -25,6 +25,8 @@ pub struct Model<'a> {
     sections: Sections<'a>,
     descriptor: Option<Descriptor>,
     touches: TrainedTouches,
+    /// Where thresholds by object stand; 0 if there are none.
+    by_object: u32,
 }
 
 /// Where the parts of an opened model are: what a [`Model`] is without its bytes. For whoever keeps the bytes somewhere
@@ -34,21 +36,23 @@ pub(crate) struct Opened {
     places: Places,
     descriptor: Option<Descriptor>,
     touches: TrainedTouches,
+    by_object: u32,
 }
 
 impl Opened {
     /// The model in the bytes that it was opened from; `None` if there are fewer or more of them. Cost: about 100
     /// instructions. Other bytes of the same length give wrong margins, nothing worse.
     pub(crate) fn model<'a>(&self, bytes: &'a [u8]) -> Option<Model<'a>> {
-        let &Self { places, descriptor, touches } = self;
-        Some(Model { sections: Sections::at(bytes, &places)?, descriptor, touches })
+        let &Self { places, descriptor, touches, by_object } = self;
+        Some(Model { sections: Sections::at(bytes, &places)?, descriptor, touches, by_object })
     }
 }
 
 impl<'a> Model<'a> {
     /// Where its parts are.
     pub(crate) fn opened(&self) -> Opened {
-        Opened { places: self.sections.places(), descriptor: self.descriptor, touches: self.touches }
+        let &Self { descriptor, touches, by_object, .. } = self;
+        Opened { places: self.sections.places(), descriptor, touches, by_object }
     }
 
     /// Opens a model, checking everything that reading it later relies on: after this nothing can fail.
@@ -61,7 +65,7 @@ impl<'a> Model<'a> {
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
         let mut model = header::read(bytes);
         if let Ok(opened) = &mut model
-            && let Err(error) = check::check(&opened.sections, &opened.sections.header(), &mut opened.touches)
+            && let Err(error) = check::check(opened)
         {
             model = Err(error);
         }
@@ -75,7 +79,7 @@ impl<'a> Model<'a> {
         let sections = Sections { bytes, optional, base, axes, cuts, groups, nodes, leaves, objects, layout, leaf };
         let TrainedTouches { patterns, counted, needs_pose, largest_spread } = self.touches;
         let touches = TrainedTouches { patterns, counted, needs_pose, largest_spread };
-        Self { sections, descriptor: self.descriptor, touches }
+        Self { sections, descriptor: self.descriptor, touches, by_object: self.by_object }
     }
 
     /// The header.
@@ -182,6 +186,28 @@ impl<'a> Model<'a> {
     /// if the descriptor needs one, unless the model states others.
     pub const fn trained_touches(&self) -> TrainedTouches {
         self.touches
+    }
+
+    /// What the weights of all other objects may come to, this one's being 1, for it to be recognized, in Q56: the
+    /// model's own threshold for it. `None` if the model has one threshold for all objects, which its header states.
+    ///
+    /// Cost: about 15 instructions. Cannot fail.
+    pub fn odds_of(&self, object: usize) -> Option<u64> {
+        let start = usize::try_from(self.by_object).ok().filter(|&start| start > 0)?;
+        let section = self.sections.bytes.get(start..)?;
+        OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
+    }
+
+    /// What the model promises about its verdicts, if it was calibrated.
+    pub fn promise(&self) -> Option<Promise> {
+        Promise::from_bytes(optional::find(self.sections.optional, Tag::Promise))
+    }
+
+    /// What evidence is divided by before it becomes a posterior; 1 unless the model states it.
+    ///
+    /// Cost: about 30 instructions for each optional section.
+    pub fn temperature(&self) -> Temperature {
+        Temperature::from_bytes(optional::find(self.sections.optional, Tag::Temperature)).unwrap_or(Temperature::ONE)
     }
 
     /// The noise in the training, if the model states it.

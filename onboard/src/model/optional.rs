@@ -1,8 +1,10 @@
 //! The optional sections: checked once, then found by their tags.
 
+use super::Model;
 use crate::bytes::ModelError;
-use crate::layouts::Sections;
-use palpate_shared::format::{Section, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section};
+use palpate_shared::format::{
+    OddsByObject, Section, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+};
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
 pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
@@ -16,8 +18,9 @@ pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
 
 /// Checks that sections fill their part of the model, in the order of their tags, that what recognition depends on makes
 /// sense (whoever asks for probe or noise finds out about those), and that none is there
-/// that has to be understood and is not. Sets `touches` if the model states them.
-pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Result<(), ModelError> {
+/// that has to be understood and is not. Sets the model's touches, and where its thresholds are, if it states them.
+pub(super) fn check(opened: &mut Model<'_>) -> Result<(), ModelError> {
+    let model = opened.sections;
     let mut rest = model.optional;
     let mut last = 0;
     while !rest.is_empty() {
@@ -28,7 +31,11 @@ pub(super) fn check(model: &Sections<'_>, touches: &mut TrainedTouches) -> Resul
             _ if tag <= last => false,
             _ if tag == Tag::Probe.code() => content.len() >= TrainedProbe::LENGTH,
             _ if tag == Tag::Touches.code() => {
-                TrainedTouches::from_bytes(content).map(|stated| *touches = stated).is_some()
+                TrainedTouches::from_bytes(content).map(|stated| opened.touches = stated).is_some()
+            }
+            _ if tag == Tag::ThresholdsByObject.code() => {
+                opened.by_object = u32::try_from(model.offset(content)).unwrap_or_default();
+                content.len() >= OddsByObject::LENGTH * usize::from(model.objects)
             }
             _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
             _ if tag == Tag::Strangers.code() => Strangers::from_bytes(content, model.objects.into()).is_some(),

@@ -113,6 +113,19 @@ codes! {
 }
 
 codes! {
+    /// Of what an error rate is promised. A name that is given and wrong is an error; no name, at the limit of touches, is
+    /// neither right nor wrong.
+    Per {
+        /// Of all names that are given, objects being touched equally often.
+        Average = 0, "average";
+        /// Of each name, when it is given.
+        Name = 1, "name";
+        /// Of the names that are given to each object.
+        Object = 2, "object";
+    }
+}
+
+codes! {
     /// What a probe's lengths are measured in.
     Length {
         /// A tenth of the object's longest side, as objects are scaled in the paper.

@@ -7,14 +7,16 @@
 mod codes;
 mod header;
 mod key;
+mod promise;
 mod records;
 mod strangers;
 mod trained;
 
 pub use crate::checksum::checksum;
-pub use codes::{Counted, Held, Key, Layout, LeafType, Length, RAW_FEATURES};
+pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
+pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
 pub use strangers::{FitTerms, FitTest, ObjectFit, Strangers};
 pub use trained::{

@@ -16,7 +16,7 @@ pub enum Tag {
     Noise,
     /// Reserved: stopping thresholds by the number of touches.
     ThresholdsByTouches,
-    /// Reserved: stopping thresholds by object.
+    /// Stopping thresholds by object: [`OddsByObject`](super::OddsByObject).
     ThresholdsByObject,
     /// A test for objects that the model does not know: [`Strangers`](super::Strangers).
     Strangers,
@@ -26,6 +26,10 @@ pub enum Tag {
     FeatureNames,
     /// [`PatternShares`].
     PatternShares,
+    /// [`Promise`](super::Promise).
+    Promise,
+    /// [`Temperature`](super::Temperature).
+    Temperature,
 }
 
 impl Tag {
@@ -41,6 +45,8 @@ impl Tag {
             Self::Plan => 7,
             Self::FeatureNames => 8,
             Self::PatternShares => 9,
+            Self::Promise => 10,
+            Self::Temperature => 11,
         }
     }
 }

@@ -1,0 +1,157 @@
+//! Sequences of a data set's touches: whole ones, no touch in two of them.
+
+use super::sequence::{Sequence, odds_of};
+use crate::error::Result;
+use crate::progress::{self, Progress};
+use crate::random::{self, Purpose};
+use palpate_onboard::{Model, Recognizer, Stopping};
+use palpate_shared::Touch;
+use rand::seq::SliceRandom;
+use rayon::prelude::*;
+
+/// What is known after a touch that is evidence.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'s> {
+    /// The touch.
+    pub touch: &'s Touch,
+    /// The evidence for each object, in units.
+    pub evidence: &'s [i64],
+    /// The object with the most.
+    pub best: usize,
+    /// Touches so far that are evidence.
+    pub touches: u32,
+    /// Approaches so far.
+    pub approaches: u32,
+}
+
+/// Where sequences end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Until {
+    /// Once the leader has so much more evidence than all others together, in nats.
+    pub margin: f64,
+    /// After so many touches that are evidence.
+    pub max_touches: u32,
+}
+
+/// The touches of one object that no sequence has used yet.
+#[derive(Debug)]
+pub struct Supply<'d> {
+    object: usize,
+    touches: &'d [Touch],
+    /// In a random order; with robots, each robot's touches in theirs.
+    order: Vec<u32>,
+    used: usize,
+    /// The touches of a robot, which makes one sequence; `None` if all touches may be mixed.
+    of_robot: Option<usize>,
+}
+
+impl<'d> Supply<'d> {
+    /// The touches of the object with this name and this index in the model. With more than one robot, touch i was made
+    /// by robot i modulo `robots`: every robot makes one sequence, so that the sequences' biases are independent.
+    pub fn new(object: usize, name: &str, touches: &'d [Touch], robots: usize, seed: u64) -> Self {
+        let mut order: Vec<u32> = (0..touches.len()).filter_map(|touch| u32::try_from(touch).ok()).collect();
+        let of_robot = (robots > 1).then(|| touches.len() / robots);
+        match of_robot {
+            None => order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, 0)),
+            Some(of_robot) => {
+                let touch = |index: usize| order[index % of_robot.max(1) * robots + index / of_robot.max(1)];
+                order = (0..of_robot * robots).map(touch).collect();
+            }
+        }
+        Self { object, touches, order, used: 0, of_robot }
+    }
+
+    /// Takes one in `parts` of the touches off, as a supply of its own; with robots, of the robots.
+    pub fn take_part(&mut self, parts: usize) -> Self {
+        let step = self.of_robot.unwrap_or(1).max(1);
+        let count = (self.order.len() / parts.max(1)).div_ceil(step) * step;
+        let rest = self.order.split_off(count.min(self.order.len()));
+        let order = std::mem::replace(&mut self.order, rest);
+        Self { order, ..*self }
+    }
+
+    /// Follows up to `wanted` sequences. One that all touches end in is left out; one that a robot's touches end in ends
+    /// there.
+    fn follow<const N: usize, G: FnMut(&Moment<'_>) -> bool>(
+        &mut self,
+        model: &Model<'_>,
+        wanted: usize,
+        until: Until,
+        gate: impl Fn() -> G,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Sequence>> {
+        // Models have at most 256 objects, and the caller makes room for as many.
+        let never = Stopping::from_odds(0, u32::MAX);
+        let Ok(mut recognizer) = Recognizer::<N>::new(model, never) else { return Ok(Vec::new()) };
+        let mut sequences = Vec::new();
+        while sequences.len() < wanted && self.used < self.order.len() {
+            progress::advance(progress, 1)?;
+            let end = self.of_robot.map_or(self.order.len(), |of_robot| self.used + of_robot);
+            let rest = self.order[self.used..end].iter().map(|&touch| &self.touches[touch as usize]);
+            let (sequence, is_whole) = one(self.object, &mut recognizer, rest, until, gate());
+            self.used = if self.of_robot.is_some() { end } else { self.used + sequence.approaches as usize };
+            if is_whole || self.of_robot.is_some() {
+                sequences.push(sequence);
+            } else {
+                self.used = self.order.len();
+            }
+        }
+        Ok(sequences)
+    }
+}
+
+/// Follows one sequence; whether it came to its end before the touches did.
+fn one<'s, const N: usize>(
+    object: usize,
+    recognizer: &mut Recognizer<'_, N>,
+    touches: impl Iterator<Item = &'s Touch>,
+    until: Until,
+    mut gate: impl FnMut(&Moment<'_>) -> bool,
+) -> (Sequence, bool) {
+    let strictest = odds_of(until.margin);
+    let mut sequence = Sequence::new(object);
+    recognizer.reset();
+    for (touch, approaches) in touches.zip(1_u32..) {
+        if recognizer.push(touch).is_err() {
+            // No evidence: it cost an approach.
+            sequence.end(approaches);
+            continue;
+        }
+        let (evidence, best, touches) = (recognizer.evidence(), recognizer.best(), recognizer.touches());
+        let may_name = gate(&Moment { touch, evidence, best, touches, approaches });
+        let odds = sequence.push(recognizer, approaches, may_name);
+        if (may_name && odds <= strictest) || touches >= until.max_touches {
+            return (sequence, true);
+        }
+    }
+    (sequence, false)
+}
+
+/// Follows sequences of all objects' touches, `wanted` of each supply's, in parallel; `gate` makes for each sequence what
+/// says after each touch whether a name may be given. Every supply then has as many sequences of those wanted as the one
+/// with the smallest share of them.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn follow<G: FnMut(&Moment<'_>) -> bool>(
+    model: &Model<'_>,
+    supplies: &mut [Supply<'_>],
+    wanted: &[usize],
+    until: Until,
+    gate: impl Fn() -> G + Sync,
+    progress: &dyn Progress,
+) -> Result<Vec<Sequence>> {
+    let of = |(supply, &wanted): (&mut Supply<'_>, &usize)| match model.object_count() {
+        0..=16 => supply.follow::<16, G>(model, wanted, until, &gate, progress),
+        17..=64 => supply.follow::<64, G>(model, wanted, until, &gate, progress),
+        _ => supply.follow::<256, G>(model, wanted, until, &gate, progress),
+    };
+    let mut found: Vec<Vec<Sequence>> = supplies.par_iter_mut().zip(wanted).map(of).collect::<Result<_>>()?;
+    let share = |(found, wanted): (&Vec<Sequence>, &usize)| (*wanted > 0).then(|| found.len() as f64 / *wanted as f64);
+    let share = found.iter().zip(wanted).filter_map(share).fold(1.0, f64::min);
+    for (found, &wanted) in found.iter_mut().zip(wanted) {
+        // Rounded up where it is a whole number but for the last bits.
+        found.truncate((wanted as f64 * share + 1e-9) as usize);
+    }
+    Ok(found.into_iter().flatten().collect())
+}

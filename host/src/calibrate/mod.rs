@@ -1,0 +1,44 @@
+//! Thresholds that keep a promised error rate, and use it up.
+//!
+//! A recognizer that stops when the posterior passes 1 − α is wrong less often than α: the last touch carries the
+//! evidence beyond the threshold. How much less depends on the model and the touches. [`calibrate`](fn@calibrate) finds
+//! out on touches that nothing was trained on: it sets the model's thresholds by Learn-then-Test ([`walk`]) on whole
+//! sequences ([`Sequence`]), followed by the onboard recognizer's own integers.
+//!
+//! The error rate is the share of the names given that are wrong. A sequence that reaches the limit of touches without a
+//! name is undecided: neither right nor wrong. The rate is promised
+//!
+//! - on average ([`Per::Average`]): of all names, with objects touched as often as the model's priors say;
+//! - per name ([`Per::Name`]): of each name, when it is given, with objects touched as often as that;
+//! - per object ([`Per::Object`]): of the names given to each object, however often it is touched.
+//!
+//! ```no_run
+//! use palpate::calibrate::{self, calibrate};
+//! use palpate::compile::CompiledModel;
+//! use palpate::touches::Dataset;
+//!
+//! # fn main() -> palpate::Result<()> {
+//! let compiled = CompiledModel::read("model.palpate")?;
+//! let fresh = Dataset::read("fresh".as_ref())?;
+//! let settings = calibrate::Settings { rate: 0.01, ..Default::default() };
+//! let calibrated = calibrate(&compiled.model(), fresh, &settings, &())?;
+//! println!("{} of {} names were wrong", calibrated.promise.wrong, calibrated.promise.given);
+//! # Ok(())
+//! # }
+//! ```
+
+mod choose;
+mod draw;
+mod model;
+mod sequence;
+mod temperature;
+#[cfg(all(test, feature = "train"))]
+mod tests;
+mod walk;
+
+pub use choose::{Chosen, Terms, choose};
+pub use draw::{Moment, Supply, Until, follow};
+pub use model::{Calibrated, Settings, calibrate, calibrate_with};
+pub use palpate_shared::format::Per;
+pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
+pub use walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};

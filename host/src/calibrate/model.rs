@@ -1,0 +1,288 @@
+//! A model's thresholds, its promise and its temperature.
+
+use super::choose::{Chosen, Terms, choose};
+use super::draw::{Moment, Supply, Until, follow};
+use super::sequence::{Odds, Sequence, margin_of, odds_of};
+use super::temperature::temperature;
+use super::{Per, Tally};
+use crate::compile::{self, Restated, restate};
+use crate::ensemble::StatedProbe;
+use crate::error::{CalibrateProblem, Error, Result};
+use crate::evaluate::Candidate;
+use crate::progress::Progress;
+use crate::touches::Dataset;
+use crate::touches::noise::Noise;
+use palpate_onboard::{Model, Refused, Stopping};
+use palpate_shared::format::{OddsByObject, Promise, Tag, Temperature};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// One in so many touches only says how strict to begin, and so does no more than one in so many sequences.
+const PILOT: usize = 30;
+/// The strictest threshold beyond that of the posterior, in nats: usually, and where a tenth of that is not enough.
+const STRICTEST: [f64; 2] = [2.5, 10.0];
+
+/// What is promised, and on how much.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// The error rate: wrong names of those that are given.
+    pub rate: f64,
+    /// Of what the rate is promised.
+    pub per: Per,
+    /// The probability that the rate is kept.
+    pub confidence: f64,
+    /// The most sequences, of all objects together.
+    pub sequences: usize,
+    /// Touches after which a sequence ends undecided; `None` takes the model's own limit.
+    pub max_touches: Option<u32>,
+    /// What is added to the touches. The promise holds for touches with the same.
+    pub noise: Noise,
+    /// Seed of the order of the touches, and of the noise.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rate: 0.01,
+            per: Per::Average,
+            confidence: 0.95,
+            sequences: 100_000,
+            max_touches: None,
+            noise: Noise::default(),
+            seed: 1,
+        }
+    }
+}
+
+/// A calibrated model, and what its calibration found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Calibrated {
+    /// What the chip reads.
+    #[serde(skip)]
+    pub model: Vec<u8>,
+    /// What it promises.
+    #[serde(skip)]
+    pub promise: Promise,
+    /// The promised error rate.
+    pub promised: f64,
+    /// Of what: "average", "name" or "object".
+    pub per: &'static str,
+    /// The probability that it is kept.
+    pub confidence: f64,
+    /// What is counted: "touches" or "approaches".
+    pub counted: &'static str,
+    /// Sequences that the promise rests on.
+    pub sequences: usize,
+    /// Share of the names given in these that were wrong.
+    pub error: f64,
+    /// Share of these that ended undecided.
+    pub undecided: f64,
+    /// Touches used on average that were evidence.
+    pub mean_touches: f64,
+    /// Approaches used on average, where the data set holds those.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_approaches: Option<f64>,
+    /// Where an uncalibrated recognizer stops at this rate: nats of evidence ahead of all other objects.
+    pub uncalibrated_margin: f64,
+    /// Where this one stops: for each name.
+    pub margins: BTreeMap<String, f64>,
+    /// For each name, or object, that the rate is promised for: the share that was wrong. Empty for an average.
+    pub errors: BTreeMap<String, f64>,
+    /// What evidence is divided by before it is shown as a posterior.
+    pub temperature: f64,
+}
+
+/// Sets a model's thresholds so that it keeps a promised error rate and uses it up, on touches that nothing was trained
+/// on; also its temperature. A data set of approaches is counted in these.
+///
+/// # Errors
+/// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or the data set lacks an
+/// object; as [`Margins::new`](crate::evaluate::Margins::new) for touches that the model cannot use;
+/// [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges;
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn calibrate(
+    model: &Model<'_>,
+    dataset: Dataset,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
+    calibrate_with(model, dataset, settings, || |_: &Moment<'_>| true, progress)
+}
+
+/// The same for a recognizer that holds names back: `gate` makes for each sequence what says after each touch whether a
+/// name may be given.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
+    model: &Model<'_>,
+    mut dataset: Dataset,
+    settings: &Settings,
+    gate: impl Fn() -> G + Sync,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
+    check(settings)?;
+    let own = Stopping::from_model(model).max_touches();
+    let max_touches = settings.max_touches.unwrap_or(own);
+    compile::stopping(settings.rate, max_touches)?;
+    let (_, known) = Candidate::Compiled(model).of(&dataset)?;
+    let mut names = compile::names(model);
+    // A background is not touched, and never named.
+    names.truncate(model.known_count());
+    if names.len() < 2 {
+        return Err(CalibrateProblem::OneObject.into());
+    }
+    let missing: Vec<String> =
+        (0..names.len()).filter(|object| !known.contains(object)).map(|object| names[object].clone()).collect();
+    if !missing.is_empty() {
+        return Err(CalibrateProblem::Missing { objects: missing }.into());
+    }
+    let robots = add_noise(model, &mut dataset, settings, max_touches)?;
+    let touched = dataset.objects.iter().zip(&known);
+    let mut supplies: Vec<Supply<'_>> = touched
+        .map(|(touched, &object)| Supply::new(object, &touched.name, &touched.touches, robots, settings.seed))
+        .collect();
+    progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
+    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let naive = ((1.0 - settings.rate) / settings.rate).ln();
+    let shares = shares(model, &known);
+    let wanted = |count: usize| -> Vec<usize> {
+        shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
+    };
+    let draw = |supplies: &mut [Supply<'_>], count: usize, beyond: f64| {
+        let until = Until { margin: naive + beyond, max_touches };
+        follow(model, supplies, &wanted(count), until, &gate, progress)
+    };
+    let mut first: Vec<Supply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
+    let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), STRICTEST[1])?;
+    let beyond = if is_kept_well(&pilot, naive + STRICTEST[0], settings.rate) { STRICTEST[0] } else { STRICTEST[1] };
+    let sequences = draw(&mut supplies, settings.sequences, beyond)?;
+    let chosen = choose(&sequences, &names, naive + beyond, &terms)?;
+    let temperature = temperature(model, &dataset, &known);
+    finished(model, &dataset, settings, max_touches, &names, &chosen, temperature)
+}
+
+fn check(settings: &Settings) -> Result<()> {
+    let Settings { rate, confidence, sequences, .. } = *settings;
+    if !(rate >= 1e-9 && rate < 0.5) {
+        return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
+    }
+    if !((0.5..=0.999_999).contains(&confidence)) {
+        return Err(Error::setting("confidence", confidence, "a number from 0.5 to 0.999999"));
+    }
+    if sequences == 0 || u32::try_from(sequences).is_err() {
+        return Err(Error::setting("sequences", sequences, "a number from 1 to 4294967295"));
+    }
+    settings.noise.check()
+}
+
+/// Adds noise to the touches. With a bias every sequence is made by a robot of its own, which has touches enough to reach
+/// the limit; the answer is how many robots there are.
+fn add_noise(model: &Model<'_>, dataset: &mut Dataset, settings: &Settings, max_touches: u32) -> Result<usize> {
+    let noise = &settings.noise;
+    if noise.is_none() {
+        return Ok(1);
+    }
+    let trained = model.trained_touches();
+    let robots = |touches: &[palpate_shared::Touch]| {
+        let used = touches.iter().filter(|touch| Refused::check(&trained, touch).is_ok()).count();
+        used / max_touches.max(1) as usize
+    };
+    let fewest = dataset.objects.iter().map(|object| robots(&object.touches)).min().unwrap_or(0);
+    let robots = if noise.has_bias() { fewest.max(1) } else { 1 };
+    // Another seed than those of training and tests.
+    let seed = settings.seed.wrapping_add(0x9e37_79b9);
+    for object in &mut dataset.objects {
+        object.touches = if noise.has_bias() {
+            noise.add_by_robots(&object.name, &object.touches, seed, robots)
+        } else {
+            noise.add(&object.name, &object.touches, seed)
+        };
+    }
+    Ok(robots)
+}
+
+/// How often each object of the data set is touched: as its prior says.
+fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
+    let weights: Vec<f64> =
+        known.iter().map(|&object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| weight / sum).collect()
+}
+
+/// Whether at this margin clearly fewer names are wrong than promised, as far as a few sequences tell.
+fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
+    let odds = Odds::All(odds_of(margin));
+    let given = pilot.iter().filter_map(|sequence| Some((sequence, sequence.given(&odds)?)));
+    let (wrong, given) = given.fold((0_u32, 0_u32), |(wrong, given), (sequence, look)| {
+        (wrong + u32::from(look.name != sequence.object), given + 1)
+    });
+    f64::from(wrong) <= 0.5 * rate * f64::from(given)
+}
+
+fn finished(
+    model: &Model<'_>,
+    dataset: &Dataset,
+    settings: &Settings,
+    max_touches: u32,
+    names: &[String],
+    chosen: &Chosen,
+    temperature: f64,
+) -> Result<Calibrated> {
+    let approaches = dataset.holds_approaches();
+    let mean = if approaches { chosen.mean_approaches } else { chosen.mean_touches };
+    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+    let promise = Promise {
+        rate: settings.rate,
+        confidence: settings.confidence,
+        per: settings.per,
+        approaches,
+        sequences: count(chosen.sequences),
+        given: count(chosen.given),
+        wrong: count(chosen.wrong),
+        mean_thousandths: (1e3 * mean).round() as u32,
+        max_touches,
+        noise: settings.noise.promised(),
+    };
+    let by_object = match &chosen.odds {
+        Odds::All(_) => None,
+        Odds::ByObject(odds) => Some((true, odds.iter().flat_map(|&odds| OddsByObject::to_bytes(odds)).collect())),
+    };
+    let stated = Temperature::new(temperature).unwrap_or(Temperature::ONE);
+    let mut sections = vec![
+        (Tag::ThresholdsByObject, by_object),
+        (Tag::Promise, Some((false, promise.write(<[u8]>::to_vec)))),
+        (Tag::Temperature, Some((false, stated.to_bytes().to_vec()))),
+    ];
+    if let (None, Some(probe)) = (model.probe(), StatedProbe::of(dataset)) {
+        sections.push((Tag::Probe, Some((false, probe.trained().to_bytes().to_vec()))));
+    }
+    let restated = Restated {
+        odds: Some(chosen.odds.strictest()),
+        max_touches: Some(max_touches),
+        sections,
+        ..Restated::default()
+    };
+    let share = |tally: &Tally| tally.wrong as f64 / tally.all.max(1) as f64;
+    let is_each = settings.per != Per::Average;
+    let errors = names.iter().cloned().zip(chosen.tallies.iter().map(share)).filter(|_| is_each).collect();
+    let margin = |(object, name): (usize, &String)| (name.clone(), margin_of(chosen.odds.of(object)));
+    Ok(Calibrated {
+        model: restate(model, &restated)?,
+        promise,
+        promised: settings.rate,
+        per: settings.per.name(),
+        confidence: settings.confidence,
+        counted: if approaches { "approaches" } else { "touches" },
+        sequences: chosen.sequences,
+        error: chosen.wrong as f64 / chosen.given.max(1) as f64,
+        undecided: 1.0 - chosen.given as f64 / chosen.sequences.max(1) as f64,
+        mean_touches: chosen.mean_touches,
+        mean_approaches: approaches.then_some(chosen.mean_approaches),
+        uncalibrated_margin: ((1.0 - settings.rate) / settings.rate).ln(),
+        margins: names.iter().enumerate().map(margin).collect(),
+        errors,
+        temperature: stated.value(),
+    })
+}

@@ -1,0 +1,156 @@
+//! Whole sequences, and what each comes to under any threshold.
+
+use palpate_onboard::Recognizer;
+
+/// Thresholds: what the weights of all other objects may come to, the leader's being 1, for its name to be given; in Q56.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Odds {
+    /// The same for all objects.
+    All(u64),
+    /// One for each object, in the model's order.
+    ByObject(Vec<u64>),
+}
+
+impl Odds {
+    /// The threshold of an object; 0, which hardly ever is passed, beyond those that there are.
+    pub fn of(&self, object: usize) -> u64 {
+        match self {
+            Self::All(odds) => *odds,
+            Self::ByObject(odds) => odds.get(object).copied().unwrap_or(0),
+        }
+    }
+
+    /// The strictest threshold.
+    pub fn strictest(&self) -> u64 {
+        match self {
+            Self::All(odds) => *odds,
+            Self::ByObject(odds) => odds.iter().copied().min().unwrap_or(0),
+        }
+    }
+}
+
+/// The odds (Q56) of a margin in nats: of how much more evidence the leader has than all others together (S1 − logsumexp
+/// of the others). 0 for margins beyond 38 nats, at most 2^56 − 1.
+pub fn odds_of(margin: f64) -> u64 {
+    (((-margin).exp() * ONE) as u64).min((1 << 56) - 1)
+}
+
+/// The margin in nats that odds (Q56) stand for.
+pub fn margin_of(odds: u64) -> f64 {
+    (ONE / odds as f64).ln()
+}
+
+/// 2^56.
+const ONE: f64 = 72_057_594_037_927_936.0;
+
+/// A moment of a sequence at which an object led by more than ever before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// The object with the most evidence.
+    pub name: usize,
+    /// What the weights of the others came to, in Q56: the recognizer's own integers.
+    pub odds: u64,
+    /// Touches so far that are evidence.
+    pub touches: u32,
+    /// Approaches so far.
+    pub approaches: u32,
+}
+
+/// A sequence of touches of one object, followed until even the strictest threshold was passed or the touches ran out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sequence {
+    /// The object that was touched: its index in the model.
+    pub object: usize,
+    /// Touches at its end that are evidence.
+    pub touches: u32,
+    /// Approaches at its end.
+    pub approaches: u32,
+    looks: Vec<Look>,
+}
+
+impl Sequence {
+    /// A sequence of touches of an object, by its index in the model, without any touch yet.
+    pub fn new(object: usize) -> Self {
+        Self { object, touches: 0, approaches: 0, looks: Vec::new() }
+    }
+
+    /// Takes in what a recognizer knows after the approach with this number. `may_name` is false where a verdict would be
+    /// held back, such as by a test for unknown objects: then no threshold gives a name here. The recognizer must not stop
+    /// by itself. The answer is what the weights of the others come to, as [`Look::odds`].
+    pub fn push<const N: usize>(&mut self, recognizer: &Recognizer<'_, N>, approaches: u32, may_name: bool) -> u64 {
+        let odds = recognizer.rivals();
+        let look = Look { name: recognizer.best(), odds, touches: recognizer.touches(), approaches };
+        self.look(look, may_name);
+        odds
+    }
+
+    /// The same with what is known given.
+    pub fn look(&mut self, look: Look, may_name: bool) {
+        (self.touches, self.approaches) = (look.touches, look.approaches);
+        let own = self.looks.iter().rev().find(|earlier| earlier.name == look.name);
+        if may_name && own.is_none_or(|own| look.odds < own.odds) {
+            self.looks.push(look);
+        }
+    }
+
+    /// Takes in that the sequence ended after this approach, whose touch was no evidence.
+    pub fn end(&mut self, approaches: u32) {
+        self.approaches = self.approaches.max(approaches);
+    }
+
+    /// The first moment at which a threshold is passed, as a recognizer with these thresholds would stop.
+    pub fn given(&self, odds: &Odds) -> Option<&Look> {
+        self.looks.iter().find(|look| look.odds <= odds.of(look.name))
+    }
+
+    /// The moments at which an object led by more than it ever had before.
+    pub fn looks(&self) -> &[Look] {
+        &self.looks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn look(name: usize, odds: u64, touches: u32) -> Look {
+        Look { name, odds, touches, approaches: 2 * touches }
+    }
+
+    #[test]
+    fn margins_and_odds_are_each_others_inverse() {
+        for margin in [0.1, 1.0, 4.595, 12.0, 30.0] {
+            assert!((margin_of(odds_of(margin)) - margin).abs() < 1e-3, "{margin}");
+        }
+        assert_eq!((odds_of(50.0), odds_of(-1.0), odds_of(0.0)), (0, (1 << 56) - 1, (1 << 56) - 1));
+    }
+
+    #[test]
+    fn a_sequence_stops_at_the_first_look_that_passes_the_threshold_of_its_name() {
+        let mut sequence = Sequence::new(1);
+        for step in [(0, 90, 1), (0, 70, 2), (1, 80, 3), (0, 75, 4), (1, 60, 5), (1, 20, 6)] {
+            sequence.look(look(step.0, step.1, step.2), true);
+        }
+        let given = |odds| sequence.given(&odds).map(|look| (look.name, look.touches));
+        assert_eq!(given(Odds::All(90)), Some((0, 1)));
+        assert_eq!(given(Odds::All(70)), Some((0, 2)));
+        assert_eq!(given(Odds::All(69)), Some((1, 5)));
+        assert_eq!(given(Odds::All(19)), None);
+        assert_eq!(given(Odds::ByObject(vec![10, 80])), Some((1, 3)));
+        assert_eq!(given(Odds::ByObject(vec![10])), None);
+        // 75 was no record of its name.
+        assert_eq!(sequence.looks().len(), 5);
+        assert_eq!((sequence.touches, sequence.approaches), (6, 12));
+        sequence.end(15);
+        assert_eq!((sequence.touches, sequence.approaches), (6, 15));
+    }
+
+    #[test]
+    fn a_verdict_that_is_held_back_is_given_at_the_next_moment_at_which_it_may_be() {
+        let mut sequence = Sequence::new(0);
+        sequence.look(look(0, 10, 1), false);
+        sequence.look(look(0, 50, 2), true);
+        assert_eq!(sequence.given(&Odds::All(60)).map(|look| look.touches), Some(2));
+        assert_eq!(sequence.given(&Odds::All(10)), None);
+    }
+}

@@ -1,0 +1,68 @@
+//! One temperature, so that the posterior that is shown is one to believe (Guo and others, 2017, arXiv 1706.04599).
+
+use crate::touches::{Dataset, ObjectTouches};
+use palpate_onboard::Model;
+use rayon::prelude::*;
+
+/// The most touches of each object that the temperature is fitted on.
+const MOST: usize = 10_000;
+/// Halvings of the range of the logarithm of the temperature, from 1/16 to 16.
+const HALVINGS: usize = 24;
+
+/// What margins have to be divided by for the posteriors of single touches to explain their objects best: the least mean
+/// negative log-likelihood, each object weighted equally. `known` are the indices of the data set's objects in the model.
+/// 1 if no touch is evidence.
+pub(super) fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
+    let rows = |(touched, &object): (&ObjectTouches, &usize)| {
+        let evidence = touched.touches.iter().filter(|touch| model.accepts(touch).is_ok());
+        let row = |touch| {
+            let mut margins = vec![0; model.object_count()];
+            model.margins(touch, &mut margins);
+            let own = margins.get(object).copied().unwrap_or(0);
+            // Ahead of the right object, in nats.
+            margins.iter().map(|margin| f64::from(margin - own) * f64::from(model.unit())).collect::<Vec<_>>()
+        };
+        evidence.take(MOST).map(row).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<Vec<f64>>> = dataset.objects.par_iter().zip(known).map(rows).collect();
+    if rows.iter().all(Vec::is_empty) {
+        return 1.0;
+    }
+    // The likelihood is concave in one over the temperature; its slope is the right object's margin less the mean one.
+    let slope = |sharpness: f64| -> f64 {
+        let of_object = |rows: &Vec<Vec<f64>>| {
+            let sum: f64 = rows.iter().map(|row| -mean_ahead(row, sharpness)).sum();
+            sum / rows.len().max(1) as f64
+        };
+        rows.par_iter().map(of_object).collect::<Vec<_>>().iter().sum()
+    };
+    let (mut low, mut high) = (-16_f64.ln(), 16_f64.ln());
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if slope(middle.exp()) > 0.0 { low = middle } else { high = middle }
+    }
+    (-0.5 * (low + high)).exp()
+}
+
+/// The mean of the margins ahead of the right object under the posterior.
+fn mean_ahead(ahead: &[f64], sharpness: f64) -> f64 {
+    let most = ahead.iter().copied().fold(0.0, f64::max);
+    let (weights, sum) = ahead.iter().fold((0.0, 0.0), |(weights, sum), &ahead| {
+        let weight = (sharpness * (ahead - most)).exp();
+        (weights + weight, sum + weight * ahead)
+    });
+    sum / weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_margin_is_that_of_a_softmax() {
+        // Posteriors 1/2, 1/4, 1/4 at a sharpness of 1.
+        let ahead = [0.0, -(2_f64.ln()), -(2_f64.ln())];
+        assert!((mean_ahead(&ahead, 1.0) + 0.5 * 2_f64.ln()).abs() < 1e-12);
+        assert!(mean_ahead(&[0.0, 700.0, 800.0], 16.0).is_finite());
+    }
+}

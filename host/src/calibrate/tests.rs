@@ -1,0 +1,336 @@
+use super::*;
+use crate::compile::{self, CompiledModel, compile};
+use crate::ensemble::train;
+use crate::error::{CalibrateProblem, Problem};
+use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::random::{Purpose, generator};
+use crate::touches::noise::Noise;
+use crate::touches::{Dataset, synthetic};
+use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use rand::RngExt;
+use std::collections::BTreeSet;
+
+const OBJECTS: usize = 3;
+
+fn model() -> CompiledModel {
+    let settings = train::Settings { rounds: 20, depth: 4, eta: 0.3, ..train::Settings::compact() };
+    let ensemble = train::train(&synthetic::dataset(&[2_000; OBJECTS], 1), &settings, &()).unwrap();
+    CompiledModel::from_bytes(compile(&ensemble, &compile::Settings::default()).unwrap().bytes).unwrap()
+}
+
+fn fresh(count: usize, seed: u64) -> Dataset {
+    synthetic::dataset(&[count; OBJECTS], seed)
+}
+
+fn supplies<'d>(dataset: &'d Dataset, robots: usize) -> Vec<Supply<'d>> {
+    let objects = dataset.objects.iter().enumerate();
+    objects.map(|(object, of)| Supply::new(object, &of.name, &of.touches, robots, 1)).collect()
+}
+
+fn problem<T>(result: crate::Result<T>) -> CalibrateProblem {
+    match result.err().unwrap().problem() {
+        Some(Problem::Calibrate(problem)) => problem.clone(),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Where made-up objects are; the first two are hard to tell apart.
+const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.45, 0.0], [2.0, 0.5], [0.0, 2.0]];
+
+/// Sequences of made-up touches: an object's place with Gaussian noise, and the exact evidence of it.
+fn walks(sequences: usize, seed: u64) -> Vec<Sequence> {
+    let sequence = |index: usize| {
+        let object = index % PLACES.len();
+        let mut random = generator(seed, Purpose::Calibration, "walks", index as u64);
+        let (mut sequence, mut evidence) = (Sequence::new(object), [0.0_f64; PLACES.len()]);
+        for touches in 1..=200 {
+            let at = PLACES[object].map(|place| place + (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
+            for (evidence, place) in evidence.iter_mut().zip(PLACES) {
+                *evidence -= 0.5 * ((at[0] - place[0]).powi(2) + (at[1] - place[1]).powi(2));
+            }
+            let name = (0..4).max_by(|&a, &b| evidence[a].total_cmp(&evidence[b])).unwrap();
+            let others: f64 = (0..4).filter(|&o| o != name).map(|o| (evidence[o] - evidence[name]).exp()).sum();
+            let odds = odds_of(-others.ln());
+            sequence.look(Look { name, odds, touches, approaches: touches }, true);
+            if odds <= odds_of(10.0) {
+                break;
+            }
+        }
+        sequence
+    };
+    (0..sequences).map(sequence).collect()
+}
+
+fn names(objects: usize) -> Vec<String> {
+    (0..objects).map(|object| format!("object{object}")).collect()
+}
+
+fn terms(rate: f64, per: Per) -> Terms {
+    Terms { rate, confidence: 0.95, per }
+}
+
+/// Wrong names of those given on fresh sequences: of all, of each name, of each object.
+fn errors(sequences: &[Sequence], odds: &Odds, objects: usize) -> (f64, Vec<f64>, Vec<f64>) {
+    let given: Vec<(usize, usize)> = sequences.iter().filter_map(|s| Some((s.object, s.given(odds)?.name))).collect();
+    let share = |keep: &dyn Fn(&(usize, usize)) -> bool| {
+        let of: Vec<_> = given.iter().filter(|case| keep(case)).collect();
+        of.iter().filter(|(object, name)| object != name).count() as f64 / of.len() as f64
+    };
+    let each =
+        |keep: &dyn Fn(&(usize, usize), usize) -> bool| (0..objects).map(|o| share(&|case| keep(case, o))).collect();
+    (share(&|_| true), each(&|case, o| case.1 == o), each(&|case, o| case.0 == o))
+}
+
+#[test]
+fn a_promise_is_kept_on_fresh_sequences_and_used_up() {
+    let (sequences, fresh) = (walks(20_000, 1), walks(20_000, 2));
+    for rate in [0.1, 0.05, 0.02, 0.01] {
+        let chosen = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Average)).unwrap();
+        let (error, ..) = errors(&fresh, &chosen.odds, 4);
+        // Calibrated to within its 95 % bound, and a standard error of the fresh ones.
+        let spread = (rate / 20_000.0).sqrt();
+        assert!(error <= rate + 2.0 * spread && error > rate - 5.0 * spread, "{rate}: {error}");
+        // Sooner than the posterior's threshold.
+        let Odds::All(odds) = chosen.odds else { panic!("{chosen:?}") };
+        assert!(margin_of(odds) < ((1.0 - rate) / rate).ln(), "{rate}: {}", margin_of(odds));
+        assert!(chosen.wrong as u64 == chosen.tallies[0].wrong && chosen.given > 19_800);
+    }
+}
+
+#[test]
+fn a_promise_per_name_or_object_is_kept_for_each_of_them() {
+    let (sequences, fresh) = (walks(40_000, 1), walks(40_000, 2));
+    let rate = 0.02;
+    let spread = (rate / 10_000.0_f64).sqrt();
+    let average = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Average)).unwrap();
+    let (_, by_name, by_object) = errors(&fresh, &average.odds, 4);
+    assert!(
+        by_name[0] > rate + spread && by_object[1] > rate + spread,
+        "an average says nothing of each: {by_name:?} {by_object:?}"
+    );
+    let name = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Name)).unwrap();
+    let (_, by_name, _) = errors(&fresh, &name.odds, 4);
+    assert!(by_name.iter().all(|error| *error <= rate + 2.0 * spread), "{by_name:?}");
+    assert!(by_name.iter().all(|error| *error > rate / 3.0), "{by_name:?} is not used up");
+    let object = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Object)).unwrap();
+    let (_, _, by_object) = errors(&fresh, &object.odds, 4);
+    assert!(by_object.iter().all(|error| *error <= rate + 2.0 * spread), "{by_object:?}");
+    assert!(object.mean_touches > average.mean_touches, "each object costs more than their average");
+    assert_eq!((name.tallies.len(), object.tallies.len(), name.sequences), (4, 4, 20_000));
+}
+
+#[test]
+fn too_few_sequences_promise_nothing_and_say_how_many_it_takes() {
+    let sequences = walks(400, 1);
+    assert!(choose(&sequences, &names(4), 10.0, &terms(0.05, Per::Average)).is_ok());
+    let few = problem(choose(&sequences, &names(4), 10.0, &terms(0.001, Per::Average)));
+    assert!(matches!(few, CalibrateProblem::TooFew { object: None, needed: 2_995, found: 399..=400, .. }), "{few:?}");
+    let few = problem(choose(&sequences, &names(4), 10.0, &terms(0.02, Per::Object)));
+    assert!(matches!(few, CalibrateProblem::TooFew { object: Some(_), needed: 149, found: 100, .. }), "{few:?}");
+    assert!(matches!(
+        problem(choose(&[], &names(4), 10.0, &terms(0.1, Per::Average))),
+        CalibrateProblem::TooFew { found: 0, .. }
+    ));
+}
+
+#[test]
+fn a_model_that_is_wrong_however_sure_it_is_keeps_no_promise() {
+    let mut sequences = walks(2_000, 1);
+    // Every twentieth is of another object than it seems.
+    sequences.iter_mut().step_by(20).for_each(|sequence| sequence.object = (sequence.object + 1) % 4);
+    let problem = problem(choose(&sequences, &names(4), 10.0, &terms(0.01, Per::Average)));
+    assert!(matches!(problem, CalibrateProblem::NotKept { wrong: 90..=110, given: 1_800..=2_000, .. }), "{problem:?}");
+}
+
+#[test]
+fn sequences_are_whole_and_use_no_touch_twice() {
+    let (compiled, dataset) = (model(), fresh(3_000, 2));
+    let until = Until { margin: 6.0, max_touches: 50 };
+    let seen = std::sync::Mutex::new(Vec::new());
+    let gate = || {
+        |moment: &Moment<'_>| {
+            seen.lock().unwrap().push(std::ptr::from_ref(moment.touch).addr());
+            true
+        }
+    };
+    let sequences = follow(&compiled.model(), &mut supplies(&dataset, 1), &[90; 3], until, gate, &()).unwrap();
+    let seen = seen.into_inner().unwrap();
+    assert_eq!(seen.iter().collect::<BTreeSet<_>>().len(), seen.len());
+    assert_eq!(sequences.len(), 270);
+    for sequence in &sequences {
+        let is_sure = sequence.given(&Odds::All(odds_of(6.0))).is_some();
+        assert!(is_sure || sequence.touches == 50, "{sequence:?}");
+        assert_eq!(sequence.touches, sequence.approaches);
+    }
+    // Fewer touches make fewer sequences, equally many of each object.
+    let few = synthetic::dataset(&[300, 3_000, 3_000], 2);
+    let sequences = follow(&compiled.model(), &mut supplies(&few, 1), &[90; 3], until, || |_: &Moment<'_>| true, &());
+    let sequences = sequences.unwrap();
+    let of = |object| sequences.iter().filter(|sequence| sequence.object == object).count();
+    assert!(of(0) > 3 && of(0) < 90 && of(0) == of(1) && of(0) == of(2), "{}", of(0));
+}
+
+#[test]
+fn every_robot_makes_one_sequence() {
+    let (compiled, dataset) = (model(), fresh(1_000, 2));
+    let until = Until { margin: 6.0, max_touches: 50 };
+    let robots = std::sync::Mutex::new(BTreeSet::new());
+    let starts: Vec<usize> = dataset.objects.iter().map(|object| object.touches.as_ptr().addr()).collect();
+    let size = size_of::<palpate_shared::Touch>();
+    let gate = || {
+        let mut own = None;
+        let robots = &robots;
+        let starts = &starts;
+        move |moment: &Moment<'_>| {
+            let at = std::ptr::from_ref(moment.touch).addr();
+            let object = (0..OBJECTS).rfind(|&object| starts[object] <= at && at < starts[object] + 1_000 * size);
+            let touch = (at - starts[object.unwrap()]) / size;
+            let robot = *own.get_or_insert(touch % 20);
+            assert_eq!(touch % 20, robot);
+            robots.lock().unwrap().insert((object, robot));
+            true
+        }
+    };
+    let sequences = follow(&compiled.model(), &mut supplies(&dataset, 20), &[90; 3], until, gate, &()).unwrap();
+    assert_eq!(sequences.len(), 3 * 20);
+    assert_eq!(robots.into_inner().unwrap().len(), 3 * 20);
+}
+
+#[test]
+fn sequences_stop_where_the_recognizer_stops() {
+    let (compiled, dataset) = (model(), fresh(3_000, 2));
+    let model = compiled.model();
+    let until = Until { margin: 8.0, max_touches: 60 };
+    let gate = || |_: &Moment<'_>| true;
+    let sequences = follow(&model, &mut supplies(&dataset, 1), &[40; 3], until, gate, &()).unwrap();
+    // The same touches in the same order, pushed into a recognizer that stops by itself.
+    let own = [0x1000_0000 << 24, 0x0200_0000 << 24, 0x0400_0000 << 24];
+    for odds in [Odds::All(odds_of(3.0)), Odds::ByObject(own.to_vec())] {
+        let bytes = with_thresholds(&model, &odds);
+        let model = Model::new(&bytes).unwrap();
+        let stopping = match &odds {
+            Odds::All(odds) => Stopping::from_odds(*odds, 60),
+            Odds::ByObject(_) => Stopping::from_model(&model).with_max_touches(60),
+        };
+        for object in 0..OBJECTS {
+            let mut order = replay(&dataset, object);
+            for sequence in sequences.iter().filter(|sequence| sequence.object == object) {
+                let mut recognizer = Recognizer::<OBJECTS>::new(&model, stopping).unwrap();
+                let own: Vec<_> = order.by_ref().take(sequence.touches as usize).collect();
+                let verdict = own.iter().find_map(|touch| match recognizer.push(touch).unwrap() {
+                    Verdict::Recognized { object, touches } => Some((usize::from(object), touches)),
+                    _ => None,
+                });
+                let given = sequence.given(&odds).map(|look| (look.name, look.touches));
+                assert_eq!(verdict, given, "{odds:?}");
+            }
+        }
+    }
+}
+
+/// The model with these thresholds.
+fn with_thresholds(model: &Model<'_>, odds: &Odds) -> Vec<u8> {
+    use palpate_shared::format::{OddsByObject, Tag};
+    let Odds::ByObject(each) = odds else { return model.bytes().to_vec() };
+    let content = each.iter().flat_map(|&odds| OddsByObject::to_bytes(odds)).collect();
+    let sections = vec![(Tag::ThresholdsByObject, Some((true, content)))];
+    compile::restate(model, &compile::Restated { sections, ..Default::default() }).unwrap()
+}
+
+/// The touches of an object in the order of its supply.
+fn replay(dataset: &Dataset, object: usize) -> impl Iterator<Item = palpate_shared::Touch> {
+    use rand::seq::SliceRandom;
+    let touches = dataset.objects[object].touches.clone();
+    let mut order: Vec<u32> = (0..touches.len() as u32).collect();
+    order.shuffle(&mut generator(1, Purpose::Calibration, &dataset.objects[object].name, 0));
+    order.into_iter().map(move |touch| touches[touch as usize])
+}
+
+#[test]
+fn a_calibrated_model_states_its_promise_and_keeps_it_on_fresh_touches() {
+    let compiled = model();
+    for per in [Per::Average, Per::Name, Per::Object] {
+        let settings = Settings { rate: 0.05, per, sequences: 6_000, max_touches: Some(60), ..Settings::default() };
+        let calibrated = calibrate(&compiled.model(), fresh(60_000, 2), &settings, &()).unwrap();
+        let model = Model::new(&calibrated.model).unwrap();
+        assert_eq!(model.promise(), Some(calibrated.promise));
+        assert_eq!((calibrated.promise.rate, calibrated.promise.per, calibrated.promise.max_touches), (0.05, per, 60));
+        assert_eq!(model.odds_of(0).is_some(), per == Per::Name);
+        assert!((model.temperature().value() - calibrated.temperature).abs() < 1e-12);
+        assert!((0.8..2.0).contains(&calibrated.temperature), "{}", calibrated.temperature);
+        // No margin changes.
+        let touch = fresh(1, 3).objects[0].touches[0];
+        let mut margins = [[0; OBJECTS]; 2];
+        assert!(compiled.model().margins(&touch, &mut margins[0]) && model.margins(&touch, &mut margins[1]));
+        assert_eq!(margins[0], margins[1]);
+        let unseen = fresh(4_000, 4);
+        let margins = Margins::new(Candidate::Compiled(&model), &unseen).unwrap();
+        let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 1 };
+        let sequential = margins.sequential(&settings).unwrap();
+        assert!(sequential.error <= 0.05 + 2.0 * sequential.error_standard_error, "{sequential:?}");
+        assert_eq!((sequential.promised, sequential.per), (Some(0.05), Some(per.name())));
+        let naive = margins.sequential(&SequentialSettings { error_rate: Some(0.05), ..settings }).unwrap();
+        let touches = [sequential.mean_touches, naive.mean_touches];
+        assert!(per != Per::Average || touches[0] < touches[1], "{touches:?}");
+        assert_eq!((naive.promised, naive.per), (None, None));
+    }
+}
+
+#[test]
+fn calibrating_again_replaces_what_an_earlier_calibration_stated() {
+    let compiled = model();
+    let settings = |per, rate| Settings { per, rate, sequences: 3_000, ..Settings::default() };
+    let once = calibrate(&compiled.model(), fresh(30_000, 2), &settings(Per::Name, 0.1), &()).unwrap();
+    let model = CompiledModel::from_bytes(once.model).unwrap();
+    let twice = calibrate(&model.model(), fresh(30_000, 2), &settings(Per::Average, 0.05), &()).unwrap();
+    let direct = calibrate(&compiled.model(), fresh(30_000, 2), &settings(Per::Average, 0.05), &()).unwrap();
+    assert_eq!(twice.model, direct.model);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_model_on_any_number_of_threads() {
+    let compiled = model();
+    let settings = Settings { rate: 0.05, per: Per::Name, sequences: 3_000, ..Settings::default() };
+    let with = |threads, seed| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = Settings { seed, ..settings.clone() };
+        pool.install(|| calibrate(&compiled.model(), fresh(30_000, 2), &settings, &()).unwrap().model)
+    };
+    assert_eq!(with(1, 1), with(3, 1));
+    assert_ne!(with(1, 1), with(1, 2));
+}
+
+#[test]
+fn noise_is_stated_and_a_bias_makes_every_sequence_a_robots() {
+    let compiled = model();
+    let noise = Noise { speed_bias: 0.02, ..Noise::gaussian(1_000.0) };
+    let settings = Settings { rate: 0.2, max_touches: Some(20), noise, ..Settings::default() };
+    let calibrated = calibrate(&compiled.model(), fresh(4_000, 2), &settings, &()).unwrap();
+    assert_eq!(Noise::of_promise(&calibrated.promise.noise), noise);
+    // 190 robots of 20 touches or more that are evidence, less a few for the pilot.
+    assert!((3 * 175..3 * 200).contains(&calibrated.sequences), "{}", calibrated.sequences);
+}
+
+#[test]
+fn what_cannot_be_calibrated_says_so() {
+    let compiled = model();
+    let refused = |settings: Settings| calibrate(&compiled.model(), fresh(100, 2), &settings, &()).unwrap_err();
+    for (settings, expected) in [
+        (Settings { rate: 0.5, ..Settings::default() }, "error_rate is 0.5"),
+        (Settings { rate: f64::NAN, ..Settings::default() }, "error_rate is NaN"),
+        (Settings { confidence: 1.0, ..Settings::default() }, "confidence is 1"),
+        (Settings { sequences: 0, ..Settings::default() }, "sequences is 0"),
+        (Settings { max_touches: Some(0), ..Settings::default() }, "max_touches is 0"),
+        (Settings { noise: Noise::gaussian(-1.0), ..Settings::default() }, "noise is -1"),
+    ] {
+        let error = refused(settings);
+        assert!(error.exit_code() == 2 && error.to_string().contains(expected), "{error}");
+    }
+    let few = refused(Settings::default());
+    assert!(few.exit_code() == 1 && few.to_string().contains("too few to promise 1 %: at least 299"), "{few}");
+    let less = synthetic::dataset(&[100, 100], 2);
+    let missing = problem(calibrate(&compiled.model(), less, &Settings::default(), &()));
+    assert_eq!(missing, CalibrateProblem::Missing { objects: vec!["object2".into()] });
+    let more = synthetic::dataset(&[100; 4], 2);
+    assert!(calibrate(&compiled.model(), more, &Settings::default(), &()).is_err());
+}
