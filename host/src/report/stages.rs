@@ -5,7 +5,7 @@ use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
     approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, published, results,
-    sequential, simulator,
+    sequential, simulator, strangers,
 };
 use crate::capture;
 use crate::compile;
@@ -118,6 +118,7 @@ pub fn report_on(
     let members = stages.stage("cost", || cost::measure(&context, get_large()?))?;
     drop(large);
     let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
+    let unknown = stages.stage("strangers", || strangers::measure(&context))?;
     let engines = stages.stage("simulator", || simulator::measure(&context))?;
     let grown = if settings.growth {
         let growth = stages.stage("growth", || growth::measure(&context))?;
@@ -143,6 +144,7 @@ pub fn report_on(
         limit::section(&context, &limit)?,
         sequential::section(&context, &sequences)?,
         calibration::section(&context, &calibration)?,
+        strangers::section(&context, &unknown)?,
         costs,
     ];
     sections.extend(grown);

@@ -42,8 +42,8 @@ use std::collections::BTreeMap;
 const FIRST: u32 = 5;
 /// How much higher the limits of misfit are at first, in nats, and the touches after which this has halved. Measured to
 /// find out most strangers after 60 and 120 touches.
-const EARLY: f64 = 8.0;
-const HALVED_AFTER: f64 = 28.0;
+const EARLY: f64 = 12.0;
+const HALVED_AFTER: f64 = 21.0;
 /// With [`Held::Certain`] no name is given whose misfit is not this far below the threshold, in nats.
 const DOUBT: f64 = 8.0;
 /// The share of strangers that must have been found out before a name is given, and the most touches to wait for it.
