@@ -69,7 +69,7 @@ mod model;
 pub mod station;
 
 pub use bytes::{Aligned, ModelError};
-pub use decide::{CapacityError, Fit, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
+pub use decide::{CapacityError, Fit, NothingExpected, Posterior, Recognizer, Stopping, Verdict, exp2_negative};
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use model::{Model, Refused};

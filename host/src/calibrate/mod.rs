@@ -29,6 +29,7 @@
 
 mod choose;
 mod draw;
+mod fresh;
 mod model;
 mod sequence;
 mod temperature;
@@ -38,7 +39,17 @@ mod walk;
 
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow};
-pub use model::{Calibrated, Settings, calibrate, calibrate_with};
+pub use fresh::calibrate_fresh;
+pub use model::{Calibrated, Settings, added_bytes, calibrate, calibrate_with};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
+/// What the promised rate is of, in words.
+pub fn of_what(per: Per) -> &'static str {
+    match per {
+        Per::Average => "all names given, on average,",
+        Per::Name => "each name, when it is given,",
+        Per::Object => "the names given to each object",
+    }
+}
+
 pub use walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};

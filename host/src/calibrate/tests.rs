@@ -24,7 +24,7 @@ fn fresh(count: usize, seed: u64) -> Dataset {
 
 fn supplies<'d>(dataset: &'d Dataset, robots: usize) -> Vec<Supply<'d>> {
     let objects = dataset.objects.iter().enumerate();
-    objects.map(|(object, of)| Supply::new(object, &of.name, &of.touches, robots, 1)).collect()
+    objects.map(|(object, of)| Supply::new(object, &of.name, &of.touches, 1, robots, 1)).collect()
 }
 
 fn problem<T>(result: crate::Result<T>) -> CalibrateProblem {
@@ -194,6 +194,25 @@ fn every_robot_makes_one_sequence() {
     let sequences = follow(&compiled.model(), &mut supplies(&dataset, 20), &[90; 3], until, gate, &()).unwrap();
     assert_eq!(sequences.len(), 3 * 20);
     assert_eq!(robots.into_inner().unwrap().len(), 3 * 20);
+}
+
+#[test]
+fn every_sequence_is_of_one_instance() {
+    let (compiled, dataset) = (model(), fresh(1_000, 2));
+    let touches = &dataset.objects[0].touches;
+    let start = touches.as_ptr().addr();
+    let gate = || {
+        let mut own = None;
+        move |moment: &Moment<'_>| {
+            let touch = (std::ptr::from_ref(moment.touch).addr() - start) / size_of::<palpate_shared::Touch>();
+            assert_eq!(*own.get_or_insert(touch % 3), touch % 3);
+            true
+        }
+    };
+    let until = Until { margin: 6.0, max_touches: 50 };
+    let mut supply = [Supply::new(0, "object0", touches, 3, 1, 1)];
+    let sequences = follow(&compiled.model(), &mut supply, &[30], until, gate, &()).unwrap();
+    assert_eq!(sequences.len(), 30);
 }
 
 #[test]

@@ -1,9 +1,13 @@
+use super::expected::{self, ExpectedArguments};
 use super::noise::NoiseArguments;
 use super::numbers::share;
+use super::percent;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::evaluate::model_file::ModelFile;
-use crate::evaluate::{self, Approaches, Evaluation, LEAST_GROUPS, Margins, Settings, Strangers};
+use crate::evaluate::{
+    self, Approaches, Candidate, Evaluation, LEAST_GROUPS, Margins, PromiseCheck, Settings, Strangers,
+};
 use crate::output;
 use crate::progress::Progress;
 use crate::touches::Dataset;
@@ -24,6 +28,8 @@ With --probe, what the file says under [real] is added to the touches, and the d
 
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
 
+Without --error-rate a compiled model stops by its own thresholds. If it was calibrated, the figures show whether it keeps what it promises; with noise, priors or objects other than those of the calibration the promise is void, and the figures show by how much it is broken.
+
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 
 Examples:
@@ -34,6 +40,8 @@ Examples:
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
   palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --confusion 20
+  palpate evaluate model.palpate unseen --prior fork=0.3,spoon=0.3
+  palpate evaluate model.palpate unseen --only bowl,fork,spoon
   palpate evaluate model.palpate unseen --strangers others
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02")]
@@ -69,6 +77,8 @@ pub(crate) struct Arguments {
     json: bool,
     #[command(flatten)]
     probe: ProbeArguments,
+    #[command(flatten)]
+    expected: ExpectedArguments,
     #[command(flatten)]
     noise: NoiseArguments,
 }
@@ -124,7 +134,14 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     });
     let unknown = unknown.transpose()?;
     let (evaluation, confusion, strangers) = file.with(|candidate| {
-        let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
+        let mut margins = Margins::new(candidate, &dataset)?.of_robots(robots);
+        let own = match candidate {
+            Candidate::Compiled(model) => expected::own_weights(model),
+            Candidate::Full(ensemble) => vec![1.0; ensemble.objects.len()],
+        };
+        if let Some(weights) = arguments.expected.weights(margins.objects(), &own)? {
+            margins = margins.expecting(weights)?;
+        }
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
             at,
@@ -133,6 +150,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             error_rate: arguments.error_rate,
             max_touches: arguments.max_touches,
             seed: arguments.seed,
+            noise,
         };
         let confusion = arguments.confusion.map(|touches| -> Result<_> {
             Ok(Confusion {
@@ -196,6 +214,9 @@ fn text(evaluated: &Evaluated) -> String {
     if let Some(approaches) = &evaluated.evaluation.approaches {
         text += &approaches_table(approaches, &evaluated.evaluation.patterns);
     }
+    if let Some(promise) = &evaluated.evaluation.promise {
+        text += &promise_text(promise);
+    }
     if evaluated.robots > 1 {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
@@ -216,6 +237,48 @@ fn text(evaluated: &Evaluated) -> String {
             text,
             "\nThe model was trained on these touches of {objects}: on others it is right less often. Capture them with \
              another seed."
+        );
+    }
+    text
+}
+
+/// At what recognizers stop.
+fn stops(error_rate: f64, promised: Option<f64>) -> String {
+    match promised {
+        Some(rate) => format!("at a promised error rate of {rate}"),
+        None => format!("at an error rate of {error_rate}"),
+    }
+}
+
+/// What was promised, what was measured, and what makes the promise void.
+fn promise_text(check: &PromiseCheck) -> String {
+    let of = match (check.per, &check.of) {
+        ("name", Some(name)) => format!(" of {name}, the name that is wrong most often,"),
+        ("object", Some(name)) => format!(" of the names given to {name}, the object that is mistaken most often,"),
+        _ => " of the names given".to_owned(),
+    };
+    let mut text = format!(
+        "\nPromised: at most {} % wrong ({}, {} % sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}.\n",
+        percent(check.promised),
+        match check.per {
+            "name" => "each name, when it is given",
+            "object" => "each object",
+            _ => "on average",
+        },
+        percent(check.confidence),
+        check.sequences,
+        100.0 * check.error,
+        100.0 * check.standard_error,
+    );
+    if !check.void.is_empty() {
+        let (by, side) = (100.0 * check.exceeded_by.abs(), if check.exceeded_by > 0.0 { "above" } else { "below" });
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "The promise is void: {}. The error rate is {by:.2} points {side} the promised one. By theory it is at most \
+             {:.1} % with any priors, if posteriors can be believed.",
+            check.void.join("; "),
+            100.0 * check.by_theory
         );
     }
     text
@@ -264,9 +327,9 @@ fn table(evaluation: &Evaluation) -> String {
     );
     _ = write!(
         text,
-        "\nStopping at an error rate of {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
+        "\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
          {}.\n{} groups per object of {} touches in all; ± is a standard error.\n",
-        sequential.error_rate,
+        stops(sequential.error_rate, sequential.promised),
         sequential.mean_touches,
         100.0 * sequential.error,
         100.0 * sequential.error_standard_error,
@@ -308,9 +371,9 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
     let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {}", percent(*share)));
     _ = writeln!(
         text,
-        "\nStopping at an error rate of {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
+        "\nStopping {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
          wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.",
-        sequential.error_rate,
+        stops(sequential.error_rate, sequential.promised),
         sequential.mean_approaches,
         sequential.mean_approaches_standard_error,
         sequential.mean_touches,

@@ -1,3 +1,4 @@
+use super::expected::PriorArguments;
 use super::numbers::share;
 use crate::Result;
 use crate::compile::{self, Instructions, Layout, Leaf, Settings};
@@ -18,7 +19,8 @@ Instructions per touch are estimated, right to 15 %. `palpate inspect MODEL --ch
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
-  palpate export ensemble.json -o strict.palpate --error-rate 0.1%")]
+  palpate export ensemble.json -o strict.palpate --error-rate 0.1%
+  palpate export ensemble.json -o kitchen.palpate --prior fork=0.3,spoon=0.3")]
 pub(crate) struct Arguments {
     /// Ensemble that `palpate train` saved
     ensemble: PathBuf,
@@ -40,6 +42,8 @@ pub(crate) struct Arguments {
     /// Print what was exported as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    prior: PriorArguments,
 }
 
 #[derive(Clone)]
@@ -65,6 +69,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         layout: arguments.layout.0,
         error_rate: arguments.error_rate,
         max_touches: arguments.max_touches,
+        priors: arguments.prior.of(&ensemble.objects)?,
         ..Settings::default()
     };
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {

@@ -44,7 +44,12 @@ pub(crate) struct Found {
 }
 
 impl StrangersArguments {
-    /// The model with the test that is wanted, and what was found; with nothing wanted, the model without one.
+    /// Whether a test is wanted.
+    pub(crate) fn is_wanted(&self) -> bool {
+        matches!(self.strangers, Some(Wanted(Some(_))))
+    }
+
+    /// The model with the test that is wanted, and what was found; with nothing wanted, the model as it is.
     ///
     /// # Errors
     /// As [`strangers::calibrate`].
@@ -56,7 +61,7 @@ impl StrangersArguments {
         noise: &Noise,
     ) -> Result<(Vec<u8>, Option<Found>)> {
         let model = compile::open(bytes)?;
-        let Some(Wanted(Some(held))) = self.strangers else { return Ok((strangers::without(&model)?, None)) };
+        let Some(Wanted(Some(held))) = self.strangers else { return Ok((bytes.to_vec(), None)) };
         let mut shapes = self.shapes(dataset)?;
         let mut noisy = dataset.clone();
         if !noise.is_none() {

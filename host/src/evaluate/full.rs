@@ -1,15 +1,15 @@
 //! The full model's recognizer.
 
 use super::margins::{best, rivals};
-use palpate_onboard::{Stopping, Verdict};
+use palpate_onboard::{Model, Stopping, Verdict};
 
 /// Recognizes with a full model: f32 margins, evidence in f64, and the stopping rule of the chip's recognizer.
 #[derive(Clone, Debug)]
 pub(super) struct FullRecognizer {
     evidence: Vec<f64>,
     stopping: Stopping,
-    /// What the other objects' weights may come to, the best one's being 1.
-    odds: f64,
+    /// For each object, what the other objects' weights may come to, its own being 1.
+    odds: Vec<f64>,
     /// How many objects can be named.
     known: usize,
     touches: u32,
@@ -17,10 +17,11 @@ pub(super) struct FullRecognizer {
 }
 
 impl FullRecognizer {
-    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats.
-    /// The first `known` objects can be named.
-    pub(super) fn new(prior: Vec<f64>, known: usize, stopping: Stopping) -> Self {
-        let odds = stopping.error_rate() / (1.0 - stopping.error_rate());
+    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats, of which the first
+    /// `known` can be named. Objects have thresholds of their own if the model that it is compared with has them.
+    pub(super) fn new(prior: Vec<f64>, known: usize, stopping: Stopping, compiled: Option<&Model<'_>>) -> Self {
+        let odds = |object| compiled.map_or(stopping.odds(), |model| stopping.odds_of(object, model));
+        let odds = (0..prior.len()).map(|object| odds(object) as f64 / 72_057_594_037_927_936.0).collect();
         Self { evidence: prior, stopping, odds, known, touches: 0, verdict: Verdict::Undecided }
     }
 
@@ -32,7 +33,7 @@ impl FullRecognizer {
         self.evidence.iter_mut().zip(margins).for_each(|(evidence, &margin)| *evidence += f64::from(margin));
         self.touches += 1;
         let best = best(&self.evidence[..self.known]);
-        if rivals(&self.evidence, best, 1.0) <= self.odds {
+        if rivals(&self.evidence, best, 1.0) <= self.odds[best] {
             // There are at most 256 objects.
             self.verdict = Verdict::Recognized { object: best as u8, touches: self.touches };
         } else if self.touches >= self.stopping.max_touches() {

@@ -42,6 +42,7 @@ mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
+mod promise;
 mod sequential;
 mod strangers;
 #[cfg(all(test, feature = "train"))]
@@ -54,10 +55,14 @@ pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
+pub use promise::{PromiseCheck, by_theory};
+#[cfg(feature = "cli")]
+pub(crate) use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};
 
 use crate::error::{Error, Result};
+use crate::touches::noise::Noise;
 use palpate_shared::ContactPattern;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -87,12 +92,15 @@ pub struct Settings {
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,
+    /// What was added to the touches: what a model promises is void with other noise.
+    pub noise: Noise,
 }
 
 impl Default for Settings {
     fn default() -> Self {
         let (at, at_approaches) = (vec![5, 10, 20, 30, 60], vec![10, 20, 60]);
-        Self { at, at_approaches, groups: 1000, error_rate: None, max_touches: None, seed: 1 }
+        let noise = Noise::default();
+        Self { at, at_approaches, groups: 1000, error_rate: None, max_touches: None, seed: 1, noise }
     }
 }
 
@@ -126,6 +134,9 @@ pub struct Evaluation {
     /// approach and change nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub approaches: Option<Approaches>,
+    /// Whether the model keeps what it promises: counted in approaches where the data set holds those.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub promise: Option<PromiseCheck>,
     /// Share of each contact pattern among the touches of the data set, each object weighted equally.
     pub patterns: BTreeMap<&'static str, f64>,
 }
@@ -144,6 +155,12 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     let stopping = settings.sequential();
     let sequential = margins.sequential(&stopping)?;
     let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
+    let approaches = approaches.transpose()?;
+    let outcomes = approaches.as_ref().map_or(&sequential.outcomes, |approaches| &approaches.sequential.outcomes);
+    let promise = match settings.error_rate {
+        None => margins.check_promise(outcomes, sequential.max_touches, &settings.noise),
+        Some(_) => None,
+    };
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));
     let per_object = |(position, name): (usize, &String)| {
         let accuracy = |&touches: &usize| (touches, curve.object_accuracy(position, touches).value);
@@ -157,7 +174,8 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
         accuracy_standard_error: settings.at.iter().map(accuracy).map(|(at, e)| (at, e.standard_error)).collect(),
         per_object: margins.tested_names().iter().enumerate().map(per_object).collect(),
         sequential,
-        approaches: approaches.transpose()?,
+        approaches,
+        promise,
         patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
     })
 }

@@ -161,7 +161,7 @@ pub(super) fn section(context: &Context, measured: &Measured) -> Result<Section>
 const COLUMNS: [&str; 2] = ["fit", "fit and background"];
 
 fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
-    let mut chart = Chart::new("touches", Axis::linear(0.0, MOST as f64), "found out", Axis::share()).sized(660, 420);
+    let mut chart = Chart::new("touches", Axis::linear(0.0, MOST as f64, 6), "found out", Axis::share()).sized(660, 420);
     let mut data = Records::new(["test", "names", "touches", "found out"]);
     let styles = [
         [("fit, likely", color::PAPER, Shape::Ring), ("fit, certain", color::PURPLE, Shape::Triangle)],

@@ -1,6 +1,7 @@
 //! Margins to a verdict: evidence, its exponential, when to stop, what fits no object, and the state as bytes.
 
 mod evidence;
+mod expected;
 mod exponential;
 mod recognizer;
 #[cfg(feature = "link")]
@@ -9,6 +10,7 @@ mod stopping;
 mod strangers;
 
 pub use evidence::Posterior;
+pub use expected::NothingExpected;
 pub use exponential::exp2_negative;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;

@@ -49,6 +49,9 @@ pub(crate) fn fit(model: &Model<'_>, evidence: &[i64], leader: usize, touches: u
     }
 }
 
+/// Evidence below this is that for an object of weight 0, whatever was touched.
+const IMPOSSIBLE: i64 = i64::MIN / 2;
+
 impl Model<'_> {
     /// How badly evidence for each object, priors included, of so many touches fits the object with the most, in 2^-16
     /// nats: what the model's test compares with its limits. `None` without a test.
@@ -69,15 +72,17 @@ fn misfit(
     touches: u32,
 ) -> Option<i64> {
     let object = test.object(leader)?;
-    let own = |object: usize| {
-        evidence.get(object).copied().unwrap_or(0).saturating_sub(i64::from(model.prior(object)))
-    };
+    // Of an object that cannot be there nothing is known: as if it had its mean.
+    let sum = |object: usize| evidence.get(object).copied().filter(|&sum| sum > IMPOSSIBLE);
+    let own = |object: usize| sum(object).map(|sum| sum.saturating_sub(i64::from(model.prior(object))));
     let mut ahead = [0_i32; FitTest::MOST_RIVALS];
     for ((ahead, &rival), index) in ahead.iter_mut().zip(object.rivals).zip(0..) {
         let mean = i64::from(object.mean(index)) << (object.mean_shift & 63).min(ObjectFit::MOST_SHIFT);
         // 2^15 · 2^40 does not overflow; times the number of touches it may, and saturates.
         let expected = mean.saturating_mul(touches.into());
-        *ahead = held(own(rival.into()).saturating_sub(own(leader)).saturating_sub(expected));
+        if let (Some(rival), Some(leader)) = (own(rival.into()), own(leader)) {
+            *ahead = held(rival.saturating_sub(leader).saturating_sub(expected));
+        }
     }
     let ahead = ahead.get(..object.rivals.len()).unwrap_or_default();
     let (mut squares, mut slope) = (0_u64, 0_i64);
