@@ -11,6 +11,7 @@ mod models;
 mod objects;
 mod probe;
 mod reports;
+mod strangers;
 mod support;
 mod view;
 
