@@ -127,7 +127,9 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
     let max_touches = settings.max_touches.unwrap_or(own);
     compile::stopping(settings.rate, max_touches)?;
     let (_, known) = Candidate::Compiled(model).of(&dataset)?;
-    let names = compile::names(model);
+    let mut names = compile::names(model);
+    // A background is not touched, and never named.
+    names.truncate(model.known_count());
     if names.len() < 2 {
         return Err(CalibrateProblem::OneObject.into());
     }

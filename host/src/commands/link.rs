@@ -206,7 +206,8 @@ impl<'c> Printer<'c> {
                 let posterior = probability(verdict.detail.map_or(0, |detail| detail.posterior()));
                 let said = match verdict.decision {
                     Decision::Recognized(object) => format!("recognized {}", self.name(object)),
-                    Decision::Unknown => "unknown".into(),
+                    Decision::Unknown => "unknown, fits no object".into(),
+                    Decision::GaveUp => format!("gave up, most likely {}", self.name(verdict.best)),
                     _ => format!("most likely {}", self.name(verdict.best)),
                 };
                 let truth = self.object.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
