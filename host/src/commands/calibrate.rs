@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. 100,000 sequences at an error rate of 1 % take some 50 touches each; with fewer touches there are fewer sequences, which leaves more of the error rate unused. No touch is used twice.
 
-A name that is given and wrong is an error. A sequence that ends at the limit of touches without a name is undecided: neither right nor wrong. With --per average the rate is that of all names given, with objects touched equally often (or as often as the model's priors say); with name that of each name, when it is given, for which each name gets a threshold of its own; with object that of the names given to each object, which needs more touches.
+A name that is given and wrong is an error. A sequence that ends at the limit of touches without a name is undecided: neither right nor wrong. With --per average the rate is that of all names given, with objects touched equally often (or as often as the model's priors say); with name that of each name, when it is given, for which each name gets a threshold of its own, and each rate is kept with the stated probability; with object that of the names given to each object, which needs more touches.
 
 The thresholds are found by Learn-then-Test: from strict to loose, up to the last at which so few errors have a probability of at most 5 % (--confidence) if the rate were higher than promised. The model then states what it promises, and a temperature that makes its posteriors ones to believe.
 

@@ -18,6 +18,7 @@ mod instructions;
 mod limit;
 mod noise;
 mod objects;
+mod promises;
 mod published;
 pub(crate) mod results;
 pub(crate) mod run_page;

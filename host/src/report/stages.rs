@@ -4,8 +4,8 @@ use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
-    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, published, results,
-    sequential, simulator, strangers,
+    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, promises,
+    published, results, sequential, simulator, strangers,
 };
 use crate::capture;
 use crate::compile;
@@ -115,6 +115,7 @@ pub fn report_on(
     let limit = stages.stage("limit", || limit::measure(&context, get_large()?))?;
     let sequences = stages.stage("sequential", || sequential::measure(&context, get_large()?))?;
     let calibration = stages.stage("calibration", || calibration::measure(&context, get_large()?))?;
+    let promised = stages.stage("promises", || promises::measure(&context, get_large()?))?;
     let members = stages.stage("cost", || cost::measure(&context, get_large()?))?;
     drop(large);
     let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
@@ -144,6 +145,7 @@ pub fn report_on(
         limit::section(&context, &limit)?,
         sequential::section(&context, &sequences)?,
         calibration::section(&context, &calibration)?,
+        promises::section(&context, &promised)?,
         strangers::section(&context, &unknown)?,
         costs,
     ];
@@ -266,6 +268,7 @@ mod tests {
             "sequential-trade",
             "sequential-objects",
             "reliability",
+            "promises-kept",
             "cost-bytes",
             "cost-time",
             "cost-work",
@@ -280,7 +283,7 @@ mod tests {
             }
         }
         let figures = html.matches("<figure id=").count();
-        assert_eq!(figures, 20, "a figure is not in the list above");
+        assert_eq!(figures, 21, "a figure is not in the list above");
         let mut ids: Vec<&str> = html.split(" id=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
         let count = ids.len();
         ids.sort_unstable();
