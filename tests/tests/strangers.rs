@@ -55,7 +55,8 @@ fn nothing_overflows_at_any_numbers_and_any_evidence() {
                 let terms = FitTerms { threshold: i32::MAX, doubt: i32::MAX, early: i32::MAX as u32, ..TERMS };
                 let bytes = with(&bytes, section(terms, shift == 1, shift, constant, number)).unwrap();
                 let model = Model::new(&bytes).unwrap();
-                for evidence in [[0; 4], [i64::MAX, i64::MIN, 0, -1], [i64::MIN; 4], [i64::MAX, 1 << 40, -(1 << 31), 7]] {
+                for evidence in [[0; 4], [i64::MAX, i64::MIN, 0, -1], [i64::MIN; 4], [i64::MAX, 1 << 40, -(1 << 31), 7]]
+                {
                     for touches in [0, 1, 2, 1_000, u32::MAX] {
                         assert!(model.misfit(&evidence, touches).is_some());
                     }

@@ -54,7 +54,9 @@ impl Margins<'_> {
         self.check(touches, groups)?;
         let row = |position| {
             let mut row = vec![0; self.objects().len()];
-            self.ends(position, touches, groups, seed, |evidence| self.best(evidence)).into_iter().for_each(|object| row[object] += 1);
+            self.ends(position, touches, groups, seed, |evidence| self.best(evidence))
+                .into_iter()
+                .for_each(|object| row[object] += 1);
             row
         };
         Ok((0..self.tested.len()).map(row).collect())

@@ -178,8 +178,17 @@ impl<'m> Margins<'m> {
         let tested = tested.collect();
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
         let known = candidate.known_count();
-        let margins =
-            Self { candidate, descriptor, objects, known, tested, tested_names, hold_approaches, shares, weights: None };
+        let margins = Self {
+            candidate,
+            descriptor,
+            objects,
+            known,
+            tested,
+            tested_names,
+            hold_approaches,
+            shares,
+            weights: None,
+        };
         margins.of_robots(1)
     }
 

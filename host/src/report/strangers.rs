@@ -92,7 +92,8 @@ fn background(context: &Context, origin: &Origin) -> Result<Dataset> {
     let scenes = capture::scenes(&[&object], origin, context.progress)?;
     let touches = scenes.iter().map(|scenes| capture::touches(scenes, &object.name, origin, 0..touches as u64));
     let touches: Vec<Vec<_>> = touches.collect::<Result<_>>()?;
-    let objects = touches.into_iter().map(|touches| crate::touches::ObjectTouches { name: object.name.clone(), touches });
+    let objects =
+        touches.into_iter().map(|touches| crate::touches::ObjectTouches { name: object.name.clone(), touches });
     Ok(Dataset::new(objects.collect()))
 }
 
@@ -161,7 +162,8 @@ pub(super) fn section(context: &Context, measured: &Measured) -> Result<Section>
 const COLUMNS: [&str; 2] = ["fit", "fit and background"];
 
 fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
-    let mut chart = Chart::new("touches", Axis::linear(0.0, MOST as f64, 6), "found out", Axis::share()).sized(660, 420);
+    let mut chart =
+        Chart::new("touches", Axis::linear(0.0, MOST as f64, 6), "found out", Axis::share()).sized(660, 420);
     let mut data = Records::new(["test", "names", "touches", "found out"]);
     let styles = [
         [("fit, likely", color::PAPER, Shape::Ring), ("fit, certain", color::PURPLE, Shape::Triangle)],
@@ -169,8 +171,11 @@ fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
     ];
     for ((column, test), styles) in columns.iter().zip(COLUMNS).zip(styles) {
         for ((way, (name, _)), (label, color, shape)) in column.ways.iter().zip(WAYS).skip(1).zip(styles) {
-            let points: Vec<(f64, f64)> =
-                (1..).zip(&way.detected).filter(|(at, _)| at % 10 == 0).map(|(at, &share)| (f64::from(at), share)).collect();
+            let points: Vec<(f64, f64)> = (1..)
+                .zip(&way.detected)
+                .filter(|(at, _)| at % 10 == 0)
+                .map(|(at, &share)| (f64::from(at), share))
+                .collect();
             chart.series(label, color, shape, &points);
             for (at, share) in (1_usize..).zip(&way.detected) {
                 data.push([test.into(), name.into(), Cell::count(at), Cell::Percent(*share, 1)]);
@@ -180,7 +185,8 @@ fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
     Ok(Figure {
         id: "strangers-detected".into(),
         title: "Strangers found out, against touches".into(),
-        caption: "The mean over the objects that were left out, with false alarms of at most 2 % of known objects.".into(),
+        caption: "The mean over the objects that were left out, with false alarms of at most 2 % of known objects."
+            .into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
@@ -227,9 +233,10 @@ fn objects_table(context: &Context, with: &Column) -> Table {
     Table {
         id: "strangers-objects".into(),
         title: "Strangers one by one".into(),
-        caption: "With a background, names being held back (certain). Objects that feel alike are hardly found out: by \
+        caption:
+            "With a background, names being held back (certain). Objects that feel alike are hardly found out: by \
                   curvature alone a fork feels like a spoon, and a hammer like a paper clip."
-            .into(),
+                .into(),
         command: context.settings.command.clone(),
         data,
     }

@@ -104,7 +104,8 @@ impl Moments {
             (form[(a, b)] + form[(b, a)]) / 2.0
         });
         let factor = reversed.cholesky()?.l();
-        let weights = DMatrix::from_fn(count, count, |a, b| if b > a { 0.0 } else { factor[(count - 1 - b, count - 1 - a)] });
+        let weights =
+            DMatrix::from_fn(count, count, |a, b| if b > a { 0.0 } else { factor[(count - 1 - b, count - 1 - a)] });
         Some(Fit { rivals, mean: expected, slope, weights, constant })
     }
 
@@ -134,7 +135,8 @@ impl Fit {
     /// How badly evidence of so many touches fits, in nats.
     pub(super) fn misfit(&self, evidence: &[f64], leader: usize, touches: u32) -> f64 {
         let count = f64::from(touches);
-        let against = self.rivals.iter().zip(self.mean.iter()).map(|(&r, mean)| evidence[r] - evidence[leader] - count * mean);
+        let against =
+            self.rivals.iter().zip(self.mean.iter()).map(|(&r, mean)| evidence[r] - evidence[leader] - count * mean);
         let against = DVector::from_iterator(self.rivals.len(), against);
         (&self.weights * &against).norm_squared() / count + self.slope.dot(&against) - count * self.constant
     }
@@ -155,7 +157,8 @@ pub(super) fn left_out(moments: &Moments, rows: &[&[i32]], threshold: f64, unit:
             for (touches, row) in (1..=last).zip(sequence.chunks_exact(objects)) {
                 evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += f64::from(margin) * unit);
                 let known = (0..moments.known).filter(|&object| object != stranger);
-                let Some(leader) = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best })
+                let Some(leader) =
+                    known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best })
                 else {
                     break;
                 };

@@ -14,15 +14,15 @@ pub(super) fn write(fit: &Fit, unit: f64, section: &mut Vec<u8>) {
     let count = fit.rivals.len();
     let means: Vec<f64> = fit.mean.iter().map(|mean| mean / unit).collect();
     let slopes: Vec<f64> = fit.slope.iter().map(|slope| slope * unit * NAT).collect();
-    let weights: Vec<f64> =
-        (0..count).flat_map(|row| (0..=row).map(move |column| (row, column))).map(|at| fit.weights[at] * unit * ROOT).collect();
+    let weights: Vec<f64> = (0..count)
+        .flat_map(|row| (0..=row).map(move |column| (row, column)))
+        .map(|at| fit.weights[at] * unit * ROOT)
+        .collect();
     let largest = |numbers: &[f64]| numbers.iter().fold(0.0_f64, |most, number| most.max(number.abs()));
     let shifts = || 0..=ObjectFit::MOST_SHIFT;
     // Means are multiples of a power of two; the others are stored as precisely as fits 16 bits.
     let mean_shift = shifts().find(|shift| largest(&means) <= MOST * power(*shift)).unwrap_or(ObjectFit::MOST_SHIFT);
-    let precise = |numbers: &[f64]| {
-        shifts().rev().find(|shift| largest(numbers) * power(*shift) <= MOST).unwrap_or(0)
-    };
+    let precise = |numbers: &[f64]| shifts().rev().find(|shift| largest(numbers) * power(*shift) <= MOST).unwrap_or(0);
     let (weight_shift, slope_shift) = (precise(&weights), precise(&slopes));
     // `as` saturates.
     let stored = |number: f64| number.round().clamp(-MOST, MOST) as i16;

@@ -146,8 +146,7 @@ fn is_decided(model: &Model<'_>, evidence: &[i64]) -> bool {
 /// The level that this share of sequences stays at or below, each object weighted equally.
 pub(super) fn quantile(sequences: &[Vec<Sequence>], share: f64) -> f64 {
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
-    let mut levels: Vec<f64> =
-        sequences.iter().flat_map(|of| of.iter().take(fewest)).map(Sequence::highest).collect();
+    let mut levels: Vec<f64> = sequences.iter().flat_map(|of| of.iter().take(fewest)).map(Sequence::highest).collect();
     levels.sort_unstable_by(f64::total_cmp);
     let position = (levels.len() as f64 * share).floor() as usize;
     levels.get(position.min(levels.len().saturating_sub(1))).copied().unwrap_or(0.0)

@@ -11,6 +11,12 @@
 //! other shapes, N(μ + s, B + C/n), and that of the leading object's touches, N(μ, C/n). The first is learned on shapes of
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
 //! each object does; measured, that detects as many strangers as the exact ratio.
+//!
+//! Measured on ten real meshes, each left out in turn, with a background column, at most 2 % of known objects' sequences
+//! being taken for unknown (`tests/src/bin/left_out.rs`; 40 trees of depth 5 on curvature of full touches): [`Held::Certain`]
+//! finds out .28 of the strangers by 30 touches, .60 by 60, .88 by 120, and names .007; a known object takes 93 touches
+//! instead of 27.5. [`Held::Likely`] finds out .53 by 60 touches and names .40, for 27.2 touches. Hopeless by curvature
+//! alone: a fork where a spoon is known (.23 by 120 touches), and until 60 touches a hammer where a paper clip is (.18).
 
 mod fit;
 mod fixed;
@@ -117,7 +123,8 @@ pub fn calibrate(model: &Model<'_>, dataset: &Dataset, shapes: &[Shapes], settin
         supplies.iter().map(|supply| supply.rows.split_at(quarter(supply))).unzip();
     let known = model.known_count();
     let moments = Moments::new(&learn, &of_shapes(model, shapes), known, objects, unit);
-    let fits = fit::fits(&moments, None).ok_or(EvaluateProblem::TooFewForFit { found: learn_count(&learn, objects) })?;
+    let fits =
+        fit::fits(&moments, None).ok_or(EvaluateProblem::TooFewForFit { found: learn_count(&learn, objects) })?;
     let terms = |threshold: f64, least: u32| terms(settings, &fits, threshold, least);
     // Levels of misfit do not depend on any threshold.
     let untested = stated(model, &terms(0.0, FIRST), &fits)?;
@@ -285,13 +292,7 @@ struct Kept {
 
 /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): from strict to loose, up to the last
 /// threshold before the first at which so few false alarms would not be unlikely if the promise were broken.
-fn threshold(
-    sequences: &[Vec<Sequence>],
-    settings: &Settings,
-    loosest: f64,
-    least: u32,
-    known: usize,
-) -> Result<Kept> {
+fn threshold(sequences: &[Vec<Sequence>], settings: &Settings, loosest: f64, least: u32, known: usize) -> Result<Kept> {
     // Equally many of each object.
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
     let all: Vec<&Sequence> = sequences.iter().flat_map(|of| of.iter().take(fewest)).collect();

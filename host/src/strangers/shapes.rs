@@ -35,7 +35,8 @@ pub fn of_dataset(directory: &Path) -> Result<(Dataset, Vec<Shapes>)> {
         let entry = listing.as_ref().and_then(|listing| listing.objects.iter().find(|entry| entry.name == name));
         entry.map_or(1, |entry| entry.instances.len().max(1))
     };
-    let shapes = dataset.objects.iter().map(|object| Shapes { touches: object.touches.clone(), count: count(&object.name) });
+    let shapes =
+        dataset.objects.iter().map(|object| Shapes { touches: object.touches.clone(), count: count(&object.name) });
     let shapes = shapes.collect();
     Ok((dataset, shapes))
 }

@@ -49,8 +49,7 @@ fn strangers_are_found_out_and_known_objects_are_not_taken_for_them() {
             let (known, unknown) = (of(0..KNOWN, 5_000, 3), of(9..10, 5_000, 3));
             let margins = Margins::new(Candidate::Compiled(&model), &known).unwrap();
             let strangers = Margins::of_strangers(Candidate::Compiled(&model), &unknown).unwrap();
-            let settings =
-                SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 1 };
+            let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 1 };
             let of_known = margins.sequential(&settings).unwrap();
             let found = evaluate::strangers((&margins, &of_known), &strangers, &settings).unwrap();
             // 2 % promised; the standard error of 3,000 sequences is a quarter of a percent.
@@ -158,9 +157,8 @@ fn without_other_shapes_a_test_is_made_too() {
 #[test]
 fn what_cannot_be_calibrated_says_so() {
     let model = compile::open(&MODELS[0]).unwrap();
-    let message = |dataset: &Dataset, settings: &Settings| {
-        calibrate(&model, dataset, &[], settings).unwrap_err().to_string()
-    };
+    let message =
+        |dataset: &Dataset, settings: &Settings| calibrate(&model, dataset, &[], settings).unwrap_err().to_string();
     let usual = Settings::default();
     assert!(message(&of(0..2, 1_000, 2), &usual).contains("no touches of object2"));
     assert!(message(&of(0..4, 1_000, 2), &usual).contains("object3"));

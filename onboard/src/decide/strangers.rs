@@ -64,13 +64,7 @@ impl Model<'_> {
 }
 
 /// How badly the touches fit the leader, in 2^-16 nats. `None` for an object without a record, which no valid model has.
-fn misfit(
-    test: &FitTest<'_>,
-    model: &Model<'_>,
-    evidence: &[i64],
-    leader: usize,
-    touches: u32,
-) -> Option<i64> {
+fn misfit(test: &FitTest<'_>, model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Option<i64> {
     let object = test.object(leader)?;
     // Of an object that cannot be there nothing is known: as if it had its mean.
     let sum = |object: usize| evidence.get(object).copied().filter(|&sum| sum > IMPOSSIBLE);
@@ -88,14 +82,20 @@ fn misfit(
     let (mut squares, mut slope) = (0_u64, 0_i64);
     for (row, &own) in ahead.iter().enumerate() {
         // Of at most 16 products below 2^46 each.
-        let sum: i64 = ahead.iter().take(row + 1).zip(0..).map(|(&r, column)| product(object.weight(row, column), r)).sum();
+        let sum: i64 =
+            ahead.iter().take(row + 1).zip(0..).map(|(&r, column)| product(object.weight(row, column), r)).sum();
         let whitened = u64::from(held(sum >> (object.weight_shift & 63)).unsigned_abs());
         squares = squares.saturating_add(whitened * whitened);
         slope += product(object.slope(row), own);
     }
     let mean = squares / u64::from(touches.max(1));
     let constant = i64::from(object.constant).saturating_mul(touches.into());
-    Some(i64::try_from(mean).unwrap_or(i64::MAX).saturating_add(slope >> (object.slope_shift & 63)).saturating_sub(constant))
+    Some(
+        i64::try_from(mean)
+            .unwrap_or(i64::MAX)
+            .saturating_add(slope >> (object.slope_shift & 63))
+            .saturating_sub(constant),
+    )
 }
 
 fn product(weight: i16, number: i32) -> i64 {

@@ -119,7 +119,8 @@ impl FitTerms {
 
     /// What stands in the section.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
-        let Self { held, rivals, first, least, threshold, early, doubt, halving, alarms, sequences, confidence } = *self;
+        let Self { held, rivals, first, least, threshold, early, doubt, halving, alarms, sequences, confidence } =
+            *self;
         let mut bytes = [0; Self::LENGTH];
         let (threshold, doubt) = (threshold.cast_unsigned(), doubt.cast_unsigned());
         let numbers = [first, least, threshold, early, doubt, halving, alarms, sequences, confidence];

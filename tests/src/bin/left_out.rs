@@ -32,7 +32,9 @@ fn main() -> palpate::Result<()> {
     let found = leave_one_out(sets, background.as_ref(), &[shapes], &training, &settings, &held, &())?;
     for (held, found) in held.iter().zip(&found) {
         println!("\nstrangers {}", held.map_or("off", Held::name));
-        println!("object      at 30  at 60 at 120  named  alarms  touches   wrong undecided  least  threshold sequences");
+        println!(
+            "object      at 30  at 60 at 120  named  alarms  touches   wrong undecided  least  threshold sequences"
+        );
         found.iter().for_each(|left_out| line(&left_out.object, std::slice::from_ref(left_out)));
         line("mean", found);
     }

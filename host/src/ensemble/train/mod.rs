@@ -11,10 +11,10 @@
 use crate::ensemble::check::check_names;
 use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Trained, Tree, feature_row};
 use crate::error::{EnsembleProblem, Error, Result};
-use crate::progress::Progress;
 use crate::mesh::source::BACKGROUND;
-use crate::touches::{Dataset, ObjectTouches};
+use crate::progress::Progress;
 use crate::touches::noise::Noise;
+use crate::touches::{Dataset, ObjectTouches};
 use hessboost::config::MultiStrategy;
 use hessboost::data::DMatrix;
 use hessboost::model::BoostedModel;

@@ -5,9 +5,7 @@
 //! none is made after one of the ten built-in objects.
 
 use super::contour::Form;
-use super::shape::{
-    Shape, bar, below, cuboid, curve, cylinder, disc, ellipse, ellipsoid, rectangle, rod, torus,
-};
+use super::shape::{Shape, bar, below, cuboid, curve, cylinder, disc, ellipse, ellipsoid, rectangle, rod, torus};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -119,9 +117,8 @@ fn carved(dice: &mut Dice) -> (Shape, f32) {
 fn profile(dice: &mut Dice) -> Tree {
     let widest = dice.ratio(0.5, 4.0);
     let count = dice.whole(2, 5);
-    let knots: Vec<(f32, f32)> = (0..=count)
-        .map(|knot| (-5.0 + 10.0 * knot as f32 / count as f32, widest * dice.between(0.25, 1.0)))
-        .collect();
+    let knots: Vec<(f32, f32)> =
+        (0..=count).map(|knot| (-5.0 + 10.0 * knot as f32 / count as f32, widest * dice.between(0.25, 1.0))).collect();
     curve(&Tree::z(), &knots)
 }
 

@@ -129,7 +129,8 @@ pub fn background(count: usize, seed: u64) -> Result<Object> {
 /// Shape `number`: the first that has a closed mesh, of those that are tried for it.
 fn shape(first: u64, number: u64) -> Result<Instance> {
     // Multiples of the number of families keep the family; a prime times that many, so that numbers share no seed.
-    let seeds = (0..100_u64).map(|attempt| first.wrapping_add(number).wrapping_add(attempt.wrapping_mul(10_000_019_000)));
+    let seeds =
+        (0..100_u64).map(|attempt| first.wrapping_add(number).wrapping_add(attempt.wrapping_mul(10_000_019_000)));
     let mut made = seeds.filter_map(|seed| Some((seed, contour::mesh(&background::form(seed))?)));
     match made.next() {
         Some((_, mesh)) => Ok(Instance { name: format!("shape-{number}"), mesh }),
