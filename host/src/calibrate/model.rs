@@ -264,7 +264,11 @@ fn finished(
     };
     let by_object = match &chosen.odds {
         Odds::All(_) => None,
-        Odds::ByObject(odds) => Some((true, odds.iter().flat_map(|&odds| OddsByObject::to_bytes(odds)).collect())),
+        Odds::ByObject(odds) => {
+            // A background, which is never named, has a place too.
+            let all = odds.iter().copied().chain(std::iter::repeat(0)).take(model.object_count());
+            Some((true, all.flat_map(OddsByObject::to_bytes).collect()))
+        }
     };
     let stated = Temperature::new(temperature).unwrap_or(Temperature::ONE);
     let mut sections = vec![

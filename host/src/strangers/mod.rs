@@ -11,6 +11,12 @@
 //! other shapes, N(μ + s, B + C/n), and that of the leading object's touches, N(μ, C/n). The first is learned on shapes of
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
 //! each object does; measured, that detects as many strangers as the exact ratio.
+//!
+//! Measured on ten real meshes, each left out in turn, with a background column, at most 2 % of known objects' sequences
+//! being taken for unknown (`tests/src/bin/left_out.rs`; 40 trees of depth 5 on curvature of full touches): [`Held::Certain`]
+//! finds out .28 of the strangers by 30 touches, .60 by 60, .88 by 120, and names .007; a known object takes 93 touches
+//! instead of 27.5; on oriented touches .95 by 30 and .97 by 60, and 20 touches instead of 7. [`Held::Likely`] finds out .53 by 60 touches and names .40, for 27.2 touches. Hopeless by curvature
+//! alone: a fork where a spoon is known (.23 by 120 touches), and until 60 touches a hammer where a paper clip is (.18).
 
 mod fit;
 mod fixed;
@@ -132,7 +138,7 @@ pub fn calibrate(model: &Model<'_>, dataset: &Dataset, shapes: &[Shapes], settin
         Held::Likely => FIRST,
         Held::Certain => found_out(&left_out).min(free.last()).max(FIRST),
     };
-    let loosest = rough - 2.0;
+    let loosest = rough - below(settings.held);
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
     let kept = threshold(&sequences, settings, loosest, least, known)?;
@@ -236,6 +242,14 @@ fn doubt(held: Held) -> f64 {
     match held {
         Held::Likely => 0.0,
         Held::Certain => DOUBT,
+    }
+}
+
+/// How far below a first guess, which was found without any name being given, thresholds are tried, in nats.
+fn below(held: Held) -> f64 {
+    match held {
+        Held::Likely => 6.0,
+        Held::Certain => 2.0,
     }
 }
 
