@@ -1,11 +1,12 @@
 //! Sequences of a data set's touches: whole ones, no touch in two of them.
 
 use super::sequence::{Sequence, odds_of};
-use crate::error::Result;
+use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::Touch;
+use palpate_shared::format::Plan;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
@@ -38,39 +39,60 @@ pub struct Until {
 pub struct Supply<'d> {
     object: usize,
     touches: &'d [Touch],
-    /// In a random order; with robots, each robot's touches in theirs.
+    /// One for each instance, or one for each robot: a sequence is of touches of one pool.
+    pools: Vec<Pool>,
+    /// The pool of the next sequence.
+    next: usize,
+    /// Whether a pool makes one sequence only.
+    is_once: bool,
+    /// The poses that the model's plan may propose; none where touches are taken in their order.
+    candidates: Vec<u16>,
+}
+
+/// Touches that may be mixed, in the order in which they are used.
+#[derive(Debug, Default)]
+struct Pool {
     order: Vec<u32>,
     used: usize,
-    /// The touches of a robot, which makes one sequence; `None` if all touches may be mixed.
-    of_robot: Option<usize>,
+    /// Under a plan the same by pose, each pose's last touch the next one.
+    by_pose: Vec<Vec<u32>>,
 }
 
 impl<'d> Supply<'d> {
-    /// The touches of the object with this name and this index in the model. With more than one robot, touch i was made
-    /// by robot i modulo `robots`: every robot makes one sequence, so that the sequences' biases are independent.
-    pub fn new(object: usize, name: &str, touches: &'d [Touch], robots: usize, seed: u64) -> Self {
-        let mut order: Vec<u32> = (0..touches.len()).filter_map(|touch| u32::try_from(touch).ok()).collect();
-        let of_robot = (robots > 1).then(|| touches.len() / robots);
-        match of_robot {
-            None => order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, 0)),
-            Some(of_robot) => {
-                let touch = |index: usize| order[index % of_robot.max(1) * robots + index / of_robot.max(1)];
-                order = (0..of_robot * robots).map(touch).collect();
+    /// The touches of the object with this name and this index in the model. Touch i is of instance i modulo `instances`
+    /// and was made by robot i modulo `robots`; a sequence is of touches of one instance and one robot. With more than one
+    /// robot, every robot makes one sequence, so that the sequences' biases are independent; `robots` should be a multiple
+    /// of `instances` then.
+    pub fn new(object: usize, name: &str, touches: &'d [Touch], instances: usize, robots: usize, seed: u64) -> Self {
+        let is_once = robots > 1;
+        let pools = if is_once { robots } else { instances.max(1) };
+        let pool = |turn: usize| {
+            let own = (turn..touches.len()).step_by(pools).filter_map(|touch| u32::try_from(touch).ok());
+            let mut order: Vec<u32> = own.collect();
+            if !is_once {
+                order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, turn as u64));
             }
-        }
-        Self { object, touches, order, used: 0, of_robot }
+            Pool { order, ..Pool::default() }
+        };
+        Self { object, touches, pools: (0..pools).map(pool).collect(), next: 0, is_once, candidates: Vec::new() }
     }
 
-    /// Takes one in `parts` of the touches off, as a supply of its own; with robots, of the robots.
+    /// Takes one in `parts` of the touches off, as a supply of its own; of robots, one in so many.
     pub fn take_part(&mut self, parts: usize) -> Self {
-        let step = self.of_robot.unwrap_or(1).max(1);
-        let count = (self.order.len() / parts.max(1)).div_ceil(step) * step;
-        let rest = self.order.split_off(count.min(self.order.len()));
-        let order = std::mem::replace(&mut self.order, rest);
-        Self { order, ..*self }
+        let part = |all: usize| all / parts.max(1);
+        let pools = if self.is_once {
+            self.pools.drain(..part(self.pools.len())).collect()
+        } else {
+            let take = |pool: &mut Pool| {
+                let rest = pool.order.split_off(part(pool.order.len()));
+                Pool { order: std::mem::replace(&mut pool.order, rest), ..Pool::default() }
+            };
+            self.pools.iter_mut().map(take).collect()
+        };
+        Self { pools, candidates: Vec::new(), ..*self }
     }
 
-    /// Follows up to `wanted` sequences. One that all touches end in is left out; one that a robot's touches end in ends
+    /// Follows up to `wanted` sequences. One that the touches end in is left out; one that a robot's touches end in ends
     /// there.
     fn follow<const N: usize, G: FnMut(&Moment<'_>) -> bool>(
         &mut self,
@@ -84,34 +106,76 @@ impl<'d> Supply<'d> {
         let never = Stopping::from_odds(0, u32::MAX);
         let Ok(mut recognizer) = Recognizer::<N>::new(model, never) else { return Ok(Vec::new()) };
         let mut sequences = Vec::new();
-        while sequences.len() < wanted && self.used < self.order.len() {
+        while sequences.len() < wanted {
             progress::advance(progress, 1)?;
-            let end = self.of_robot.map_or(self.order.len(), |of_robot| self.used + of_robot);
-            let rest = self.order[self.used..end].iter().map(|&touch| &self.touches[touch as usize]);
-            let (sequence, is_whole) = one(self.object, &mut recognizer, rest, until, gate());
-            self.used = if self.of_robot.is_some() { end } else { self.used + sequence.approaches as usize };
-            if is_whole || self.of_robot.is_some() {
-                sequences.push(sequence);
-            } else {
-                self.used = self.order.len();
+            let Some(pool) = self.pools.get_mut(self.next) else { break };
+            let (touches, candidates) = (self.touches, &self.candidates);
+            let mut rest = pool.order[pool.used..].iter();
+            let by_pose = &mut pool.by_pose;
+            let next = |recognizer: &Recognizer<'_, N>| {
+                let touch = if by_pose.is_empty() {
+                    rest.next().copied()
+                } else {
+                    let pose = recognizer.next_approach(candidates.iter().copied())?.pose;
+                    by_pose.get_mut(usize::from(pose))?.pop()
+                };
+                touch.map(|touch| &touches[touch as usize])
+            };
+            let (sequence, is_whole) = one(self.object, &mut recognizer, next, until, gate());
+            if !is_whole && (!self.is_once || pool.order.is_empty()) {
+                break;
+            }
+            pool.used += sequence.approaches as usize;
+            sequences.push(sequence);
+            self.next += 1;
+            if !self.is_once {
+                self.next %= self.pools.len();
             }
         }
         Ok(sequences)
     }
 }
 
+/// Lets sequences go where the plan of the model says: each next touch is one of those that no sequence has used, in the
+/// pose that the recognizer proposes. Poses that some supply has no touch in are never proposed; a sequence that proposes
+/// one that is used up ends its supply, as the end of all touches does without a plan.
+///
+/// # Errors
+/// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
+pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_>) -> Result<()> {
+    let poses = plan.poses();
+    for supply in &mut *supplies {
+        for pool in &mut supply.pools {
+            let mut by_pose = vec![Vec::new(); poses.count().into()];
+            for &touch in pool.order.iter().rev() {
+                let no_pose =
+                    || EvaluateProblem::NoPoseOf { object: names.get(supply.object).cloned().unwrap_or_default() };
+                let pose = supply.touches[touch as usize].pose().ok_or_else(no_pose)?;
+                by_pose[usize::from(poses.number_of(&pose))].push(touch);
+            }
+            pool.by_pose = by_pose;
+        }
+    }
+    let pools = || supplies.iter().flat_map(|supply| &supply.pools);
+    let has_some = |pose: &u16| pools().all(|pool| !pool.by_pose[usize::from(*pose)].is_empty());
+    let candidates: Vec<u16> = (0..poses.count()).filter(|&pose| plan.may_touch(pose)).filter(has_some).collect();
+    supplies.iter_mut().for_each(|supply| supply.candidates.clone_from(&candidates));
+    Ok(())
+}
+
 /// Follows one sequence; whether it came to its end before the touches did.
 fn one<'s, const N: usize>(
     object: usize,
     recognizer: &mut Recognizer<'_, N>,
-    touches: impl Iterator<Item = &'s Touch>,
+    mut next: impl FnMut(&Recognizer<'_, N>) -> Option<&'s Touch>,
     until: Until,
     mut gate: impl FnMut(&Moment<'_>) -> bool,
 ) -> (Sequence, bool) {
     let strictest = odds_of(until.margin);
     let mut sequence = Sequence::new(object);
     recognizer.reset();
-    for (touch, approaches) in touches.zip(1_u32..) {
+    for approaches in 1_u32.. {
+        let Some(touch) = next(recognizer) else { break };
         if recognizer.push(touch).is_err() {
             // No evidence: it cost an approach.
             sequence.end(approaches);
@@ -151,7 +215,7 @@ pub fn follow<G: FnMut(&Moment<'_>) -> bool>(
     let share = found.iter().zip(wanted).filter_map(share).fold(1.0, f64::min);
     for (found, &wanted) in found.iter_mut().zip(wanted) {
         // Rounded up where it is a whole number but for the last bits.
-        found.truncate((wanted as f64 * share + 1e-9) as usize);
+        found.truncate((wanted as f64 * share + 1e-6) as usize);
     }
     Ok(found.into_iter().flatten().collect())
 }

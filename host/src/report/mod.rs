@@ -19,6 +19,7 @@ mod limit;
 mod noise;
 mod objects;
 mod plan;
+mod promises;
 mod published;
 pub(crate) mod results;
 pub(crate) mod run_page;

@@ -13,6 +13,7 @@ use crate::page::chart::{Chart, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
+use crate::touches::noise::Noise;
 use crate::touches::{Dataset, Origin};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
@@ -142,6 +143,7 @@ fn at_rates(context: &Context, bytes: &[u8], test: &Dataset, active: bool) -> Re
             groups: count(context),
             error_rate: Some(error_rate),
             max_touches: None,
+            noise: Noise::default(),
             seed: context.settings.seed,
         };
         let measured: Evaluation = match &active {

@@ -4,8 +4,8 @@ use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
-    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, published,
-    results, sequential, simulator,
+    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
+    published, results, sequential, simulator,
 };
 use crate::capture;
 use crate::compile;
@@ -115,6 +115,7 @@ pub fn report_on(
     let limit = stages.stage("limit", || limit::measure(&context, get_large()?))?;
     let sequences = stages.stage("sequential", || sequential::measure(&context, get_large()?))?;
     let calibration = stages.stage("calibration", || calibration::measure(&context, get_large()?))?;
+    let promised = stages.stage("promises", || promises::measure(&context, get_large()?))?;
     let members = stages.stage("cost", || cost::measure(&context, get_large()?))?;
     drop(large);
     let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
@@ -145,6 +146,7 @@ pub fn report_on(
         limit::section(&context, &limit)?,
         sequential::section(&context, &sequences)?,
         calibration::section(&context, &calibration)?,
+        promises::section(&context, &promised)?,
         costs,
     ];
     sections.extend(grown);
@@ -267,6 +269,7 @@ mod tests {
             "sequential-trade",
             "sequential-objects",
             "reliability",
+            "promises-kept",
             "cost-bytes",
             "cost-time",
             "cost-work",
