@@ -157,7 +157,6 @@ fn a_promise_is_calibrated_under_the_plan_and_kept_under_it() {
     assert_eq!(sequential["promised"], 0.05);
     assert!(sequential["error"].as_f64().unwrap() < 0.06, "{sequential:#}");
     place.fails(&["calibrate", "model.palpate", "more", "-o", "x.palpate", "--active"], 1, "has no plan");
-    place.fails(&["calibrate", "planned.palpate", "blind", "-o", "x.palpate", "--active"], 1, "blind");
 }
 
 #[test]
