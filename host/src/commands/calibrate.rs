@@ -19,6 +19,8 @@ Calibrate on touches that the model was not trained on, made and disturbed as th
 
 A name that is given and wrong is an error. A sequence that ends at the limit of touches without a name is undecided: neither right nor wrong. With --per average the rate is that of all names given, with objects touched equally often (or as often as the model's priors say); with name that of each name, when it is given, for which each name gets a threshold of its own, and each rate is kept with the stated probability; with object that of the names given to each object, which needs more touches.
 
+With --active each next approach is one in the pose that the plan proposes. A sequence that proposes a pose whose approaches are used up ends the object's sequences, so more approaches are needed for as many sequences.
+
 The thresholds are found by Learn-then-Test: from strict to loose, up to the last at which so few errors have a probability of at most 5 % (--confidence) if the rate were higher than promised. The model then states what it promises, and a temperature that makes its posteriors ones to believe.
 
 With --strangers the model also gets a test of whether touches fit any object that it knows: at most 2 % of known objects' sequences end as unknown. likely costs hardly a touch and finds out about half of what the model does not know before it gets a name; certain finds out nearly all of what can be found out, and takes as many touches as that needs. A model with a background column (`palpate train --background`) finds out more. Objects that feel like a known one are not found out.
@@ -29,7 +31,8 @@ Examples:
   palpate calibrate model.palpate fresh -o strict.palpate --error-rate 0.1% --per name
   palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
   palpate calibrate model.palpate fresh -o real.palpate --noise 0..5ms --timer 1ms
-  palpate evaluate calibrated.palpate unseen --json | jq .promise")]
+  palpate evaluate calibrated.palpate unseen --json | jq .promise
+  palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
 pub(crate) struct Arguments {
     /// Compiled model
     model: PathBuf,
@@ -53,6 +56,9 @@ pub(crate) struct Arguments {
     /// Touches after which recognizers give up [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
+    /// Make every approach where the model's plan says (see `palpate plan`): the promise holds for a robot that goes there
+    #[arg(long)]
+    active: bool,
     /// Seed of the order of the touches, and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -80,6 +86,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
         max_touches: arguments.max_touches,
         noise: arguments.noise.over(file.map_or_else(Noise::default, |file| file.real)),
+        active: arguments.active,
         seed: arguments.seed,
     };
     let wrong = |error: crate::Error| error.in_file(&arguments.directory);
