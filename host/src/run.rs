@@ -1,9 +1,10 @@
 //! The main job: capture, train, compile, recognize, report.
 
+use crate::calibrate::{self, Calibrated};
 use crate::capture;
 use crate::compile::{self, Compiled};
 use crate::ensemble::{StatedProbe, train};
-use crate::error::{ReportProblem, Result};
+use crate::error::{Problem, ReportProblem, Result};
 use crate::evaluate::parity::{self, Parity};
 use crate::evaluate::{self, Approaches, Candidate, Curve, Evaluation, Margins, SequentialSettings};
 use crate::mesh::Object;
@@ -61,8 +62,10 @@ pub struct Settings {
     pub test_share: f64,
     /// Groups, and also sequences, drawn for each object.
     pub groups: usize,
-    /// The error rate that recognizers stop at.
+    /// The error rate that models promise.
     pub error_rate: f64,
+    /// The most sequences, of all objects together, that a promise rests on.
+    pub sequences: usize,
     /// The command line that remakes the result, as the report shows it.
     pub command: String,
 }
@@ -78,6 +81,7 @@ impl Default for Settings {
             test_share: 0.1,
             groups: 1000,
             error_rate: 0.01,
+            sequences: 10_000,
             command: "palpate run".into(),
         }
     }
@@ -148,6 +152,10 @@ pub struct Method {
     pub followed_to: usize,
     /// The compiled model compared with the ensemble, on the test touches.
     pub parity: Parity,
+    /// How its thresholds were found, on touches captured for that; null if they were not.
+    pub calibration: Option<Calibrated>,
+    /// Why they were not.
+    pub uncalibrated: Option<String>,
 }
 
 /// A sequence of approaches to one object, pushed until the verdict.
@@ -201,7 +209,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
     evaluate::add_noise(&mut approaches.test, &settings.noise, seed.wrapping_add(1))?;
     let probe = Some(StatedProbe::from(&settings.capture.origin));
-    let job = Job { settings, approaches: &approaches.test, robots, out, progress };
+    let job = Job { settings, objects, approaches: &approaches.test, robots, out, progress };
     let method = |name, files, preset, split| Trial::new(name, files, preset, split, job);
     let compact = train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() };
     let full = train::Settings { counted: Some(Counted::Full), ..compact.clone() };
@@ -261,6 +269,7 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
         "test_share": settings.test_share,
         "groups": settings.groups,
         "error_rate": settings.error_rate,
+        "sequences": settings.sequences,
     }))
 }
 
@@ -268,6 +277,7 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
 #[derive(Clone, Copy)]
 struct Job<'d> {
     settings: &'d Settings,
+    objects: &'d [Object],
     approaches: &'d Dataset,
     /// How many robots made the test touches, in turn.
     robots: usize,
@@ -286,14 +296,18 @@ struct Trial {
 
 impl Trial {
     fn new(name: &str, stem: &str, preset: train::Settings, split: &Split, job: Job<'_>) -> Result<Self> {
-        let Job { settings, approaches, robots, out, progress } = job;
+        let Job { settings, approaches, robots, out, progress, .. } = job;
         let began = Instant::now();
         let ensemble = train::train(&split.train, &preset, progress)?;
         let train_seconds = began.elapsed().as_secs_f64();
         progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
         let compile = compile::Settings { error_rate: settings.error_rate, ..compile::Settings::default() };
-        let compiled = compile::compile(&ensemble, &compile)?;
+        let mut compiled = compile::compile(&ensemble, &compile)?;
+        let calibration = calibrated(&compiled.bytes, split, &job)?;
+        if let Ok(calibrated) = &calibration {
+            compiled.bytes.clone_from(&calibrated.model);
+        }
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
         let model = compile::open(&compiled.bytes)?;
@@ -309,6 +323,7 @@ impl Trial {
                 error_rate: None,
                 max_touches: None,
                 seed,
+                noise: settings.noise,
             },
         )?;
         let approached = Margins::new(Candidate::Compiled(&model), approaches)?.of_robots(robots);
@@ -328,8 +343,33 @@ impl Trial {
             followed_to: curve.most(),
             evaluation,
             parity,
+            uncalibrated: calibration.as_ref().err().cloned(),
+            calibration: calibration.ok(),
         };
         Ok(Self { compiled, fewest, curve, method })
+    }
+}
+
+/// The model with thresholds that keep the error rate, found on touches that are captured for it; or why there are none.
+fn calibrated(bytes: &[u8], split: &Split, job: &Job<'_>) -> Result<Result<Calibrated, String>> {
+    let settings = job.settings;
+    let (origin, approaches) = (&settings.capture.origin, split.test.holds_approaches());
+    // Neither training nor tests use these seeds.
+    let seed = origin.seed.wrapping_add(if approaches { 3 } else { 2 });
+    let origin = Origin { approaches, seed, ..origin.clone() };
+    let terms = calibrate::Settings {
+        rate: settings.error_rate,
+        sequences: settings.sequences,
+        noise: settings.noise,
+        seed,
+        ..calibrate::Settings::default()
+    };
+    match calibrate::calibrate_fresh(&compile::open(bytes)?, job.objects, &origin, &terms, job.progress) {
+        Err(error) => match error.problem() {
+            Some(Problem::Calibrate(problem)) => Ok(Err(problem.to_string())),
+            _ => Err(error),
+        },
+        Ok(calibrated) => Ok(Ok(calibrated)),
     }
 }
 
@@ -402,6 +442,8 @@ fn table(summary: &Summary) -> Records {
         format!("approaches to a {rate} % error rate, stopping when sure"),
         approaches(&|of| Cell::Spread(of.sequential.mean_approaches, of.sequential.mean_approaches_standard_error, 1)),
     );
+    let promised = |rate: Option<f64>| rate.map_or(Cell::Missing, |rate| Cell::Percent(rate, 2));
+    row("  promised".into(), approaches(&|of| promised(of.sequential.promised)));
     row("  wrong verdicts".into(), approaches(&|of| Cell::Percent(of.sequential.error, 2)));
     row("  undecided when touches ran out".into(), approaches(&|of| Cell::Percent(of.sequential.undecided, 2)));
     for at in AT_APPROACHES {
@@ -429,6 +471,7 @@ fn table(summary: &Summary) -> Records {
             Cell::Spread(sequential.mean_touches, sequential.mean_touches_standard_error, 1)
         }),
     );
+    row("  promised".into(), both(&|m| promised(m.evaluation.sequential.promised)));
     row("  wrong verdicts".into(), both(&|m| Cell::Percent(m.evaluation.sequential.error, 2)));
     row("  undecided when touches ran out".into(), both(&|m| Cell::Percent(m.evaluation.sequential.undecided, 2)));
     row(
@@ -462,7 +505,29 @@ fn note(summary: &Summary) -> String {
         true => "No noise was added to touches.".to_owned(),
         false => format!("Ours was trained, and all are tested, with {noise}; the paper's method is trained without."),
     };
-    [noise, missing(summary)].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    [noise, calibration(summary), missing(summary)]
+        .into_iter()
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// What the promises rest on, or why there are none.
+fn calibration(summary: &Summary) -> String {
+    let ours = &summary.ours;
+    let promise = match (&ours.calibration, &ours.uncalibrated) {
+        (Some(calibrated), _) => format!(
+            "The model keeps its promise with a probability of {} %; its thresholds were found on {} sequences of {} \
+             captured for that.",
+            100.0 * calibrated.confidence,
+            calibrated.sequences,
+            calibrated.counted
+        ),
+        (None, why) => format!("The model promises nothing: {}.", why.as_deref().unwrap_or("it was not calibrated")),
+    };
+    let others = [("paper", &summary.paper), ("full touches", &summary.full)];
+    let why = |(name, method): (&str, &Method)| method.uncalibrated.as_ref().map(|why| format!(" {name}: {why}."));
+    promise + &others.into_iter().filter_map(why).collect::<String>()
 }
 
 /// What a missing accuracy means, if one is missing.
@@ -576,6 +641,7 @@ mod tests {
             capture: crate::touches::Origin { touches, ..Default::default() }.into(),
             approaches: 3 * touches,
             groups: 50,
+            sequences: 600,
             command: "palpate run 'my meshes'".into(),
             ..Settings::default()
         }

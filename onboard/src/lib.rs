@@ -69,7 +69,8 @@ pub mod station;
 
 pub use bytes::{Aligned, ModelError};
 pub use decide::{
-    CapacityError, Forgetting, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict, exp2_negative,
+    CapacityError, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
+    exp2_negative,
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};

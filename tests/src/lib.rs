@@ -7,6 +7,7 @@ pub mod flash;
 pub mod identity;
 pub mod plain;
 pub mod random;
+pub mod replay;
 pub mod sections;
 pub mod unaligned;
 pub mod vectors;

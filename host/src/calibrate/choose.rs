@@ -1,7 +1,7 @@
 //! Thresholds that keep a promise, from sequences.
 
-use super::sequence::{Look, Odds, Sequence, margin_of, odds_of};
-use super::walk::{Kept, Stop, Tally, allowed, needed, walk};
+use super::sequence::{Odds, Sequence, odds_of};
+use super::walk::{Kept, Stop, Tally, binomial_tail, needed, walk};
 use crate::error::{CalibrateProblem, Result};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
@@ -10,13 +10,8 @@ use rayon::prelude::*;
 const STEP: f64 = 0.01;
 /// The loosest threshold that is tried, in nats.
 const LOOSEST: f64 = 0.05;
-/// How far thresholds by name are moved from what was learned, in nats: strict to loose.
-const SHIFTS: [f64; 2] = [3.0, -1.5];
-/// Rounds of learning thresholds by name, and how far one moves in a round at most, in nats.
-const ROUNDS: usize = 6;
-const MOST_MOVE: f64 = 0.3;
-/// Steps at once on the way to where they begin.
-const COARSE: usize = 5;
+/// Steps at once where names have thresholds of their own.
+const NAMES_STEP: usize = 2;
 
 /// What is promised.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +31,7 @@ pub struct Chosen {
     pub odds: Odds,
     /// Wrong names of those given: one tally for an average, one for each object otherwise.
     pub tallies: Vec<Tally>,
-    /// Sequences that were tested on: those that no threshold was learned on.
+    /// Sequences that were tested on.
     pub sequences: usize,
     /// Names given in these.
     pub given: usize,
@@ -52,37 +47,25 @@ pub struct Chosen {
 /// `strictest` (a margin in nats) or to the limit of touches. `objects` are the model's.
 ///
 /// A sequence that ends without a name is neither right nor wrong: the error rate is that of names that are given. One
-/// threshold is walked from strict to loose on all sequences, for an average as for each object. Thresholds by name are
-/// learned on every other sequence of each object; then all of them together are moved from strict to loose, and tested on the rest.
+/// threshold is walked from strict to loose for an average as for each object, whose rates are all kept at once with the
+/// stated probability. With thresholds by name each name walks; each rate is kept with that probability by itself.
 ///
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise or too few names are given to know.
 pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms: &Terms) -> Result<Chosen> {
     let Terms { rate, confidence, per } = *terms;
     let count = objects.len();
-    let (kept, tested): (Result<Kept<Odds>, Stop>, Vec<&Sequence>) = match per {
+    let tested: Vec<&Sequence> = sequences.iter().collect();
+    let kept: Result<Kept<Odds>, Stop> = match per {
         Per::Average | Per::Object => {
-            let tested: Vec<&Sequence> = sequences.iter().collect();
             let margins = grid(strictest, LOOSEST).map(|margin| Odds::All(odds_of(margin)));
             let steps = margins.map(|odds| {
                 let tallies = tallies(&tested, &odds, if per == Per::Average { By::All } else { By::Touched(count) });
                 (odds, tallies)
             });
-            (walk(steps, rate, confidence), tested)
+            walk(steps, rate, confidence)
         }
-        Per::Name => {
-            let (learn, tested) = halves(sequences, count);
-            let margins = learn_by_name(&learn, count, strictest, terms);
-            let shifted = |shift: f64| {
-                let odds = margins.iter().map(|margin| stored((margin + shift).clamp(LOOSEST, strictest)));
-                Odds::ByObject(odds.collect())
-            };
-            let steps = grid(SHIFTS[0], SHIFTS[1]).map(shifted).map(|odds| {
-                let tallies = tallies(&tested, &odds, By::Named(count));
-                (odds, tallies)
-            });
-            (walk(steps, rate, confidence), tested)
-        }
+        Per::Name => walk_by_name(&tested, count, strictest, terms),
     };
     let of = |position: usize| (per != Per::Average).then(|| objects.get(position).cloned()).flatten();
     let Kept { threshold, tallies } = kept.map_err(|stop| match stop {
@@ -94,17 +77,6 @@ pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms:
         }
     })?;
     Ok(summary(threshold, tallies, &tested))
-}
-
-/// Every other sequence of each object, and the rest.
-fn halves(sequences: &[Sequence], count: usize) -> (Vec<&Sequence>, Vec<&Sequence>) {
-    let mut is_odd = vec![false; count];
-    sequences.iter().partition(|sequence| {
-        is_odd.get_mut(sequence.object).is_some_and(|is_odd| {
-            *is_odd = !*is_odd;
-            *is_odd
-        })
-    })
 }
 
 /// Margins from `strict` to `loose`.
@@ -155,71 +127,53 @@ fn tallies(sequences: &[&Sequence], odds: &Odds, by: By) -> Vec<Tally> {
     sequences.par_iter().with_min_len(1_000).fold(none, add).reduce(none, sum)
 }
 
-/// Margins by name at which each name is wrong about as often as a test on as many sequences allows.
-fn learn_by_name(sequences: &[&Sequence], count: usize, strictest: f64, terms: &Terms) -> Vec<f64> {
-    // First with the same threshold for all: where each name's rate passes the promised one. Then each moves a part of the
-    // way to where it would be best if the others stayed; all the way they could chase each other.
-    let mut margins = vec![strictest; count];
+/// Walks over the thresholds of all names at once: they loosen together, and a name whose test fails stays where it last
+/// passed while the others go on. What those take from it later is mostly theirs, so that it is wrong no more often; if it
+/// is, it is made stricter in the end, until every name passes where all of them ended.
+fn walk_by_name(sequences: &[&Sequence], count: usize, strictest: f64, terms: &Terms) -> Result<Kept<Odds>, Stop> {
+    let Terms { rate, confidence, .. } = *terms;
+    let passes = |tally: Tally| binomial_tail(tally, rate) <= 1.0 - confidence;
+    let needed = needed(rate, confidence);
+    let mut kept: Vec<Option<f64>> = vec![None; count];
     let mut walks = vec![true; count];
-    for margin in grid(strictest, LOOSEST).step_by(COARSE) {
-        let tallies = tallies(sequences, &Odds::All(odds_of(margin)), By::Named(count));
-        for ((own, walks), tally) in margins.iter_mut().zip(&mut walks).zip(tallies) {
-            *walks &= !is_beyond(tally, terms);
-            if *walks && is_allowed(tally, terms) {
-                *own = margin;
+    let mut most = vec![0; count];
+    for margin in grid(strictest, LOOSEST).step_by(NAMES_STEP) {
+        let tried = (0..count).map(|name| stored(kept[name].filter(|_| !walks[name]).unwrap_or(margin)));
+        let tallies = tallies(sequences, &Odds::ByObject(tried.collect()), By::Named(count));
+        for name in (0..count).filter(|&name| tallies[name].all >= needed) {
+            if !walks[name] {
+                continue;
+            }
+            if passes(tallies[name]) {
+                kept[name] = Some(margin);
+            } else if kept[name].is_none() {
+                return Err(Stop::TooMany { position: name, tally: tallies[name] });
+            } else {
+                walks[name] = false;
             }
         }
+        most.iter_mut().zip(&tallies).for_each(|(most, tally)| *most = tally.all.max(*most));
         if !walks.contains(&true) {
             break;
         }
     }
-    for _ in 0..ROUNDS {
-        let found: Vec<f64> = (0..count)
-            .into_par_iter()
-            .map(|name| loosest(sequences, &margins, name, terms).map_or(strictest, margin_of))
-            .collect();
-        for (own, found) in margins.iter_mut().zip(found) {
-            *own = (*own + (0.5 * (found - *own)).clamp(-MOST_MOVE, MOST_MOVE)).clamp(LOOSEST, strictest);
+    let too_few = |name: usize| Stop::TooFew { position: name, found: most[name] };
+    let kept: Result<Vec<f64>, Stop> = (0..count).map(|name| kept[name].ok_or_else(|| too_few(name))).collect();
+    let mut kept = kept?;
+    loop {
+        let odds = Odds::ByObject(kept.iter().map(|&margin| stored(margin)).collect());
+        let tallies = tallies(sequences, &odds, By::Named(count));
+        let failed: Vec<usize> = (0..count).filter(|&name| !passes(tallies[name])).collect();
+        if failed.is_empty() {
+            return Ok(Kept { threshold: odds, tallies });
+        }
+        for name in failed {
+            if kept[name] >= strictest {
+                return Err(Stop::TooMany { position: name, tally: tallies[name] });
+            }
+            kept[name] = (kept[name] + STEP).min(strictest);
         }
     }
-    margins
-}
-
-/// Whether a rate is above the promised one by more than chance.
-fn is_beyond(Tally { wrong, all }: Tally, terms: &Terms) -> bool {
-    let expected = terms.rate * all as f64;
-    wrong as f64 > expected + 3.0 * expected.sqrt() + 1.0
-}
-
-fn is_allowed(tally: Tally, terms: &Terms) -> bool {
-    // A rough bound first: the exact one is dear.
-    tally.wrong as f64 <= terms.rate * tally.all as f64
-        && allowed(tally.all, terms.rate, terms.confidence).is_some_and(|most| tally.wrong <= most)
-}
-
-/// The loosest odds of one name, those of the others given, at which it is not wrong too often.
-fn loosest(sequences: &[&Sequence], margins: &[f64], name: usize, terms: &Terms) -> Option<u64> {
-    let odds: Vec<u64> = margins.iter().map(|&margin| odds_of(margin)).collect();
-    // The name leads by most at its last look before another name is given; odds from there on give it.
-    let least = |sequence: &&Sequence| {
-        let of = |look: &Look| odds.get(look.name).copied().unwrap_or(0);
-        let before = sequence.looks().iter().take_while(|look| look.name == name || look.odds > of(look));
-        let own = before.filter(|look| look.name == name).last()?;
-        Some((own.odds, sequence.object != name))
-    };
-    let mut cases: Vec<(u64, bool)> = sequences.iter().filter_map(least).collect();
-    cases.sort_unstable();
-    let (mut tally, mut loosest) = (Tally::default(), None);
-    for &(odds, is_wrong) in &cases {
-        tally = Tally { wrong: tally.wrong + u64::from(is_wrong), all: tally.all + 1 };
-        if is_beyond(tally, terms) {
-            break;
-        }
-        if is_allowed(tally, terms) {
-            loosest = Some(odds);
-        }
-    }
-    loosest
 }
 
 fn summary(odds: Odds, tallies: Vec<Tally>, tested: &[&Sequence]) -> Chosen {

@@ -38,39 +38,56 @@ pub struct Until {
 pub struct Supply<'d> {
     object: usize,
     touches: &'d [Touch],
-    /// In a random order; with robots, each robot's touches in theirs.
+    /// One for each instance, or one for each robot: a sequence is of touches of one pool.
+    pools: Vec<Pool>,
+    /// The pool of the next sequence.
+    next: usize,
+    /// Whether a pool makes one sequence only.
+    is_once: bool,
+}
+
+/// Touches that may be mixed, in the order in which they are used.
+#[derive(Debug, Default)]
+struct Pool {
     order: Vec<u32>,
     used: usize,
-    /// The touches of a robot, which makes one sequence; `None` if all touches may be mixed.
-    of_robot: Option<usize>,
 }
 
 impl<'d> Supply<'d> {
-    /// The touches of the object with this name and this index in the model. With more than one robot, touch i was made
-    /// by robot i modulo `robots`: every robot makes one sequence, so that the sequences' biases are independent.
-    pub fn new(object: usize, name: &str, touches: &'d [Touch], robots: usize, seed: u64) -> Self {
-        let mut order: Vec<u32> = (0..touches.len()).filter_map(|touch| u32::try_from(touch).ok()).collect();
-        let of_robot = (robots > 1).then(|| touches.len() / robots);
-        match of_robot {
-            None => order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, 0)),
-            Some(of_robot) => {
-                let touch = |index: usize| order[index % of_robot.max(1) * robots + index / of_robot.max(1)];
-                order = (0..of_robot * robots).map(touch).collect();
+    /// The touches of the object with this name and this index in the model. Touch i is of instance i modulo `instances`
+    /// and was made by robot i modulo `robots`; a sequence is of touches of one instance and one robot. With more than one
+    /// robot, every robot makes one sequence, so that the sequences' biases are independent; `robots` should be a multiple
+    /// of `instances` then.
+    pub fn new(object: usize, name: &str, touches: &'d [Touch], instances: usize, robots: usize, seed: u64) -> Self {
+        let is_once = robots > 1;
+        let pools = if is_once { robots } else { instances.max(1) };
+        let pool = |turn: usize| {
+            let own = (turn..touches.len()).step_by(pools).filter_map(|touch| u32::try_from(touch).ok());
+            let mut order: Vec<u32> = own.collect();
+            if !is_once {
+                order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, turn as u64));
             }
-        }
-        Self { object, touches, order, used: 0, of_robot }
+            Pool { order, used: 0 }
+        };
+        Self { object, touches, pools: (0..pools).map(pool).collect(), next: 0, is_once }
     }
 
-    /// Takes one in `parts` of the touches off, as a supply of its own; with robots, of the robots.
+    /// Takes one in `parts` of the touches off, as a supply of its own; of robots, one in so many.
     pub fn take_part(&mut self, parts: usize) -> Self {
-        let step = self.of_robot.unwrap_or(1).max(1);
-        let count = (self.order.len() / parts.max(1)).div_ceil(step) * step;
-        let rest = self.order.split_off(count.min(self.order.len()));
-        let order = std::mem::replace(&mut self.order, rest);
-        Self { order, ..*self }
+        let part = |all: usize| all / parts.max(1);
+        let pools = if self.is_once {
+            self.pools.drain(..part(self.pools.len())).collect()
+        } else {
+            let take = |pool: &mut Pool| {
+                let rest = pool.order.split_off(part(pool.order.len()));
+                Pool { order: std::mem::replace(&mut pool.order, rest), used: 0 }
+            };
+            self.pools.iter_mut().map(take).collect()
+        };
+        Self { pools, ..*self }
     }
 
-    /// Follows up to `wanted` sequences. One that all touches end in is left out; one that a robot's touches end in ends
+    /// Follows up to `wanted` sequences. One that the touches end in is left out; one that a robot's touches end in ends
     /// there.
     fn follow<const N: usize, G: FnMut(&Moment<'_>) -> bool>(
         &mut self,
@@ -84,16 +101,19 @@ impl<'d> Supply<'d> {
         let never = Stopping::from_odds(0, u32::MAX);
         let Ok(mut recognizer) = Recognizer::<N>::new(model, never) else { return Ok(Vec::new()) };
         let mut sequences = Vec::new();
-        while sequences.len() < wanted && self.used < self.order.len() {
+        while sequences.len() < wanted {
             progress::advance(progress, 1)?;
-            let end = self.of_robot.map_or(self.order.len(), |of_robot| self.used + of_robot);
-            let rest = self.order[self.used..end].iter().map(|&touch| &self.touches[touch as usize]);
+            let Some(pool) = self.pools.get_mut(self.next) else { break };
+            let rest = pool.order[pool.used..].iter().map(|&touch| &self.touches[touch as usize]);
             let (sequence, is_whole) = one(self.object, &mut recognizer, rest, until, gate());
-            self.used = if self.of_robot.is_some() { end } else { self.used + sequence.approaches as usize };
-            if is_whole || self.of_robot.is_some() {
-                sequences.push(sequence);
-            } else {
-                self.used = self.order.len();
+            if !is_whole && (!self.is_once || pool.order.is_empty()) {
+                break;
+            }
+            pool.used += sequence.approaches as usize;
+            sequences.push(sequence);
+            self.next += 1;
+            if !self.is_once {
+                self.next %= self.pools.len();
             }
         }
         Ok(sequences)
@@ -151,7 +171,7 @@ pub fn follow<G: FnMut(&Moment<'_>) -> bool>(
     let share = found.iter().zip(wanted).filter_map(share).fold(1.0, f64::min);
     for (found, &wanted) in found.iter_mut().zip(wanted) {
         // Rounded up where it is a whole number but for the last bits.
-        found.truncate((wanted as f64 * share + 1e-9) as usize);
+        found.truncate((wanted as f64 * share + 1e-6) as usize);
     }
     Ok(found.into_iter().flatten().collect())
 }

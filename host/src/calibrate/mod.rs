@@ -9,7 +9,8 @@
 //! name is undecided: neither right nor wrong. The rate is promised
 //!
 //! - on average ([`Per::Average`]): of all names, with objects touched as often as the model's priors say;
-//! - per name ([`Per::Name`]): of each name, when it is given, with objects touched as often as that;
+//! - per name ([`Per::Name`]): of each name, when it is given, with objects touched as often as that; each name has a
+//!   threshold of its own, and its rate is kept with the stated probability, whether or not the others' are;
 //! - per object ([`Per::Object`]): of the names given to each object, however often it is touched.
 //!
 //! ```no_run
@@ -29,6 +30,7 @@
 
 mod choose;
 mod draw;
+mod fresh;
 mod model;
 mod sequence;
 mod temperature;
@@ -38,7 +40,21 @@ mod walk;
 
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow};
-pub use model::{Calibrated, Settings, calibrate, calibrate_with};
+pub use fresh::calibrate_fresh;
+#[cfg(feature = "cli")]
+pub(crate) use fresh::fresh;
+pub use model::{Calibrated, Settings, added_bytes, calibrate, calibrate_with};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
+#[cfg(feature = "cli")]
+pub(crate) use temperature::temperature;
+/// What the promised rate is of, in words.
+pub fn of_what(per: Per) -> &'static str {
+    match per {
+        Per::Average => "all names given, on average,",
+        Per::Name => "each name, when it is given,",
+        Per::Object => "the names given to each object",
+    }
+}
+
 pub use walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};

@@ -13,14 +13,14 @@ use crate::progress::Progress;
 use crate::touches::Dataset;
 use crate::touches::noise::Noise;
 use palpate_onboard::{Model, Refused, Stopping};
-use palpate_shared::format::{OddsByObject, Promise, Tag, Temperature};
+use palpate_shared::format::{OddsByObject, Promise, PromisedNoise, SECTION_HEADER_LENGTH, Tag, Temperature};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// One in so many touches only says how strict to begin, and so does no more than one in so many sequences.
 const PILOT: usize = 30;
 /// The strictest threshold beyond that of the posterior, in nats: usually, and where a tenth of that is not enough.
-const STRICTEST: [f64; 2] = [2.5, 10.0];
+pub(super) const STRICTEST: [f64; 2] = [2.5, 10.0];
 
 /// What is promised, and on how much.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,7 +139,10 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
     let robots = add_noise(model, &mut dataset, settings, max_touches)?;
     let touched = dataset.objects.iter().zip(&known);
     let mut supplies: Vec<Supply<'_>> = touched
-        .map(|(touched, &object)| Supply::new(object, &touched.name, &touched.touches, robots, settings.seed))
+        .map(|(touched, &object)| {
+            let instances = dataset.instances.get(&touched.name).copied().unwrap_or(1);
+            Supply::new(object, &touched.name, &touched.touches, instances, robots, settings.seed)
+        })
         .collect();
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
@@ -188,7 +191,9 @@ fn add_noise(model: &Model<'_>, dataset: &mut Dataset, settings: &Settings, max_
         used / max_touches.max(1) as usize
     };
     let fewest = dataset.objects.iter().map(|object| robots(&object.touches)).min().unwrap_or(0);
-    let robots = if noise.has_bias() { fewest.max(1) } else { 1 };
+    // A robot's touches are then of one instance, also where objects have different numbers of them.
+    let instances = dataset.instances.values().fold(1, |all, &instances| lcm(all, instances.max(1)));
+    let robots = if noise.has_bias() { (fewest / instances * instances).max(1) } else { 1 };
     // Another seed than those of training and tests.
     let seed = settings.seed.wrapping_add(0x9e37_79b9);
     for object in &mut dataset.objects {
@@ -199,6 +204,11 @@ fn add_noise(model: &Model<'_>, dataset: &mut Dataset, settings: &Settings, max_
         };
     }
     Ok(robots)
+}
+
+/// The least common multiple of two positive numbers.
+fn lcm(a: usize, b: usize) -> usize {
+    (1..=b).find(|times| a * times % b == 0).unwrap_or(1) * a
 }
 
 /// How often each object of the data set is touched: as its prior says.
@@ -217,6 +227,13 @@ fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
         (wrong + u32::from(look.name != sequence.object), given + 1)
     });
     f64::from(wrong) <= 0.5 * rate * f64::from(given)
+}
+
+/// Bytes that a calibration to an average error rate adds to a model that states neither promise nor temperature.
+pub fn added_bytes(noise: &Noise) -> usize {
+    let is_short = PromisedNoise { touch: noise.promised().touch, ..PromisedNoise::default() } == noise.promised();
+    let promise = if is_short { Promise::LENGTH } else { Promise::FULL_LENGTH };
+    2 * SECTION_HEADER_LENGTH + promise + Temperature::LENGTH
 }
 
 fn finished(

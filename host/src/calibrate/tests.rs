@@ -24,7 +24,7 @@ fn fresh(count: usize, seed: u64) -> Dataset {
 
 fn supplies<'d>(dataset: &'d Dataset, robots: usize) -> Vec<Supply<'d>> {
     let objects = dataset.objects.iter().enumerate();
-    objects.map(|(object, of)| Supply::new(object, &of.name, &of.touches, robots, 1)).collect()
+    objects.map(|(object, of)| Supply::new(object, &of.name, &of.touches, 1, robots, 1)).collect()
 }
 
 fn problem<T>(result: crate::Result<T>) -> CalibrateProblem {
@@ -111,12 +111,13 @@ fn a_promise_per_name_or_object_is_kept_for_each_of_them() {
     let name = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Name)).unwrap();
     let (_, by_name, _) = errors(&fresh, &name.odds, 4);
     assert!(by_name.iter().all(|error| *error <= rate + 2.0 * spread), "{by_name:?}");
-    assert!(by_name.iter().all(|error| *error > rate / 3.0), "{by_name:?} is not used up");
+    assert!(by_name.iter().all(|error| *error > 0.6 * rate), "{by_name:?} is not used up");
     let object = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Object)).unwrap();
     let (_, _, by_object) = errors(&fresh, &object.odds, 4);
     assert!(by_object.iter().all(|error| *error <= rate + 2.0 * spread), "{by_object:?}");
     assert!(object.mean_touches > average.mean_touches, "each object costs more than their average");
-    assert_eq!((name.tallies.len(), object.tallies.len(), name.sequences), (4, 4, 20_000));
+    assert_eq!((name.tallies.len(), object.tallies.len(), name.sequences), (4, 4, 40_000));
+    assert!(name.mean_touches < 1.1 * average.mean_touches, "{} {}", name.mean_touches, average.mean_touches);
 }
 
 #[test]
@@ -194,6 +195,25 @@ fn every_robot_makes_one_sequence() {
     let sequences = follow(&compiled.model(), &mut supplies(&dataset, 20), &[90; 3], until, gate, &()).unwrap();
     assert_eq!(sequences.len(), 3 * 20);
     assert_eq!(robots.into_inner().unwrap().len(), 3 * 20);
+}
+
+#[test]
+fn every_sequence_is_of_one_instance() {
+    let (compiled, dataset) = (model(), fresh(1_000, 2));
+    let touches = &dataset.objects[0].touches;
+    let start = touches.as_ptr().addr();
+    let gate = || {
+        let mut own = None;
+        move |moment: &Moment<'_>| {
+            let touch = (std::ptr::from_ref(moment.touch).addr() - start) / size_of::<palpate_shared::Touch>();
+            assert_eq!(*own.get_or_insert(touch % 3), touch % 3);
+            true
+        }
+    };
+    let until = Until { margin: 6.0, max_touches: 50 };
+    let mut supply = [Supply::new(0, "object0", touches, 3, 1, 1)];
+    let sequences = follow(&compiled.model(), &mut supply, &[30], until, gate, &()).unwrap();
+    assert_eq!(sequences.len(), 30);
 }
 
 #[test]
@@ -333,4 +353,30 @@ fn what_cannot_be_calibrated_says_so() {
     assert_eq!(missing, CalibrateProblem::Missing { objects: vec!["object2".into()] });
     let more = synthetic::dataset(&[100; 4], 2);
     assert!(calibrate(&compiled.model(), more, &Settings::default(), &()).is_err());
+}
+
+#[test]
+fn with_other_priors_or_fewer_objects_errors_stay_below_what_theory_says() {
+    let compiled = model();
+    let settings = Settings { rate: 0.05, sequences: 6_000, max_touches: Some(60), ..Settings::default() };
+    let calibrated = calibrate(&compiled.model(), fresh(60_000, 2), &settings, &()).unwrap();
+    let model = Model::new(&calibrated.model).unwrap();
+    let bound = crate::evaluate::by_theory(&model);
+    // The threshold is looser than the posterior's, so that is what it may come to.
+    assert!(bound > 0.05 && bound < 0.3, "{bound}");
+    let unseen = fresh(4_000, 4);
+    let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 2_000, seed: 1 };
+    let mut errors = Vec::new();
+    for weights in [[1, 1, 1], [8, 1, 1], [1, 1, 8], [1, 1, 0], [0, 1, 1], [1, 0, 9]] {
+        let margins = Margins::new(Candidate::Compiled(&model), &unseen).unwrap().expecting(weights.to_vec()).unwrap();
+        let sequential = margins.sequential(&settings).unwrap();
+        assert!(sequential.error <= bound + 2.0 * sequential.error_standard_error, "{weights:?}: {}", sequential.error);
+        assert_eq!(sequential.promised, None);
+        let tested = weights.iter().filter(|weight| **weight > 0).count();
+        assert_eq!(sequential.per_object.len(), tested);
+        errors.push(sequential.error);
+    }
+    // Equal weights are what the model was calibrated for.
+    let equal = Margins::new(Candidate::Compiled(&model), &unseen).unwrap().sequential(&settings).unwrap();
+    assert!((equal.error - errors[0]).abs() < 1e-12);
 }

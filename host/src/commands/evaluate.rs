@@ -1,12 +1,14 @@
+use super::expected::{self, ExpectedArguments};
 use super::noise::NoiseArguments;
 use super::numbers::share;
+use super::percent;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::error::{Problem, RowsProblem};
 use crate::evaluate::model_file::ModelFile;
 use crate::evaluate::{
-    self, Active, ActiveFacts, Approaches, Classes, Evaluation, LEAST_GROUPS, Margins, Regression, RowsEvaluation,
-    Rule, Settings, Switched, evaluate_rows,
+    self, Active, ActiveFacts, Approaches, Candidate, Classes, Evaluation, LEAST_GROUPS, Margins, PromiseCheck,
+    Regression, RowsEvaluation, Rule, Settings, Switched, evaluate_rows,
 };
 use crate::output;
 use crate::progress::Progress;
@@ -28,6 +30,8 @@ With --probe, what the file says under [real] is added to the touches, and the d
 
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
 
+Without --error-rate a compiled model stops by its own thresholds. If it was calibrated, the figures show whether it keeps what it promises; with noise, priors or objects other than those of the calibration the promise is void, and the figures show by how much it is broken.
+
 With --active, on approaches with pose, each next approach is drawn from those of the same object in the pose that the model's plan proposes, none twice in a sequence. A pose whose approaches are used up is not proposed again in the sequence; where none is left, it ends without a verdict.
 
 With --label the file has rows of features for a model that was exported from another library's (CSV): each row is classified alone, and compared with the class in the column, its name or its number from 0; or for a model with one output with the number there.
@@ -42,6 +46,8 @@ Examples:
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
   palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --confusion 20
+  palpate evaluate model.palpate unseen --prior fork=0.3,spoon=0.3
+  palpate evaluate model.palpate unseen --only bowl,fork,spoon
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02
   palpate evaluate planned.palpate approaches --active
@@ -86,6 +92,8 @@ pub(crate) struct Arguments {
     json: bool,
     #[command(flatten)]
     probe: ProbeArguments,
+    #[command(flatten)]
+    expected: ExpectedArguments,
     #[command(flatten)]
     noise: NoiseArguments,
 }
@@ -141,7 +149,14 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let progress = Bar::new();
     progress.begin("evaluating", None);
     let (evaluation, confusion, active, switch) = file.with(|candidate| {
-        let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
+        let mut margins = Margins::new(candidate, &dataset)?.of_robots(robots);
+        let own = match candidate {
+            Candidate::Compiled(model) => expected::own_weights(model),
+            Candidate::Full(ensemble) => vec![1.0; ensemble.objects.len()],
+        };
+        if let Some(weights) = arguments.expected.weights(margins.objects(), &own)? {
+            margins = margins.expecting(weights)?;
+        }
         let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
         let settings = Settings {
             at,
@@ -150,6 +165,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             error_rate: arguments.error_rate,
             max_touches: arguments.max_touches,
             seed: arguments.seed,
+            noise,
         };
         let confusion = arguments.confusion.map(|touches| -> Result<_> {
             Ok(Confusion {
@@ -250,6 +266,9 @@ fn text(evaluated: &Evaluated) -> String {
     if let Some(approaches) = &evaluated.evaluation.approaches {
         text += &approaches_table(approaches, &evaluated.evaluation.patterns);
     }
+    if let Some(promise) = &evaluated.evaluation.promise {
+        text += &promise_text(promise);
+    }
     if let Some(ActiveFacts { rolls, poses, left_out, without_approaches }) = &evaluated.active {
         // Writing to a string cannot fail.
         _ = writeln!(
@@ -279,6 +298,48 @@ fn text(evaluated: &Evaluated) -> String {
             text,
             "\nThe model was trained on these touches of {objects}: on others it is right less often. Capture them with \
              another seed."
+        );
+    }
+    text
+}
+
+/// At what recognizers stop.
+fn stops(error_rate: f64, promised: Option<f64>) -> String {
+    match promised {
+        Some(rate) => format!("at a promised error rate of {rate}"),
+        None => format!("at an error rate of {error_rate}"),
+    }
+}
+
+/// What was promised, what was measured, and what makes the promise void.
+fn promise_text(check: &PromiseCheck) -> String {
+    let of = match (check.per, &check.of) {
+        ("name", Some(name)) => format!(" of {name}, the name that is wrong most often,"),
+        ("object", Some(name)) => format!(" of the names given to {name}, the object that is mistaken most often,"),
+        _ => " of the names given".to_owned(),
+    };
+    let mut text = format!(
+        "\nPromised: at most {} % wrong ({}, {} % sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}.\n",
+        percent(check.promised),
+        match check.per {
+            "name" => "each name, when it is given",
+            "object" => "each object",
+            _ => "on average",
+        },
+        percent(check.confidence),
+        check.sequences,
+        100.0 * check.error,
+        100.0 * check.standard_error,
+    );
+    if !check.void.is_empty() {
+        let (by, side) = (100.0 * check.exceeded_by.abs(), if check.exceeded_by > 0.0 { "above" } else { "below" });
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "The promise is void: {}. The error rate is {by:.2} points {side} the promised one. By theory it is at most \
+             {:.1} % with any priors, if posteriors can be believed.",
+            check.void.join("; "),
+            100.0 * check.by_theory
         );
     }
     text
@@ -327,9 +388,9 @@ fn table(evaluation: &Evaluation) -> String {
     );
     _ = write!(
         text,
-        "\nStopping at an error rate of {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
+        "\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
          {}.\n{} groups per object of {} touches in all; ± is a standard error.\n",
-        sequential.error_rate,
+        stops(sequential.error_rate, sequential.promised),
         sequential.mean_touches,
         100.0 * sequential.error,
         100.0 * sequential.error_standard_error,
@@ -371,9 +432,9 @@ fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeM
     let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {}", percent(*share)));
     _ = writeln!(
         text,
-        "\nStopping at an error rate of {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
+        "\nStopping {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
          wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.",
-        sequential.error_rate,
+        stops(sequential.error_rate, sequential.promised),
         sequential.mean_approaches,
         sequential.mean_approaches_standard_error,
         sequential.mean_touches,

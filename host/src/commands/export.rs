@@ -1,3 +1,4 @@
+use super::expected::PriorArguments;
 use super::numbers::share;
 use crate::Result;
 use crate::compile::{self, Candidate, Goal, Instructions, Layout, Leaf, Settings};
@@ -18,7 +19,7 @@ Leaves:
   i8   one byte per value: half the size, margins within hundredths of a nat
   f32  four bytes per value, added as the trainer adds them: the same margins
 
-Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most twice the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
+Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
 
 Instructions per touch are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
 
@@ -28,6 +29,7 @@ Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
   palpate export ensemble.json -o strict.palpate --error-rate 0.1%
+  palpate export ensemble.json -o kitchen.palpate --prior fork=0.3,spoon=0.3
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
   palpate export lightgbm.txt -o model.palpate --for speed
   palpate export forest.onnx -o model.palpate --scale width=100,height=10")]
@@ -70,6 +72,8 @@ pub(crate) struct Arguments {
     /// Print what was exported as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    prior: PriorArguments,
 }
 
 #[derive(Clone)]
@@ -117,6 +121,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         error_rate: arguments.error_rate,
         max_touches: arguments.max_touches,
         scales,
+        priors: arguments.prior.of(&ensemble.objects)?,
         ..Settings::default()
     };
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {

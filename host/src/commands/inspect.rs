@@ -1,9 +1,12 @@
 use super::export::instructions;
 use crate::Result;
+use crate::calibrate;
 use crate::chip::instructions::Chip;
 use crate::compile::{self, CompiledModel, Core, Instructions, Memory};
+use crate::evaluate;
 use crate::output;
 use crate::rows::{Encoder, feature_names};
+use crate::touches;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Length, TrainedNoise, TrainedProbe};
 use palpate_shared::{ContactPattern, Pose, Q15_ONE, Touch};
@@ -56,6 +59,12 @@ struct Inspected<'a> {
     unit: f32,
     margin_error: f32,
     stopping: Defaults,
+    /// What the model promises; null if it was not calibrated.
+    promise: Option<Promised>,
+    /// What evidence is divided by before it is shown as a posterior.
+    temperature: f64,
+    /// The logarithm of each object's prior, the largest 0; null if all are equal.
+    priors: Option<BTreeMap<&'a str, f64>>,
     probe: Probe,
     /// The touches that are evidence.
     touches: Touches,
@@ -81,6 +90,30 @@ struct Feature {
 struct Defaults {
     error_rate: f64,
     max_touches: u32,
+}
+
+#[derive(serde::Serialize)]
+struct Promised {
+    error_rate: f64,
+    /// "average", "name" or "object".
+    per: &'static str,
+    confidence: f64,
+    /// "touches" or "approaches".
+    counted: &'static str,
+    sequences: u32,
+    /// Names given in these sequences, and wrong ones of them.
+    given: u32,
+    wrong: u32,
+    undecided: f64,
+    /// Touches, or approaches, of a sequence on average.
+    mean: f64,
+    max_touches: u32,
+    /// What was added to the touches.
+    noise: touches::noise::Noise,
+    /// Nats by which an object has to be ahead of all others for its name to be given.
+    margins: BTreeMap<String, f64>,
+    /// What the error rate is at most by theory, with any priors.
+    by_theory: f64,
 }
 
 #[derive(serde::Serialize)]
@@ -142,6 +175,34 @@ fn probe(model: &Model<'_>) -> Probe {
             }
         }
     }
+}
+
+fn promised(model: &Model<'_>) -> Option<Promised> {
+    let promise = model.promise()?;
+    let stopping = Stopping::from_model(model);
+    let margin = |object| calibrate::margin_of(stopping.odds_of(object, model));
+    Some(Promised {
+        error_rate: promise.rate,
+        per: promise.per.name(),
+        confidence: promise.confidence,
+        counted: if promise.approaches { "approaches" } else { "touches" },
+        sequences: promise.sequences,
+        given: promise.given,
+        wrong: promise.wrong,
+        undecided: 1.0 - f64::from(promise.given) / f64::from(promise.sequences.max(1)),
+        mean: f64::from(promise.mean_thousandths) / 1e3,
+        max_touches: promise.max_touches,
+        noise: touches::noise::Noise::of_promise(&promise.noise),
+        margins: compile::names(model).into_iter().enumerate().map(|(object, name)| (name, margin(object))).collect(),
+        by_theory: evaluate::by_theory(model),
+    })
+}
+
+fn priors<'a>(model: &Model<'a>) -> Option<BTreeMap<&'a str, f64>> {
+    let objects = 0..model.object_count();
+    let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
+    let is_flat = objects.clone().all(|object| model.prior(object) == model.prior(0));
+    (!is_flat).then(|| objects.map(|object| (model.object_name(object), prior(object))).collect())
 }
 
 fn evidence(model: &Model<'_>) -> Touches {
@@ -232,7 +293,13 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         checksum: format!("{:08x}", model.checksum()),
         unit: model.unit(),
         margin_error: model.margin_error(),
-        stopping: Defaults { error_rate: significant(stopping.error_rate()), max_touches: stopping.max_touches() },
+        stopping: Defaults {
+            error_rate: evaluate::significant(stopping.error_rate()),
+            max_touches: stopping.max_touches(),
+        },
+        promise: promised(model),
+        temperature: model.temperature().value(),
+        priors: priors(model),
         probe: probe(model),
         touches: evidence(model),
         noise: noise(model),
@@ -243,11 +310,6 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
     }
 }
 
-/// The stored odds hold an error rate to about sixteen digits; nine say what was meant.
-fn significant(rate: f64) -> f64 {
-    format!("{rate:.8e}").parse().unwrap_or(rate)
-}
-
 fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
     let header = model.header();
     let objects = model.object_count();
@@ -255,10 +317,9 @@ fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
     BTreeMap::from([
         ("header", HEADER_LENGTH),
         ("text", length(header.text_length())),
-        ("sections", length(header.optional_length())),
+        ("optional_sections", length(header.optional_length())),
         ("base_margins", 4 * objects),
         ("priors", 4 * objects),
-        ("sections", length(header.optional_length())),
         ("axes", 4 * usize::from(header.axes())),
         ("thresholds", length(header.cuts_length())),
         ("groups", 8 * usize::from(header.groups())),
@@ -275,7 +336,7 @@ fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip> {
     };
     // The image makes touches of what it is given; a model over rows of features cannot be measured with it.
     let measured = match model.descriptor() {
-        Some(_) if emulated.is_there() => Some(emulated.measure(model.bytes(), &touches(model))?),
+        Some(_) if emulated.is_there() => Some(emulated.measure(model.bytes(), &spread_touches(model))?),
         _ => None,
     };
     let (how, margins, verdict) = match measured {
@@ -297,7 +358,7 @@ fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip> {
 }
 
 /// Touches that spread evenly over what the model's probe can give, the same every time.
-fn touches(model: &Model<'_>) -> Vec<Touch> {
+fn spread_touches(model: &Model<'_>) -> Vec<Touch> {
     // Most contacts come within a twentieth of the longest time.
     let range = compile::longest_time(model) * 1e6 / 20.0;
     let spread = |index: u32, step: f64| ((f64::from(index) * step).fract() * range) as u32;
@@ -333,8 +394,50 @@ fn text(inspected: &Inspected<'_>) -> String {
     );
     line(
         "stopping",
-        format!("error rate {}, at most {} touches", inspected.stopping.error_rate, inspected.stopping.max_touches),
+        match &inspected.promise {
+            None => format!(
+                "error rate {}, at most {} touches",
+                inspected.stopping.error_rate, inspected.stopping.max_touches
+            ),
+            Some(_) => format!("at most {} touches", inspected.stopping.max_touches),
+        },
     );
+    if let Some(promise) = &inspected.promise {
+        line(
+            "promise",
+            format!(
+                "at most {} % of {} wrong, {} % sure; {} sequences of {:.1} {}, {} names given, {} wrong, {:.2} % \
+                 undecided",
+                super::percent(promise.error_rate),
+                match promise.per {
+                    "name" => "each name, when it is given,",
+                    "object" => "the names given to each object",
+                    _ => "all names given",
+                },
+                super::percent(promise.confidence),
+                promise.sequences,
+                promise.mean,
+                promise.counted,
+                promise.given,
+                promise.wrong,
+                100.0 * promise.undecided,
+            ),
+        );
+        line("", format!("for touches with {}, at most {} of them", promise.noise, promise.max_touches));
+        let margins: Vec<f64> = promise.margins.values().copied().collect();
+        let is_one = margins.iter().all(|margin| *margin == margins[0]);
+        let margin = |(name, margin): (&String, &f64)| format!("{name} {margin:.2}");
+        let margins = match margins.first().filter(|_| is_one) {
+            Some(margin) => format!("{margin:.2}"),
+            None => promise.margins.iter().map(margin).collect::<Vec<_>>().join(", "),
+        };
+        line("thresholds", format!("nats ahead of all others: {margins}"));
+        line("posteriors", format!("at a temperature of {:.2}", inspected.temperature));
+    }
+    if let Some(priors) = &inspected.priors {
+        let prior = |(name, prior): (&&str, &f64)| format!("{name} {prior:.2}");
+        line("priors", format!("nats: {}", priors.iter().map(prior).collect::<Vec<_>>().join(", ")));
+    }
     line(
         "probe",
         match &inspected.probe {

@@ -1,10 +1,12 @@
 //! One file per command: its arguments, its help, and the call into the library.
 
+mod calibrate;
 mod capture;
 mod cast;
 mod completions;
 mod design;
 mod evaluate;
+mod expected;
 mod export;
 mod inspect;
 mod link;
@@ -74,6 +76,8 @@ commands! {
     Plan => plan,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
+    /// Set a model's thresholds so that it keeps a promised error rate
+    Calibrate => calibrate,
     /// Find the best model that fits a chip
     Tune => tune,
     /// Find out which probe to build for your objects
@@ -185,6 +189,11 @@ fn message(error: &Error, command: &str) -> String {
         return format!("{place}--{option} is {value}. {}", problem.fix());
     }
     error.to_string()
+}
+
+/// A share in percent, as it was meant: without the last bits.
+fn percent(share: f64) -> f64 {
+    (share * 1e9).round() / 1e7
 }
 
 /// Reads a data set; its warnings go to stderr.

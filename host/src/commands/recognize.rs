@@ -1,3 +1,4 @@
+use super::expected::{self, ExpectedArguments};
 use super::numbers::share;
 use crate::Result;
 use crate::chip::Entry;
@@ -24,8 +25,12 @@ Examples:
   probe | palpate recognize model.palpate
   palpate recognize model.palpate - --json < data/fork.txt
   palpate recognize model.palpate data/fork.txt --error-rate 5% --max-touches 30
+  palpate recognize model.palpate data/fork.txt --only fork,spoon,bowl
+  palpate recognize model.palpate data/fork.txt --prior fork=0.3,spoon=0.3
   probe | palpate recognize planned.palpate --active
-  palpate recognize model.palpate rows.csv --features --json")]
+  palpate recognize model.palpate rows.csv --features --json
+
+The posterior is that of the model's temperature, if it was calibrated. What it promises holds for its own priors and all of its objects; `palpate evaluate` with --prior or --only says what becomes of it.")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
@@ -38,7 +43,7 @@ pub(crate) struct Arguments {
     /// Add up the evidence of rows until there is a verdict, as that of touches
     #[arg(long, requires = "features")]
     add_up: bool,
-    /// Stop at this error rate, such as 0.05 or 5%, instead of the model's
+    /// Stop when the posterior passes one less this, such as 0.05 or 5%, instead of at the model's own thresholds; nothing is promised then
     #[arg(long, value_name = "RATE", value_parser = share)]
     error_rate: Option<f64>,
     /// Give up after this many touches instead of the model's limit
@@ -50,6 +55,8 @@ pub(crate) struct Arguments {
     /// Print one JSON object per line
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    expected: ExpectedArguments,
 }
 
 #[derive(serde::Serialize)]
@@ -89,13 +96,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     if arguments.active && model.plan().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
-    let stream = Stream {
-        recognizer,
-        model: &model,
-        longest: compile::longest_time(&model),
-        active: arguments.active,
-        json: arguments.json,
-    };
+    let weights = arguments.expected.weights(&compiled.names(), &expected::own_weights(&model))?;
+    let longest = compile::longest_time(&model);
+    let (active, json) = (arguments.active, arguments.json);
+    let mut stream = Stream { recognizer, model: &model, weights, longest, active, json };
+    stream.reset();
     let path = &arguments.file;
     if path.as_os_str() == "-" {
         return stream.run(std::io::stdin().lock(), Path::new("standard input"));
@@ -108,6 +113,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 struct Stream<'m> {
     recognizer: Recognizer<'m, 256>,
     model: &'m Model<'m>,
+    /// How often each object is touched, if not as the model says.
+    weights: Option<Vec<u32>>,
     /// The longest time between contacts that makes sense, in seconds.
     longest: f64,
     active: bool,
@@ -128,7 +135,7 @@ impl Stream<'_> {
             let wrong = |problem: Problem| Error::at(Place::line(path, number), problem);
             let line = std::str::from_utf8(&bytes).map_err(|_| wrong(TouchesProblem::NotText.into()))?.trim();
             if line.is_empty() {
-                self.recognizer.reset();
+                self.reset();
                 continue;
             }
             let touch = parse_touch(line).map_err(|problem| wrong(problem.into()))?;
@@ -136,10 +143,19 @@ impl Stream<'_> {
             let verdict = self.recognizer.push(&touch);
             self.print(verdict.err())?;
             if self.recognizer.verdict() != Verdict::Undecided {
-                self.recognizer.reset();
+                self.reset();
             }
         }
         Ok(())
+    }
+
+    /// Begins another object.
+    fn reset(&mut self) {
+        match &self.weights {
+            // One of them is above 0.
+            Some(weights) => _ = self.recognizer.reset_to(weights),
+            None => self.recognizer.reset(),
+        }
     }
 
     /// Refuses times that no object can give, such as times in milliseconds.

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// Find the best model that fits a chip.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Trains a family of ensembles, compiles each in several ways, and keeps the model that needs the fewest touches within the limits. It is chosen on touches held out from training, and measured on others again.
+Trains a family of ensembles, compiles each in several ways, and keeps the model that needs the fewest touches within the limits. It is chosen on touches held out from training, calibrated to the error rate on others, and measured on others again.
 
 Examples:
   palpate tune data --max-bytes 16K -o model.palpate
@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     /// Which features a touch is turned into
     #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "NAME")]
     descriptor: Descriptor,
-    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%
+    /// The error rate that the model promises, such as 0.05 or 5%
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
     error_rate: f64,
     /// Groups of touches, and sequences, to draw at random for each object
@@ -148,11 +148,20 @@ fn table(tuned: &Tuned) -> String {
         tuned.test.accuracy.iter().map(|(at, share)| format!("{:.1} % at {at}", 100.0 * share)).collect();
     _ = write!(
         text,
-        "\n* the best that fits; on touches that did not choose it: {}; stops after {:.1} touches, {:.2} % wrong.\n\
+        "\n* the best that fits; on touches that did not choose it: {}; stops after {:.1} touches, {:.2} % wrong.\n{}\n\
          M4F and M0+: instructions per touch, estimated, right to 15 %. The last line is the full model without limits.\n",
         accuracy.join(", "),
         tuned.test.sequential.mean_touches,
         100.0 * tuned.test.sequential.error,
+        match (&tuned.calibration, &tuned.uncalibrated) {
+            (Some(calibrated), _) => format!(
+                "It promises at most {} % wrong, {} % sure, from {} sequences.",
+                super::percent(calibrated.promised),
+                super::percent(calibrated.confidence),
+                calibrated.sequences
+            ),
+            (None, why) => format!("It promises nothing: {}.", why.as_deref().unwrap_or("it was not calibrated")),
+        },
     );
     text
 }

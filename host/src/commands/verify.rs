@@ -21,7 +21,8 @@ The exit code is 1 if a margin differs by more than the model states.
 
 Examples:
   palpate verify model.palpate xgboost.json rows.csv
-  palpate verify model.palpate lightgbm.txt rows.csv --library-margins margins.csv --json")]
+  palpate verify model.palpate lightgbm.txt rows.csv --json
+  palpate verify model.palpate m.json rows.csv --library-margins margins.csv")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,

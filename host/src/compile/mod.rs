@@ -100,7 +100,7 @@ impl Default for Settings {
 /// What a layout is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
-    /// The fewest instructions of those layouts that have at most twice the bytes of the smallest.
+    /// The fewest instructions of those layouts that have at most three times the bytes of the smallest.
     Balanced(Core),
     /// The fewest instructions.
     Speed,
@@ -204,7 +204,7 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
         Goal::Size => eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f)),
         Goal::Speed => eligible().min_by_key(|(_, candidate)| (candidate.instructions.m4f, candidate.bytes)),
         Goal::Balanced(core) => eligible()
-            .filter(|(_, candidate)| candidate.bytes <= 2 * smallest)
+            .filter(|(_, candidate)| candidate.bytes <= 3 * smallest)
             .min_by_key(|(_, candidate)| (instructions(candidate, core), candidate.bytes)),
     };
     best.map(|(index, _)| index)

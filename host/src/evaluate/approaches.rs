@@ -28,7 +28,8 @@ pub struct Approaches {
     pub sequential: ApproachSequential,
 }
 
-/// What a recognizer does with approaches that stops by itself. Each object is weighted equally.
+/// What a recognizer does with approaches that stops by itself. Each object is weighted by its prior, as in
+/// [`Sequential`](super::Sequential).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ApproachSequential {
     /// What it was asked to stay below: the promised rate, or that of the posterior.
@@ -57,6 +58,11 @@ pub struct ApproachSequential {
     pub error_per_object: BTreeMap<String, f64>,
     /// Share of sequences without a verdict, for each object.
     pub undecided_per_object: BTreeMap<String, f64>,
+    /// Share of wrong names among those given of each name; without names that were never given.
+    pub error_per_name: BTreeMap<String, f64>,
+    /// For each tested object, how it went for every sequence.
+    #[serde(skip)]
+    pub outcomes: Vec<Vec<Outcome>>,
 }
 
 /// Accuracies by the number of approaches or touches.
@@ -100,7 +106,7 @@ impl Margins<'_> {
             })
             .collect();
         let used = self.tested.iter().map(|tested| tested.touches as f64 / tested.approaches.len().max(1) as f64);
-        let sequential = self.summary(&outcomes, self.stated(settings, stopping), stopping.max_touches());
+        let sequential = self.summary(outcomes, self.stated(settings, stopping), stopping.max_touches());
         Ok(self.in_approaches(used.collect(), self.accuracies(at, &correct), sequential))
     }
 
@@ -164,11 +170,11 @@ impl Margins<'_> {
         correct.into_iter().map(|correct| Estimate::share(correct, groups)).collect()
     }
 
-    pub(super) fn summary(&self, outcomes: &[Vec<Outcome>], stated: Stated, max_touches: u32) -> ApproachSequential {
+    pub(super) fn summary(&self, outcomes: Vec<Vec<Outcome>>, stated: Stated, max_touches: u32) -> ApproachSequential {
         let Stated { error_rate, promised, per } = stated;
-        let approaches = self.mean(outcomes, |outcome| outcome.approaches);
-        let error = self.wrong(outcomes);
-        let undecided = self.undecided(outcomes);
+        let approaches = self.mean(&outcomes, |outcome| outcome.approaches);
+        let error = self.wrong(&outcomes);
+        let undecided = self.undecided(&outcomes);
         ApproachSequential {
             error_rate,
             promised,
@@ -176,13 +182,15 @@ impl Margins<'_> {
             max_touches,
             mean_approaches: approaches.all.value,
             mean_approaches_standard_error: approaches.all.standard_error,
-            mean_touches: self.mean(outcomes, |outcome| outcome.touches).all.value,
+            mean_touches: self.mean(&outcomes, |outcome| outcome.touches).all.value,
             error: error.all.value,
             error_standard_error: error.all.standard_error,
             undecided: undecided.all.value,
             per_object: approaches.per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
+            error_per_name: self.wrong_by_name(&outcomes).into_iter().map(|(name, of)| (name, of.value)).collect(),
+            outcomes,
         }
     }
 }

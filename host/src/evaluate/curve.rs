@@ -1,7 +1,7 @@
 //! Accuracy after a fixed number of touches.
 
 use super::estimate::Estimate;
-use super::margins::{Margins, best, rivals};
+use super::margins::{Candidate, Margins, best, rivals};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -66,7 +66,11 @@ impl Margins<'_> {
     /// As [`Margins::curve`], and `at` if `touches` is 0.
     pub fn confidences(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Confidence>> {
         self.check(touches, groups)?;
-        let unit = self.unit();
+        // What is shown is a posterior at the model's temperature.
+        let unit = match self.candidate {
+            Candidate::Compiled(model) => self.unit() / model.temperature().value(),
+            Candidate::Full(_) => self.unit(),
+        };
         let confidences = |position: usize| {
             let right = self.tested[position].object;
             self.ends(position, touches, groups, seed, move |evidence| {

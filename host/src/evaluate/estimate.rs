@@ -26,6 +26,16 @@ impl Estimate {
         Self { value, standard_error: (variance / count).sqrt() }
     }
 
+    /// The mean of independent estimates, weighted.
+    pub fn weighted(estimates: impl Iterator<Item = (Self, f64)> + Clone) -> Self {
+        let all: f64 = estimates.clone().map(|(_, weight)| weight).sum();
+        Self {
+            value: estimates.clone().map(|(estimate, weight)| estimate.value * weight).sum::<f64>() / all,
+            standard_error: estimates.map(|(of, weight)| (of.standard_error * weight).powi(2)).sum::<f64>().sqrt()
+                / all,
+        }
+    }
+
     /// The mean of independent estimates.
     pub fn mean_of(estimates: impl Iterator<Item = Self> + Clone) -> Self {
         let count = estimates.clone().count() as f64;

@@ -1,23 +1,25 @@
 //! The full model's recognizer.
 
 use super::margins::{best, rivals};
-use palpate_onboard::{Rivals, Stopping, Verdict};
+use palpate_onboard::{Model, Rivals, Stopping, Verdict};
 
 /// Recognizes with a full model: f32 margins, evidence in f64, and the stopping rule of the chip's recognizer.
 #[derive(Clone, Debug)]
 pub(super) struct FullRecognizer {
     evidence: Vec<f64>,
     stopping: Stopping,
-    /// What the other objects' weights may come to, the best one's being 1.
-    odds: f64,
+    /// For each object, what the other objects' weights may come to, its own being 1.
+    odds: Vec<f64>,
     touches: u32,
     verdict: Verdict,
 }
 
 impl FullRecognizer {
-    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats.
-    pub(super) fn new(prior: Vec<f64>, stopping: Stopping) -> Self {
-        let odds = stopping.error_rate() / (1.0 - stopping.error_rate());
+    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats. Objects have thresholds
+    /// of their own if the model that it is compared with has them.
+    pub(super) fn new(prior: Vec<f64>, stopping: Stopping, compiled: Option<&Model<'_>>) -> Self {
+        let odds = |object| compiled.map_or(stopping.odds(), |model| stopping.odds_of(object, model));
+        let odds = (0..prior.len()).map(|object| odds(object) as f64 / 72_057_594_037_927_936.0).collect();
         Self { evidence: prior, stopping, odds, touches: 0, verdict: Verdict::Undecided }
     }
 
@@ -30,8 +32,8 @@ impl FullRecognizer {
         self.touches += 1;
         let best = best(&self.evidence);
         let weight = rivals(&self.evidence, best, 1.0);
-        if weight <= self.odds {
-            // There are at most 256 objects, and the odds are below 1.
+        if weight <= self.odds[best] {
+            // There are at most 256 objects, and each weighs 1 at most; a conversion saturates.
             let rivals = Rivals::from_q56((weight * (1_u64 << 56) as f64) as u64);
             self.verdict = Verdict::Recognized { object: best as u8, touches: self.touches, rivals };
         } else if self.touches >= self.stopping.max_touches() {

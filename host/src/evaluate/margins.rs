@@ -2,10 +2,10 @@
 
 use crate::compile;
 use crate::ensemble::{Ensemble, StatedProbe, feature_row};
-use crate::error::{EvaluateProblem, Result};
+use crate::error::{Error, EvaluateProblem, Result};
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
-use palpate_onboard::{Model, Refused};
+use palpate_onboard::{Model, Recognizer, Refused, Stopping};
 use palpate_shared::format::{TrainedProbe, TrainedTouches};
 use palpate_shared::{Descriptor, Touch};
 use rayon::prelude::*;
@@ -31,6 +31,8 @@ pub struct Margins<'m> {
     tested_names: Vec<String>,
     hold_approaches: bool,
     shares: [f64; 6],
+    /// How often each object that the model knows is touched, if not as the model says.
+    pub(super) weights: Option<Vec<u32>>,
 }
 
 /// The margins of one object's test touches.
@@ -142,7 +144,8 @@ impl<'m> Margins<'m> {
         });
         let tested = tested.collect();
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
-        let margins = Self { candidate, descriptor, objects, tested, tested_names, hold_approaches, shares };
+        let margins =
+            Self { candidate, descriptor, objects, tested, tested_names, hold_approaches, shares, weights: None };
         Ok(margins.of_robots(1))
     }
 
@@ -156,6 +159,39 @@ impl<'m> Margins<'m> {
             tested.turns = turns;
         }
         self
+    }
+
+    /// The same for a recognizer that is told how often each object is touched, which replaces the model's priors
+    /// ([`Recognizer::reset_to`]): `weights` are for the model's objects, in its order. Objects of weight 0 are not there:
+    /// they cannot be recognized, and are not tested.
+    ///
+    /// # Errors
+    /// [`Problem::Setting`](crate::error::Problem::Setting) `prior` unless there is a weight for each object, and one of
+    /// a tested object is above 0.
+    pub fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
+        let objects = self.objects.len();
+        let is_there = |tested: &Tested<'_>| weights.get(tested.object).is_some_and(|&weight| weight > 0);
+        if weights.len() != objects || !self.tested.iter().any(is_there) {
+            let allowed = format!("{objects} weights, one for each object, of which one of the data set is above 0");
+            return Err(Error::setting("prior", format!("{weights:?}"), allowed));
+        }
+        let kept: Vec<bool> = self.tested.iter().map(is_there).collect();
+        let mut is_kept = kept.iter();
+        self.tested.retain(|_| is_kept.next().is_some_and(|kept| *kept));
+        let mut is_kept = kept.iter();
+        self.tested_names.retain(|_| is_kept.next().is_some_and(|kept| *kept));
+        self.weights = Some(weights);
+        Ok(self)
+    }
+
+    /// How often a tested object is touched, compared with others.
+    pub(super) fn frequency(&self, position: usize) -> f64 {
+        let object = self.tested[position].object;
+        match (&self.weights, self.candidate) {
+            (Some(weights), _) => weights.get(object).copied().unwrap_or(0).into(),
+            (None, Candidate::Compiled(model)) => (f64::from(model.prior(object)) * f64::from(model.unit())).exp(),
+            (None, Candidate::Full(_)) => 1.0,
+        }
     }
 
     /// The model's descriptor.
@@ -245,6 +281,20 @@ impl<'m> Margins<'m> {
 
     /// The evidence before any touch, in units.
     pub(super) fn prior(&self) -> Vec<f64> {
+        if let Some(weights) = &self.weights {
+            let most = f64::from(weights.iter().copied().max().unwrap_or(1));
+            return match self.candidate {
+                Candidate::Full(_) => weights.iter().map(|&weight| (f64::from(weight) / most).ln()).collect(),
+                Candidate::Compiled(model) => {
+                    let never = Stopping::from_odds(0, u32::MAX);
+                    let told = Recognizer::<256>::new(model, never).ok().and_then(|mut recognizer| {
+                        recognizer.reset_to(weights).ok()?;
+                        Some(recognizer.evidence().iter().map(|&evidence| evidence as f64).collect())
+                    });
+                    told.unwrap_or_default()
+                }
+            };
+        }
         let prior = |object| match self.candidate {
             Candidate::Full(_) => 0.0,
             Candidate::Compiled(model) => f64::from(model.prior(object)),

@@ -47,6 +47,7 @@ mod noisy;
 pub mod parity;
 mod plan;
 mod poses;
+mod promise;
 mod rows;
 mod sequential;
 mod switch;
@@ -65,12 +66,16 @@ pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
 pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
 pub use poses::{ByPose, Stock};
+pub use promise::{PromiseCheck, by_theory};
 pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
+#[cfg(feature = "cli")]
+pub(crate) use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use switch::{Rule, Stopped, Switched};
 pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
+use crate::touches::noise::Noise;
 use palpate_shared::ContactPattern;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -100,6 +105,8 @@ pub struct Settings {
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,
+    /// What was added to the touches: what a model promises is void with other noise.
+    pub noise: Noise,
 }
 
 impl Settings {
@@ -113,7 +120,8 @@ impl Settings {
 impl Default for Settings {
     fn default() -> Self {
         let (at, at_approaches) = (vec![5, 10, 20, 30, 60], vec![10, 20, 60]);
-        Self { at, at_approaches, groups: 1000, error_rate: None, max_touches: None, seed: 1 }
+        let noise = Noise::default();
+        Self { at, at_approaches, groups: 1000, error_rate: None, max_touches: None, seed: 1, noise }
     }
 }
 
@@ -139,6 +147,9 @@ pub struct Evaluation {
     /// approach and change nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub approaches: Option<Approaches>,
+    /// Whether the model keeps what it promises: counted in approaches where the data set holds those.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub promise: Option<PromiseCheck>,
     /// Share of each contact pattern among the touches of the data set, each object weighted equally.
     pub patterns: BTreeMap<&'static str, f64>,
 }
@@ -157,6 +168,12 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     let stopping = settings.sequences();
     let sequential = margins.sequential(&stopping)?;
     let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
+    let approaches = approaches.transpose()?;
+    let outcomes = approaches.as_ref().map_or(&sequential.outcomes, |approaches| &approaches.sequential.outcomes);
+    let promise = match settings.error_rate {
+        None => margins.check_promise(outcomes, sequential.max_touches, &settings.noise),
+        Some(_) => None,
+    };
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));
     let per_object = |(position, name): (usize, &String)| {
         let accuracy = |&touches: &usize| (touches, curve.object_accuracy(position, touches).value);
@@ -170,7 +187,8 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
         accuracy_standard_error: settings.at.iter().map(accuracy).map(|(at, e)| (at, e.standard_error)).collect(),
         per_object: margins.tested_names().iter().enumerate().map(per_object).collect(),
         sequential,
-        approaches: approaches.transpose()?,
+        approaches,
+        promise,
         patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
     })
 }

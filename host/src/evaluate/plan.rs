@@ -283,8 +283,9 @@ mod tests {
         };
         assert!(plan(&model, &good, 1).is_ok());
         assert_eq!(refused(&|_| {}, 3).exit_code(), 2);
-        let few = refused(&|_| {}, 2);
-        assert!(matches!(problem(few), EvaluateProblem::FewInPose { needed: LEAST_IN_POSE, .. }));
+        let few = refused(&|dataset| _ = dataset.objects[1].touches.pop(), 1);
+        let expected = EvaluateProblem::FewInPose { object: "fork".into(), found: 19, needed: LEAST_IN_POSE };
+        assert_eq!(problem(few), expected);
         let full = refused(&|dataset| dataset.origin.as_mut().unwrap().approaches = false, 1);
         assert_eq!(problem(full), EvaluateProblem::NoApproaches);
         let one = refused(&|dataset| dataset.objects.truncate(1), 1);

@@ -26,7 +26,8 @@ pub struct SequentialSettings {
     pub seed: u64,
 }
 
-/// What a recognizer does that stops by itself. Each object is weighted equally.
+/// What a recognizer does that stops by itself. Each object is weighted by its prior: equally, unless the model or
+/// [`Margins::expecting`] says otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
     /// What it was asked to stay below: the promised rate, or that of the posterior.
@@ -53,6 +54,8 @@ pub struct Sequential {
     pub error_per_object: BTreeMap<String, f64>,
     /// Share of sequences without a verdict, for each object.
     pub undecided_per_object: BTreeMap<String, f64>,
+    /// Share of wrong names among those given of each name; without names that were never given.
+    pub error_per_name: BTreeMap<String, f64>,
     /// For each tested object, how it went for every sequence.
     #[serde(skip)]
     pub outcomes: Vec<Vec<Outcome>>,
@@ -109,6 +112,7 @@ impl Margins<'_> {
             per_object: touches.per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
+            error_per_name: self.wrong_by_name(&outcomes).into_iter().map(|(name, of)| (name, of.value)).collect(),
             outcomes,
         }
     }
@@ -139,9 +143,10 @@ impl Margins<'_> {
         let estimates: Vec<Estimate> =
             outcomes.iter().enumerate().map(|(position, outcomes)| of(position, outcomes)).collect();
         let values = estimates.iter().map(|estimate| estimate.value);
+        let weights = (0..).map(|position| self.frequency(position));
         Figure {
             per_object: self.tested_names().iter().cloned().zip(values).collect(),
-            all: Estimate::mean_of(estimates.iter().copied()),
+            all: Estimate::weighted(estimates.iter().copied().zip(weights)),
         }
     }
 
@@ -178,6 +183,10 @@ impl Margins<'_> {
     pub(super) fn stated(&self, settings: &SequentialSettings, stopping: Stopping) -> Stated {
         match (settings.error_rate, self.candidate) {
             (None, Candidate::Compiled(model)) => match model.promise() {
+                // Other priors than those of the calibration, or fewer objects: nothing was promised for these.
+                Some(promise) if self.weights.is_some() => {
+                    Stated { error_rate: promise.rate, promised: None, per: None }
+                }
                 Some(promise) => {
                     Stated { error_rate: promise.rate, promised: Some(promise.rate), per: Some(promise.per.name()) }
                 }
@@ -195,18 +204,18 @@ impl Margins<'_> {
         stopping: Stopping,
         approaches: impl Iterator<Item = Option<u32>>,
     ) -> Outcome {
-        let objects = self.objects().len();
+        let (objects, weights) = (self.objects().len(), self.weights.as_deref());
         match &self.tested[position].values {
             Values::Compiled(model, values) => {
                 let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
                 match objects {
-                    0..=16 => onboard::<16>(model, stopping, rows),
-                    17..=64 => onboard::<64>(model, stopping, rows),
-                    _ => onboard::<256>(model, stopping, rows),
+                    0..=16 => onboard::<16>(model, stopping, weights, rows),
+                    17..=64 => onboard::<64>(model, stopping, weights, rows),
+                    _ => onboard::<256>(model, stopping, weights, rows),
                 }
             }
             Values::Full(values) => {
-                let mut recognizer = FullRecognizer::new(self.prior(), stopping);
+                let mut recognizer = FullRecognizer::new(self.prior(), stopping, None);
                 let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
                 until_sure(rows.map(|margins| margins.map(|margins| recognizer.push(margins))))
             }
@@ -230,12 +239,17 @@ pub(crate) fn significant(rate: f64) -> f64 {
 fn onboard<'r, const N: usize>(
     model: &Model<'_>,
     stopping: Stopping,
+    weights: Option<&[u32]>,
     rows: impl Iterator<Item = Option<&'r [i32]>>,
 ) -> Outcome {
     let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
         // Room was made for at least as many objects as the model has.
         return Outcome { touches: 0, approaches: 0, recognized: None };
     };
+    if let Some(weights) = weights {
+        // Of which one is above 0.
+        _ = recognizer.reset_to(weights);
+    }
     until_sure(rows.map(|margins| margins.map(|margins| recognizer.push_margins(margins))))
 }
 

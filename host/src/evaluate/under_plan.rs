@@ -44,7 +44,11 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
         })
         .collect();
     let (stated, most) = (|| margins.stated(&settings.sequences(), rule), rule.max_touches());
-    let in_approaches = margins.summary(&outcomes, stated(), most);
+    let promise = match settings.error_rate {
+        None => margins.check_promise(&outcomes, most, &settings.noise),
+        Some(_) => None,
+    };
+    let in_approaches = margins.summary(outcomes.clone(), stated(), most);
     let accuracies = margins.accuracies(at, &by_touches);
     Ok(Evaluation {
         descriptor: margins.descriptor().name(),
@@ -55,6 +59,7 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
         per_object: accuracies.per_object,
         sequential: margins.of_outcomes(outcomes, stated(), most),
         approaches: Some(margins.in_approaches(used, margins.accuracies(at_approaches, &by_approaches), in_approaches)),
+        promise,
         patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
     })
 }

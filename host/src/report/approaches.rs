@@ -127,7 +127,7 @@ pub(super) fn measure(context: &Context) -> Result<ByApproach> {
 }
 
 /// Approaches to train on, and a third as many to test on.
-fn approaches(context: &Context, scenes: &[Vec<Scene>], origin: &Origin) -> Result<[Dataset; 2]> {
+pub(super) fn approaches(context: &Context, scenes: &[Vec<Scene>], origin: &Origin) -> Result<[Dataset; 2]> {
     let count = context.settings.approaches;
     let touched = |samples: Range<u64>| -> Result<Dataset> {
         let of = |(object, scenes): (&Object, &Vec<Scene>)| {

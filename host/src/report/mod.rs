@@ -18,6 +18,8 @@ mod instructions;
 mod limit;
 mod noise;
 mod objects;
+mod plan;
+mod promises;
 mod published;
 pub(crate) mod results;
 pub(crate) mod run_page;

@@ -4,8 +4,8 @@ use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
-    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, published, results,
-    sequential, simulator,
+    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
+    published, results, sequential, simulator,
 };
 use crate::capture;
 use crate::compile;
@@ -115,9 +115,11 @@ pub fn report_on(
     let limit = stages.stage("limit", || limit::measure(&context, get_large()?))?;
     let sequences = stages.stage("sequential", || sequential::measure(&context, get_large()?))?;
     let calibration = stages.stage("calibration", || calibration::measure(&context, get_large()?))?;
+    let promised = stages.stage("promises", || promises::measure(&context, get_large()?))?;
     let members = stages.stage("cost", || cost::measure(&context, get_large()?))?;
     drop(large);
     let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
+    let plans = stages.stage("plan", || plan::measure(&context))?;
     let engines = stages.stage("simulator", || simulator::measure(&context))?;
     let grown = if settings.growth {
         let growth = stages.stage("growth", || growth::measure(&context))?;
@@ -139,10 +141,12 @@ pub fn report_on(
         objects::section(&context)?,
         cross_validation::section(&context, &folds)?,
         approaches::section(&context, &by_approach)?,
+        plan::section(&context, &plans)?,
         noise::section(&context, &noisy)?,
         limit::section(&context, &limit)?,
         sequential::section(&context, &sequences)?,
         calibration::section(&context, &calibration)?,
+        promises::section(&context, &promised)?,
         costs,
     ];
     sections.extend(grown);
@@ -255,6 +259,7 @@ mod tests {
             "accuracy",
             "accuracy-objects",
             "approaches-accuracy",
+            "plan-errors",
             "confusion",
             "signal-to-noise",
             "noise",
@@ -264,6 +269,7 @@ mod tests {
             "sequential-trade",
             "sequential-objects",
             "reliability",
+            "promises-kept",
             "cost-bytes",
             "cost-time",
             "cost-work",
@@ -278,7 +284,7 @@ mod tests {
             }
         }
         let figures = html.matches("<figure id=").count();
-        assert_eq!(figures, 20, "a figure is not in the list above");
+        assert_eq!(figures, 22, "a figure is not in the list above");
         let mut ids: Vec<&str> = html.split(" id=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
         let count = ids.len();
         ids.sort_unstable();

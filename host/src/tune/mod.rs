@@ -2,8 +2,8 @@
 //!
 //! A family of ensembles is trained (trees, depth, eta; for the table layout bins of each feature), each compiled with
 //! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Kept is the model
-//! that stops after the fewest touches at the wanted error rate, of those within the limits. Its own figures come from a
-//! third share of the touches, which chose nothing.
+//! that stops after the fewest touches at the wanted error rate, of those within the limits. It is calibrated to that rate
+//! on a third share of the touches, and its own figures come from a fourth.
 //!
 //! Instructions per touch are the compiler's estimate ([`crate::compile::Instructions`]).
 //!
@@ -24,6 +24,7 @@ pub mod probe;
 #[cfg(test)]
 mod tests;
 
+use crate::calibrate::{self, Calibrated};
 use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
 use crate::ensemble::{Ensemble, StatedProbe};
 use crate::error::{CompileProblem, Problem, Result, TuneProblem};
@@ -98,7 +99,7 @@ pub struct Row {
     pub leaf: Option<&'static str>,
     /// How trees are laid out.
     pub layout: Option<&'static str>,
-    /// Size of the model.
+    /// Size of the model, calibrated.
     pub bytes: Option<usize>,
     /// Instructions per touch on a Cortex-M4F, estimated.
     pub instructions: Option<u64>,
@@ -133,7 +134,11 @@ pub struct Tuned {
     pub rows: Vec<Row>,
     /// The one kept: its position in `rows`.
     pub chosen: usize,
-    /// Its figures on touches that neither trained nor chose it.
+    /// How its thresholds were found, on touches that neither trained nor chose it; null if they were not.
+    pub calibration: Option<Calibrated>,
+    /// Why they were not.
+    pub uncalibrated: Option<String>,
+    /// Its figures on touches that neither trained, calibrated nor chose it.
     pub test: Evaluation,
     /// Its bytes.
     #[serde(skip)]
@@ -143,15 +148,17 @@ pub struct Tuned {
     pub ensemble: Ensemble,
 }
 
-/// Trains the family on eight tenths of the touches, chooses on one tenth, and measures the choice on the last.
+/// Trains the family on seven tenths of the touches, chooses on one tenth, calibrates the choice on one, and measures it
+/// on the last.
 ///
 /// # Errors
 /// As [`crate::ensemble::train::train`], [`compile`](fn@crate::compile::compile) (but for layouts that an ensemble does not fit) and
 /// [`evaluate::evaluate`]; [`TuneProblem::NothingFits`] if no model is within the limits.
 pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Tuned> {
-    let outer = folds::split(dataset, 0.2, settings.seed)?;
-    let held_out = folds::split(&outer.test, 0.5, settings.seed)?;
-    let (mut choose, mut test) = (held_out.train, held_out.test);
+    let outer = folds::split(dataset, 0.3, settings.seed)?;
+    let held_out = folds::split(&outer.test, 1.0 / 3.0, settings.seed)?;
+    let halves = folds::split(&held_out.train, 0.5, settings.seed)?;
+    let (mut choose, fresh, mut test) = (halves.train, halves.test, held_out.test);
     // Other seeds than that of the training.
     let robots = [(&mut choose, 1), (&mut test, 2)]
         .map(|(part, other)| evaluate::add_noise(part, &settings.noise, settings.seed.wrapping_add(other)));
@@ -175,10 +182,38 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     mark_frontier(&mut models, settings.core);
     let chosen = choose_from(&models, settings)?;
     let (_, ensemble, compiled) = &models[chosen];
-    let (ensemble, model) = ((*ensemble).clone(), compiled.bytes.clone());
+    let (ensemble, mut model) = ((*ensemble).clone(), compiled.bytes.clone());
+    let calibration = calibrated(&model, fresh, settings, progress)?;
+    if let Ok(calibrated) = &calibration {
+        model.clone_from(&calibrated.model);
+    }
     let opened = compile::open(&model)?;
-    let test = evaluated(Candidate::Compiled(&opened), &test, settings)?;
-    Ok(Tuned { unlimited, rows: models.into_iter().map(|(row, ..)| row).collect(), chosen, test, model, ensemble })
+    let test = evaluated(Candidate::Compiled(&opened), &test, None, settings)?;
+    let rows = models.into_iter().map(|(row, ..)| row).collect();
+    let uncalibrated = calibration.as_ref().err().cloned();
+    Ok(Tuned { unlimited, rows, chosen, calibration: calibration.ok(), uncalibrated, test, model, ensemble })
+}
+
+/// The model with thresholds that keep the error rate; or why there are none.
+fn calibrated(
+    model: &[u8],
+    fresh: Dataset,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Result<Calibrated, String>> {
+    let terms = calibrate::Settings {
+        rate: settings.error_rate,
+        noise: settings.noise,
+        seed: settings.seed.wrapping_add(3),
+        ..calibrate::Settings::default()
+    };
+    match calibrate::calibrate(&compile::open(model)?, fresh, &terms, progress) {
+        Err(error) => match error.problem() {
+            Some(Problem::Calibrate(problem)) => Ok(Err(problem.to_string())),
+            _ => Err(error),
+        },
+        Ok(calibrated) => Ok(Ok(calibrated)),
+    }
 }
 
 /// Touches that are held out, and how many robots made them.
@@ -215,7 +250,7 @@ fn compiled_models<'e>(
             let row = match &measured {
                 Some(row) => Row {
                     layout: Some(compiled.layout.name()),
-                    bytes: Some(compiled.bytes.len()),
+                    bytes: Some(bytes(&compiled, settings)),
                     instructions: Some(compiled.instructions.m4f),
                     instructions_m0_plus: compiled.instructions.m0_plus,
                     ..row.clone()
@@ -240,6 +275,11 @@ fn unless_unfit(compiled: Result<Compiled>) -> Result<Option<Compiled>> {
     }
 }
 
+/// Bytes of the model with what a calibration adds.
+fn bytes(compiled: &Compiled, settings: &Settings) -> usize {
+    compiled.bytes.len() + calibrate::added_bytes(&settings.noise)
+}
+
 fn measure(
     candidate: Candidate<'_>,
     recipe: &Recipe,
@@ -247,12 +287,12 @@ fn measure(
     choose: &Held,
     settings: &Settings,
 ) -> Result<Row> {
-    let evaluation = evaluated(candidate, choose, settings)?;
+    let evaluation = evaluated(candidate, choose, Some(settings.error_rate), settings)?;
     Ok(Row {
         recipe: recipe.clone(),
         leaf: compiled.map(|(leaf, _)| leaf.name()),
         layout: compiled.map(|(_, compiled)| compiled.layout.name()),
-        bytes: compiled.map(|(_, compiled)| compiled.bytes.len()),
+        bytes: compiled.map(|(_, compiled)| bytes(compiled, settings)),
         instructions: compiled.map(|(_, compiled)| compiled.instructions.m4f),
         instructions_m0_plus: compiled.and_then(|(_, compiled)| compiled.instructions.m0_plus),
         accuracy: evaluation.accuracy,
@@ -263,16 +303,23 @@ fn measure(
     })
 }
 
-fn evaluated(candidate: Candidate<'_>, (touches, robots): &Held, settings: &Settings) -> Result<Evaluation> {
+/// `error_rate` as [`evaluate::Settings::error_rate`].
+fn evaluated(
+    candidate: Candidate<'_>,
+    (touches, robots): &Held,
+    error_rate: Option<f64>,
+    settings: &Settings,
+) -> Result<Evaluation> {
     let margins = Margins::new(candidate, touches)?.of_robots(*robots);
     let (fewest, approaches) = (margins.fewest_touches(), margins.fewest_approaches());
     let settings = evaluate::Settings {
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),
         at_approaches: [10, 20, 60].into_iter().filter(|&at| at <= approaches).collect(),
         groups: settings.groups,
-        error_rate: Some(settings.error_rate),
+        error_rate,
         max_touches: None,
         seed: settings.seed,
+        noise: settings.noise,
     };
     evaluate::evaluate(&margins, &settings)
 }
@@ -310,7 +357,7 @@ fn choose_from(models: &[Measured<'_>], settings: &Settings) -> Result<usize> {
 }
 
 fn nothing_fits(models: &[Measured<'_>], core: Core) -> TuneProblem {
-    let bytes = models.iter().map(|(.., compiled)| compiled.bytes.len()).min();
+    let bytes = models.iter().filter_map(|(row, ..)| row.bytes).min();
     let instructions = models.iter().filter_map(|(.., compiled)| compiled.instructions.on(core)).min();
     match bytes.zip(instructions) {
         Some((bytes, instructions)) => TuneProblem::NothingFits { bytes, instructions },

@@ -405,6 +405,6 @@ fn an_ensemble_trained_on_seconds_is_refused_at_export_with_its_feature() {
     seconds.save(place.path("seconds.json")).unwrap();
     let (code, message) = refusal(&["export", &place.text("seconds.json"), "-o", &place.text("seconds.palpate")]);
     assert_eq!(code, 1);
-    assert!(message.contains("seconds.json: ") && message.contains("8 thresholds of curvature"), "{message}");
+    assert!(message.contains("seconds.json: ") && message.contains("of curvature is neither whole"), "{message}");
     assert!(!place.path("seconds.palpate").exists());
 }

@@ -9,6 +9,7 @@ mod help;
 mod mesh;
 mod models;
 mod objects;
+mod plan;
 mod probe;
 mod reports;
 mod rows;

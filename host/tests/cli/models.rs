@@ -331,3 +331,135 @@ fn tune_names_the_file_it_wrote_and_the_features_that_the_chip_needs() {
     assert!(written.contains(&format!("features of palpate-onboard: {layout}, {leaf}-leaves")), "{written}");
     assert!(succeeds(at, &tune).contains("The model was not written"));
 }
+
+/// Touches of two objects that overlap, drawn without chance; each call with another `first` gives others.
+fn many(directory: &Path, count: u64, first: u64) {
+    std::fs::create_dir_all(directory).unwrap();
+    for (name, bend) in [("bowl", 100_000), ("fork", 200_000)] {
+        let spread = |index: u64, prime: u64, range: u64| (index.wrapping_mul(prime) >> 7) % range;
+        let lines = (first..first + count).map(|index| {
+            let slope = spread(index, 0x9e37_79b9_7f4a_7c15, 300_007);
+            let bend = spread(index, 0xd134_2543_de82_ef95, bend);
+            let times = [0, slope / 2 + bend, slope].map(|micros| micros as f64 * 1e-6);
+            format!("{:.6} {:.6} {:.6}\n", times[0], times[1], times[2])
+        });
+        std::fs::write(directory.join(format!("{name}.txt")), lines.collect::<String>()).unwrap();
+    }
+}
+
+/// A model of `many` touches and three directories of others: `train`, `fresh`, `unseen`.
+fn uncalibrated() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    many(&at.join("train"), 2_000, 0);
+    many(&at.join("fresh"), 20_000, 1_000_000);
+    many(&at.join("unseen"), 4_000, 2_000_000);
+    succeeds(at, &["train", "train", "-o", "ensemble.json", "--rounds", "10"]);
+    succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
+    directory
+}
+
+#[test]
+fn a_calibrated_model_promises_and_evaluate_shows_whether_it_keeps_it() {
+    let directory = uncalibrated();
+    let at = directory.path();
+    let json = |arguments: &[&str]| -> Value { serde_json::from_str(&succeeds(at, arguments)).unwrap() };
+    let before = json(&["evaluate", "model.palpate", "unseen", "--json"]);
+    assert_eq!((&before["sequential"]["promised"], &before["sequential"]["error_rate"]), (&Value::Null, &0.01.into()));
+    assert!(before.get("promise").is_none());
+    let calibrate = ["calibrate", "model.palpate", "fresh", "-o", "calibrated.palpate", "--error-rate", "5%", "--json"];
+    let calibrated = json(&calibrate);
+    assert_eq!((&calibrated["promised"], &calibrated["per"]), (&0.05.into(), &"average".into()));
+    assert!(calibrated["error"].as_f64().unwrap() <= 0.05 && calibrated["sequences"].as_u64().unwrap() > 500);
+    let inspected = json(&["inspect", "calibrated.palpate", "--json"]);
+    let promise = &inspected["promise"];
+    assert_eq!((&promise["error_rate"], &promise["confidence"]), (&0.05.into(), &0.95.into()));
+    assert_eq!(promise["sequences"], calibrated["sequences"]);
+    assert_eq!(promise["margins"]["bowl"], promise["margins"]["fork"]);
+    let parts = inspected["bytes_by_part"].as_object().unwrap().values();
+    assert_eq!(inspected["bytes"], parts.map(|bytes| bytes.as_u64().unwrap()).sum::<u64>());
+    assert!(succeeds(at, &["inspect", "calibrated.palpate"]).contains("at most 5 % of all names given wrong"));
+
+    let evaluated = json(&["evaluate", "calibrated.palpate", "unseen", "--json"]);
+    let (sequential, promise) = (&evaluated["sequential"], &evaluated["promise"]);
+    assert_eq!((&sequential["promised"], &sequential["per"]), (&0.05.into(), &"average".into()));
+    assert_eq!((&promise["promised"], promise["void"].as_array().unwrap().len()), (&0.05.into(), 0));
+    assert!(sequential["error"].as_f64().unwrap() <= 0.05 + 3.0 * sequential["error_standard_error"].as_f64().unwrap());
+    assert!(succeeds(at, &["evaluate", "calibrated.palpate", "unseen"]).contains("Promised: at most 5 % wrong"));
+    // Another error rate is that of the posterior, which nothing promises.
+    let replaced = json(&["evaluate", "calibrated.palpate", "unseen", "--json", "--error-rate", "0.05"]);
+    assert_eq!(replaced["sequential"]["promised"], Value::Null);
+    assert!(replaced.get("promise").is_none());
+    // Other noise makes the promise void; how far it is broken is said.
+    let noisy = json(&["evaluate", "calibrated.palpate", "unseen", "--json", "--noise", "50ms"]);
+    assert!(noisy["promise"]["void"][0].as_str().unwrap().contains("noise of 50 ms"));
+    assert!(noisy["promise"]["exceeded_by"].as_f64().unwrap() > 0.0);
+    let text = succeeds(at, &["evaluate", "calibrated.palpate", "unseen", "--noise", "50ms"]);
+    assert!(text.contains("The promise is void: promised with no noise") && text.contains("points above"), "{text}");
+}
+
+#[test]
+fn thresholds_by_name_are_stated_for_each_and_evaluated_for_each() {
+    let directory = uncalibrated();
+    let at = directory.path();
+    let json = |arguments: &[&str]| -> Value { serde_json::from_str(&succeeds(at, arguments)).unwrap() };
+    let per = ["calibrate", "model.palpate", "fresh", "-o", "names.palpate", "--error-rate", "0.1", "--per", "name"];
+    assert!(succeeds(at, &per).contains("each name, when it is given"));
+    let inspected = json(&["inspect", "names.palpate", "--json"]);
+    assert_eq!(inspected["promise"]["per"], "name");
+    let evaluated = json(&["evaluate", "names.palpate", "unseen", "--json"]);
+    assert_eq!(evaluated["sequential"]["per"], "name");
+    let errors = evaluated["sequential"]["error_per_name"].as_object().unwrap();
+    assert_eq!(errors.keys().collect::<Vec<_>>(), ["bowl", "fork"]);
+    let largest = errors.values().map(|error| error.as_f64().unwrap()).fold(0.0, f64::max);
+    assert!((evaluated["promise"]["error"].as_f64().unwrap() - largest).abs() < 1e-12);
+}
+
+#[test]
+fn priors_and_subsets_are_expected_at_run_time_and_void_the_promise() {
+    let directory = uncalibrated();
+    let at = directory.path();
+    let json = |arguments: &[&str]| -> Value { serde_json::from_str(&succeeds(at, arguments)).unwrap() };
+    succeeds(at, &["calibrate", "model.palpate", "fresh", "-o", "calibrated.palpate", "--error-rate", "0.05"]);
+    let only = json(&["evaluate", "calibrated.palpate", "unseen", "--json", "--only", "fork", "--at", "1"]);
+    assert_eq!((&only["accuracy"]["1"], &only["sequential"]["mean_touches"]), (&1.0.into(), &1.0.into()));
+    assert_eq!(only["sequential"]["promised"], Value::Null);
+    assert!(only["promise"]["void"][0].as_str().unwrap().contains("priors"));
+    assert_eq!(only["per_object"].as_object().unwrap().keys().collect::<Vec<_>>(), ["fork"]);
+    let sooner = |prior: &str| {
+        let told = json(&["evaluate", "calibrated.palpate", "unseen", "--json", "--prior", prior]);
+        told["sequential"]["per_object"]["fork"].as_f64().unwrap()
+    };
+    assert!(sooner("fork=0.95") < sooner("fork=0.5"));
+    let recognized = succeeds(at, &["recognize", "calibrated.palpate", "unseen/bowl.txt", "--only", "fork"]);
+    assert!(recognized.lines().all(|line| line.contains("recognized  fork 1.0000")));
+    fails(at, &["recognize", "calibrated.palpate", "unseen/bowl.txt", "--only", "knife"], 2, "--only is knife");
+    succeeds(at, &["export", "ensemble.json", "-o", "kitchen.palpate", "--prior", "fork=0.9"]);
+    let inspected = json(&["inspect", "kitchen.palpate", "--json"]);
+    assert!((inspected["priors"]["bowl"].as_f64().unwrap() + 9.0_f64.ln()).abs() < 0.01);
+    fails(at, &["export", "ensemble.json", "-o", "kitchen.palpate", "--prior", "fork=1.5"], 2, "--prior is 1.5");
+}
+
+#[test]
+fn what_cannot_be_promised_is_said_and_nothing_is_written() {
+    let directory = uncalibrated();
+    let at = directory.path();
+    let calibrate = |more: &[&str]| -> Vec<String> {
+        let fixed = ["calibrate", "model.palpate", "train", "-o", "none.palpate"];
+        fixed.iter().chain(more).map(|word| (*word).to_owned()).collect()
+    };
+    for (more, code, expected) in [
+        (&["--error-rate", "0.001"][..], 1, "too few to promise 0.1 %: at least 2995 are needed"),
+        (&["--error-rate", "0.6"], 2, "--error-rate is 0.6"),
+        (&["--confidence", "1"], 2, "--confidence is 1"),
+        (&["--sequences", "0"], 2, "--sequences is 0"),
+        (&["--per", "touch"], 2, "use one of average, name, object"),
+    ] {
+        let words = calibrate(more);
+        fails(at, &words.iter().map(String::as_str).collect::<Vec<_>>(), code, expected);
+        assert!(!at.join("none.palpate").exists());
+    }
+    fails(at, &["calibrate", "ensemble.json", "fresh", "-o", "none.palpate"], 1, "ensemble.json");
+    // Its own input may be replaced by the calibrated model.
+    succeeds(at, &["calibrate", "model.palpate", "fresh", "-o", "model.palpate", "--error-rate", "0.1"]);
+}

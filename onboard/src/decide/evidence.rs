@@ -72,7 +72,8 @@ const MOST_BITS: u64 = 1 << 42;
 impl Unit {
     /// e^-(`ahead` units) in Q56.
     pub(super) fn weight(self, ahead: u64) -> u64 {
-        let ahead = u64::from(u32::try_from(ahead).unwrap_or(u32::MAX));
+        // 2^32 units are at least 256 nats.
+        let Ok(ahead) = u32::try_from(ahead).map(u64::from) else { return 0 };
         let bits = (ahead * u64::from(self.bits)) >> (self.shift & 63);
         if self.sharpness == SHARPNESS {
             return exp2_negative(bits);

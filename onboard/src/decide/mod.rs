@@ -2,6 +2,7 @@
 
 mod approach;
 mod evidence;
+mod expected;
 mod exponential;
 mod forgetting;
 mod recognizer;
@@ -13,6 +14,7 @@ pub use approach::Proposal;
 #[cfg(feature = "station")]
 pub(crate) use approach::propose;
 pub use evidence::{Posterior, Rivals};
+pub use expected::NothingExpected;
 pub use exponential::exp2_negative;
 pub use forgetting::Forgetting;
 #[cfg(feature = "station")]

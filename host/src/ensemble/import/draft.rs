@@ -78,7 +78,8 @@ impl Draft {
         let lost = |value: f64| (value - f64::from(value as f32)).abs();
         let mut worst = 0.0_f64;
         for (object, &base) in self.base.iter().enumerate() {
-            let (mut sum, mut range, mut additions) = (lost(base), base.abs(), 0.0);
+            let sums = if self.f32_sums { 2.0 } else { 1.0 };
+            let (mut sum, mut range) = (lost(base), base.abs());
             for tree in &self.trees {
                 let position = match tree.output {
                     Output::One(own) if own == object => 0,
@@ -94,10 +95,9 @@ impl Draft {
                 });
                 sum += of_tree.0;
                 range += of_tree.1;
-                additions += 1.0;
+                sum += sums * range * f64::from(f32::EPSILON) / 2.0;
             }
-            let sums = if self.f32_sums { 2.0 } else { 1.0 };
-            worst = worst.max(sum + sums * additions * range * f64::from(f32::EPSILON) / 2.0);
+            worst = worst.max(sum);
         }
         worst
     }

@@ -276,7 +276,10 @@ impl Grower<'_> {
     /// Writes one split, or three where zero goes another way than its neighbors.
     fn split(&mut self, split: Split, to: usize, waiting: &mut Vec<(i64, usize)>) {
         let Split { feature, threshold, default_left, missing, left, right } = split;
-        let (zero, zero_is_left) = (f64::from(ZERO), threshold >= 0.0);
+        let zero_is_left = threshold >= 0.0;
+        // LightGBM reads everything from -ZERO to ZERO as 0: all of it goes one way.
+        let above_zero = after(f64::from(ZERO));
+        let whole = if zero_is_left { after(threshold).max(above_zero) } else { after(threshold).min(-ZERO) };
         let mut put = |nodes: &mut Self, at: usize, threshold: f32, missing_left: bool, sides: [Side; 2]| {
             let [left, right] = sides.map(|side| match side {
                 Side::Copy(from) => {
@@ -290,12 +293,10 @@ impl Grower<'_> {
         };
         let (left, right) = (Side::Copy(left), Side::Copy(right));
         match missing {
-            Missing::NaN => put(self, to, after(threshold), default_left, [left, right]),
-            Missing::Nothing => put(self, to, after(threshold), zero_is_left, [left, right]),
-            // Zeros go where the comparison sends all of them.
-            Missing::Zero if (default_left && threshold >= zero) || (!default_left && threshold < -zero) => {
-                put(self, to, after(threshold), default_left, [left, right]);
-            }
+            Missing::NaN => put(self, to, whole, default_left, [left, right]),
+            Missing::Nothing => put(self, to, whole, zero_is_left, [left, right]),
+            // Zeros go where the comparison sends them.
+            Missing::Zero if default_left == zero_is_left => put(self, to, whole, default_left, [left, right]),
             Missing::Zero => {
                 // Below zero, then zero, then above it: each side of zero is compared with the threshold as usual.
                 let (above, zero_or_above) = (self.reserve(), self.reserve());
@@ -307,7 +308,7 @@ impl Grower<'_> {
                     (Side::At(above), right)
                 };
                 put(self, to, -ZERO, false, [below, Side::At(zero_or_above)]);
-                put(self, zero_or_above, after(zero), true, [side(default_left), over]);
+                put(self, zero_or_above, above_zero, true, [side(default_left), over]);
                 put(self, above, after(threshold), default_left, [left, right]);
             }
         }

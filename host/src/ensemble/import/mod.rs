@@ -16,8 +16,6 @@ mod catboost;
 mod draft;
 mod lightgbm;
 mod onnx;
-#[cfg(test)]
-mod tests;
 mod ubjson;
 
 use super::{Ensemble, Imported, xgboost};

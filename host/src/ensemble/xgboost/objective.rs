@@ -33,8 +33,8 @@ impl Objective {
     pub(super) fn named(name: &str) -> Result<Self, EnsembleProblem> {
         let (kind, link) = match name {
             "multi:softprob" | "multi:softmax" => (Kind::Classes, Link::Identity),
-            "binary:logistic" | "binary:logitraw" => (Kind::Binary, Link::Logit),
-            "binary:hinge" => (Kind::Binary, Link::Identity),
+            "binary:logistic" => (Kind::Binary, Link::Logit),
+            "binary:logitraw" | "binary:hinge" => (Kind::Binary, Link::Identity),
             "reg:logistic" => (Kind::One, Link::Logit),
             "count:poisson" | "reg:gamma" | "reg:tweedie" | "survival:cox" | "survival:aft" => (Kind::One, Link::Log),
             "reg:squarederror"

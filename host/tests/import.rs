@@ -1,8 +1,8 @@
 //! Files that other libraries wrote, with their own margins: `tests/data/import`.
 
-use super::*;
-use crate::ensemble::Inputs;
-use std::path::PathBuf;
+use palpate::ensemble::import::read;
+use palpate::ensemble::{Ensemble, Inputs};
+use std::path::{Path, PathBuf};
 
 fn directory() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/import")
@@ -131,4 +131,38 @@ fn counts_and_nesting_without_end_are_refused_soon() {
     }
     // A field whose length is beyond the file.
     assert!(read(Path::new("endless"), b"\x08\x0a\x3a\xff\xff\xff\xff\x7f", None).is_err());
+}
+
+/// A LightGBM file of one tree with one split.
+fn stump(threshold: &str, decision: u8) -> Ensemble {
+    let text = format!(
+        "tree\nversion=v4\nnum_class=1\nnum_tree_per_iteration=1\nlabel_index=0\nmax_feature_idx=0\n\
+         objective=regression\nfeature_names=a\n\nTree=0\nnum_leaves=2\nnum_cat=0\nsplit_feature=0\n\
+         threshold={threshold}\ndecision_type={decision}\nleft_child=-1\nright_child=-2\nleaf_value=1 2\n\nend of trees\n"
+    );
+    read(Path::new("stump"), text.as_bytes(), None).unwrap()
+}
+
+#[test]
+fn lightgbms_zeros_and_missing_values_go_where_lightgbm_sends_them() {
+    // What LightGBM does: everything within ZERO of 0 is read as 0.
+    const ZERO: f32 = 1e-35;
+    let goes_left = |threshold: f64, decision: u8, x: f32| {
+        let x = if x.abs() <= ZERO { 0.0 } else { f64::from(x) };
+        let (default_left, missing) = (decision & 2 != 0, decision >> 2);
+        let x = if x.is_nan() && missing != 2 { 0.0 } else { x };
+        if (missing == 1 && x == 0.0) || x.is_nan() { default_left } else { x <= threshold }
+    };
+    let values = [0.0, -0.0, ZERO, -ZERO, ZERO.next_up(), (-ZERO).next_down(), 1e-40, 0.5, -0.5, 1.5, -1.5, f32::NAN];
+    let infinite = [f32::INFINITY, f32::NEG_INFINITY];
+    for threshold in ["0", "1.0000000180025095e-35", "-1.0000000180025095e-35", "0.5", "-0.5", "1e-40", "1e300"] {
+        for decision in [0, 2, 4, 6, 8, 10] {
+            let ensemble = stump(threshold, decision);
+            for x in values.into_iter().chain(infinite) {
+                let expected = if goes_left(threshold.parse().unwrap(), decision, x) { 1.0 } else { 2.0 };
+                let margins = ensemble.margins_of_features(&[x]);
+                assert_eq!(margins, [expected], "{x:e} at {threshold}, decision type {decision}");
+            }
+        }
+    }
 }

@@ -1,0 +1,96 @@
+//! Calibrating on touches that are captured for it.
+
+use super::draw::{Supply, Until, follow};
+use super::model::{Calibrated, Settings, calibrate};
+use crate::capture;
+use crate::error::Result;
+use crate::evaluate::Candidate;
+use crate::mesh::Object;
+use crate::probe::scene::Scene;
+use crate::progress::Progress;
+use crate::touches::{Dataset, ObjectTouches, Origin};
+use palpate_onboard::{Model, Refused, Stopping};
+
+/// Samples of each object from which it is estimated how many a sequence takes.
+const FIRST: u64 = 2_000;
+/// The most samples of an object.
+const MOST: u64 = 4_000_000;
+/// How much more is captured than is expected to be used.
+const SPARE: f64 = 1.15;
+
+/// Captures touches of `objects` in memory, as many of each as about `settings.sequences` sequences take, and calibrates
+/// on them. `origin` says how objects are touched; its seed must be another than that of the training, and its number of
+/// touches does not matter.
+///
+/// # Errors
+/// As [`calibrate`] and [`capture::capture`](fn@crate::capture::capture).
+pub fn calibrate_fresh(
+    model: &Model<'_>,
+    objects: &[Object],
+    origin: &Origin,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
+    let mut objects: Vec<&Object> = objects.iter().collect();
+    objects.sort_by(|a, b| a.name.cmp(&b.name));
+    let scenes = capture::scenes(&objects, origin, progress)?;
+    let named: Vec<(&str, &[Scene])> =
+        objects.iter().zip(&scenes).map(|(object, scenes)| (object.name.as_str(), scenes.as_slice())).collect();
+    let dataset = fresh(model, &named, origin, settings, progress)?;
+    calibrate(model, dataset, settings, progress)
+}
+
+/// The touches of objects, by name and instances' scenes, that [`calibrate_fresh`] calibrates on.
+///
+/// # Errors
+/// As [`calibrate_fresh`].
+pub(crate) fn fresh(
+    model: &Model<'_>,
+    objects: &[(&str, &[Scene])],
+    origin: &Origin,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Dataset> {
+    progress.begin("touching, to calibrate", None);
+    let touch = |(name, scenes): &(&str, &[Scene]), samples| -> Result<ObjectTouches> {
+        crate::progress::check(progress)?;
+        Ok(ObjectTouches { name: (*name).into(), touches: capture::touches(scenes, name, origin, samples)? })
+    };
+    let instances = objects.iter().filter(|(_, scenes)| scenes.len() > 1);
+    let instances = instances.map(|(name, scenes)| ((*name).to_owned(), scenes.len())).collect();
+    let first: Vec<ObjectTouches> = objects.iter().map(|object| touch(object, 0..FIRST)).collect::<Result<_>>()?;
+    let dataset =
+        Dataset { origin: Some(Origin { touches: FIRST, ..origin.clone() }), instances, ..Dataset::new(first) };
+    let means = means(model, &dataset, settings)?;
+    let wanted = settings.sequences as f64 / objects.len().max(1) as f64;
+    let counts = means.into_iter().map(|mean| {
+        // A few standard errors more, as if lengths were exponentially distributed.
+        let count = SPARE * mean * (wanted + 3.0 * wanted.sqrt());
+        (count.ceil() as u64).clamp(1, MOST)
+    });
+    let more = objects.iter().zip(counts).map(|(object, count)| touch(object, FIRST..FIRST + count));
+    Ok(Dataset { objects: more.collect::<Result<_>>()?, ..dataset })
+}
+
+/// How many samples of each object a sequence takes on average.
+fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Vec<f64>> {
+    let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
+    let (_, known) = Candidate::Compiled(model).of(dataset)?;
+    let trained = model.trained_touches();
+    let mean = |(touched, &object): (&ObjectTouches, &usize)| -> Result<f64> {
+        let ObjectTouches { name, touches } = touched;
+        let used = touches.iter().filter(|touch| Refused::check(&trained, touch).is_ok()).count().max(1);
+        let to_the_limit = f64::from(max_touches) * touches.len() as f64 / used as f64;
+        if settings.noise.has_bias() {
+            return Ok(to_the_limit);
+        }
+        let noisy = settings.noise.add(name, touches, settings.seed);
+        let margin = ((1.0 - settings.rate) / settings.rate).ln() + super::model::STRICTEST[0];
+        let mut supply = [Supply::new(object, name, &noisy, 1, 1, settings.seed)];
+        let until = Until { margin, max_touches };
+        let found = follow(model, &mut supply, &[usize::MAX], until, || |_: &super::Moment<'_>| true, &())?;
+        let approaches: f64 = found.iter().map(|sequence| f64::from(sequence.approaches)).sum();
+        Ok(if found.is_empty() { to_the_limit } else { approaches / found.len() as f64 })
+    };
+    dataset.objects.iter().zip(&known).map(mean).collect()
+}

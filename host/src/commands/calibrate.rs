@@ -1,0 +1,132 @@
+use super::noise::NoiseArguments;
+use super::numbers::{count, share};
+use super::probe::ProbeArguments;
+use super::progress::Bar;
+use crate::Result;
+use crate::calibrate::{self, Calibrated, Per, Settings};
+use crate::compile::CompiledModel;
+use crate::output;
+use crate::touches::noise::Noise;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. 100,000 sequences at an error rate of 1 % take some 50 touches each; with fewer touches there are fewer sequences, which leaves more of the error rate unused. No touch is used twice.
+
+A name that is given and wrong is an error. A sequence that ends at the limit of touches without a name is undecided: neither right nor wrong. With --per average the rate is that of all names given, with objects touched equally often (or as often as the model's priors say); with name that of each name, when it is given, for which each name gets a threshold of its own, and each rate is kept with the stated probability; with object that of the names given to each object, which needs more touches.
+
+The thresholds are found by Learn-then-Test: from strict to loose, up to the last at which so few errors have a probability of at most 5 % (--confidence) if the rate were higher than promised. The model then states what it promises, and a temperature that makes its posteriors ones to believe.
+
+Examples:
+  palpate capture builtin -o fresh --approaches --touches 100000 --seed 3
+  palpate calibrate model.palpate fresh -o calibrated.palpate
+  palpate calibrate model.palpate fresh -o strict.palpate --error-rate 0.1% --per name
+  palpate calibrate model.palpate fresh -o real.palpate --noise 0..5ms --timer 1ms
+  palpate evaluate calibrated.palpate unseen --json | jq .promise")]
+pub(crate) struct Arguments {
+    /// Compiled model
+    model: PathBuf,
+    /// Directory that `palpate capture` filled
+    directory: PathBuf,
+    /// Where to write the calibrated model
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// The error rate to promise, such as 0.01 or 1%
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
+    error_rate: f64,
+    /// Of what: of all names on average, of each name, or of the names given to each object
+    #[arg(long, value_parser = per, default_value = "average", value_name = "average|name|object")]
+    per: Per,
+    /// The probability that the promise is kept
+    #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
+    confidence: f64,
+    /// The most sequences, of all objects together
+    #[arg(long, default_value = "100000", value_name = "N", value_parser = count)]
+    sequences: u64,
+    /// Touches after which recognizers give up [default: the model's own limit]
+    #[arg(long, value_name = "N")]
+    max_touches: Option<u32>,
+    /// Seed of the order of the touches, and of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print what was found as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    probe: ProbeArguments,
+    #[command(flatten)]
+    noise: NoiseArguments,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let dataset = super::dataset(&arguments.directory)?;
+    let file = arguments.probe.read()?;
+    arguments.probe.of_dataset(file.as_ref(), &dataset)?;
+    let settings = Settings {
+        rate: arguments.error_rate,
+        per: arguments.per,
+        confidence: arguments.confidence,
+        sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
+        max_touches: arguments.max_touches,
+        noise: arguments.noise.over(file.map_or_else(Noise::default, |file| file.real)),
+        seed: arguments.seed,
+    };
+    let calibrated = calibrate::calibrate(&compiled.model(), dataset, &settings, &Bar::new())
+        .map_err(|error| error.in_file(&arguments.directory))?;
+    output::write_bytes(&arguments.output, &calibrated.model)?;
+    if arguments.json {
+        return output::print_json_about(&arguments.output, &calibrated);
+    }
+    let text = format!("{}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
+    output::print_about(&arguments.output, &text)
+}
+
+fn written(path: &std::path::Path, calibrated: &Calibrated) -> String {
+    format!("{}: {} bytes", path.display(), calibrated.model.len())
+}
+
+fn text(calibrated: &Calibrated) -> String {
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let mut text = format!(
+        "Promised: at most {} % of {} wrong, with a probability of {} %.\n",
+        super::percent(calibrated.promised),
+        calibrate::of_what(calibrated.promise.per),
+        super::percent(calibrated.confidence),
+    );
+    // Writing to a string cannot fail.
+    _ = writeln!(
+        text,
+        "{} sequences: {} wrong, {} undecided; {:.1} {} each.",
+        calibrated.sequences,
+        percent(calibrated.error),
+        percent(calibrated.undecided),
+        calibrated.mean_approaches.unwrap_or(calibrated.mean_touches),
+        calibrated.counted,
+    );
+    let width = calibrated.margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
+    if calibrated.errors.is_empty() {
+        let margin = calibrated.margins.values().next().copied().unwrap_or(f64::NAN);
+        _ = writeln!(
+            text,
+            "Names are given {margin:.2} nats ahead of all others; uncalibrated it would be {:.2}.",
+            calibrated.uncalibrated_margin
+        );
+    } else {
+        _ = writeln!(text, "\n{:width$} {:>8} {:>8}", "", "wrong", "nats");
+        for (name, margin) in &calibrated.margins {
+            let error = calibrated.errors.get(name).map_or("–".into(), |&error| percent(error));
+            _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
+        }
+        _ = writeln!(text, "Uncalibrated, names are given at {:.2} nats.", calibrated.uncalibrated_margin);
+    }
+    _ = writeln!(text, "Temperature of the posteriors that are shown: {:.2}", calibrated.temperature);
+    text
+}
+
+fn per(name: &str) -> Result<Per, String> {
+    Per::ALL.iter().copied().find(|per| per.name() == name).ok_or_else(|| "use one of average, name, object".to_owned())
+}

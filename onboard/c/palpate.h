@@ -1,0 +1,1328 @@
+/* palpate.h: recognize objects by touch, or classify rows of features, with a model that `palpate export` wrote.
+ *
+ * One header in C99 (also C++11). No allocation, no library, no floating point unless a model has f32 leaves, no undefined
+ * behavior for any bytes. It reads shared/FORMAT.md of Palpate, and gives the same margins, evidence, verdicts, posteriors
+ * and snapshots as the crate palpate-onboard, bit for bit. Licensed as Palpate: MIT or Apache-2.0.
+ *
+ *     palpate_model model;
+ *     palpate_recognizer recognizer;
+ *     if (palpate_open(&model, bytes, length) != PALPATE_OK) { ... model.wrong is the place ... }
+ *     palpate_start(&recognizer, &model);
+ *     ...
+ *     palpate_touch touch = {{30000, 0, 50000}, 0, {0, 0, 0}, {0, 0, 0}};
+ *     if (palpate_push(&recognizer, &touch) == PALPATE_COUNTED && recognizer.verdict == PALPATE_RECOGNIZED) {
+ *         ... recognizer.object ...
+ *     }
+ *
+ * Every function is `static inline`: include it in the one file that recognizes, and only what is called takes flash.
+ *
+ * Before the #include may be defined:
+ *   PALPATE_LAYOUTS      which layouts are read, as PALPATE_COMPACT | PALPATE_COMPLETE; all of them by default
+ *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
+ *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default. 8 bytes of state, and 4 of stack, for each
+ *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
+ *   PALPATE_API          instead of `static inline`
+ */
+#ifndef PALPATE_H
+#define PALPATE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Layouts. `palpate export` and `palpate inspect` say which one a model has. */
+#define PALPATE_COMPACT 1
+#define PALPATE_COMPLETE 2
+#define PALPATE_GRID 4
+#define PALPATE_WIDE 8
+#define PALPATE_PATTERNS 16
+/* Types of leaves. */
+#define PALPATE_I8 1
+#define PALPATE_I16 2
+#define PALPATE_F32 4
+
+#ifndef PALPATE_LAYOUTS
+#define PALPATE_LAYOUTS 31
+#endif
+#ifndef PALPATE_LEAVES
+#define PALPATE_LEAVES 7
+#endif
+#ifndef PALPATE_MAX_OBJECTS
+#define PALPATE_MAX_OBJECTS 32
+#endif
+#ifndef PALPATE_BYTE
+#define PALPATE_BYTE(p) (*(p))
+#endif
+#ifndef PALPATE_API
+#define PALPATE_API static inline
+#endif
+#if defined(__GNUC__)
+#define PALPATE_APART_ __attribute__((noinline))
+#else
+#define PALPATE_APART_
+#endif
+
+#if PALPATE_LEAVES & PALPATE_F32
+#include <float.h>
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD > 0
+#error "f32 leaves are added in f32: compile without excess precision (-mfpmath=sse), or without PALPATE_F32"
+#endif
+#endif
+
+/* A contact that is missing. */
+#define PALPATE_MISSING UINT32_MAX
+/* A feature that is missing. */
+#define PALPATE_MISSING_FEATURE INT32_MIN
+/* The most features of a touch. */
+#define PALPATE_TOUCH_FEATURES 10
+/* 1 as a posterior. */
+#define PALPATE_ONE ((uint64_t)1 << 56)
+/* Bytes that are enough for a snapshot. */
+#define PALPATE_SNAPSHOT_LENGTH(objects) (16 + 10 * (objects))
+
+/* Why bytes are no model, or a model is not used. The place of what is wrong is in `wrong` of the model. */
+typedef enum {
+    PALPATE_OK = 0,
+    PALPATE_LENGTH,          /* fewer bytes than the model has, or more */
+    PALPATE_NOT_A_MODEL,     /* they do not start as a model does */
+    PALPATE_VERSION,         /* a version of the format that this header does not know */
+    PALPATE_CHECKSUM,        /* bytes were changed */
+    PALPATE_FIELD,           /* a field has an invalid value */
+    PALPATE_SECTION,         /* a section does not have its length */
+    PALPATE_NOT_UNDERSTOOD,  /* a section that must be understood, and is not */
+    PALPATE_MARGIN_RANGE,    /* margins could overflow */
+    PALPATE_NOT_BUILT_IN,    /* not in PALPATE_LAYOUTS (place 6) or PALPATE_LEAVES (place 7) */
+    PALPATE_TOO_MANY_OBJECTS /* more than PALPATE_MAX_OBJECTS (place 14) */
+} palpate_error;
+
+/* Why a touch or a row is no evidence. It was not counted, and nothing has changed. */
+typedef enum {
+    PALPATE_COUNTED = 0,
+    PALPATE_REFUSED_PATTERN, /* the model was not trained on touches with these contacts */
+    PALPATE_REFUSED_SPREAD,  /* the contacts are further apart than in any touch of the training */
+    PALPATE_REFUSED_NO_POSE, /* the model needs the probe's pose */
+    PALPATE_NEEDS_FEATURES,  /* the model is over rows of features */
+    PALPATE_NEEDS_TOUCHES    /* the model is over touches */
+} palpate_answer;
+
+/* What is known. */
+typedef enum {
+    PALPATE_UNDECIDED = 0,
+    PALPATE_RECOGNIZED, /* an object, until the reset */
+    PALPATE_UNKNOWN     /* the limit of touches was reached, until the reset */
+} palpate_verdict;
+
+/* What became of a snapshot. */
+typedef enum { PALPATE_RESTORED = 0, PALPATE_DAMAGED, PALPATE_OTHER_MODEL } palpate_restored;
+
+/* An approach: when each finger touched, in microseconds on any common clock, or PALPATE_MISSING; and the probe's pose if
+ * `has_pose` is not 0: direction of motion, and from the first to the third finger, as cosines in Q15. */
+typedef struct {
+    uint32_t times[3];
+    uint8_t has_pose;
+    int16_t direction[3];
+    int16_t alignment[3];
+} palpate_touch;
+
+/* A model that was opened. Its bytes are read in place and must stay. Names with _ at the end are not for users. */
+typedef struct {
+    const uint8_t *bytes;
+    const uint8_t *part_[8]; /* starts of text, sections, margins, axes, groups, splits, leaves, checksum */
+    const uint8_t *cuts_;    /* thresholds of the axes */
+    const uint8_t *odds_;    /* thresholds by object, or NULL */
+    uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
+    uint32_t largest_spread; /* of touches that count, in microseconds */
+    uint16_t objects;        /* 1 to 256 */
+    uint16_t features;       /* of a row, 1 to 256 */
+    uint8_t layout_;
+    uint8_t leaf_;
+    uint8_t descriptor; /* 255: rows of features */
+    uint8_t real;       /* 1: features are keys of f32 values, see palpate_key */
+    uint8_t patterns;   /* contact patterns that count, bit by code */
+    uint8_t needs_pose;
+} palpate_model;
+
+/* What is known of the object that is touched. */
+typedef struct {
+    const palpate_model *model;
+    uint64_t odds;        /* threshold: what the others may weigh, in Q56; of objects without one of their own */
+    uint32_t max_touches; /* limit */
+    uint32_t touches;     /* counted so far */
+    uint8_t by_object;    /* 1: the model's thresholds by object come before `odds` */
+    uint8_t verdict;      /* a palpate_verdict */
+    uint8_t object;       /* the one that was recognized */
+    int64_t evidence[PALPATE_MAX_OBJECTS];
+} palpate_recognizer;
+
+/* Parts of a model. */
+enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPATE_GROUPS_, PALPATE_SPLITS_, PALPATE_LEAVES_, PALPATE_END_ };
+
+/* Whether a model has this layout, or type of leaf: without a question where only one is built in. */
+#define PALPATE_IS_LAYOUT_(model, bit, code) \
+    (PALPATE_LAYOUTS == (bit) || ((PALPATE_LAYOUTS & (bit)) != 0 && (model)->layout_ == (code)))
+#define PALPATE_IS_LEAF_(model, bit, code) \
+    (PALPATE_LEAVES == (bit) || ((PALPATE_LEAVES & (bit)) != 0 && (model)->leaf_ == (code)))
+#define PALPATE_IS_COMPACT_(model) PALPATE_IS_LAYOUT_(model, PALPATE_COMPACT, 0)
+#define PALPATE_IS_COMPLETE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_COMPLETE, 1)
+#define PALPATE_IS_GRID_(model) PALPATE_IS_LAYOUT_(model, PALPATE_GRID, 2)
+#define PALPATE_IS_WIDE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_WIDE, 3)
+#define PALPATE_IS_PATTERNS_(model) PALPATE_IS_LAYOUT_(model, PALPATE_PATTERNS, 4)
+#define PALPATE_IS_I8_(model) PALPATE_IS_LEAF_(model, PALPATE_I8, 0)
+#define PALPATE_IS_I16_(model) PALPATE_IS_LEAF_(model, PALPATE_I16, 1)
+#define PALPATE_IS_F32_(model) PALPATE_IS_LEAF_(model, PALPATE_F32, 2)
+
+/* ---- Bytes ---- */
+
+static inline uint32_t palpate_u16_(const uint8_t *p)
+{
+    return (uint32_t)PALPATE_BYTE(p) | (uint32_t)PALPATE_BYTE(p + 1) << 8;
+}
+
+static inline uint32_t palpate_u32_(const uint8_t *p)
+{
+    return palpate_u16_(p) | palpate_u16_(p + 2) << 16;
+}
+
+/* The CRC-32 of bytes. Cost: about 60 instructions per byte. */
+PALPATE_API uint32_t palpate_checksum(const uint8_t *bytes, size_t length)
+{
+    uint32_t sum = 0xffffffffu;
+    while (length-- != 0) {
+        uint8_t i;
+        sum ^= PALPATE_BYTE(bytes);
+        bytes++;
+        for (i = 0; i < 8; i++) {
+            sum = sum >> 1 ^ (0xedb88320u & (0u - (sum & 1)));
+        }
+    }
+    return ~sum;
+}
+
+/* A signed number of 1 to 4 bytes. */
+static inline int32_t palpate_signed_(const uint8_t *p, uint8_t width)
+{
+    uint32_t number;
+    if (width == 2) {
+        return (int16_t)(uint16_t)palpate_u16_(p);
+    }
+    if (width == 4) {
+        return (int32_t)palpate_u32_(p);
+    }
+    p += width;
+    number = 0u - (uint32_t)(PALPATE_BYTE(p - 1) >> 7);
+    do {
+        p--;
+        number = number << 8 | PALPATE_BYTE(p);
+    } while (--width != 0);
+    return (int32_t)number;
+}
+
+/* ---- Opening a model: after it nothing can fail ---- */
+
+static inline size_t palpate_leaf_size_(const palpate_model *model)
+{
+    return PALPATE_IS_I8_(model) ? 1 : PALPATE_IS_I16_(model) ? 2 : 4;
+}
+
+static inline palpate_error palpate_wrong_(palpate_model *model, palpate_error error, const uint8_t *place)
+{
+    model->wrong = (uint32_t)(place - model->bytes);
+    return error;
+}
+
+/* Bytes between two places. */
+static inline uint32_t palpate_between_(const uint8_t *start, const uint8_t *end)
+{
+    return (uint32_t)(end - start);
+}
+
+/* The next optional section of those that end at `end`: its tag as it stands there, 0x10000 if it is not whole. Its content
+ * starts 8 bytes after `p`, and has `length` bytes; `p` becomes where the next one starts. */
+static inline uint32_t palpate_section_(const uint8_t **p, const uint8_t *end, uint32_t *length)
+{
+    const uint8_t *head = *p;
+    uint32_t rest = palpate_between_(head, end), size;
+    if (rest < 8) {
+        return 0x10000u;
+    }
+    rest -= 8;
+    size = palpate_u32_(head + 4);
+    if (size > rest || ((0u - size) & 3) > rest - size) {
+        return 0x10000u;
+    }
+    *length = size;
+    *p = head + 8 + size + ((0u - size) & 3);
+    return palpate_u16_(head);
+}
+
+/* The trained touches in a section; 0 if they make no sense. */
+static inline int palpate_trained_(palpate_model *model, const uint8_t *content)
+{
+    uint8_t patterns = PALPATE_BYTE(content), counted = PALPATE_BYTE(content + 1), pose = PALPATE_BYTE(content + 2);
+    uint8_t possible = counted == 0 ? 0x20 : counted == 1 ? 0x3e : 0x3f;
+    if (counted > 2 || pose > 1 || patterns == 0 || (patterns & ~possible) != 0) {
+        return 0;
+    }
+    model->patterns = patterns;
+    model->needs_pose = pose;
+    model->largest_spread = palpate_u32_(content + 4);
+    return 1;
+}
+
+/* Sections that are whole, in order, valid, and understood where they must be. */
+static inline palpate_error palpate_check_sections_(palpate_model *model)
+{
+    const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
+    uint32_t last = 0;
+    while (p != end) {
+        const uint8_t *content = p + 8;
+        uint32_t length = 0, least = 0, tag, pairs;
+        palpate_wrong_(model, PALPATE_OK, p);
+        tag = palpate_section_(&p, end, &length);
+        if (tag > 0xffff) {
+            return PALPATE_SECTION;
+        }
+        if ((tag & 0x7fff) <= last) {
+            return PALPATE_FIELD;
+        }
+        last = tag & 0x7fff;
+        switch (last) {
+        case 1: /* probe */
+        case 3: /* noise */
+            least = 16;
+            break;
+        case 2:
+            if (length < 8 || !palpate_trained_(model, content)) {
+                return PALPATE_FIELD;
+            }
+            break;
+        case 5:
+            model->odds_ = content;
+            least = 4 * (uint32_t)model->objects;
+            break;
+        case 7: /* plan: pairs of objects, 26 directions with 1, 2 or 4 rolls */
+            pairs = (uint32_t)model->objects * (model->objects - 1u) / 2;
+            if (length < 4 || pairs == 0 || PALPATE_BYTE(content) != 0) {
+                return PALPATE_FIELD;
+            }
+            least = PALPATE_BYTE(content + 1);
+            if (least != 1 && least != 2 && least != 4) {
+                return PALPATE_FIELD;
+            }
+            least = 4 + pairs * 26 * least;
+            break;
+        default:
+            if (tag != last) {
+                return PALPATE_NOT_UNDERSTOOD;
+            }
+        }
+        if (length < least) {
+            return PALPATE_FIELD;
+        }
+    }
+    return PALPATE_OK;
+}
+
+/* Axes of features that exist, columns that a byte numbers, thresholds that fill their section. */
+static inline palpate_error palpate_check_axes_(palpate_model *model)
+{
+    const uint8_t *axis = model->part_[PALPATE_AXES_], *end = model->part_[PALPATE_GROUPS_];
+    const uint8_t *cuts = model->cuts_;
+    uint16_t columns = 0;
+    for (; axis != model->cuts_; axis += 4) {
+        uint8_t kind = PALPATE_BYTE(axis + 1), width = PALPATE_BYTE(axis + 2);
+        uint32_t size = (uint32_t)width * PALPATE_BYTE(axis + 3);
+        columns = (uint16_t)(columns + 1 + (kind == 3));
+        if (kind - 1u > 2 || width - 1u > 3 || PALPATE_BYTE(axis) >= model->features || columns > 256) {
+            return palpate_wrong_(model, PALPATE_FIELD, axis);
+        }
+        if (size > palpate_between_(cuts, end)) {
+            return palpate_wrong_(model, PALPATE_SECTION, cuts);
+        }
+        cuts += size;
+    }
+    if (PALPATE_IS_WIDE_(model) ? axis != model->part_[PALPATE_AXES_] || (palpate_between_(cuts, end) & 3) != 0 : cuts != end) {
+        return palpate_wrong_(model, PALPATE_SECTION, cuts);
+    }
+    return PALPATE_OK;
+}
+
+/* The cells of a table; 0 if the model does not have its axes. */
+static inline uint32_t palpate_cells_(const palpate_model *model)
+{
+    const uint8_t *axis = model->part_[PALPATE_AXES_];
+    uint32_t axes = palpate_between_(axis, model->cuts_) / 4, first, second;
+    if (axes < 2) {
+        return 0;
+    }
+    first = PALPATE_BYTE(axis + 3);
+    second = PALPATE_BYTE(axis + 7);
+    if (PALPATE_IS_GRID_(model)) {
+        return axes != 2 ? 0 : (first + 2) * (second + 2);
+    }
+    if (axes != 3 || PALPATE_BYTE(axis) != 1 || PALPATE_BYTE(axis + 4) != 2 || PALPATE_BYTE(axis + 8) != 3 ||
+        model->descriptor != 4) {
+        return 0;
+    }
+    return 5 + (uint32_t)PALPATE_BYTE(axis + 11) + second + (first + 1) * (second + 1);
+}
+
+/* Groups whose splits and leaves fill their parts exactly, and whose margins stay within 2^30. */
+static inline palpate_error palpate_check_groups_(palpate_model *model)
+{
+    const uint32_t limit = (uint32_t)1 << 30;
+    const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
+    const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *end = model->part_[PALPATE_END_];
+    const uint8_t bits = PALPATE_IS_I8_(model) ? 7 : 15;
+    uint32_t range = (uint32_t)1 << 20, most = 0;
+    uint16_t object;
+    uint8_t shift = 24;
+    if (PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
+        uint32_t size = palpate_cells_(model) * model->objects * (uint32_t)palpate_leaf_size_(model);
+        if (size == 0) {
+            return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_AXES_]);
+        }
+        if (size > palpate_between_(leaves, end)) {
+            return palpate_wrong_(model, PALPATE_SECTION, leaves);
+        }
+        leaves += size;
+        if (group != splits) {
+            return palpate_wrong_(model, PALPATE_SECTION, group);
+        }
+    }
+    for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
+        uint32_t trees = palpate_u32_(group + 4), leaf = (uint32_t)palpate_leaf_size_(model);
+        uint8_t depth = PALPATE_BYTE(group), one = PALPATE_BYTE(group + 2);
+        int fits = 1;
+        if (PALPATE_BYTE(group + 1) > shift || one > 1 || (one != 0 && PALPATE_BYTE(group + 3) >= model->objects) ||
+            (PALPATE_IS_F32_(model) && PALPATE_BYTE(group + 1) != 0)) {
+            return palpate_wrong_(model, PALPATE_FIELD, group);
+        }
+        shift = PALPATE_BYTE(group + 1);
+        if (!PALPATE_IS_F32_(model)) {
+            if (trees > limit >> bits >> shift) {
+                return palpate_wrong_(model, PALPATE_MARGIN_RANGE, model->bytes + 8);
+            }
+            range += trees << (bits + shift);
+            range = range > limit ? limit + 1 : range;
+        }
+        if (one == 0) {
+            leaf *= model->objects;
+        }
+        if (PALPATE_IS_COMPLETE_(model)) {
+            if (depth - 1u > 7) {
+                return palpate_wrong_(model, PALPATE_FIELD, group);
+            }
+            fits = trees <= palpate_between_(splits, model->part_[PALPATE_LEAVES_]) >> 1 >> depth &&
+                   (uint64_t)(trees << depth) * leaf <= palpate_between_(leaves, end);
+            if (fits) {
+                splits += (size_t)(trees << depth) * 2;
+                leaves += (size_t)((trees << depth) * leaf);
+            }
+        } else {
+            const uint32_t node = PALPATE_IS_WIDE_(model) ? 6 : 3;
+            if (depth != 0) {
+                return palpate_wrong_(model, PALPATE_FIELD, group);
+            }
+            for (; trees != 0 && fits; trees--) {
+                uint32_t rest = palpate_between_(splits, model->part_[PALPATE_LEAVES_]), count = 0;
+                fits = rest >= 2;
+                if (fits) {
+                    count = palpate_u16_(splits);
+                    fits = count * node <= rest - 2 && (count + 1) * leaf <= palpate_between_(leaves, end);
+                }
+                if (fits) {
+                    splits += (size_t)(count * node + 2);
+                    leaves += (size_t)((count + 1) * leaf);
+                }
+            }
+        }
+        if (!fits) {
+            return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_SPLITS_]);
+        }
+    }
+    if (splits != model->part_[PALPATE_LEAVES_]) {
+        return palpate_wrong_(model, PALPATE_SECTION, splits);
+    }
+    if (leaves != end) {
+        return palpate_wrong_(model, PALPATE_SECTION, leaves);
+    }
+    for (object = 0; !PALPATE_IS_F32_(model) && object < model->objects; object++) {
+        uint32_t base = palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (size_t)object);
+        base = base >> 31 != 0 ? 0u - base : base;
+        most = base > most ? base : most;
+    }
+    return range + most > limit ? palpate_wrong_(model, PALPATE_MARGIN_RANGE, model->bytes + 8) : PALPATE_OK;
+}
+
+/* The place of a number of the header that makes no sense; 0 if there is none. */
+static inline uint8_t palpate_wrong_number_(const uint8_t *bytes)
+{
+    uint32_t unit = palpate_u32_(bytes + 32), shift, difference;
+    uint64_t bits = (uint64_t)((unit & 0x7fffff) | 0x800000) * 3098164010u; /* log2 e in Q31 */
+    if (unit < 0x33800000u || unit > 0x3f000000u) { /* 2^-24 to 0.5 */
+        return 32;
+    }
+    shift = 149u - (unit >> 23) - PALPATE_BYTE(bytes + 40);
+    if (shift > 63) {
+        return 40;
+    }
+    bits = (bits >> shift) + 2 - palpate_u32_(bytes + 36);
+    difference = (uint32_t)(bits >> 32);
+    if (difference != 0 || (uint32_t)bits > 4) {
+        return 36;
+    }
+    return PALPATE_BYTE(bytes + 55) != 0 ? 48 : palpate_u32_(bytes + 56) == 0 ? 56 : 0;
+}
+
+/* The place of a code of the header that is not known, or of a number that makes no sense; 0 if there is none. */
+static inline uint8_t palpate_wrong_header_(palpate_model *model)
+{
+    const uint8_t *bytes = model->bytes;
+    if (model->layout_ > 4) {
+        return 6;
+    }
+    if (model->leaf_ > 2) {
+        return 7;
+    }
+    if (model->descriptor != 255) {
+        if (model->descriptor > 6) {
+            return 12;
+        }
+        /* 3, 2, 4, 8, 4, 6 and 10 features. */
+        if (model->features != (0xa648423u >> 4 * model->descriptor & 15)) {
+            return 15;
+        }
+        if (model->real != 0) {
+            return 13;
+        }
+    }
+    return model->real > 1 ? 13 : palpate_wrong_number_(bytes);
+}
+
+/* Opens a model, checking everything that is relied on later. `bytes` must stay as they are while it is used. On an error
+ * `model->wrong` is its place, and the model must not be used. Cost: about 50 instructions per byte, for the checksum. */
+PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *bytes, size_t length)
+{
+    uint32_t lengths[7], rest, i;
+    const uint8_t *p;
+    palpate_error error;
+    model->bytes = bytes;
+    for (i = 0; i < 4 && i < length; i++) {
+        if (PALPATE_BYTE(bytes + i) != (uint8_t)(0x54504c50u >> 8 * i)) { /* PLPT */
+            return palpate_wrong_(model, PALPATE_NOT_A_MODEL, bytes);
+        }
+    }
+    if (length < 96) {
+        return palpate_wrong_(model, PALPATE_LENGTH, bytes + length);
+    }
+    i = palpate_u16_(bytes + 4);
+    if (i - 1 > 1) {
+        return palpate_wrong_(model, PALPATE_VERSION, bytes + 4);
+    }
+    rest = palpate_u32_(bytes + 8);
+    if (length != rest) {
+        return palpate_wrong_(model, PALPATE_LENGTH, bytes + (length < rest ? length : (size_t)rest));
+    }
+    if (palpate_checksum(bytes, length - 4) != palpate_u32_(bytes + (length - 4))) {
+        return palpate_wrong_(model, PALPATE_CHECKSUM, bytes + 8);
+    }
+    model->layout_ = PALPATE_BYTE(bytes + 6);
+    model->leaf_ = PALPATE_BYTE(bytes + 7);
+    model->descriptor = PALPATE_BYTE(bytes + 12);
+    model->real = PALPATE_BYTE(bytes + 13);
+    model->objects = (uint16_t)(PALPATE_BYTE(bytes + 14) + 1);
+    model->features = (uint16_t)(PALPATE_BYTE(bytes + 15) + 1);
+    /* The parts follow each other. */
+    lengths[PALPATE_TEXT_] = palpate_u32_(bytes + 68);
+    lengths[PALPATE_OPTIONAL_] = i == 1 ? 0 : palpate_u32_(bytes + 92);
+    lengths[PALPATE_MARGINS_] = 8 * (uint32_t)model->objects;
+    i = 4 * palpate_u16_(bytes + 16);
+    rest = palpate_u32_(bytes + 80);
+    lengths[PALPATE_AXES_] = rest + i < i ? UINT32_MAX : rest + i;
+    lengths[PALPATE_GROUPS_] = 8 * palpate_u16_(bytes + 18);
+    lengths[PALPATE_SPLITS_] = palpate_u32_(bytes + 84);
+    lengths[PALPATE_LEAVES_] = palpate_u32_(bytes + 88);
+    p = bytes + 96;
+    rest = (uint32_t)length - 96;
+    for (i = 0; i < 7; i++) {
+        model->part_[i] = p;
+        if (lengths[i] > rest) {
+            return palpate_wrong_(model, PALPATE_SECTION, p);
+        }
+        p += lengths[i];
+        rest -= lengths[i];
+    }
+    model->part_[PALPATE_END_] = p;
+    if (rest != 4) {
+        return palpate_wrong_(model, PALPATE_SECTION, p);
+    }
+    model->cuts_ = model->part_[PALPATE_AXES_] + 4 * (size_t)palpate_u16_(bytes + 16);
+    model->wrong = palpate_wrong_header_(model);
+    if (model->wrong != 0) {
+        return PALPATE_FIELD;
+    }
+    if ((PALPATE_LAYOUTS >> model->layout_ & 1) == 0) {
+        return palpate_wrong_(model, PALPATE_NOT_BUILT_IN, bytes + 6);
+    }
+    if ((PALPATE_LEAVES >> model->leaf_ & 1) == 0) {
+        return palpate_wrong_(model, PALPATE_NOT_BUILT_IN, bytes + 7);
+    }
+    model->odds_ = NULL;
+    model->patterns = 0x20;
+    model->largest_spread = UINT32_MAX;
+    model->needs_pose = (uint8_t)(model->descriptor < 7 && (0x6cu >> model->descriptor & 1) != 0);
+    error = palpate_check_sections_(model);
+    if (error == PALPATE_OK) {
+        error = palpate_check_axes_(model);
+    }
+    if (error == PALPATE_OK) {
+        error = palpate_check_groups_(model);
+    }
+    return error;
+}
+
+/* An object's name, with 0 at its end, cut to `room` bytes together: its bytes in the model, meant as UTF-8. Empty for one
+ * that the model does not know. Returns its length. */
+PALPATE_API size_t palpate_object_name(const palpate_model *model, uint16_t object, char *name, size_t room)
+{
+    const uint8_t *text = model->part_[PALPATE_TEXT_], *end = model->part_[PALPATE_OPTIONAL_];
+    size_t length = 0, i;
+    uint32_t skipped;
+    for (skipped = 0; text != end; skipped++) {
+        length = PALPATE_BYTE(text);
+        text++;
+        if (length > (size_t)(end - text)) {
+            length = 0;
+            break;
+        }
+        if (skipped == object + 1u) {
+            break;
+        }
+        text += length;
+        length = 0;
+    }
+    if (room != 0) {
+        length = length < room ? length : room - 1;
+        for (i = 0; i < length; i++) {
+            name[i] = (char)PALPATE_BYTE(text + i);
+        }
+        name[length] = 0;
+    }
+    return length;
+}
+
+/* ---- Features ---- */
+
+/* The key of an f32 value with these bits, as rows of a model whose `real` is 1 hold them. NaN is missing. */
+PALPATE_API int32_t palpate_key(uint32_t bits)
+{
+    uint32_t magnitude = bits & 0x7fffffffu;
+    if (magnitude > 0x7f800000u) {
+        return PALPATE_MISSING_FEATURE;
+    }
+    return bits >> 31 != 0 ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+/* The key of an f32 value. Cost: about six instructions, none of them in floating point. */
+PALPATE_API int32_t palpate_f32_key(float value)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } both;
+    both.value = value;
+    return palpate_key(both.bits);
+}
+
+static inline int32_t palpate_clamp_(int32_t value)
+{
+    const int32_t limit = ((int32_t)1 << 24) - 1;
+    return value > limit ? limit : value < -limit && value != PALPATE_MISSING_FEATURE ? -limit : value;
+}
+
+/* Times from the earliest on. */
+static inline void palpate_times_(const palpate_touch *touch, uint32_t *times)
+{
+    uint32_t earliest = PALPATE_MISSING;
+    uint8_t i;
+    for (i = 0; i < 3; i++) {
+        times[i] = touch->times[i];
+        earliest = times[i] < earliest ? times[i] : earliest;
+    }
+    for (i = 0; i < 3; i++) {
+        times[i] -= times[i] == PALPATE_MISSING ? 0 : earliest;
+    }
+}
+
+/* The code of a touch's contacts: 0 none, 1 one outer finger, 2 the middle one, 3 middle and outer, 4 both outer, 5 all. */
+static inline uint8_t palpate_pattern_(const uint32_t *times)
+{
+    uint8_t code = (uint8_t)((times[0] != PALPATE_MISSING) + (times[2] != PALPATE_MISSING));
+    code = (uint8_t)(2 * code + (times[1] != PALPATE_MISSING));
+    return code - 1u < 2 ? (uint8_t)(3 - code) : code;
+}
+
+/* Why a model over touches does not count one, or PALPATE_COUNTED. */
+static inline palpate_answer palpate_accepts_(const palpate_model *model, const palpate_touch *touch, const uint32_t *times)
+{
+    uint8_t i;
+    if (model->descriptor == 255) {
+        return PALPATE_NEEDS_FEATURES;
+    }
+    if ((model->patterns >> palpate_pattern_(times) & 1) == 0) {
+        return PALPATE_REFUSED_PATTERN;
+    }
+    for (i = 0; i < 3; i++) {
+        if (times[i] != PALPATE_MISSING && times[i] > model->largest_spread) {
+            return PALPATE_REFUSED_SPREAD;
+        }
+    }
+    return model->needs_pose != 0 && touch->has_pose == 0 ? PALPATE_REFUSED_NO_POSE : PALPATE_COUNTED;
+}
+
+/* The features of a touch, of which there are `model->features`; of a model over touches. */
+static inline void palpate_features_(const palpate_model *model, const palpate_touch *touch, const uint32_t *times, int32_t *features)
+{
+    const int32_t none = PALPATE_MISSING_FEATURE;
+    const uint8_t descriptor = model->descriptor;
+    int32_t at[3], curvature = none, slope = none, pair = none;
+    uint8_t i;
+    for (i = 0; i < 3; i++) {
+        const uint32_t limit = (uint32_t)1 << 28;
+        at[i] = times[i] == PALPATE_MISSING ? none : (int32_t)(times[i] < limit ? times[i] : limit);
+    }
+    if (descriptor == 0) {
+        for (i = 0; i < 3; i++) {
+            features[i] = palpate_clamp_(at[i]);
+        }
+        return;
+    }
+    if (at[0] != none && at[2] != none) {
+        slope = at[0] < at[2] ? at[2] - at[0] : at[0] - at[2];
+        if (at[1] != none) {
+            curvature = at[0] - 2 * at[1] + at[2];
+        }
+    } else if (at[1] != none) {
+        /* The outer finger that touched, if one did: missing is the least number. */
+        pair = at[0] > at[2] ? at[0] : at[2];
+        pair = pair == none ? none : at[1] - pair;
+    }
+    if (descriptor >= 4) {
+        *features++ = palpate_pattern_(times);
+    }
+    *features++ = palpate_clamp_(curvature);
+    *features++ = palpate_clamp_(slope);
+    if (descriptor >= 4) {
+        *features++ = palpate_clamp_(pair);
+    }
+    /* What there is of the pose, from x or from z on. */
+    if ((0x6cu >> descriptor & 1) != 0) {
+        const uint8_t first = (0x24u >> descriptor & 1) != 0 ? 2 : 0;
+        int flip = 0;
+        if (at[0] != at[2]) {
+            /* A missing contact is later than any other: the largest as a number without a sign. */
+            flip = (uint32_t)at[0] > (uint32_t)at[2];
+        } else {
+            /* The first component that is not 0 decides; the last one with partial touches. */
+            for (i = 0; i < 3; i++) {
+                int16_t part = touch->alignment[descriptor >= 4 ? i : 2 - i];
+                flip = part == 0 ? flip : part < 0;
+            }
+        }
+        for (i = first; i < 3; i++) {
+            *features++ = touch->has_pose == 0 ? none : touch->direction[i];
+        }
+        for (i = first; i < 3; i++) {
+            int32_t part = touch->alignment[i];
+            part = !flip ? part : part == -32768 ? 32767 : -part;
+            *features++ = touch->has_pose == 0 ? none : part;
+        }
+    }
+}
+
+/* ---- Margins ---- */
+
+/* How many of an axis's `count` thresholds of `width` bytes are at or below `value`. */
+static inline uint8_t palpate_rank_(const uint8_t *cuts, uint8_t width, uint8_t count, int32_t value)
+{
+    uint8_t rank = 0, step = 128;
+    while (step > count) {
+        step >>= 1;
+    }
+    for (; step != 0; step >>= 1) {
+        uint8_t next = (uint8_t)(rank + step);
+        if (next <= count && palpate_signed_(cuts + (size_t)width * (size_t)(next - 1), width) <= value) {
+            rank = next;
+        }
+    }
+    return rank;
+}
+
+static inline int32_t palpate_value_(const int32_t *features, uint16_t count, uint8_t feature)
+{
+    return feature < count ? features[feature] : PALPATE_MISSING_FEATURE;
+}
+
+/* Adds a leaf with `values` values to as many sums; bytes with 128 more than they are. */
+static inline void palpate_add_leaf_(const palpate_model *model, uint32_t *sums, uint16_t values, const uint8_t *leaf, uint8_t shift)
+{
+    do {
+        if (PALPATE_IS_I8_(model)) {
+            *sums += (uint32_t)PALPATE_BYTE(leaf) << shift;
+            leaf += 1;
+        } else if (PALPATE_IS_I16_(model)) {
+            *sums += (uint32_t)(int32_t)(int16_t)(uint16_t)palpate_u16_(leaf) << shift;
+            leaf += 2;
+        } else {
+#if PALPATE_LEAVES & PALPATE_F32
+            union {
+                uint32_t bits;
+                float value;
+            } sum, more;
+            sum.bits = *sums;
+            more.bits = palpate_u32_(leaf);
+            sum.value += more.value;
+            *sums = sum.bits;
+            leaf += 4;
+#endif
+        }
+        sums++;
+    } while (--values != 0);
+}
+
+/* The sums of a row of features, in units or as the bits of f32 values. */
+static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
+{
+    const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
+    const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *cuts = model->cuts_, *axis = model->part_[PALPATE_AXES_];
+    const int table = PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model);
+    const size_t size = palpate_leaf_size_(model);
+    uint32_t words[64], cell = 0;
+    uint8_t *ranks = (uint8_t *)words;
+    uint16_t i;
+    for (i = 0; i < model->objects; i++) {
+        /* The f32 value that changes nothing is -0. */
+        sums[i] = !table ? palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (size_t)i) : PALPATE_IS_F32_(model) ? 0x80000000u : 0;
+    }
+    /* Columns beyond those that there are have rank 0. */
+    for (i = 0; i < 64; i += 4) {
+        words[i] = 0;
+        words[i + 1] = 0;
+        words[i + 2] = 0;
+        words[i + 3] = 0;
+    }
+    for (; axis != model->cuts_; axis += 4) {
+        const uint8_t columns = PALPATE_BYTE(axis + 1), width = PALPATE_BYTE(axis + 2), most = PALPATE_BYTE(axis + 3);
+        const int32_t value = palpate_value_(features, count, PALPATE_BYTE(axis));
+        uint8_t left = 0, right = 255;
+        if (value != PALPATE_MISSING_FEATURE) {
+            left = palpate_rank_(cuts, width, most, value);
+            right = left;
+        }
+        cuts += (size_t)width * most;
+        if (PALPATE_IS_GRID_(model)) {
+            cell = cell * (most + 2u) + (value == PALPATE_MISSING_FEATURE ? most + 1u : left);
+        } else if (PALPATE_IS_PATTERNS_(model)) {
+            *ranks++ = left;
+        } else {
+            if ((columns & 1) != 0) {
+                *ranks++ = left;
+            }
+            if ((columns & 2) != 0) {
+                *ranks++ = right;
+            }
+        }
+    }
+    ranks = (uint8_t *)words;
+    if (table) {
+        if (PALPATE_IS_PATTERNS_(model)) {
+            const uint32_t m = PALPATE_BYTE(model->part_[PALPATE_AXES_] + 7), l = PALPATE_BYTE(model->part_[PALPATE_AXES_] + 11);
+            switch (palpate_value_(features, count, 0)) {
+            case 1:
+                cell = 1;
+                break;
+            case 2:
+                cell = 2;
+                break;
+            case 3:
+                cell = 3 + (uint32_t)ranks[2];
+                break;
+            case 4:
+                cell = 4 + l + ranks[1];
+                break;
+            case 5:
+                cell = 5 + l + m + ranks[0] * (m + 1) + ranks[1];
+                break;
+            default:
+                cell = 0;
+            }
+        }
+        palpate_add_leaf_(model, sums, model->objects, leaves + (size_t)cell * model->objects * size, 0);
+        for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
+            sums[i] -= 128;
+        }
+        return;
+    }
+    for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
+        const uint8_t depth = PALPATE_BYTE(group), shift = PALPATE_BYTE(group + 1);
+        const int one = PALPATE_BYTE(group + 2) != 0;
+        const uint16_t values = one ? 1 : model->objects;
+        const size_t length = size * values;
+        uint32_t *first = one ? sums + PALPATE_BYTE(group + 3) : sums;
+        uint32_t trees = palpate_u32_(group + 4);
+        if (PALPATE_IS_I8_(model)) {
+            for (i = 0; i < values; i++) {
+                first[i] -= trees << (7 + shift);
+            }
+        }
+        if (PALPATE_IS_COMPLETE_(model)) {
+            const size_t slots = (size_t)1 << depth;
+            const uint8_t *thresholds = splits + (size_t)(trees << depth);
+            for (; trees != 0; trees--) {
+                size_t slot = 1;
+                do {
+                    slot = 2 * slot + (ranks[PALPATE_BYTE(splits + slot)] > PALPATE_BYTE(thresholds + slot));
+                } while (slot < slots);
+                palpate_add_leaf_(model, first, values, leaves + (slot - slots) * length, shift);
+                splits += slots;
+                thresholds += slots;
+                leaves += slots * length;
+            }
+            splits = thresholds;
+        } else {
+            for (; trees != 0; trees--) {
+                const uint32_t node = PALPATE_IS_WIDE_(model) ? 6 : 3;
+                const uint32_t all = palpate_u16_(splits);
+                /* The split, those in its subtree, the leaves to its left. */
+                uint32_t at = 0, below = all, leaf = 0;
+                splits += 2;
+                while (below != 0 && at < all) {
+                    const uint8_t *split = splits + (size_t)(at * node);
+                    uint32_t left;
+                    int goes_right;
+                    if (PALPATE_IS_WIDE_(model)) {
+                        const int32_t value = palpate_value_(features, count, PALPATE_BYTE(split));
+                        const uint32_t number = palpate_u16_(split + 2);
+                        const uint32_t cut = number < palpate_between_(model->cuts_, model->part_[PALPATE_GROUPS_]) / 4
+                                                 ? palpate_u32_(model->cuts_ + 4 * (size_t)number)
+                                                 : 0;
+                        goes_right = value == PALPATE_MISSING_FEATURE ? PALPATE_BYTE(split + 1) == 0 : value >= (int32_t)cut;
+                        left = palpate_u16_(split + 4);
+                    } else {
+                        goes_right = ranks[PALPATE_BYTE(split)] > PALPATE_BYTE(split + 1);
+                        left = PALPATE_BYTE(split + 2);
+                    }
+                    at++;
+                    if (goes_right) {
+                        at += left;
+                        leaf += left + 1;
+                        below = below > left + 1 ? below - left - 1 : 0;
+                    } else {
+                        below = left;
+                    }
+                }
+                splits += (size_t)(all * node);
+                /* Sizes that contradict each other may lead beyond the last one. */
+                if (leaf <= all) {
+                    palpate_add_leaf_(model, first, values, leaves + (size_t)leaf * length, shift);
+                }
+                leaves += (size_t)(all + 1) * length;
+            }
+        }
+    }
+}
+
+/* An f32 value, given by its bits, in units of 2^-16, rounded half away from zero, within 2^30. */
+static inline int32_t palpate_q16_(uint32_t bits)
+{
+    const uint32_t limit = (uint32_t)1 << 30;
+    const uint8_t exponent = (uint8_t)(bits >> 23);
+    uint32_t magnitude = (bits & 0x7fffff) | 0x800000;
+    if (exponent < 110 || (exponent == 255 && magnitude != 0x800000)) {
+        return 0;
+    }
+    if (exponent < 134) {
+        magnitude = (magnitude + ((uint32_t)1 << (133 - exponent))) >> (134 - exponent);
+    } else {
+        magnitude = exponent > 140 ? limit : magnitude << (exponent - 134);
+        magnitude = magnitude > limit ? limit : magnitude;
+    }
+    return bits >> 31 != 0 ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+/* The margins of a row of `count` features, in units: one for each object, within 2^30. Features are whole numbers, or keys
+ * if the model's `real` is 1; PALPATE_MISSING_FEATURE, and what is beyond the end of a short row, is missing. */
+PALPATE_API void palpate_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
+{
+    uint16_t i;
+    palpate_sum_(model, features, count, (uint32_t *)margins);
+    for (i = 0; PALPATE_IS_F32_(model) && i < model->objects; i++) {
+        margins[i] = palpate_q16_((uint32_t)margins[i]);
+    }
+}
+
+/* The features of a touch in `features`, which has room for PALPATE_TOUCH_FEATURES; returns how many there are: 0 of a
+ * model over rows of features. */
+PALPATE_API uint16_t palpate_features(const palpate_model *model, const palpate_touch *touch, int32_t *features)
+{
+    uint32_t times[3];
+    if (model->descriptor == 255) {
+        return 0;
+    }
+    palpate_times_(touch, times);
+    palpate_features_(model, touch, times, features);
+    return model->features;
+}
+
+/* The margins of a touch, whether it counts or not; see palpate_margins_of. */
+PALPATE_API void palpate_margins(const palpate_model *model, const palpate_touch *touch, int32_t *margins)
+{
+    int32_t features[PALPATE_TOUCH_FEATURES];
+    palpate_margins_of(model, features, palpate_features(model, touch, features), margins);
+}
+
+#if PALPATE_LEAVES & PALPATE_F32
+/* The sums of a row of features as the trainer's own f32 values; 0, and nothing written, unless the model has f32 leaves. */
+PALPATE_API int palpate_f32_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, float *margins)
+{
+    union {
+        uint32_t bits;
+        float value;
+    } both;
+    uint32_t sums[PALPATE_MAX_OBJECTS];
+    uint16_t i;
+    if (!PALPATE_IS_F32_(model) || model->objects > PALPATE_MAX_OBJECTS) {
+        return 0;
+    }
+    palpate_sum_(model, features, count, sums);
+    for (i = 0; i < model->objects; i++) {
+        both.bits = sums[i];
+        margins[i] = both.value;
+    }
+    return 1;
+}
+#endif
+
+/* ---- Evidence and verdicts ---- */
+
+/* The high half of a product. */
+static inline uint32_t palpate_high_(uint32_t a, uint32_t b)
+{
+    return (uint32_t)((uint64_t)a * b >> 32);
+}
+
+/* 2^-u in Q56, for u in Q32. Error: at most 1e-8 of the result, and 2^-57. */
+PALPATE_API uint64_t palpate_exp2(uint64_t u)
+{
+    static const uint32_t sixteenths[16] = {
+        2147483648u, 2056437387u, 1969251188u, 1885761398u, 1805811301u, 1729250827u, 1655936265u, 1585730000u,
+        1518500250u, 1454120821u, 1392470869u, 1333434672u, 1276901417u, 1222764986u, 1170923762u, 1121280436u,
+    };
+    const uint32_t whole = (uint32_t)(u >> 32), rest = (uint32_t)u << 4;
+    uint32_t power = sixteenths[(uint32_t)u >> 28];
+    uint32_t slope = 186065157u - palpate_high_(rest, 4029616u - palpate_high_(rest, 56985u));
+    if (whole > 57) {
+        return 0;
+    }
+    power -= palpate_high_(power, palpate_high_(rest, slope));
+    return (uint64_t)power << 25 >> whole;
+}
+
+/* How many bits an object is behind the leader, in Q32. */
+static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint16_t leader, uint16_t object)
+{
+    const uint8_t *bytes = recognizer->model->bytes;
+    uint64_t units = (uint64_t)recognizer->evidence[leader] - (uint64_t)recognizer->evidence[object];
+    if (units >> 32 != 0) {
+        units = 0xffffffffu;
+    }
+    return units * palpate_u32_(bytes + 36) >> (PALPATE_BYTE(bytes + 40) & 63);
+}
+
+/* The object with the most evidence; the first of several. */
+PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
+{
+    uint16_t best = 0, i;
+    for (i = 1; i < recognizer->model->objects; i++) {
+        if (recognizer->evidence[i] > recognizer->evidence[best]) {
+            best = i;
+        }
+    }
+    return best;
+}
+
+/* Forgets all touches, for the next object. */
+PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
+{
+    const palpate_model *model = recognizer->model;
+    uint16_t i;
+    recognizer->touches = 0;
+    recognizer->verdict = PALPATE_UNDECIDED;
+    recognizer->object = 0;
+    for (i = 0; i < model->objects; i++) {
+        recognizer->evidence[i] = (int32_t)palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * ((size_t)model->objects + i));
+    }
+}
+
+/* A recognizer that has touched nothing yet, with the model's own thresholds and limit. For others, set `odds`, `max_touches`
+ * and `by_object` afterwards: odds = error rate / (1 - error rate) in Q56. The model must stay where it is. Fails with
+ * PALPATE_TOO_MANY_OBJECTS only. */
+PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_model *model)
+{
+    const uint8_t *bytes = model->bytes;
+    if (model->objects > PALPATE_MAX_OBJECTS) {
+        return palpate_wrong_(model, PALPATE_TOO_MANY_OBJECTS, bytes + 14);
+    }
+    recognizer->model = model;
+    recognizer->odds = palpate_u32_(bytes + 48) | (uint64_t)palpate_u32_(bytes + 52) << 32;
+    recognizer->max_touches = palpate_u32_(bytes + 56);
+    recognizer->by_object = 1;
+    palpate_reset(recognizer);
+    return PALPATE_OK;
+}
+
+/* Takes in a touch or row by its margins. */
+PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins)
+{
+    const palpate_model *model = recognizer->model;
+    uint64_t left = recognizer->odds;
+    uint16_t best, i;
+    if (recognizer->verdict != PALPATE_UNDECIDED) {
+        return;
+    }
+    for (i = 0; i < model->objects; i++) {
+        const int64_t before = recognizer->evidence[i], margin = margins[i];
+        int64_t after;
+        if (margin >= 0) {
+            after = before > INT64_MAX - margin ? INT64_MAX : before + margin;
+        } else {
+            after = before < INT64_MIN - margin ? INT64_MIN : before + margin;
+        }
+        recognizer->evidence[i] = after;
+    }
+    recognizer->touches += recognizer->touches != UINT32_MAX;
+    best = palpate_best(recognizer);
+    if (recognizer->by_object != 0 && model->odds_ != NULL) {
+        left = (uint64_t)palpate_u32_(model->odds_ + 4 * (size_t)best) << 24;
+    }
+    for (i = 0; i < model->objects; i++) {
+        if (i != best) {
+            const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i));
+            if (weight > left) {
+                if (recognizer->touches >= recognizer->max_touches) {
+                    recognizer->verdict = PALPATE_UNKNOWN;
+                }
+                return;
+            }
+            left -= weight;
+        }
+    }
+    recognizer->verdict = PALPATE_RECOGNIZED;
+    recognizer->object = (uint8_t)best;
+}
+
+/* Takes in a touch; after a decision nothing changes until the reset. Cost: the ensemble's margins, about 15 instructions for
+ * each object, and an exponential, rarely more. */
+PALPATE_API palpate_answer palpate_push(palpate_recognizer *recognizer, const palpate_touch *touch)
+{
+    int32_t features[PALPATE_TOUCH_FEATURES], margins[PALPATE_MAX_OBJECTS];
+    uint32_t times[3];
+    palpate_answer answer;
+    palpate_times_(touch, times);
+    answer = palpate_accepts_(recognizer->model, touch, times);
+    if (answer == PALPATE_COUNTED && recognizer->verdict == PALPATE_UNDECIDED) {
+        palpate_features_(recognizer->model, touch, times, features);
+        palpate_margins_of(recognizer->model, features, recognizer->model->features, margins);
+        palpate_push_margins(recognizer, margins);
+    }
+    return answer;
+}
+
+/* Takes in a row of features; see palpate_margins_of. */
+PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer, const int32_t *features, uint16_t count)
+{
+    int32_t margins[PALPATE_MAX_OBJECTS];
+    if (recognizer->model->descriptor != 255) {
+        return PALPATE_NEEDS_TOUCHES;
+    }
+    palpate_margins_of(recognizer->model, features, count, margins);
+    palpate_push_margins(recognizer, margins);
+    return PALPATE_COUNTED;
+}
+
+/* part / whole in Q56, rounded down, for a part that is at most the whole. */
+static inline uint64_t palpate_ratio_(uint64_t part, uint64_t whole)
+{
+    uint64_t quotient = 0;
+    uint8_t i;
+    if (part >= whole) {
+        return PALPATE_ONE;
+    }
+    for (i = 0; i < 56; i++) {
+        quotient <<= 1;
+        /* Twice the rest may not fit, but less the whole it does. */
+        if (part >= whole - part) {
+            part -= whole - part;
+            quotient |= 1;
+        } else {
+            part <<= 1;
+        }
+    }
+    return quotient;
+}
+
+/* The posterior of an object in Q56 (PALPATE_ONE is 1), of the evidence divided by the model's temperature; 0 for an object
+ * that the model does not know. Cost: an exponential for each object, and about 1,000 instructions. */
+PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uint16_t object)
+{
+    const palpate_model *model = recognizer->model;
+    const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
+    const uint16_t best = palpate_best(recognizer);
+    uint32_t sharpness = 65536;
+    uint64_t own = 0, others = 0, all;
+    uint16_t i;
+    if (object >= model->objects) {
+        return 0;
+    }
+    while (p != end) {
+        const uint8_t *content = p + 8;
+        uint32_t length = 0;
+        if ((palpate_section_(&p, end, &length) & 0x7fff) == 11 && length >= 4) {
+            const uint32_t stated = palpate_u32_(content);
+            sharpness = stated >= 4096 && stated <= 1048576u ? stated : sharpness;
+        }
+    }
+    for (i = 0; i < model->objects; i++) {
+        if (i != best) {
+            const uint64_t most = (uint64_t)1 << 42; /* where a weight is 0 at any temperature */
+            uint64_t bits = palpate_behind_(recognizer, best, i);
+            bits = palpate_exp2((bits < most ? bits : most) * sharpness >> 16);
+            others += bits;
+            own = i == object ? bits : own;
+        }
+    }
+    /* 256 objects that are level are as much as does not fit. */
+    all = others > UINT64_MAX - PALPATE_ONE ? UINT64_MAX : PALPATE_ONE + others;
+    return object == best ? PALPATE_ONE - palpate_ratio_(others, all) : palpate_ratio_(own, all);
+}
+
+/* ---- Snapshots ---- */
+
+/* Seven bits a byte, the low ones first. Returns the length with them; bytes beyond `room` are counted only. */
+static inline size_t palpate_put_(uint8_t *buffer, size_t length, size_t room, uint64_t number)
+{
+    for (;; length++) {
+        if (length < room) {
+            buffer[length] = (uint8_t)((number & 127) | (number > 127 ? 128 : 0));
+        }
+        number >>= 7;
+        if (number == 0) {
+            return length + 1;
+        }
+    }
+}
+
+/* The number that `palpate_put_` wrote, of at most `most` bytes, the last of which is at most `last`; `*at` is moved past
+ * it, or becomes more than `length`. */
+static inline uint64_t palpate_take_(const uint8_t *buffer, size_t *at, size_t length, uint8_t most, uint8_t last)
+{
+    uint64_t number = 0;
+    uint8_t i;
+    for (i = 0; i < most && *at < length; i++) {
+        const uint8_t byte = buffer[*at];
+        *at += 1;
+        number |= (uint64_t)(byte & 127) << 7 * i;
+        if (byte < 128) {
+            if (i == most - 1 && byte > last) {
+                break;
+            }
+            return number;
+        }
+    }
+    *at = length + 1;
+    return 0;
+}
+
+/* Writes what is known to the start of `buffer`, and returns the bytes that it took: at most
+ * PALPATE_SNAPSHOT_LENGTH(objects). Returns 0 if there is less room. */
+PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_t *buffer, size_t room)
+{
+    const palpate_model *model = recognizer->model;
+    size_t length;
+    uint32_t sum;
+    uint16_t i;
+    length = palpate_put_(buffer, 0, room, palpate_u32_(model->part_[PALPATE_END_]));
+    length = palpate_put_(buffer, length, room, recognizer->touches);
+    if (room - length < 2 || room < length) {
+        return 0;
+    }
+    buffer[length++] = recognizer->verdict;
+    buffer[length++] = recognizer->verdict == PALPATE_RECOGNIZED ? recognizer->object : 0;
+    for (i = 0; i < model->objects; i++) {
+        const uint64_t evidence = (uint64_t)recognizer->evidence[i];
+        length = palpate_put_(buffer, length, room, evidence << 1 ^ (0u - (evidence >> 63)));
+    }
+    if (length > room || room - length < 4) {
+        return 0;
+    }
+    sum = palpate_checksum(buffer, length);
+    for (i = 0; i < 4; i++) {
+        buffer[length++] = (uint8_t)(sum >> 8 * i);
+    }
+    return length;
+}
+
+/* Takes over a snapshot; what was touched before is forgotten. Unless it is PALPATE_RESTORED, nothing changes. */
+PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, const uint8_t *snapshot, size_t length)
+{
+    const palpate_model *model = recognizer->model;
+    int64_t most = 0;
+    size_t at = 0, start;
+    uint32_t sum = 0, checksum, touches;
+    uint16_t i, best = 0;
+    uint8_t verdict, object;
+    if (length < 4) {
+        return PALPATE_DAMAGED;
+    }
+    length -= 4;
+    for (i = 0; i < 4; i++) {
+        sum |= (uint32_t)snapshot[length + i] << 8 * i;
+    }
+    if (palpate_checksum(snapshot, length) != sum) {
+        return PALPATE_DAMAGED;
+    }
+    checksum = (uint32_t)palpate_take_(snapshot, &at, length, 5, 15);
+    touches = (uint32_t)palpate_take_(snapshot, &at, length, 5, 15);
+    if (at > length || length - at < 2) {
+        return PALPATE_DAMAGED;
+    }
+    verdict = snapshot[at++];
+    object = snapshot[at++];
+    if (checksum != palpate_u32_(model->part_[PALPATE_END_])) {
+        return PALPATE_OTHER_MODEL;
+    }
+    start = at;
+    for (i = 0; i < model->objects; i++) {
+        const uint64_t number = palpate_take_(snapshot, &at, length, 10, 1);
+        const int64_t evidence = (int64_t)(number >> 1 ^ (0u - (number & 1)));
+        if (i == 0 || evidence > most) {
+            most = evidence;
+            best = i;
+        }
+    }
+    if (at != length || verdict > PALPATE_UNKNOWN || (verdict != PALPATE_UNDECIDED && touches == 0) ||
+        (verdict == PALPATE_RECOGNIZED && object != best)) {
+        return PALPATE_DAMAGED;
+    }
+    palpate_reset(recognizer);
+    recognizer->touches = touches;
+    recognizer->verdict = verdict;
+    recognizer->object = object;
+    for (i = 0; i < model->objects && touches != 0; i++) {
+        const uint64_t number = palpate_take_(snapshot, &start, length, 10, 1);
+        recognizer->evidence[i] = (int64_t)(number >> 1 ^ (0u - (number & 1)));
+    }
+    return PALPATE_RESTORED;
+}
+
+#endif

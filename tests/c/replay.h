@@ -1,0 +1,248 @@
+/* Commands on models, touches, rows and snapshots, played through palpate.h; what comes out is text, which tests/tests/c.rs
+ * compares with what the crate gives. No library: the same for this machine and for bare chips.
+ *
+ * Commands, numbers little endian:
+ *   M u32 length, bytes      opens a model and starts a recognizer: "open ERROR PLACE"
+ *   T 3 u32, u8, 6 i16       pushes a touch: times, whether it has a pose, direction and alignment
+ *   R u16 count, i32 each    pushes a row of features
+ *   P                        the posterior of every object
+ *   N                        the name of every object
+ *   S                        a snapshot
+ *   L u32 length, bytes      takes over a snapshot
+ *   X                        forgets all touches
+ * After a model that was refused, everything up to the next M is skipped. */
+#ifndef PALPATE_REPLAY_H
+#define PALPATE_REPLAY_H
+
+#ifndef PALPATE_MAX_OBJECTS
+#define PALPATE_MAX_OBJECTS 256
+#endif
+#include "palpate.h"
+
+/* One byte of the commands; -1 at their end. */
+static int replay_get(void);
+static void replay_put(char byte);
+/* Room for the bytes of a model (0) or others (1), instead of the last one; exactly `length` of them may be touched. */
+static uint8_t *replay_room(int which, size_t length);
+
+static palpate_model replay_model;
+static palpate_recognizer replay_recognizer;
+static int32_t replay_features[256], replay_margins[PALPATE_MAX_OBJECTS];
+
+static uint32_t replay_number(int bytes)
+{
+    uint32_t number = 0;
+    int i;
+    for (i = 0; i < bytes; i++) {
+        number |= (uint32_t)(replay_get() & 255) << 8 * i;
+    }
+    return number;
+}
+
+static void replay_text(const char *text)
+{
+    while (*text != 0) {
+        replay_put(*text++);
+    }
+}
+
+static void replay_u64(uint64_t number)
+{
+    char digits[21];
+    int length = 0;
+    do {
+        digits[length++] = (char)('0' + number % 10);
+        number /= 10;
+    } while (number != 0);
+    while (length != 0) {
+        replay_put(digits[--length]);
+    }
+}
+
+static void replay_i64(int64_t number)
+{
+    replay_put(' ');
+    if (number < 0) {
+        replay_put('-');
+    }
+    replay_u64(number < 0 ? 0u - (uint64_t)number : (uint64_t)number);
+}
+
+static void replay_hex(const uint8_t *bytes, size_t length)
+{
+    replay_put(' ');
+    while (length-- != 0) {
+        replay_put("0123456789abcdef"[*bytes >> 4]);
+        replay_put("0123456789abcdef"[*bytes++ & 15]);
+    }
+}
+
+static void replay_numbers(const char *word, const int32_t *numbers, uint16_t count)
+{
+    uint16_t i;
+    replay_text(word);
+    for (i = 0; i < count; i++) {
+        replay_i64(numbers[i]);
+    }
+    replay_put('\n');
+}
+
+/* What came of a touch or row with these features. */
+static void replay_known(palpate_answer answer, uint16_t count)
+{
+    const uint16_t objects = replay_model.objects;
+    uint16_t i;
+    if (answer != PALPATE_COUNTED) {
+        replay_text("refused");
+        replay_i64((int64_t)answer);
+        replay_put('\n');
+        return;
+    }
+    replay_numbers("features", replay_features, count);
+    palpate_margins_of(&replay_model, replay_features, count, replay_margins);
+    replay_numbers("margins", replay_margins, objects);
+#if PALPATE_LEAVES & PALPATE_F32
+    {
+        static union {
+            float sums[PALPATE_MAX_OBJECTS];
+            uint32_t bits[PALPATE_MAX_OBJECTS];
+        } both;
+        if (palpate_f32_margins_of(&replay_model, replay_features, count, both.sums)) {
+            replay_text("sums");
+            for (i = 0; i < objects; i++) {
+                /* Which of the NaNs it is, is up to the machine. */
+                replay_i64((both.bits[i] & 0x7fffffffu) > 0x7f800000u ? -1 : (int64_t)both.bits[i]);
+            }
+            replay_put('\n');
+        }
+    }
+#endif
+    replay_text("evidence");
+    for (i = 0; i < objects; i++) {
+        replay_i64(replay_recognizer.evidence[i]);
+    }
+    replay_text("\nverdict");
+    replay_i64(replay_recognizer.verdict);
+    replay_i64(replay_recognizer.verdict == PALPATE_RECOGNIZED ? replay_recognizer.object : 0);
+    replay_i64((int64_t)replay_recognizer.touches);
+    replay_put('\n');
+}
+
+static void replay_touch(int is_open)
+{
+    palpate_touch touch;
+    palpate_answer answer;
+    uint16_t count;
+    int i;
+    for (i = 0; i < 3; i++) {
+        touch.times[i] = replay_number(4);
+    }
+    touch.has_pose = (uint8_t)replay_get();
+    for (i = 0; i < 3; i++) {
+        touch.direction[i] = (int16_t)(uint16_t)replay_number(2);
+    }
+    for (i = 0; i < 3; i++) {
+        touch.alignment[i] = (int16_t)(uint16_t)replay_number(2);
+    }
+    if (is_open) {
+        answer = palpate_push(&replay_recognizer, &touch);
+        count = palpate_features(&replay_model, &touch, replay_features);
+        if (answer == PALPATE_COUNTED) {
+            /* The same without a recognizer. */
+            palpate_margins(&replay_model, &touch, replay_margins);
+            replay_numbers("touch", replay_margins, replay_model.objects);
+        }
+        replay_known(answer, count);
+    }
+}
+
+/* All commands. Returns 0 unless one is not known. */
+static int replay(void)
+{
+    static uint8_t snapshot[PALPATE_SNAPSHOT_LENGTH(PALPATE_MAX_OBJECTS)];
+    int is_open = 0, command;
+    uint16_t i, count;
+    uint32_t length, at;
+    uint8_t *bytes;
+    while ((command = replay_get()) >= 0) {
+        switch (command) {
+        case 'M':
+        case 'L':
+            length = replay_number(4);
+            bytes = replay_room(command != 'M', length);
+            for (at = 0; at < length; at++) {
+                bytes[at] = (uint8_t)replay_get();
+            }
+            if (command == 'M') {
+                palpate_error error = palpate_open(&replay_model, bytes, length);
+                if (error == PALPATE_OK) {
+                    error = palpate_start(&replay_recognizer, &replay_model);
+                }
+                is_open = error == PALPATE_OK;
+                replay_text("open");
+                replay_i64((int64_t)error);
+                replay_i64(is_open ? 0 : (int64_t)replay_model.wrong);
+                replay_put('\n');
+            } else if (is_open) {
+                replay_text("restore");
+                replay_i64((int64_t)palpate_restore(&replay_recognizer, bytes, length));
+                replay_put('\n');
+            }
+            break;
+        case 'T':
+            replay_touch(is_open);
+            break;
+        case 'R':
+            count = (uint16_t)replay_number(2);
+            for (i = 0; i < count; i++) {
+                replay_features[i & 255] = (int32_t)replay_number(4);
+            }
+            if (is_open) {
+                replay_known(palpate_push_features(&replay_recognizer, replay_features, count), count);
+            }
+            break;
+        case 'P':
+            if (is_open) {
+                replay_text("best");
+                replay_i64(palpate_best(&replay_recognizer));
+                replay_text("\nposteriors");
+                for (i = 0; i <= replay_model.objects; i++) {
+                    replay_put(' ');
+                    replay_u64(palpate_posterior(&replay_recognizer, i));
+                }
+                replay_put('\n');
+            }
+            break;
+        case 'N':
+            for (i = 0; is_open && i <= replay_model.objects; i++) {
+                char name[256];
+                replay_text("name ");
+                palpate_object_name(&replay_model, i, name, sizeof name);
+                replay_text(name);
+                replay_put('\n');
+            }
+            break;
+        case 'S':
+            if (is_open) {
+                size_t whole = palpate_snapshot(&replay_recognizer, snapshot, sizeof snapshot);
+                replay_text("snapshot");
+                replay_hex(snapshot, whole);
+                /* In as many bytes as it takes, and in one less. */
+                replay_i64((int64_t)palpate_snapshot(&replay_recognizer, replay_room(1, whole), whole));
+                replay_i64((int64_t)palpate_snapshot(&replay_recognizer, replay_room(1, whole - 1), whole - 1));
+                replay_put('\n');
+            }
+            break;
+        case 'X':
+            if (is_open) {
+                palpate_reset(&replay_recognizer);
+            }
+            break;
+        default:
+            return 1;
+        }
+    }
+    return 0;
+}
+
+#endif

@@ -1,0 +1,206 @@
+//! Commands for the C header's test program (`tests/c/replay.h`), and what it has to say to each: what the crate gives.
+
+use palpate_onboard::{Model, ModelError, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
+use palpate_shared::Touch;
+use palpate_shared::format::{HEADER_LENGTH, Layout};
+use std::fmt::Write;
+
+/// Commands, and the lines that have to come out.
+#[derive(Default)]
+pub struct Script<'m> {
+    /// What the program reads.
+    pub commands: Vec<u8>,
+    /// What it has to write.
+    pub expected: String,
+    recognizer: Option<Recognizer<'m, 256>>,
+}
+
+impl<'m> Script<'m> {
+    /// Opens a model; whether it is one.
+    pub fn open(&mut self, bytes: &'m [u8]) -> bool {
+        self.block(b'M', bytes);
+        let opened = Model::new(bytes);
+        let (code, place) = opened.as_ref().map_or_else(|error| (code(error), error.offset()), |_| (0, 0));
+        self.say(&format!("open {code} {place}"));
+        let start = |model: &Model<'m>| Recognizer::new(model, Stopping::from_model(model)).expect("at most 256 objects");
+        self.recognizer = opened.ok().as_ref().map(start);
+        self.recognizer.is_some()
+    }
+
+    /// What is known under the model that is open.
+    ///
+    /// # Panics
+    /// If none is.
+    pub fn recognizer(&self) -> &Recognizer<'m, 256> {
+        self.recognizer.as_ref().expect("a model is open")
+    }
+
+    fn known(&mut self) -> &mut Recognizer<'m, 256> {
+        self.recognizer.as_mut().expect("a model is open")
+    }
+
+    /// Pushes a touch.
+    pub fn touch(&mut self, touch: &Touch) {
+        self.commands.push(b'T');
+        for time in touch.times() {
+            self.commands.extend(time.micros().unwrap_or(u32::MAX).to_le_bytes());
+        }
+        self.commands.push(touch.pose().is_some().into());
+        let pose = touch.pose().map_or([[0; 3]; 2], |pose| [pose.direction, pose.alignment]);
+        self.commands.extend(pose.into_iter().flatten().flat_map(i16::to_le_bytes));
+        if let Err(refused) = self.known().push(touch) {
+            return self.say(&format!("refused {}", refusal(refused)));
+        }
+        let model = *self.recognizer().model();
+        let features = model.descriptor().expect("it takes touches").features(touch);
+        let mut margins = vec![0; model.object_count()];
+        model.margins(touch, &mut margins);
+        self.numbers("touch", &margins);
+        self.row_known(features.as_slice());
+    }
+
+    /// Pushes a row of features.
+    pub fn row(&mut self, row: &[i32]) {
+        self.commands.push(b'R');
+        self.commands.extend((row.len() as u16).to_le_bytes());
+        self.commands.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+        match self.known().push_features(row) {
+            Err(refused) => self.say(&format!("refused {}", refusal(refused))),
+            Ok(_) => self.row_known(row),
+        }
+    }
+
+    /// Forgets all touches.
+    pub fn reset(&mut self) {
+        self.commands.push(b'X');
+        self.known().reset();
+    }
+
+    /// The posteriors of all objects, and of one that does not exist.
+    pub fn posteriors(&mut self) {
+        self.commands.push(b'P');
+        let recognizer = self.recognizer();
+        let objects = 0..=recognizer.model().object_count();
+        let posteriors: Vec<u64> = objects.map(|object| recognizer.posterior(object).q56()).collect();
+        self.say(&format!("best {}", self.recognizer().best()));
+        self.numbers("posteriors", &posteriors);
+    }
+
+    /// The objects' names.
+    pub fn names(&mut self) {
+        self.commands.push(b'N');
+        let model = *self.recognizer().model();
+        for object in 0..=model.object_count() {
+            self.say(&format!("name {}", model.object_name(object)));
+        }
+    }
+
+    /// A snapshot, which is handed back.
+    pub fn snapshot(&mut self) -> Vec<u8> {
+        self.commands.push(b'S');
+        let mut buffer = [0; SNAPSHOT_LENGTH + 2_560];
+        let snapshot = self.recognizer().snapshot(&mut buffer).expect("a long buffer").to_vec();
+        let mut line = "snapshot ".to_string();
+        snapshot.iter().for_each(|byte| write!(line, "{byte:02x}").expect("a string"));
+        self.say(&format!("{line} {} 0", snapshot.len()));
+        snapshot
+    }
+
+    /// Takes over a snapshot.
+    pub fn restore(&mut self, bytes: &[u8]) {
+        self.block(b'L', bytes);
+        let answer = match self.known().restore(bytes) {
+            Ok(()) => 0,
+            Err(SnapshotError::OtherModel) => 2,
+            Err(_) => 1,
+        };
+        self.say(&format!("restore {answer}"));
+    }
+
+    fn row_known(&mut self, features: &[i32]) {
+        let model = *self.recognizer().model();
+        self.numbers("features", features);
+        let mut margins = vec![0; model.object_count()];
+        model.margins_of(features, &mut margins);
+        self.numbers("margins", &margins);
+        let mut sums = vec![0.0; model.object_count()];
+        if model.f32_margins_of(features, &mut sums) {
+            let bits = |sum: &f32| if sum.is_nan() { -1 } else { i64::from(sum.to_bits()) };
+            self.numbers("sums", &sums.iter().map(bits).collect::<Vec<_>>());
+        }
+        let evidence = self.recognizer().evidence().to_vec();
+        self.numbers("evidence", &evidence);
+        let (verdict, object) = match self.recognizer().verdict() {
+            Verdict::Undecided => (0, 0),
+            Verdict::Recognized { object, .. } => (1, object),
+            Verdict::Unknown => (2, 0),
+        };
+        self.say(&format!("verdict {verdict} {object} {}", self.recognizer().touches()));
+    }
+
+    fn block(&mut self, command: u8, bytes: &[u8]) {
+        self.commands.push(command);
+        self.commands.extend((bytes.len() as u32).to_le_bytes());
+        self.commands.extend_from_slice(bytes);
+    }
+
+    fn numbers(&mut self, word: &str, numbers: &[impl std::fmt::Display]) {
+        self.expected += word;
+        numbers.iter().for_each(|number| write!(self.expected, " {number}").expect("a string"));
+        self.say("");
+    }
+
+    fn say(&mut self, line: &str) {
+        self.expected += line;
+        self.expected.push('\n');
+    }
+}
+
+/// The number of an error in `palpate.h`.
+const fn code(error: &ModelError) -> u8 {
+    match error {
+        ModelError::Length { .. } => 1,
+        ModelError::NotAModel => 2,
+        ModelError::Version(_) => 3,
+        ModelError::Checksum { .. } => 4,
+        ModelError::Field { .. } => 5,
+        ModelError::Section { .. } => 6,
+        ModelError::NotUnderstood { .. } => 7,
+        ModelError::MarginRange => 8,
+        _ => 9,
+    }
+}
+
+/// The number of a refusal in `palpate.h`.
+const fn refusal(refused: Refused) -> u8 {
+    match refused {
+        Refused::Pattern(_) => 1,
+        Refused::Spread => 2,
+        Refused::NoPose => 3,
+        Refused::NeedsFeatures => 4,
+        _ => 5,
+    }
+}
+
+/// Whether the walk through a model that was opened is specified: slot 0 of a complete tree is not checked, and what
+/// comes of a wrong one is up to the implementation.
+pub fn is_specified(model: &Model<'_>) -> bool {
+    let (bytes, header) = (model.bytes(), model.header());
+    if header.layout() != Layout::Complete.code() {
+        return true;
+    }
+    let groups = HEADER_LENGTH
+        + header.text_length() as usize
+        + header.optional_length() as usize
+        + 8 * model.object_count()
+        + 4 * usize::from(header.axes())
+        + header.cuts_length() as usize;
+    let mut splits = groups + 8 * usize::from(header.groups());
+    bytes[groups..splits].chunks(8).all(|group| {
+        let slots = 1 << group[0];
+        let trees = u32::from_le_bytes([group[4], group[5], group[6], group[7]]) as usize;
+        let roots = (0..trees).all(|tree| bytes[splits + tree * slots] == 1);
+        splits += 2 * trees * slots;
+        roots
+    })
+}
