@@ -22,7 +22,8 @@ impl<'m> Script<'m> {
         let opened = Model::new(bytes);
         let (code, place) = opened.as_ref().map_or_else(|error| (code(error), error.offset()), |_| (0, 0));
         self.say(&format!("open {code} {place}"));
-        let start = |model: &Model<'m>| Recognizer::new(model, Stopping::from_model(model)).expect("at most 256 objects");
+        let start =
+            |model: &Model<'m>| Recognizer::new(model, Stopping::from_model(model)).expect("at most 256 objects");
         self.recognizer = opened.ok().as_ref().map(start);
         self.recognizer.is_some()
     }

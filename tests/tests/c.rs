@@ -1,9 +1,7 @@
 //! `onboard/c/palpate.h` gives the bits that the crate gives: on this machine, under sanitizers, and on emulated chips.
 
 use palpate_onboard::Model;
-use palpate_shared::format::{
-    MUST_UNDERSTAND, OddsByObject, Plan, Section, Tag, Temperature, f32_key, write_section,
-};
+use palpate_shared::format::{MUST_UNDERSTAND, OddsByObject, Plan, Section, Tag, Temperature, f32_key, write_section};
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use palpate_tests::replay::{Script, is_specified};
 use palpate_tests::sections::with_sections;
@@ -226,7 +224,8 @@ fn mutant(models: &[Vec<u8>], rng: &mut SmallRng) -> Vec<u8> {
             3..5 => bytes[at] = bytes[at].wrapping_add(1),
             5..7 => bytes[at] = bytes[at].wrapping_sub(1),
             7 => {
-                let number: u32 = [0, u32::MAX, 1 << 31, rng.random(), rng.random_range(0..300)][rng.random_range(0..5)];
+                let number: u32 =
+                    [0, u32::MAX, 1 << 31, rng.random(), rng.random_range(0..300)][rng.random_range(0..5)];
                 let at = at & !3;
                 bytes.iter_mut().skip(at).zip(number.to_le_bytes()).for_each(|(to, from)| *to = from);
             }
@@ -344,7 +343,8 @@ fn emulated_chips_give_the_bits_of_the_crate() {
     for (chip, compiler, flags, emulator) in CHIPS {
         let directory = tempfile::tempdir().unwrap();
         let program = directory.path().join("replay");
-        let linker: Vec<String> = flags.split(' ').map(|flag| flag.replace("tests/c", &format!("{ROOT}/tests/c"))).collect();
+        let linker: Vec<String> =
+            flags.split(' ').map(|flag| flag.replace("tests/c", &format!("{ROOT}/tests/c"))).collect();
         let mut all = vec!["-Os", "-ffreestanding", "-nostdlib", "-static", "-Wl,--no-warn-rwx-segments"];
         all.extend(linker.iter().map(String::as_str));
         compile(compiler, &all, "chip.c", &program).unwrap();
