@@ -140,7 +140,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     pub fn push(&mut self, touch: &Touch) -> Result<Verdict, Refused> {
         self.model.accepts(touch)?;
         let mut margins = AlignedTo8([0; N]);
-        self.model.margins(touch, &mut margins.0);
+        self.model.touch_in_zeros(touch, &mut margins.0);
         Ok(self.add(&margins.0))
     }
 
