@@ -56,9 +56,17 @@
 #define PALPATE_API static inline
 #endif
 #if defined(__GNUC__)
-#define PALPATE_APART_ __attribute__((noinline))
+#define PALPATE_NEAR_ static inline __attribute__((always_inline))
+#define PALPATE_APART_ static __attribute__((noinline, unused))
 #else
-#define PALPATE_APART_
+#define PALPATE_NEAR_ static inline
+#define PALPATE_APART_ static inline
+#endif
+/* A number of four bytes is a single load on a chip that loads from any address, and a call on others. */
+#if defined(__ARM_FEATURE_UNALIGNED) || defined(__x86_64__) || defined(__aarch64__)
+#define PALPATE_U32_ PALPATE_NEAR_
+#else
+#define PALPATE_U32_ PALPATE_APART_
 #endif
 
 #if PALPATE_LEAVES & PALPATE_F32
@@ -178,28 +186,25 @@ static inline uint32_t palpate_u16_(const uint8_t *p)
     return (uint32_t)PALPATE_BYTE(p) | (uint32_t)PALPATE_BYTE(p + 1) << 8;
 }
 
-static inline uint32_t palpate_u32_(const uint8_t *p)
+PALPATE_U32_ uint32_t palpate_u32_(const uint8_t *p)
 {
-    return palpate_u16_(p) | palpate_u16_(p + 2) << 16;
+    return (uint32_t)PALPATE_BYTE(p) | (uint32_t)PALPATE_BYTE(p + 1) << 8 | (uint32_t)PALPATE_BYTE(p + 2) << 16 |
+           (uint32_t)PALPATE_BYTE(p + 3) << 24;
 }
 
-/* The CRC-32 of bytes. Cost: about 60 instructions per byte. */
-PALPATE_API uint32_t palpate_checksum(const uint8_t *bytes, size_t length)
+/* The CRC-32 so far with one more byte; it begins with all ones, and ends inverted. */
+PALPATE_APART_ uint32_t palpate_crc_(uint32_t sum, uint8_t byte)
 {
-    uint32_t sum = 0xffffffffu;
-    while (length-- != 0) {
-        uint8_t i;
-        sum ^= PALPATE_BYTE(bytes);
-        bytes++;
-        for (i = 0; i < 8; i++) {
-            sum = sum >> 1 ^ (0xedb88320u & (0u - (sum & 1)));
-        }
+    uint_fast8_t i;
+    sum ^= byte;
+    for (i = 0; i < 8; i++) {
+        sum = sum >> 1 ^ (0xedb88320u & (0u - (sum & 1)));
     }
-    return ~sum;
+    return sum;
 }
 
 /* A signed number of 1 to 4 bytes. */
-static inline int32_t palpate_signed_(const uint8_t *p, uint8_t width)
+static inline int32_t palpate_signed_(const uint8_t *p, uint_fast8_t width)
 {
     uint32_t number;
     if (width == 2) {
@@ -328,11 +333,11 @@ static inline palpate_error palpate_check_axes_(palpate_model *model)
 {
     const uint8_t *axis = model->part_[PALPATE_AXES_], *end = model->part_[PALPATE_GROUPS_];
     const uint8_t *cuts = model->cuts_;
-    uint16_t columns = 0;
+    uint_fast16_t columns = 0;
     for (; axis != model->cuts_; axis += 4) {
         uint8_t kind = PALPATE_BYTE(axis + 1), width = PALPATE_BYTE(axis + 2);
         uint32_t size = (uint32_t)width * PALPATE_BYTE(axis + 3);
-        columns = (uint16_t)(columns + 1 + (kind == 3));
+        columns += 1u + (kind == 3);
         if (kind - 1u > 2 || width - 1u > 3 || PALPATE_BYTE(axis) >= model->features || columns > 256) {
             return palpate_wrong_(model, PALPATE_FIELD, axis);
         }
@@ -375,8 +380,8 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
     const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *end = model->part_[PALPATE_END_];
     const uint8_t bits = PALPATE_IS_I8_(model) ? 7 : 15;
     uint32_t range = (uint32_t)1 << 20, most = 0;
-    uint16_t object;
-    uint8_t shift = 24;
+    uint_fast16_t object;
+    uint_fast8_t shift = 24;
     if (PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
         uint32_t size = palpate_cells_(model) * model->objects * (uint32_t)palpate_leaf_size_(model);
         if (size == 0) {
@@ -524,7 +529,11 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     if (length != rest) {
         return palpate_wrong_(model, PALPATE_LENGTH, bytes + (length < rest ? length : (size_t)rest));
     }
-    if (palpate_checksum(bytes, length - 4) != palpate_u32_(bytes + (length - 4))) {
+    rest = 0xffffffffu;
+    for (p = bytes; p != bytes + (length - 4); p++) {
+        rest = palpate_crc_(rest, PALPATE_BYTE(p));
+    }
+    if (~rest != palpate_u32_(p)) {
         return palpate_wrong_(model, PALPATE_CHECKSUM, bytes + 8);
     }
     model->layout_ = PALPATE_BYTE(bytes + 6);
@@ -645,7 +654,7 @@ static inline int32_t palpate_clamp_(int32_t value)
 static inline void palpate_times_(const palpate_touch *touch, uint32_t *times)
 {
     uint32_t earliest = PALPATE_MISSING;
-    uint8_t i;
+    uint_fast8_t i;
     for (i = 0; i < 3; i++) {
         times[i] = touch->times[i];
         earliest = times[i] < earliest ? times[i] : earliest;
@@ -666,7 +675,7 @@ static inline uint8_t palpate_pattern_(const uint32_t *times)
 /* Why a model over touches does not count one, or PALPATE_COUNTED. */
 static inline palpate_answer palpate_accepts_(const palpate_model *model, const palpate_touch *touch, const uint32_t *times)
 {
-    uint8_t i;
+    uint_fast8_t i;
     if (model->descriptor == 255) {
         return PALPATE_NEEDS_FEATURES;
     }
@@ -687,7 +696,7 @@ static inline void palpate_features_(const palpate_model *model, const palpate_t
     const int32_t none = PALPATE_MISSING_FEATURE;
     const uint8_t descriptor = model->descriptor;
     int32_t at[3], curvature = none, slope = none, pair = none;
-    uint8_t i;
+    uint_fast8_t i;
     for (i = 0; i < 3; i++) {
         const uint32_t limit = (uint32_t)1 << 28;
         at[i] = times[i] == PALPATE_MISSING ? none : (int32_t)(times[i] < limit ? times[i] : limit);
@@ -744,19 +753,21 @@ static inline void palpate_features_(const palpate_model *model, const palpate_t
 /* ---- Margins ---- */
 
 /* How many of an axis's `count` thresholds of `width` bytes are at or below `value`. */
-static inline uint8_t palpate_rank_(const uint8_t *cuts, uint8_t width, uint8_t count, int32_t value)
+PALPATE_APART_ uint8_t palpate_rank_(const uint8_t *cuts, uint_fast8_t width, uint_fast8_t count, int32_t value)
 {
-    uint8_t rank = 0, step = 128;
+    uint_fast16_t rank = 0, step = count < 16 ? 8 : 128;
+    /* Not before the model: its header is. */
+    cuts -= width;
     while (step > count) {
         step >>= 1;
     }
     for (; step != 0; step >>= 1) {
-        uint8_t next = (uint8_t)(rank + step);
-        if (next <= count && palpate_signed_(cuts + (size_t)width * (size_t)(next - 1), width) <= value) {
+        const uint_fast16_t next = rank + step;
+        if (next <= count && palpate_signed_(cuts + (size_t)width * next, width) <= value) {
             rank = next;
         }
     }
-    return rank;
+    return (uint8_t)rank;
 }
 
 static inline int32_t palpate_value_(const int32_t *features, uint16_t count, uint8_t feature)
@@ -765,17 +776,25 @@ static inline int32_t palpate_value_(const int32_t *features, uint16_t count, ui
 }
 
 /* Adds a leaf with `values` values to as many sums; bytes with 128 more than they are. */
-static inline void palpate_add_leaf_(const palpate_model *model, uint32_t *sums, uint16_t values, const uint8_t *leaf, uint8_t shift)
+PALPATE_APART_ void palpate_add_leaf_(const palpate_model *model, uint32_t *sums, uint16_t values, const uint8_t *leaf)
 {
-    do {
-        if (PALPATE_IS_I8_(model)) {
-            *sums += (uint32_t)PALPATE_BYTE(leaf) << shift;
-            leaf += 1;
-        } else if (PALPATE_IS_I16_(model)) {
-            *sums += (uint32_t)(int32_t)(int16_t)(uint16_t)palpate_u16_(leaf) << shift;
+    uint32_t *const end = sums + values;
+    if (PALPATE_IS_I8_(model)) {
+        do {
+            *sums++ += PALPATE_BYTE(leaf);
+            leaf++;
+        } while (sums != end);
+    } else if (PALPATE_IS_I16_(model)) {
+        do {
+            /* Within 2^30, as was checked. */
+            const int16_t value = (int16_t)palpate_u16_(leaf);
+            const int32_t sum = (int32_t)*sums + value;
+            *sums++ = (uint32_t)sum;
             leaf += 2;
-        } else {
+        } while (sums != end);
+    } else {
 #if PALPATE_LEAVES & PALPATE_F32
+        do {
             union {
                 uint32_t bits;
                 float value;
@@ -783,12 +802,79 @@ static inline void palpate_add_leaf_(const palpate_model *model, uint32_t *sums,
             sum.bits = *sums;
             more.bits = palpate_u32_(leaf);
             sum.value += more.value;
-            *sums = sum.bits;
+            *sums++ = sum.bits;
             leaf += 4;
+        } while (sums != end);
 #endif
+    }
+}
+
+/* The number of the leaf that is reached in a complete tree of so many slots. */
+PALPATE_APART_ size_t palpate_walk_complete_(const uint8_t *ranks, const uint8_t *columns, const uint8_t *thresholds, size_t slots)
+{
+    size_t slot = 1;
+    do {
+        slot = 2 * slot + (ranks[PALPATE_BYTE(columns + slot)] > PALPATE_BYTE(thresholds + slot));
+    } while (slot < slots);
+    return slot - slots;
+}
+
+/* The number of the leaf that is reached in a compact tree of `below` splits. */
+PALPATE_APART_ uint32_t palpate_walk_compact_(const uint8_t *ranks, const uint8_t *split, uint32_t below)
+{
+    uint32_t leaf = 0;
+    while (below != 0) {
+        uint32_t left = PALPATE_BYTE(split + 2);
+        const int goes_right = ranks[PALPATE_BYTE(split)] > PALPATE_BYTE(split + 1);
+        split += 3;
+        below--;
+        /* Sizes that contradict each other must not lead out of the tree. */
+        left = left < below ? left : below;
+        if (goes_right) {
+            leaf += left + 1;
+            split += (size_t)(left * 3);
+            below -= left;
+        } else {
+            below = left;
         }
-        sums++;
-    } while (--values != 0);
+    }
+    return leaf;
+}
+
+/* The same of a wide tree. */
+PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int32_t *features, uint16_t count, const uint8_t *split,
+                                           uint32_t below)
+{
+    const uint32_t cuts = palpate_between_(model->cuts_, model->part_[PALPATE_GROUPS_]) / 4;
+    uint32_t leaf = 0;
+    while (below != 0) {
+        const int32_t value = palpate_value_(features, count, PALPATE_BYTE(split));
+        const uint32_t number = palpate_u16_(split + 2);
+        uint32_t left = palpate_u16_(split + 4);
+        int goes_right = PALPATE_BYTE(split + 1) == 0;
+        if (value != PALPATE_MISSING_FEATURE) {
+            goes_right = value >= (number < cuts ? (int32_t)palpate_u32_(model->cuts_ + 4 * (size_t)number) : 0);
+        }
+        split += 6;
+        below--;
+        left = left < below ? left : below;
+        if (goes_right) {
+            leaf += left + 1;
+            split += (size_t)(left * 6);
+            below -= left;
+        } else {
+            below = left;
+        }
+    }
+    return leaf;
+}
+
+static inline void palpate_shift_(const palpate_model *model, uint32_t *sums, uint_fast8_t shift)
+{
+    uint_fast16_t i;
+    for (i = 0; shift != 0 && i < model->objects; i++) {
+        sums[i] <<= shift;
+    }
 }
 
 /* The sums of a row of features, in units or as the bits of f32 values. */
@@ -796,14 +882,16 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
 {
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
     const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *cuts = model->cuts_, *axis = model->part_[PALPATE_AXES_];
+    const uint8_t *base = model->part_[PALPATE_MARGINS_];
     const int table = PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model);
     const size_t size = palpate_leaf_size_(model);
     uint32_t words[64], cell = 0;
     uint8_t *ranks = (uint8_t *)words;
-    uint16_t i;
+    uint_fast16_t i;
+    uint_fast8_t last;
     for (i = 0; i < model->objects; i++) {
-        /* The f32 value that changes nothing is -0. */
-        sums[i] = !table ? palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (size_t)i) : PALPATE_IS_F32_(model) ? 0x80000000u : 0;
+        /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
+        sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * (size_t)i);
     }
     /* Columns beyond those that there are have rank 0. */
     for (i = 0; i < 64; i += 4) {
@@ -858,12 +946,13 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 cell = 0;
             }
         }
-        palpate_add_leaf_(model, sums, model->objects, leaves + (size_t)cell * model->objects * size, 0);
+        palpate_add_leaf_(model, sums, model->objects, leaves + (size_t)cell * model->objects * size);
         for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
             sums[i] -= 128;
         }
         return;
     }
+    last = group != splits ? PALPATE_BYTE(group + 1) : 0;
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
         const uint8_t depth = PALPATE_BYTE(group), shift = PALPATE_BYTE(group + 1);
         const int one = PALPATE_BYTE(group + 2) != 0;
@@ -871,20 +960,18 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
         const size_t length = size * values;
         uint32_t *first = one ? sums + PALPATE_BYTE(group + 3) : sums;
         uint32_t trees = palpate_u32_(group + 4);
-        if (PALPATE_IS_I8_(model)) {
-            for (i = 0; i < values; i++) {
-                first[i] -= trees << (7 + shift);
-            }
+        /* Shifts get smaller: what was added before is shifted on the way. */
+        palpate_shift_(model, sums, (uint_fast8_t)(last - shift));
+        last = shift;
+        for (i = 0; PALPATE_IS_I8_(model) && i < values; i++) {
+            first[i] -= trees << 7;
         }
         if (PALPATE_IS_COMPLETE_(model)) {
             const size_t slots = (size_t)1 << depth;
             const uint8_t *thresholds = splits + (size_t)(trees << depth);
             for (; trees != 0; trees--) {
-                size_t slot = 1;
-                do {
-                    slot = 2 * slot + (ranks[PALPATE_BYTE(splits + slot)] > PALPATE_BYTE(thresholds + slot));
-                } while (slot < slots);
-                palpate_add_leaf_(model, first, values, leaves + (slot - slots) * length, shift);
+                const size_t leaf = palpate_walk_complete_(ranks, splits, thresholds, slots);
+                palpate_add_leaf_(model, first, values, leaves + leaf * length);
                 splits += slots;
                 thresholds += slots;
                 leaves += slots * length;
@@ -892,43 +979,25 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
             splits = thresholds;
         } else {
             for (; trees != 0; trees--) {
-                const uint32_t node = PALPATE_IS_WIDE_(model) ? 6 : 3;
                 const uint32_t all = palpate_u16_(splits);
-                /* The split, those in its subtree, the leaves to its left. */
-                uint32_t at = 0, below = all, leaf = 0;
+                uint32_t leaf;
                 splits += 2;
-                while (below != 0 && at < all) {
-                    const uint8_t *split = splits + (size_t)(at * node);
-                    uint32_t left;
-                    int goes_right;
-                    if (PALPATE_IS_WIDE_(model)) {
-                        const int32_t value = palpate_value_(features, count, PALPATE_BYTE(split));
-                        const uint32_t number = palpate_u16_(split + 2);
-                        const uint32_t cut = number < palpate_between_(model->cuts_, model->part_[PALPATE_GROUPS_]) / 4
-                                                 ? palpate_u32_(model->cuts_ + 4 * (size_t)number)
-                                                 : 0;
-                        goes_right = value == PALPATE_MISSING_FEATURE ? PALPATE_BYTE(split + 1) == 0 : value >= (int32_t)cut;
-                        left = palpate_u16_(split + 4);
-                    } else {
-                        goes_right = ranks[PALPATE_BYTE(split)] > PALPATE_BYTE(split + 1);
-                        left = PALPATE_BYTE(split + 2);
-                    }
-                    at++;
-                    if (goes_right) {
-                        at += left;
-                        leaf += left + 1;
-                        below = below > left + 1 ? below - left - 1 : 0;
-                    } else {
-                        below = left;
-                    }
+                if (PALPATE_IS_WIDE_(model)) {
+                    leaf = palpate_walk_wide_(model, features, count, splits, all);
+                    splits += (size_t)(all * 6);
+                } else {
+                    leaf = palpate_walk_compact_(ranks, splits, all);
+                    splits += (size_t)(all * 3);
                 }
-                splits += (size_t)(all * node);
-                /* Sizes that contradict each other may lead beyond the last one. */
-                if (leaf <= all) {
-                    palpate_add_leaf_(model, first, values, leaves + (size_t)leaf * length, shift);
-                }
+                palpate_add_leaf_(model, first, values, leaves + (size_t)leaf * length);
                 leaves += (size_t)(all + 1) * length;
             }
+        }
+    }
+    if (!PALPATE_IS_F32_(model)) {
+        palpate_shift_(model, sums, last);
+        for (i = 0; i < model->objects; i++) {
+            sums[i] += palpate_u32_(base + 4 * (size_t)i);
         }
     }
 }
@@ -955,7 +1024,7 @@ static inline int32_t palpate_q16_(uint32_t bits)
  * if the model's `real` is 1; PALPATE_MISSING_FEATURE, and what is beyond the end of a short row, is missing. */
 PALPATE_API void palpate_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
 {
-    uint16_t i;
+    uint_fast16_t i;
     palpate_sum_(model, features, count, (uint32_t *)margins);
     for (i = 0; PALPATE_IS_F32_(model) && i < model->objects; i++) {
         margins[i] = palpate_q16_((uint32_t)margins[i]);
@@ -991,7 +1060,7 @@ PALPATE_API int palpate_f32_margins_of(const palpate_model *model, const int32_t
         float value;
     } both;
     uint32_t sums[PALPATE_MAX_OBJECTS];
-    uint16_t i;
+    uint_fast16_t i;
     if (!PALPATE_IS_F32_(model) || model->objects > PALPATE_MAX_OBJECTS) {
         return 0;
     }
@@ -1030,7 +1099,7 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
 }
 
 /* How many bits an object is behind the leader, in Q32. */
-static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint16_t leader, uint16_t object)
+static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint_fast16_t leader, uint_fast16_t object)
 {
     const uint8_t *bytes = recognizer->model->bytes;
     uint64_t units = (uint64_t)recognizer->evidence[leader] - (uint64_t)recognizer->evidence[object];
@@ -1043,20 +1112,20 @@ static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uin
 /* The object with the most evidence; the first of several. */
 PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
 {
-    uint16_t best = 0, i;
+    uint_fast16_t best = 0, i;
     for (i = 1; i < recognizer->model->objects; i++) {
         if (recognizer->evidence[i] > recognizer->evidence[best]) {
             best = i;
         }
     }
-    return best;
+    return (uint16_t)best;
 }
 
 /* Forgets all touches, for the next object. */
 PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
 {
     const palpate_model *model = recognizer->model;
-    uint16_t i;
+    uint_fast16_t i;
     recognizer->touches = 0;
     recognizer->verdict = PALPATE_UNDECIDED;
     recognizer->object = 0;
@@ -1087,7 +1156,7 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
 {
     const palpate_model *model = recognizer->model;
     uint64_t left = recognizer->odds;
-    uint16_t best, i;
+    uint_fast16_t best, i;
     if (recognizer->verdict != PALPATE_UNDECIDED) {
         return;
     }
@@ -1155,7 +1224,7 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
 static inline uint64_t palpate_ratio_(uint64_t part, uint64_t whole)
 {
     uint64_t quotient = 0;
-    uint8_t i;
+    uint_fast8_t i;
     if (part >= whole) {
         return PALPATE_ONE;
     }
@@ -1181,7 +1250,7 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     const uint16_t best = palpate_best(recognizer);
     uint32_t sharpness = 65536;
     uint64_t own = 0, others = 0, all;
-    uint16_t i;
+    uint_fast16_t i;
     if (object >= model->objects) {
         return 0;
     }
@@ -1228,13 +1297,13 @@ static inline size_t palpate_put_(uint8_t *buffer, size_t length, size_t room, u
 static inline uint64_t palpate_take_(const uint8_t *buffer, size_t *at, size_t length, uint8_t most, uint8_t last)
 {
     uint64_t number = 0;
-    uint8_t i;
+    uint_fast8_t i;
     for (i = 0; i < most && *at < length; i++) {
         const uint8_t byte = buffer[*at];
         *at += 1;
         number |= (uint64_t)(byte & 127) << 7 * i;
         if (byte < 128) {
-            if (i == most - 1 && byte > last) {
+            if (i + 1u == most && byte > last) {
                 break;
             }
             return number;
@@ -1249,9 +1318,9 @@ static inline uint64_t palpate_take_(const uint8_t *buffer, size_t *at, size_t l
 PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_t *buffer, size_t room)
 {
     const palpate_model *model = recognizer->model;
-    size_t length;
-    uint32_t sum;
-    uint16_t i;
+    size_t length, at;
+    uint32_t sum = 0xffffffffu;
+    uint_fast16_t i;
     length = palpate_put_(buffer, 0, room, palpate_u32_(model->part_[PALPATE_END_]));
     length = palpate_put_(buffer, length, room, recognizer->touches);
     if (room - length < 2 || room < length) {
@@ -1266,9 +1335,11 @@ PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_
     if (length > room || room - length < 4) {
         return 0;
     }
-    sum = palpate_checksum(buffer, length);
+    for (at = 0; at < length; at++) {
+        sum = palpate_crc_(sum, buffer[at]);
+    }
     for (i = 0; i < 4; i++) {
-        buffer[length++] = (uint8_t)(sum >> 8 * i);
+        buffer[length++] = (uint8_t)(~sum >> 8 * i);
     }
     return length;
 }
@@ -1279,8 +1350,8 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     const palpate_model *model = recognizer->model;
     int64_t most = 0;
     size_t at = 0, start;
-    uint32_t sum = 0, checksum, touches;
-    uint16_t i, best = 0;
+    uint32_t sum = 0, found = 0xffffffffu, checksum, touches;
+    uint_fast16_t i, best = 0;
     uint8_t verdict, object;
     if (length < 4) {
         return PALPATE_DAMAGED;
@@ -1289,7 +1360,12 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     for (i = 0; i < 4; i++) {
         sum |= (uint32_t)snapshot[length + i] << 8 * i;
     }
-    if (palpate_checksum(snapshot, length) != sum) {
+    sum = ~sum;
+    for (at = 0; at < length; at++) {
+        found = palpate_crc_(found, snapshot[at]);
+    }
+    at = 0;
+    if (found != sum) {
         return PALPATE_DAMAGED;
     }
     checksum = (uint32_t)palpate_take_(snapshot, &at, length, 5, 15);

@@ -1,5 +1,5 @@
 /* Commands on models, touches, rows and snapshots, played through palpate.h; what comes out is text, which tests/tests/c.rs
- * compares with what the crate gives. No library: the same for this machine and for bare chips.
+ * compares with what the crate gives; numbers in hexadecimal digits. No library: the same for this machine and for bare chips.
  *
  * Commands, numbers little endian:
  *   M u32 length, bytes      opens a model and starts a recognizer: "open ERROR PLACE"
@@ -46,16 +46,15 @@ static void replay_text(const char *text)
     }
 }
 
+/* In hexadecimal digits, which need no division: it would take a small chip most of its time. */
 static void replay_u64(uint64_t number)
 {
-    char digits[21];
-    int length = 0;
-    do {
-        digits[length++] = (char)('0' + number % 10);
-        number /= 10;
-    } while (number != 0);
-    while (length != 0) {
-        replay_put(digits[--length]);
+    int shift = 60;
+    while (shift > 0 && number >> shift == 0) {
+        shift -= 4;
+    }
+    for (; shift >= 0; shift -= 4) {
+        replay_put("0123456789abcdef"[number >> shift & 15]);
     }
 }
 

@@ -21,7 +21,7 @@ impl<'m> Script<'m> {
         self.block(b'M', bytes);
         let opened = Model::new(bytes);
         let (code, place) = opened.as_ref().map_or_else(|error| (code(error), error.offset()), |_| (0, 0));
-        self.say(&format!("open {code} {place}"));
+        self.say(&format!("open {code} {place:x}"));
         let start =
             |model: &Model<'m>| Recognizer::new(model, Stopping::from_model(model)).expect("at most 256 objects");
         self.recognizer = opened.ok().as_ref().map(start);
@@ -83,7 +83,7 @@ impl<'m> Script<'m> {
         let recognizer = self.recognizer();
         let objects = 0..=recognizer.model().object_count();
         let posteriors: Vec<u64> = objects.map(|object| recognizer.posterior(object).q56()).collect();
-        self.say(&format!("best {}", self.recognizer().best()));
+        self.say(&format!("best {:x}", self.recognizer().best()));
         self.numbers("posteriors", &posteriors);
     }
 
@@ -103,7 +103,7 @@ impl<'m> Script<'m> {
         let snapshot = self.recognizer().snapshot(&mut buffer).expect("a long buffer").to_vec();
         let mut line = "snapshot ".to_string();
         snapshot.iter().for_each(|byte| write!(line, "{byte:02x}").expect("a string"));
-        self.say(&format!("{line} {} 0", snapshot.len()));
+        self.say(&format!("{line} {:x} 0", snapshot.len()));
         snapshot
     }
 
@@ -137,7 +137,7 @@ impl<'m> Script<'m> {
             Verdict::Unknown => (2, 0),
             Verdict::GaveUp => (3, 0),
         };
-        self.say(&format!("verdict {verdict} {object} {}", self.recognizer().touches()));
+        self.say(&format!("verdict {verdict} {object:x} {:x}", self.recognizer().touches()));
     }
 
     fn block(&mut self, command: u8, bytes: &[u8]) {
@@ -146,9 +146,13 @@ impl<'m> Script<'m> {
         self.commands.extend_from_slice(bytes);
     }
 
-    fn numbers(&mut self, word: &str, numbers: &[impl std::fmt::Display]) {
+    fn numbers<T: Copy + Into<i128>>(&mut self, word: &str, numbers: &[T]) {
         self.expected += word;
-        numbers.iter().for_each(|number| write!(self.expected, " {number}").expect("a string"));
+        for &number in numbers {
+            let number: i128 = number.into();
+            let sign = if number < 0 { "-" } else { "" };
+            write!(self.expected, " {sign}{:x}", number.unsigned_abs()).expect("a string");
+        }
         self.say("");
     }
 
@@ -184,13 +188,10 @@ const fn refusal(refused: Refused) -> u8 {
     }
 }
 
-/// Whether the walk through a model that was opened is specified: slot 0 of a complete tree is not checked, and what
-/// comes of a wrong one is up to the implementation.
+/// Whether `FORMAT.md` says where the walk through a model that was opened leads. Slot 0 of a complete tree is not checked,
+/// nor that the sizes of subtrees agree: what comes of wrong ones is up to the implementation, as long as it ends.
 pub fn is_specified(model: &Model<'_>) -> bool {
     let (bytes, header) = (model.bytes(), model.header());
-    if header.layout() != Layout::Complete.code() {
-        return true;
-    }
     let groups = HEADER_LENGTH
         + header.text_length() as usize
         + header.optional_length() as usize
@@ -198,11 +199,39 @@ pub fn is_specified(model: &Model<'_>) -> bool {
         + 4 * usize::from(header.axes())
         + header.cuts_length() as usize;
     let mut splits = groups + 8 * usize::from(header.groups());
+    let number = |at: usize| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
     bytes[groups..splits].chunks(8).all(|group| {
-        let slots = 1 << group[0];
         let trees = u32::from_le_bytes([group[4], group[5], group[6], group[7]]) as usize;
-        let roots = (0..trees).all(|tree| bytes[splits + tree * slots] == 1);
-        splits += 2 * trees * slots;
-        roots
+        match model.layout() {
+            Layout::Complete => {
+                let slots = 1 << group[0];
+                let roots = (0..trees).all(|tree| bytes[splits + tree * slots] == 1);
+                splits += 2 * trees * slots;
+                roots
+            }
+            _ => (0..trees).all(|_| {
+                let (start, count) = (splits + 2, number(splits));
+                let is_wide = model.layout() == Layout::Wide;
+                let size = if is_wide { 6 } else { 3 };
+                splits = start + size * count;
+                let left = |split: usize| {
+                    let at = start + size * (split + 1);
+                    if is_wide { number(at - 2) } else { bytes[at - 1].into() }
+                };
+                agrees(&left, 0, count)
+            }),
+        }
     })
+}
+
+/// Whether subtrees stay within those that they are part of.
+fn agrees(left: &impl Fn(usize) -> usize, mut start: usize, end: usize) -> bool {
+    while start < end {
+        let right = start + 1 + left(start);
+        if right > end || !agrees(left, start + 1, right) {
+            return false;
+        }
+        start = right;
+    }
+    true
 }

@@ -143,7 +143,6 @@ fn at_rates(context: &Context, bytes: &[u8], test: &Dataset, active: bool) -> Re
             groups: count(context),
             error_rate: Some(error_rate),
             max_touches: None,
-            noise: Noise::default(),
             seed: context.settings.seed,
             noise: Noise::default(),
         };
