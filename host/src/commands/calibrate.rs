@@ -28,9 +28,9 @@ With --strangers the model also gets a test of whether touches fit any object th
 Examples:
   palpate capture builtin -o fresh --approaches --touches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
-  palpate calibrate model.palpate fresh -o strict.palpate --error-rate 0.1% --per name
+  palpate calibrate model.palpate fresh -o names.palpate --per name
   palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
-  palpate calibrate model.palpate fresh -o real.palpate --noise 0..5ms --timer 1ms
+  palpate calibrate model.palpate fresh -o noisy.palpate --noise 0..5ms
   palpate evaluate calibrated.palpate unseen --json | jq .promise
   palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
 pub(crate) struct Arguments {

@@ -358,11 +358,16 @@ fn promise_text(check: &PromiseCheck) -> String {
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "The promise is void: {}. The error rate is {by:.2} points {side} the promised one. By theory it is at most \
-             {:.1} % with any priors, if posteriors can be believed.",
-            check.void.join("; "),
-            100.0 * check.by_theory
+            "The promise is void: {}. The error rate is {by:.2} points {side} the promised one.",
+            check.void.join("; ")
         );
+        if let Some(most) = check.by_theory {
+            _ = writeln!(
+                text,
+                "By theory it is at most {:.1} % with any priors, if posteriors can be believed.",
+                100.0 * most
+            );
+        }
     }
     text
 }
