@@ -85,7 +85,7 @@ Examples:
   palpate link /dev/ttyACM0 --load model.palpate      load a model into it
   palpate link /dev/ttyACM0 touches/                  recognize a data set
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
-  palpate link /dev/ttyACM0 - --active                and say where to touch next
+  palpate link /dev/ttyACM0 - --active                where to touch next
   palpate link emulator --load model.palpate --parity touches/ --touches 10000
   palpate link emulator --load model.palpate --parity touches/ \\
       --bad-line 0.001,0.001,0.01,5
