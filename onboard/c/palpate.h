@@ -1121,7 +1121,8 @@ PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
     return (uint16_t)best;
 }
 
-/* Forgets all touches, for the next object. */
+/* Forgets all touches, for the next object. Whoever expects some objects more often than others can set `evidence`
+ * afterwards: the logarithm of how often, in units of a margin, up to a constant. */
 PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
 {
     const palpate_model *model = recognizer->model;
@@ -1395,7 +1396,7 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     recognizer->touches = touches;
     recognizer->verdict = verdict;
     recognizer->object = object;
-    for (i = 0; i < model->objects && touches != 0; i++) {
+    for (i = 0; i < model->objects; i++) {
         const uint64_t number = palpate_take_(snapshot, &start, length, 10, 1);
         recognizer->evidence[i] = (int64_t)(number >> 1 ^ (0u - (number & 1)));
     }

@@ -77,3 +77,7 @@ pub use decide::{
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use model::{Model, Refused};
 pub use palpate_shared as shared;
+
+/// `palpate.h`, which reads the same models in C99 and gives the same bits: for programs that write it beside a model. No
+/// chip has it in flash unless it uses it.
+pub const C_HEADER: &str = include_str!("../c/palpate.h");

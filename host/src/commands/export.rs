@@ -1,7 +1,7 @@
 use super::expected::PriorArguments;
 use super::numbers::share;
 use crate::Result;
-use crate::compile::{self, Candidate, Goal, Instructions, Layout, Leaf, Settings};
+use crate::compile::{self, Candidate, Goal, Instructions, Language, Layout, Leaf, Settings};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Error;
 use crate::output;
@@ -32,7 +32,8 @@ Examples:
   palpate export ensemble.json -o kitchen.palpate --prior fork=0.3,spoon=0.3
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
   palpate export lightgbm.txt -o model.palpate --for speed
-  palpate export forest.onnx -o model.palpate --scale width=100,height=10")]
+  palpate export forest.onnx -o model.palpate --scale width=100,height=10
+  palpate export ensemble.json -o model.palpate --emit c    # also model.h and palpate.h")]
 pub(crate) struct Arguments {
     /// Ensemble that `palpate train` or another library saved
     ensemble: PathBuf,
@@ -69,6 +70,9 @@ pub(crate) struct Arguments {
     /// The touches after which they give up
     #[arg(long, default_value_t = 200, value_name = "N")]
     max_touches: u32,
+    /// Write the model as source code beside it, too: an array in FILE.h with palpate.h to read it, or in FILE.rs
+    #[arg(long, value_name = "c|rust,…", value_delimiter = ',', value_parser = language)]
+    emit: Vec<Language>,
     /// Print what was exported as JSON
     #[arg(long)]
     json: bool,
@@ -104,6 +108,9 @@ struct Exported {
     /// What whole numbers do to each feature.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     scales: Vec<Effect>,
+    /// Files with source code.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    sources: Vec<PathBuf>,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
@@ -111,6 +118,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         &arguments.output,
         [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten(),
     )?;
+    let sources = sources(&arguments)?;
     let names = arguments.names.as_deref().map(names).transpose()?;
     let ensemble = Ensemble::load_named(&arguments.ensemble, names.as_deref())?;
     let scales = scales(&arguments, &ensemble)?;
@@ -129,6 +137,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         _ => error,
     })?;
     output::write_bytes(&arguments.output, &compiled.bytes)?;
+    write_sources(&sources, &compiled.bytes)?;
     let imported = ensemble.origin.imported.as_ref();
     let exported = Exported {
         bytes: compiled.bytes.len(),
@@ -148,11 +157,45 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         imported: imported.map(|imported| imported.kind.clone()),
         notes: imported.map(|imported| imported.notes.clone()).unwrap_or_default(),
         scales: settings.scales.as_ref().map(|scales| scales::effects(&ensemble, scales)).unwrap_or_default(),
+        sources: sources.into_iter().map(|(_, path)| path).collect(),
     };
     if arguments.json {
         return output::print_json_about(&arguments.output, &exported);
     }
     output::print_about(&arguments.output, &text(&arguments.output, &exported))
+}
+
+/// Where source code is to be written: beside the model, under its name.
+fn sources(arguments: &Arguments) -> Result<Vec<(Language, PathBuf)>> {
+    let (output, mut sources) = (&arguments.output, Vec::new());
+    for &language in &arguments.emit {
+        let path = output.with_extension(language.extension());
+        let taken = path == *output || path.file_name().is_some_and(|name| name == HEADER);
+        if output::is_stdout(output) || taken {
+            return Err(Error::setting("output", output.display(), format!("a file beside which another one can have the extension .{} (but not {HEADER}), for --emit", language.extension())));
+        }
+        output::refuse_input(&path, [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten())?;
+        sources.push((language, path));
+    }
+    Ok(sources)
+}
+
+/// The header that reads models in C.
+const HEADER: &str = "palpate.h";
+
+fn write_sources(sources: &[(Language, PathBuf)], bytes: &[u8]) -> Result<()> {
+    for (language, path) in sources {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        output::write_bytes(path, compile::emit(&compile::open(bytes)?, &name, *language).as_bytes())?;
+        if *language == Language::C {
+            output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+fn language(name: &str) -> Result<Language, String> {
+    Language::ALL.into_iter().find(|language| language.name() == name).ok_or_else(|| "use c or rust".to_owned())
 }
 
 /// Names from the command line: a file's lines, if there is such a file, else what commas separate.
@@ -228,6 +271,9 @@ fn text(path: &Path, exported: &Exported) -> String {
             "{feature}: {scale} units make up 1; of {thresholds} thresholds {different} stay different; a value within \
              {largest_step:e} of one may go the other way"
         );
+    }
+    for source in &exported.sources {
+        _ = writeln!(text, "Source code: {}", source.display());
     }
     for note in &exported.notes {
         _ = writeln!(text, "Note: {note}");

@@ -38,6 +38,7 @@
 mod axes;
 mod cells;
 mod cost;
+mod emit;
 mod forest;
 mod layout;
 mod model;
@@ -52,6 +53,7 @@ mod trees;
 mod write;
 
 pub use cost::{Core, Instructions, Memory};
+pub use emit::{Language, emit};
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, restate};
