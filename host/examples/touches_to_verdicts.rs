@@ -40,7 +40,8 @@ fn recognize(bytes: &[u8], touches: impl Iterator<Item = palpate::Result<Touch>>
                 let (name, posterior) = (model.object_name(object.into()), rivals.posterior().to_f64());
                 println!("{name} after {touches} touches, posterior {posterior:.4}");
             }
-            Ok(Verdict::Unknown) => println!("unknown"),
+            Ok(Verdict::Unknown) => println!("unknown: the touches fit no object of the model"),
+            Ok(Verdict::GaveUp) => println!("undecided after the limit of touches"),
         }
         recognizer.reset();
     }

@@ -66,6 +66,7 @@
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
 //! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
+//! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
@@ -110,6 +111,9 @@ pub mod calibrate;
 
 #[cfg(feature = "train")]
 pub mod tune;
+
+#[cfg(feature = "train")]
+pub mod strangers;
 
 pub mod chip;
 

@@ -34,6 +34,8 @@ pub(crate) enum Purpose {
     Active,
     /// When objects are exchanged, and for which.
     Switch,
+    /// The order in which touches are used to calibrate a test of fit.
+    Fit,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -56,6 +58,7 @@ impl Purpose {
             Self::Calibration => Some(9),
             Self::Active => Some(16),
             Self::Switch => Some(17),
+            Self::Fit => Some(11),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }

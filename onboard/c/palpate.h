@@ -116,7 +116,8 @@ typedef enum {
 typedef enum {
     PALPATE_UNDECIDED = 0,
     PALPATE_RECOGNIZED, /* an object, until the reset */
-    PALPATE_UNKNOWN     /* the limit of touches was reached, until the reset */
+    PALPATE_UNKNOWN,    /* the touches fit no object: only of models with a test of fit, which this header refuses */
+    PALPATE_GAVE_UP     /* the limit of touches was reached, until the reset */
 } palpate_verdict;
 
 /* What became of a snapshot. */
@@ -1180,7 +1181,7 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
             const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i));
             if (weight > left) {
                 if (recognizer->touches >= recognizer->max_touches) {
-                    recognizer->verdict = PALPATE_UNKNOWN;
+                    recognizer->verdict = PALPATE_GAVE_UP;
                 }
                 return;
             }
@@ -1387,7 +1388,7 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
             best = i;
         }
     }
-    if (at != length || verdict > PALPATE_UNKNOWN || (verdict != PALPATE_UNDECIDED && touches == 0) ||
+    if (at != length || verdict > PALPATE_GAVE_UP || (verdict != PALPATE_UNDECIDED && touches == 0) ||
         (verdict == PALPATE_RECOGNIZED && object != best)) {
         return PALPATE_DAMAGED;
     }

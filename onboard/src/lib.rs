@@ -25,7 +25,8 @@
 //!     Ok(Verdict::Recognized { object, touches, rivals }) => {
 //!         let _ = (model.object_name(object.into()), touches, rivals.posterior());
 //!     }
-//!     Ok(Verdict::Unknown) => { /* the limit of touches was reached */ }
+//!     Ok(Verdict::Unknown) => { /* the touches fit no object that the model knows */ }
+//!     Ok(Verdict::GaveUp) => { /* the limit of touches was reached */ }
 //!     Err(refused) => { /* the model was not trained for such touches: not counted, touch again */
 //! #       let _ = refused;
 //!     }
@@ -69,7 +70,7 @@ pub mod station;
 
 pub use bytes::{Aligned, ModelError};
 pub use decide::{
-    CapacityError, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
+    CapacityError, Fit, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
     exp2_negative,
 };
 #[cfg(feature = "link")]

@@ -227,6 +227,7 @@ pub fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
             Ok(Verdict::Undecided) => Decision::Undecided,
             Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
             Ok(Verdict::Unknown) => Decision::Unknown,
+            Ok(Verdict::GaveUp) => Decision::GaveUp,
             Err(Refused::Pattern(_)) => return Outcome::Refused(Refusal::Pattern),
             Err(Refused::Spread) => return Outcome::Refused(Refusal::Spread),
             Err(refused) => panic!("{refused}"),

@@ -9,7 +9,7 @@ pub enum Decision {
     /// An object, and the number of touches.
     Recognized(usize, u32),
     /// The limit was reached.
-    Unknown,
+    GaveUp,
 }
 
 struct Axis {
@@ -347,7 +347,7 @@ impl<'a> Plain<'a> {
         if self.rivals(1 << 16) <= u128::from(odds) {
             self.decision = Decision::Recognized(leader, self.touches);
         } else if self.touches >= self.limit {
-            self.decision = Decision::Unknown;
+            self.decision = Decision::GaveUp;
         }
     }
 

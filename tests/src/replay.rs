@@ -135,6 +135,7 @@ impl<'m> Script<'m> {
             Verdict::Undecided => (0, 0),
             Verdict::Recognized { object, .. } => (1, object),
             Verdict::Unknown => (2, 0),
+            Verdict::GaveUp => (3, 0),
         };
         self.say(&format!("verdict {verdict} {object:x} {:x}", self.recognizer().touches()));
     }

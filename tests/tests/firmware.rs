@@ -291,6 +291,7 @@ impl Known<'_> {
             Verdict::Undecided => Decision::Undecided,
             Verdict::Recognized { object, .. } => Decision::Recognized(object),
             Verdict::Unknown => Decision::Unknown,
+            Verdict::GaveUp => Decision::GaveUp,
         };
         let best = recognizer.best();
         let detail = Some(Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));

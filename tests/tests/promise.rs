@@ -106,7 +106,7 @@ fn every_object_has_its_own_threshold_and_an_error_rate_replaces_them_all() {
             );
             seen[best] += 1;
         } else {
-            assert!(matches!(verdict, Verdict::Undecided | Verdict::Unknown), "{verdict:?}");
+            assert!(matches!(verdict, Verdict::Undecided | Verdict::GaveUp), "{verdict:?}");
         }
         if verdict != Verdict::Undecided {
             recognizer.reset();

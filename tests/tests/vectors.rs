@@ -95,7 +95,7 @@ impl<'m> Both<'m> {
                 let plain = match plain {
                     Decision::Undecided => "undecided".into(),
                     Decision::Recognized(object, touches) => format!("recognized {object} {touches}"),
-                    Decision::Unknown => "unknown".into(),
+                    Decision::GaveUp => "gave-up".into(),
                 };
                 assert_eq!((here.as_str(), plain.as_str()), (words, words));
             }
@@ -125,6 +125,7 @@ fn said(verdict: Verdict) -> String {
         Verdict::Undecided => "undecided".into(),
         Verdict::Recognized { object, touches, .. } => format!("recognized {object} {touches}"),
         Verdict::Unknown => "unknown".into(),
+        Verdict::GaveUp => "gave-up".into(),
     }
 }
 
@@ -230,7 +231,7 @@ fn the_vectors_have_every_layout_leaf_descriptor_and_verdict() {
     assert_eq!(of(13), (0..2).collect());
     let of = |word: &str| lines().filter(|line| line.1 == word).map(|line| line.2).collect::<BTreeSet<_>>();
     let verdicts: BTreeSet<&str> = of("verdict").iter().map(|words| words.split(' ').next().unwrap()).collect();
-    assert_eq!(verdicts, BTreeSet::from(["recognized", "undecided", "unknown"]));
+    assert_eq!(verdicts, BTreeSet::from(["gave-up", "recognized", "undecided"]));
     assert_eq!(of("refused"), BTreeSet::from(["features", "pattern", "pose", "spread"]));
     assert!(VECTORS.len() < 500_000, "{} bytes", VECTORS.len());
 }

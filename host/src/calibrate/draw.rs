@@ -1,11 +1,12 @@
 //! Sequences of a data set's touches: whole ones, no touch in two of them.
 
 use super::sequence::{Sequence, odds_of};
-use crate::error::Result;
+use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::Touch;
+use palpate_shared::format::Plan;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
@@ -44,6 +45,8 @@ pub struct Supply<'d> {
     next: usize,
     /// Whether a pool makes one sequence only.
     is_once: bool,
+    /// The poses that the model's plan may propose; none where touches are taken in their order.
+    candidates: Vec<u16>,
 }
 
 /// Touches that may be mixed, in the order in which they are used.
@@ -51,6 +54,8 @@ pub struct Supply<'d> {
 struct Pool {
     order: Vec<u32>,
     used: usize,
+    /// Under a plan the same by pose, each pose's last touch the next one.
+    by_pose: Vec<Vec<u32>>,
 }
 
 impl<'d> Supply<'d> {
@@ -67,9 +72,9 @@ impl<'d> Supply<'d> {
             if !is_once {
                 order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, turn as u64));
             }
-            Pool { order, used: 0 }
+            Pool { order, ..Pool::default() }
         };
-        Self { object, touches, pools: (0..pools).map(pool).collect(), next: 0, is_once }
+        Self { object, touches, pools: (0..pools).map(pool).collect(), next: 0, is_once, candidates: Vec::new() }
     }
 
     /// Takes one in `parts` of the touches off, as a supply of its own; of robots, one in so many.
@@ -80,11 +85,11 @@ impl<'d> Supply<'d> {
         } else {
             let take = |pool: &mut Pool| {
                 let rest = pool.order.split_off(part(pool.order.len()));
-                Pool { order: std::mem::replace(&mut pool.order, rest), used: 0 }
+                Pool { order: std::mem::replace(&mut pool.order, rest), ..Pool::default() }
             };
             self.pools.iter_mut().map(take).collect()
         };
-        Self { pools, ..*self }
+        Self { pools, candidates: Vec::new(), ..*self }
     }
 
     /// Follows up to `wanted` sequences. One that the touches end in is left out; one that a robot's touches end in ends
@@ -104,8 +109,19 @@ impl<'d> Supply<'d> {
         while sequences.len() < wanted {
             progress::advance(progress, 1)?;
             let Some(pool) = self.pools.get_mut(self.next) else { break };
-            let rest = pool.order[pool.used..].iter().map(|&touch| &self.touches[touch as usize]);
-            let (sequence, is_whole) = one(self.object, &mut recognizer, rest, until, gate());
+            let (touches, candidates) = (self.touches, &self.candidates);
+            let mut rest = pool.order[pool.used..].iter();
+            let by_pose = &mut pool.by_pose;
+            let next = |recognizer: &Recognizer<'_, N>| {
+                let touch = if by_pose.is_empty() {
+                    rest.next().copied()
+                } else {
+                    let pose = recognizer.next_approach(candidates.iter().copied())?.pose;
+                    by_pose.get_mut(usize::from(pose))?.pop()
+                };
+                touch.map(|touch| &touches[touch as usize])
+            };
+            let (sequence, is_whole) = one(self.object, &mut recognizer, next, until, gate());
             if !is_whole && (!self.is_once || pool.order.is_empty()) {
                 break;
             }
@@ -120,18 +136,46 @@ impl<'d> Supply<'d> {
     }
 }
 
+/// Lets sequences go where the plan of the model says: each next touch is one of those that no sequence has used, in the
+/// pose that the recognizer proposes. Poses that some supply has no touch in are never proposed; a sequence that proposes
+/// one that is used up ends its supply, as the end of all touches does without a plan.
+///
+/// # Errors
+/// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
+pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_>) -> Result<()> {
+    let poses = plan.poses();
+    for supply in &mut *supplies {
+        for pool in &mut supply.pools {
+            let mut by_pose = vec![Vec::new(); poses.count().into()];
+            for &touch in pool.order.iter().rev() {
+                let no_pose =
+                    || EvaluateProblem::NoPoseOf { object: names.get(supply.object).cloned().unwrap_or_default() };
+                let pose = supply.touches[touch as usize].pose().ok_or_else(no_pose)?;
+                by_pose[usize::from(poses.number_of(&pose))].push(touch);
+            }
+            pool.by_pose = by_pose;
+        }
+    }
+    let pools = || supplies.iter().flat_map(|supply| &supply.pools);
+    let has_some = |pose: &u16| pools().all(|pool| !pool.by_pose[usize::from(*pose)].is_empty());
+    let candidates: Vec<u16> = (0..poses.count()).filter(|&pose| plan.may_touch(pose)).filter(has_some).collect();
+    supplies.iter_mut().for_each(|supply| supply.candidates.clone_from(&candidates));
+    Ok(())
+}
+
 /// Follows one sequence; whether it came to its end before the touches did.
 fn one<'s, const N: usize>(
     object: usize,
     recognizer: &mut Recognizer<'_, N>,
-    touches: impl Iterator<Item = &'s Touch>,
+    mut next: impl FnMut(&Recognizer<'_, N>) -> Option<&'s Touch>,
     until: Until,
     mut gate: impl FnMut(&Moment<'_>) -> bool,
 ) -> (Sequence, bool) {
     let strictest = odds_of(until.margin);
     let mut sequence = Sequence::new(object);
     recognizer.reset();
-    for (touch, approaches) in touches.zip(1_u32..) {
+    for approaches in 1_u32.. {
+        let Some(touch) = next(recognizer) else { break };
         if recognizer.push(touch).is_err() {
             // No evidence: it cost an approach.
             sequence.end(approaches);

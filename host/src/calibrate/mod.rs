@@ -39,7 +39,7 @@ mod tests;
 mod walk;
 
 pub use choose::{Chosen, Terms, choose};
-pub use draw::{Moment, Supply, Until, follow};
+pub use draw::{Moment, Supply, Until, follow, follow_plan};
 pub use fresh::calibrate_fresh;
 #[cfg(feature = "cli")]
 pub(crate) use fresh::fresh;

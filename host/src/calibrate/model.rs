@@ -1,13 +1,13 @@
 //! A model's thresholds, its promise and its temperature.
 
 use super::choose::{Chosen, Terms, choose};
-use super::draw::{Moment, Supply, Until, follow};
+use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
 use super::{Per, Tally};
 use crate::compile::{self, Restated, restate};
 use crate::ensemble::StatedProbe;
-use crate::error::{CalibrateProblem, Error, Result};
+use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result};
 use crate::evaluate::Candidate;
 use crate::progress::Progress;
 use crate::touches::Dataset;
@@ -37,6 +37,8 @@ pub struct Settings {
     pub max_touches: Option<u32>,
     /// What is added to the touches. The promise holds for touches with the same.
     pub noise: Noise,
+    /// Whether every approach is where the model's plan says. The promise then holds for a robot that goes there.
+    pub active: bool,
     /// Seed of the order of the touches, and of the noise.
     pub seed: u64,
 }
@@ -50,6 +52,7 @@ impl Default for Settings {
             sequences: 100_000,
             max_touches: None,
             noise: Noise::default(),
+            active: false,
             seed: 1,
         }
     }
@@ -127,7 +130,9 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
     let max_touches = settings.max_touches.unwrap_or(own);
     compile::stopping(settings.rate, max_touches)?;
     let (_, known) = Candidate::Compiled(model).of(&dataset)?;
-    let names = compile::names(model);
+    let mut names = compile::names(model);
+    // A background is not touched, and never named.
+    names.truncate(model.known_count());
     if names.len() < 2 {
         return Err(CalibrateProblem::OneObject.into());
     }
@@ -156,6 +161,14 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
         follow(model, supplies, &wanted(count), until, &gate, progress)
     };
     let mut first: Vec<Supply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
+    if settings.active {
+        let plan = model.plan().ok_or(EvaluateProblem::NoPlan)?;
+        if !dataset.holds_approaches() {
+            return Err(EvaluateProblem::NoApproaches.into());
+        }
+        follow_plan(&mut first, &names, &plan)?;
+        follow_plan(&mut supplies, &names, &plan)?;
+    }
     let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), STRICTEST[1])?;
     let beyond = if is_kept_well(&pilot, naive + STRICTEST[0], settings.rate) { STRICTEST[0] } else { STRICTEST[1] };
     let sequences = draw(&mut supplies, settings.sequences, beyond)?;
@@ -262,7 +275,11 @@ fn finished(
     };
     let by_object = match &chosen.odds {
         Odds::All(_) => None,
-        Odds::ByObject(odds) => Some((true, odds.iter().flat_map(|&odds| OddsByObject::to_bytes(odds)).collect())),
+        Odds::ByObject(odds) => {
+            // A background, which is never named, has a place too.
+            let all = odds.iter().copied().chain(std::iter::repeat(0)).take(model.object_count());
+            Some((true, all.flat_map(OddsByObject::to_bytes).collect()))
+        }
     };
     let stated = Temperature::new(temperature).unwrap_or(Temperature::ONE);
     let mut sections = vec![

@@ -126,6 +126,7 @@ impl Entry {
                 verdict: match verdict.decision {
                     Decision::Recognized(object) => name(object),
                     Decision::Unknown => "unknown".into(),
+                    Decision::GaveUp => "gave-up".into(),
                     _ => "undecided".into(),
                 },
                 best: name(verdict.best),

@@ -312,7 +312,7 @@ impl Run {
 
     fn end_object(&mut self, chip: &ChipModel) {
         if !std::mem::take(&mut self.decided) && self.truth.is_some() {
-            self.count(Decision::Unknown, chip);
+            self.count(Decision::GaveUp, chip);
         }
     }
 }

@@ -2,10 +2,12 @@ use super::noise::NoiseArguments;
 use super::numbers::{count, share};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
+use super::strangers::{Found, StrangersArguments};
 use crate::Result;
 use crate::calibrate::{self, Calibrated, Per, Settings};
-use crate::compile::CompiledModel;
+use crate::compile::{self, CompiledModel};
 use crate::output;
+use crate::strangers;
 use crate::touches::noise::Noise;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -17,14 +19,20 @@ Calibrate on touches that the model was not trained on, made and disturbed as th
 
 A name that is given and wrong is an error. A sequence that ends at the limit of touches without a name is undecided: neither right nor wrong. With --per average the rate is that of all names given, with objects touched equally often (or as often as the model's priors say); with name that of each name, when it is given, for which each name gets a threshold of its own, and each rate is kept with the stated probability; with object that of the names given to each object, which needs more touches.
 
+With --active each next approach is one in the pose that the plan proposes. A sequence that proposes a pose whose approaches are used up ends the object's sequences, so more approaches are needed for as many sequences.
+
 The thresholds are found by Learn-then-Test: from strict to loose, up to the last at which so few errors have a probability of at most 5 % (--confidence) if the rate were higher than promised. The model then states what it promises, and a temperature that makes its posteriors ones to believe.
+
+With --strangers the model also gets a test of whether touches fit any object that it knows: at most 2 % of known objects' sequences end as unknown. likely costs hardly a touch and finds out about half of what the model does not know before it gets a name; certain finds out nearly all of what can be found out, and takes as many touches as that needs. A model with a background column (`palpate train --background`) finds out more. Objects that feel like a known one are not found out.
 
 Examples:
   palpate capture builtin -o fresh --approaches --touches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
-  palpate calibrate model.palpate fresh -o strict.palpate --error-rate 0.1% --per name
-  palpate calibrate model.palpate fresh -o real.palpate --noise 0..5ms --timer 1ms
-  palpate evaluate calibrated.palpate unseen --json | jq .promise")]
+  palpate calibrate model.palpate fresh -o names.palpate --per name
+  palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
+  palpate calibrate model.palpate fresh -o noisy.palpate --noise 0..5ms
+  palpate evaluate calibrated.palpate unseen --json | jq .promise
+  palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
 pub(crate) struct Arguments {
     /// Compiled model
     model: PathBuf,
@@ -48,12 +56,17 @@ pub(crate) struct Arguments {
     /// Touches after which recognizers give up [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
+    /// Make every approach where the model's plan says (see `palpate plan`): the promise holds for a robot that goes there
+    #[arg(long)]
+    active: bool,
     /// Seed of the order of the touches, and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print what was found as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    strangers: StrangersArguments,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
@@ -73,16 +86,43 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
         max_touches: arguments.max_touches,
         noise: arguments.noise.over(file.map_or_else(Noise::default, |file| file.real)),
+        active: arguments.active,
         seed: arguments.seed,
     };
-    let calibrated = calibrate::calibrate(&compiled.model(), dataset, &settings, &Bar::new())
-        .map_err(|error| error.in_file(&arguments.directory))?;
+    let wrong = |error: crate::Error| error.in_file(&arguments.directory);
+    // Sequences of known objects, as if no test ended them.
+    let untested = strangers::without(&compiled.model())?;
+    let touches = arguments.strangers.is_wanted().then(|| dataset.clone());
+    let mut calibrated =
+        calibrate::calibrate(&compile::open(&untested)?, dataset, &settings, &Bar::new()).map_err(wrong)?;
+    let mut found = None;
+    if let Some(touches) = touches {
+        let terms = strangers::Settings {
+            sequences: settings.sequences,
+            confidence: settings.confidence,
+            seed: settings.seed,
+            ..Default::default()
+        };
+        let tested = arguments.strangers.apply(&calibrated.model, &touches, &terms, &settings.noise).map_err(wrong)?;
+        (calibrated.model, found) = tested;
+    }
     output::write_bytes(&arguments.output, &calibrated.model)?;
     if arguments.json {
-        return output::print_json_about(&arguments.output, &calibrated);
+        return output::print_json_about(&arguments.output, &Both { calibrated: &calibrated, strangers: &found });
     }
-    let text = format!("{}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
+    let strangers = found.map_or_else(String::new, |found| found.text() + "\n");
+    let text = format!("{}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
     output::print_about(&arguments.output, &text)
+}
+
+/// What was found.
+#[derive(serde::Serialize)]
+struct Both<'c> {
+    #[serde(flatten)]
+    calibrated: &'c Calibrated,
+    /// About strangers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strangers: &'c Option<Found>,
 }
 
 fn written(path: &std::path::Path, calibrated: &Calibrated) -> String {

@@ -8,11 +8,12 @@ use crate::error::{Problem, RowsProblem};
 use crate::evaluate::model_file::ModelFile;
 use crate::evaluate::{
     self, Active, ActiveFacts, Approaches, Candidate, Classes, Evaluation, LEAST_GROUPS, Margins, PromiseCheck,
-    Regression, RowsEvaluation, Rule, Settings, Switched, evaluate_rows,
+    Regression, RowsEvaluation, Rule, Settings, Strangers, Switched, evaluate_rows,
 };
 use crate::output;
 use crate::progress::Progress;
 use crate::rows::feature_names;
+use crate::touches::Dataset;
 use crate::touches::noise::Noise;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
@@ -48,6 +49,7 @@ Examples:
   palpate evaluate model.palpate unseen --confusion 20
   palpate evaluate model.palpate unseen --prior fork=0.3,spoon=0.3
   palpate evaluate model.palpate unseen --only bowl,fork,spoon
+  palpate evaluate model.palpate unseen --strangers others
   palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
   palpate evaluate model.palpate approaches --error-rate 0.02
   palpate evaluate planned.palpate approaches --active
@@ -61,6 +63,9 @@ pub(crate) struct Arguments {
     /// Column of the rows' classes, or of the numbers that a regression should give
     #[arg(long, value_name = "COLUMN", conflicts_with_all = ["at", "confusion"])]
     label: Option<String>,
+    /// Touches of objects that the model does not know, a directory as DIR: say as well how many are found out
+    #[arg(long, value_name = "DIR2")]
+    strangers: Option<PathBuf>,
     /// Numbers of touches after which to give the accuracy [default: 5,10,20,30,60, as far as the touches go]
     #[arg(long, value_delimiter = ',', value_name = "TOUCHES,…")]
     at: Option<Vec<usize>>,
@@ -118,6 +123,9 @@ struct Evaluated {
     /// Sequences in which the object is exchanged.
     #[serde(skip_serializing_if = "Option::is_none")]
     switch: Option<Switched>,
+    /// What is said to objects that the model does not know.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strangers: Option<Strangers>,
 }
 
 /// How often each object was taken for each.
@@ -148,7 +156,13 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let (evaluation, confusion, active, switch) = file.with(|candidate| {
+    let unknown = arguments.strangers.as_deref().map(|directory| -> Result<_> {
+        let mut dataset = super::checked(Dataset::read_any(directory)?);
+        evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
+        Ok((directory, dataset))
+    });
+    let unknown = unknown.transpose()?;
+    let evaluated = file.with(|candidate| {
         let mut margins = Margins::new(candidate, &dataset)?.of_robots(robots);
         let own = match candidate {
             Candidate::Compiled(model) => expected::own_weights(model),
@@ -181,11 +195,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             None => evaluate::evaluate(&margins, &settings)?,
         };
         let switch = arguments.switch.map(|nats| margins.switched(&settings.sequences(), nats)).transpose()?;
-        Ok((evaluation, confusion.transpose()?, active.map(|active| active.facts()), switch))
+        let strangers = unknown.as_ref().map(|(directory, dataset)| {
+            let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
+            let known = (&margins, &evaluation.sequential);
+            evaluate::strangers(known, &unknown.of_robots(robots), &settings.sequences())
+        });
+        let (confusion, strangers) = (confusion.transpose()?, strangers.transpose()?);
+        let (instances, active) = (dataset.instances.clone(), active.map(|active| active.facts()));
+        Ok(Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch, strangers })
     })?;
     drop(progress);
-    let instances = dataset.instances;
-    let evaluated = Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch };
     if arguments.json {
         return output::print_json(&evaluated);
     }
@@ -291,6 +310,9 @@ fn text(evaluated: &Evaluated) -> String {
     if let Some(switch) = &evaluated.switch {
         text += &switch_table(switch);
     }
+    if let Some(strangers) = &evaluated.strangers {
+        text += &strangers_table(strangers);
+    }
     if !evaluated.trained_on.is_empty() {
         let objects = evaluated.trained_on.join(", ");
         // Writing to a string cannot fail.
@@ -336,11 +358,16 @@ fn promise_text(check: &PromiseCheck) -> String {
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "The promise is void: {}. The error rate is {by:.2} points {side} the promised one. By theory it is at most \
-             {:.1} % with any priors, if posteriors can be believed.",
-            check.void.join("; "),
-            100.0 * check.by_theory
+            "The promise is void: {}. The error rate is {by:.2} points {side} the promised one.",
+            check.void.join("; ")
         );
+        if let Some(most) = check.by_theory {
+            _ = writeln!(
+                text,
+                "By theory it is at most {:.1} % with any priors, if posteriors can be believed.",
+                100.0 * most
+            );
+        }
     }
     text
 }
@@ -360,7 +387,7 @@ fn table(evaluation: &Evaluation) -> String {
     for (name, accuracy) in &evaluation.per_object {
         _ = write!(text, "{name:width$}");
         cells(&mut text, &mut accuracy.values().map(percent));
-        let of = |shares: &std::collections::BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
         _ = writeln!(
             text,
             " {:>9.1} {:>9} {:>9}",
@@ -403,7 +430,7 @@ fn table(evaluation: &Evaluation) -> String {
 }
 
 /// What approaches come to: one row per object, one column per number of approaches; then the sequential figures.
-fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeMap<&str, f64>) -> String {
+fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> String {
     let names = approaches.per_object.keys().map(|name| name.chars().count());
     let width = names.max().unwrap_or(0).max("approaches".len());
     let sequential = &approaches.sequential;
@@ -418,7 +445,7 @@ fn approaches_table(approaches: &Approaches, patterns: &std::collections::BTreeM
         _ = writeln!(text, " {stop:>9.1} {:>9} {:>9} {:>9}", percent(wrong), percent(undecided), percent(used));
     };
     for (name, accuracy) in &approaches.per_object {
-        let of = |shares: &std::collections::BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
         let stopping = [
             of(&sequential.per_object),
             of(&sequential.error_per_object),
@@ -468,6 +495,33 @@ fn switch_table(switch: &Switched) -> String {
         );
     }
     text + "Exchanged at a random approach before the verdict; wrong is any name but that of the object touched last.\n"
+}
+
+/// What is said to strangers, in percent: one row per object.
+fn strangers_table(strangers: &Strangers) -> String {
+    let names = strangers.detected_per_object.keys().map(|name| name.chars().count());
+    let width = names.max().unwrap_or(0).max("found out by".len());
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut text = format!("\n{:width$}", "found out by");
+    // Writing to a string cannot fail.
+    strangers.detected.keys().for_each(|at| _ = write!(text, " {at:>8}"));
+    _ = writeln!(text, " {:>9}", "named");
+    let mut line = |name: &str, detected: &BTreeMap<usize, f64>, named: f64| {
+        _ = write!(text, "{name:width$}");
+        detected.values().for_each(|share| _ = write!(text, " {:>8}", percent(*share)));
+        _ = writeln!(text, " {:>9}", percent(named));
+    };
+    for (name, detected) in &strangers.detected_per_object {
+        line(name, detected, strangers.wrong_name_per_object.get(name).copied().unwrap_or(f64::NAN));
+    }
+    line("all", &strangers.detected, strangers.wrong_name);
+    let (alarms, undecided) = (percent(strangers.false_alarms), percent(strangers.undecided));
+    _ = writeln!(
+        text,
+        "\nObjects that the model does not know: the share found out by so many touches, and the share that got a name; \
+         {undecided} got no verdict.\nOf the objects that it knows, {alarms} were taken for unknown."
+    );
+    text
 }
 
 /// Shares in percent: one row per touched object, one column per object that it was taken for.

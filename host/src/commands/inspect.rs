@@ -8,7 +8,7 @@ use crate::output;
 use crate::rows::{Encoder, feature_names};
 use crate::touches;
 use palpate_onboard::{Model, Stopping};
-use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Length, TrainedNoise, TrainedProbe};
+use palpate_shared::format::{CHECKSUM_LENGTH, FitTerms, HEADER_LENGTH, Length, TrainedNoise, TrainedProbe};
 use palpate_shared::{ContactPattern, Pose, Q15_ONE, Touch};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -61,6 +61,10 @@ struct Inspected<'a> {
     stopping: Defaults,
     /// What the model promises; null if it was not calibrated.
     promise: Option<Promised>,
+    /// Whether it has a column for what it does not know.
+    background: bool,
+    /// Its test of whether touches fit any object that it knows; null without one.
+    strangers: Option<Tested>,
     /// What evidence is divided by before it is shown as a posterior.
     temperature: f64,
     /// The logarithm of each object's prior, the largest 0; null if all are equal.
@@ -114,6 +118,34 @@ struct Promised {
     margins: BTreeMap<String, f64>,
     /// What the error rate is at most by theory, with any priors.
     by_theory: f64,
+}
+
+#[derive(serde::Serialize)]
+struct Tested {
+    /// How long names are held back: "likely" or "certain".
+    held: &'static str,
+    /// The promised share of known objects' sequences that end as unknown.
+    promised: f64,
+    confidence: f64,
+    sequences: u32,
+    /// Touches before which nothing is tested, and no name is given.
+    first_touches: u32,
+    /// Touches before which no name is given.
+    least_touches: u32,
+    /// The misfit above which an object is unknown, after many touches, in nats.
+    threshold: f64,
+}
+
+fn tested(terms: &FitTerms) -> Tested {
+    Tested {
+        held: terms.held.name(),
+        promised: f64::from(terms.alarms) / 1e6,
+        confidence: f64::from(terms.confidence) / 1e6,
+        sequences: terms.sequences,
+        first_touches: terms.first,
+        least_touches: terms.least,
+        threshold: f64::from(terms.threshold) / 65_536.0,
+    }
 }
 
 #[derive(serde::Serialize)]
@@ -282,7 +314,7 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         descriptor: model.descriptor().map_or("none (rows of features)", palpate_shared::Descriptor::name),
         features: model.feature_count(),
         feature_names: model.descriptor().is_none().then(|| features(model)),
-        objects: (0..model.object_count()).map(|object| model.object_name(object)).collect(),
+        objects: (0..model.known_count()).map(|object| model.object_name(object)).collect(),
         layout: model.layout().name(),
         leaf: model.leaf_type().name(),
         trees: header.trees(),
@@ -298,6 +330,8 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
             max_touches: stopping.max_touches(),
         },
         promise: promised(model),
+        background: model.background().is_some(),
+        strangers: model.strangers().and_then(|strangers| strangers.test).map(|test| tested(&test.terms)),
         temperature: model.temperature().value(),
         priors: priors(model),
         probe: probe(model),
@@ -433,6 +467,23 @@ fn text(inspected: &Inspected<'_>) -> String {
         };
         line("thresholds", format!("nats ahead of all others: {margins}"));
         line("posteriors", format!("at a temperature of {:.2}", inspected.temperature));
+    }
+    if inspected.background {
+        line("background", "a column for what the model does not know".into());
+    }
+    if let Some(test) = &inspected.strangers {
+        line(
+            "strangers",
+            format!(
+                "{}: at most {} % of known objects are taken for unknown, {} % sure; {} sequences; names after {} touches \
+                 at the earliest",
+                test.held,
+                super::percent(test.promised),
+                super::percent(test.confidence),
+                test.sequences,
+                test.least_touches
+            ),
+        );
     }
     if let Some(priors) = &inspected.priors {
         let prior = |(name, prior): (&&str, &f64)| format!("{name} {prior:.2}");

@@ -85,7 +85,7 @@ Examples:
   palpate link /dev/ttyACM0 --load model.palpate      load a model into it
   palpate link /dev/ttyACM0 touches/                  recognize a data set
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
-  palpate link /dev/ttyACM0 - --active                and say where to touch next
+  palpate link /dev/ttyACM0 - --active                where to touch next
   palpate link emulator --load model.palpate --parity touches/ --touches 10000
   palpate link emulator --load model.palpate --parity touches/ \\
       --bad-line 0.001,0.001,0.01,5
@@ -206,7 +206,8 @@ impl<'c> Printer<'c> {
                 let posterior = probability(verdict.detail.map_or(0, |detail| detail.posterior()));
                 let said = match verdict.decision {
                     Decision::Recognized(object) => format!("recognized {}", self.name(object)),
-                    Decision::Unknown => "unknown".into(),
+                    Decision::Unknown => "unknown, fits no object".into(),
+                    Decision::GaveUp => format!("gave up, most likely {}", self.name(verdict.best)),
                     _ => format!("most likely {}", self.name(verdict.best)),
                 };
                 let truth = self.object.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();

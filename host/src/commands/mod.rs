@@ -22,6 +22,7 @@ mod recognize_rows;
 mod report;
 mod run;
 mod shell;
+mod strangers;
 mod train;
 mod tune;
 mod verify;
@@ -198,11 +199,15 @@ fn percent(share: f64) -> f64 {
 
 /// Reads a data set; its warnings go to stderr.
 fn dataset(directory: &Path) -> Result<Dataset> {
-    let dataset = Dataset::read(directory)?;
+    Dataset::read(directory).map(checked)
+}
+
+/// A data set whose warnings went to stderr.
+fn checked(dataset: Dataset) -> Dataset {
     for warning in &dataset.warnings {
         eprintln!("palpate: warning: {warning}");
     }
-    Ok(dataset)
+    dataset
 }
 
 /// The files that a data set consists of, as far as they can be found: what a command that reads it must not write.

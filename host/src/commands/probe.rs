@@ -84,16 +84,21 @@ impl UnitArguments {
             return source::objects_of_instances(sources);
         }
         let (mut objects, mut others) = (Vec::new(), Vec::new());
+        let mut background = false;
         for source in sources {
             let names = builtin::names();
             match source.as_str() {
                 "builtin" => objects.extend(names.map(String::from)),
+                source::BACKGROUND if !std::path::Path::new(source::BACKGROUND).exists() => background = true,
                 name if names.contains(&name) && !std::path::Path::new(name).exists() => objects.push(name.into()),
                 _ => others.push(source.clone()),
             }
         }
         let varied = objects.iter().map(|name| builtin::instances(name, count, seed));
         let mut objects: Vec<Object> = varied.collect::<Result<_>>()?;
+        if background {
+            objects.push(builtin::background(count, seed)?);
+        }
         if !others.is_empty() {
             objects.extend(source::objects_of_instances(&others)?);
         }

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Recognize objects from a stream of touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided, recognized, or unknown once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
+Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided; recognized; unknown where the touches fit no object of the model, which only a model with a test of fit says (`palpate calibrate --strangers`); or gave-up once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
 
 With --features each line in is a row of features for a model that was exported from another library's: CSV with the features' names in the header, or as many columns as features, empty cells for missing values. Each line out is the verdict of that row alone, or with --add-up of all rows since the last verdict. A model with one output gives its value and no verdict.
 
@@ -176,6 +176,7 @@ impl Stream<'_> {
                 Verdict::Undecided => "undecided",
                 Verdict::Recognized { .. } => "recognized",
                 Verdict::Unknown => "unknown",
+                Verdict::GaveUp => "gave-up",
             },
             // Before the first counted touch no object is more likely than the others.
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },

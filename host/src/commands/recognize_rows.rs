@@ -52,6 +52,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, adds_up: bool, j
             Verdict::Undecided => "undecided",
             Verdict::Recognized { .. } => "recognized",
             Verdict::Unknown => "unknown",
+            Verdict::GaveUp => "gave-up",
         };
         let has_classes = model.object_count() > 1;
         let line = Line {

@@ -6,6 +6,7 @@ use crate::ensemble::train::{self, Engine, Settings};
 use crate::evaluate::{self, CostOfNoise};
 use crate::output;
 use crate::probe::file::ProbeFile;
+use crate::touches::Dataset;
 use crate::touches::noise::Noise;
 use palpate_onboard::Refused;
 use palpate_shared::format::Counted;
@@ -33,6 +34,8 @@ Examples:
   palpate capture builtin -o approaches --approaches --touches 60000
   palpate train approaches -o contacts.json
   palpate train approaches -o all.json --touches all
+  palpate capture background -o shapes --approaches --touches 60000
+  palpate train approaches -o wary.json --background shapes
   palpate train data -o table.json --bins 64,16  for a small, very fast table
   palpate train data -o robust.json --noise 0..10ms --timer 1ms
   palpate train data -o real.json --probe probe.toml
@@ -43,6 +46,9 @@ pub(crate) struct Arguments {
     /// Where to save the ensemble
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Touches of many other shapes: trains a column more, for what the model does not know, which is never named
+    #[arg(long, value_name = "DIR2")]
+    background: Option<PathBuf>,
     /// Where the settings below start from
     #[arg(long, value_enum, default_value = "compact")]
     preset: Preset,
@@ -144,7 +150,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let settings = Settings { probe, ..arguments.settings(file.as_ref()) };
     let is_clean = settings.noise.is_none();
     let start = Instant::now();
-    let ensemble = train::train(&dataset, &settings, &Bar::new()).map_err(|error| match error.exit_code() {
+    let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
+    let trained = match &background {
+        None => train::train(&dataset, &settings, &Bar::new()),
+        Some(background) => train::train_with_background(&dataset, background, &settings, &Bar::new()),
+    };
+    let ensemble = trained.map_err(|error| match error.exit_code() {
         1 => error.in_file(&arguments.directory),
         _ => error,
     })?;
@@ -158,7 +169,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let splits = (nodes - trees) / 2;
     let trained = Trained {
         descriptor: ensemble.descriptor().map_or("", Descriptor::name),
-        objects: ensemble.objects.len(),
+        objects: ensemble.known_count(),
         touches: dataset.len(),
         used: dataset.objects.iter().flat_map(|object| &object.touches).filter(is_used).count(),
         counted: evidence.counted.name(),

@@ -8,7 +8,7 @@ use crate::error::{CompileProblem, Error, Result};
 use crate::probe::approach::Probe;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HeaderBuilder, Layout, RAW_FEATURES, Tag, Trained, checksum, write_section,
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, RAW_FEATURES, Strangers, Tag, Trained, checksum, write_section,
 };
 
 /// The model's bytes.
@@ -95,7 +95,14 @@ fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
             noise: origin.noise.map(|noise| noise.trained()),
             shares: origin.trained.and_then(|trained| trained.pattern_shares()),
         };
-        trained.write(|part| bytes.extend_from_slice(part));
+        // In the order of the tags.
+        Trained { shares: None, ..trained }.write(|part| bytes.extend_from_slice(part));
+        if origin.background {
+            // Whoever does not know it would name the background.
+            let section = Strangers::header(true, false);
+            write_section(Tag::Strangers, true, &section, &mut |part| bytes.extend_from_slice(part));
+        }
+        Trained { shares: trained.shares, ..Trained::default() }.write(|part| bytes.extend_from_slice(part));
     } else if settings.scales.is_some() || ensemble.inputs.are_named() {
         let mut features = Vec::new();
         for (index, name) in ensemble.inputs.names().into_iter().enumerate() {

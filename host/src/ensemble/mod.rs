@@ -139,6 +139,11 @@ impl Ensemble {
         self.inputs.descriptor()
     }
 
+    /// How many objects can be named: all but the background.
+    pub fn known_count(&self) -> usize {
+        self.objects.len() - usize::from(self.origin.background && !self.objects.is_empty())
+    }
+
     /// The touches that are evidence: those that the ensemble states; full touches, with a pose if the descriptor needs
     /// one, where it states none. Every model compiled from it takes the same.
     pub fn trained_touches(&self) -> TrainedTouches {

@@ -20,6 +20,9 @@ pub struct Origin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
+    /// The last object is a background: many other shapes, which stand for all that the ensemble does not know. It is a
+    /// rival of the others, and never named.
+    pub background: bool,
     /// The file of another library that it was read from, if it was.
     pub imported: Option<Imported>,
 }

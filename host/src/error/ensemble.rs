@@ -191,6 +191,12 @@ pub enum EnsembleProblem {
         /// The object.
         object: String,
     },
+    /// A background does not go with a data set.
+    #[error("the background does not go with the data set: {detail}")]
+    Background {
+        /// Why not.
+        detail: &'static str,
+    },
     /// An object has no touch of those that were asked for.
     #[error("no touch of {object} is evidence: {}", none_of(*counted))]
     NothingCounts {
@@ -400,6 +406,7 @@ impl EnsembleProblem {
             Self::OneObject => "Capture at least two.".into(),
             Self::TooManyObjects { .. } => "Leave some objects out of the data set.".into(),
             Self::NoTouches { .. } => "Capture it again.".into(),
+            Self::Background { .. } => "Capture the background as the data set: `palpate capture background`.".into(),
             Self::NothingCounts { .. } => "Capture more approaches, or train on touches with any contact.".into(),
             Self::NoPose { .. } => "Capture the touches with their pose, or use the descriptor curvature.".into(),
             Self::Trainer { .. } => "Report this as a bug, with the data.".into(),

@@ -14,6 +14,32 @@ pub enum EvaluateProblem {
         /// The objects that it knows.
         known: Vec<String>,
     },
+    /// The model knows an object that was to be one that it does not know.
+    #[error("the model knows the object {object}, so that it is no stranger")]
+    KnownObject {
+        /// The object.
+        object: String,
+    },
+    /// An object that the model knows is not in a data set that must hold all of them.
+    #[error("there are no touches of {object}, which the model knows")]
+    MissingObject {
+        /// The object.
+        object: String,
+    },
+    /// An object has too few touches to say what its touches give.
+    #[error("an object has only {found} touches to learn from what its touches give, or they are all alike")]
+    TooFewForFit {
+        /// How many there are.
+        found: usize,
+    },
+    /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
+    #[error("the touches make only {object_sequences} sequences of an object, and the promise takes at least {needed}")]
+    TooFewForAlarms {
+        /// Sequences of the object with the fewest.
+        object_sequences: usize,
+        /// How many of each object it takes.
+        needed: u64,
+    },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
     RawFeatures,
@@ -99,6 +125,9 @@ impl EvaluateProblem {
     pub fn fix(&self) -> String {
         match self {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
+            Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
+            Self::MissingObject { .. } => "Capture touches of every object that the model knows.",
+            Self::TooFewForFit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
             Self::RawFeatures => {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
             }

@@ -125,12 +125,13 @@ impl Margins<'_> {
 
     /// How a sequence of approaches under the plan's policy ends.
     pub(super) fn active_outcome(&self, active: &Active, which: (usize, usize), rule: (Stopping, u64)) -> Outcome {
-        let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None };
+        let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
         self.follow_plan(active, which, rule, &mut |moment| {
             (outcome.touches, outcome.approaches) = (moment.touches, moment.approaches);
             if let Verdict::Recognized { object, .. } = moment.verdict {
                 outcome.recognized = Some(object.into());
             }
+            outcome.unknown = moment.verdict == Verdict::Unknown;
             moment.verdict != Verdict::Undecided
         });
         outcome

@@ -2,7 +2,7 @@
 
 use super::draws::Draws;
 use super::estimate::Estimate;
-use super::margins::{Margins, best};
+use super::margins::Margins;
 use super::sequential::{Outcome, SequentialSettings, Stated};
 use crate::error::{Error, Result};
 use crate::random::Purpose;
@@ -52,6 +52,8 @@ pub struct ApproachSequential {
     pub error_standard_error: f64,
     /// Share of sequences without a verdict.
     pub undecided: f64,
+    /// Share of sequences that ended as unknown, although the object is known.
+    pub unknown: f64,
     /// Approaches used on average, for each object.
     pub per_object: BTreeMap<String, f64>,
     /// Share of sequences with a wrong verdict, for each object.
@@ -159,7 +161,7 @@ impl Margins<'_> {
                     is_evidence = true;
                 }
                 for (count, _) in correct.iter_mut().zip(at).filter(|(_, at)| **at == index + 1) {
-                    *count += usize::from(is_evidence && best(&evidence) == tested.object);
+                    *count += usize::from(is_evidence && self.best(&evidence) == tested.object);
                 }
             }
             correct
@@ -186,6 +188,7 @@ impl Margins<'_> {
             error: error.all.value,
             error_standard_error: error.all.standard_error,
             undecided: undecided.all.value,
+            unknown: self.unknown(&outcomes).all.value,
             per_object: approaches.per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,

@@ -1,7 +1,7 @@
 //! Accuracy after a fixed number of touches.
 
 use super::estimate::Estimate;
-use super::margins::{Candidate, Margins, best, rivals};
+use super::margins::{Candidate, Margins, rivals};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -35,7 +35,7 @@ impl Margins<'_> {
         let correct = (0..self.tested.len()).map(|position| {
             let group = |mut correct: Vec<usize>, group| {
                 self.follow(position, group, most, seed, |touches, evidence| {
-                    correct[touches - 1] += usize::from(best(evidence) == self.tested[position].object);
+                    correct[touches - 1] += usize::from(self.best(evidence) == self.tested[position].object);
                 });
                 correct
             };
@@ -54,7 +54,9 @@ impl Margins<'_> {
         self.check(touches, groups)?;
         let row = |position| {
             let mut row = vec![0; self.objects().len()];
-            self.ends(position, touches, groups, seed, best).into_iter().for_each(|object| row[object] += 1);
+            self.ends(position, touches, groups, seed, |evidence| self.best(evidence))
+                .into_iter()
+                .for_each(|object| row[object] += 1);
             row
         };
         Ok((0..self.tested.len()).map(row).collect())
@@ -74,7 +76,7 @@ impl Margins<'_> {
         let confidences = |position: usize| {
             let right = self.tested[position].object;
             self.ends(position, touches, groups, seed, move |evidence| {
-                let best = best(evidence);
+                let best = self.best(evidence);
                 Confidence { posterior: 1.0 / (1.0 + rivals(evidence, best, unit)), correct: best == right }
             })
         };

@@ -10,17 +10,19 @@ pub(super) struct FullRecognizer {
     stopping: Stopping,
     /// For each object, what the other objects' weights may come to, its own being 1.
     odds: Vec<f64>,
+    /// How many objects can be named.
+    known: usize,
     touches: u32,
     verdict: Verdict,
 }
 
 impl FullRecognizer {
-    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats. Objects have thresholds
-    /// of their own if the model that it is compared with has them.
-    pub(super) fn new(prior: Vec<f64>, stopping: Stopping, compiled: Option<&Model<'_>>) -> Self {
+    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats, of which the first
+    /// `known` can be named. Objects have thresholds of their own if the model that it is compared with has them.
+    pub(super) fn new(prior: Vec<f64>, known: usize, stopping: Stopping, compiled: Option<&Model<'_>>) -> Self {
         let odds = |object| compiled.map_or(stopping.odds(), |model| stopping.odds_of(object, model));
         let odds = (0..prior.len()).map(|object| odds(object) as f64 / 72_057_594_037_927_936.0).collect();
-        Self { evidence: prior, stopping, odds, touches: 0, verdict: Verdict::Undecided }
+        Self { evidence: prior, stopping, odds, known, touches: 0, verdict: Verdict::Undecided }
     }
 
     /// Takes in a touch by its margins, one for each object. After a verdict touches change nothing.
@@ -30,14 +32,14 @@ impl FullRecognizer {
         }
         self.evidence.iter_mut().zip(margins).for_each(|(evidence, &margin)| *evidence += f64::from(margin));
         self.touches += 1;
-        let best = best(&self.evidence);
+        let best = best(&self.evidence[..self.known]);
         let weight = rivals(&self.evidence, best, 1.0);
         if weight <= self.odds[best] {
             // There are at most 256 objects, and each weighs 1 at most; a conversion saturates.
             let rivals = Rivals::from_q56((weight * (1_u64 << 56) as f64) as u64);
             self.verdict = Verdict::Recognized { object: best as u8, touches: self.touches, rivals };
         } else if self.touches >= self.stopping.max_touches() {
-            self.verdict = Verdict::Unknown;
+            self.verdict = Verdict::GaveUp;
         }
         self.verdict
     }

@@ -24,8 +24,10 @@ pub enum Candidate<'m> {
 pub struct Margins<'m> {
     pub(super) candidate: Candidate<'m>,
     descriptor: Descriptor,
-    /// The objects that the model knows.
+    /// The objects that the model has margins for.
     objects: Vec<String>,
+    /// How many of them can be named: all but a background.
+    known: usize,
     /// The data set's objects.
     pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
@@ -35,9 +37,12 @@ pub struct Margins<'m> {
     pub(super) weights: Option<Vec<u32>>,
 }
 
+/// In place of the index of an object that the model does not know.
+const STRANGER: usize = usize::MAX;
+
 /// The margins of one object's test touches.
 pub(super) struct Tested<'m> {
-    /// The object's index in the model.
+    /// The object's index in the model, or [`STRANGER`].
     pub(super) object: usize,
     /// How many touches are evidence to the model.
     pub(super) touches: usize,
@@ -88,6 +93,14 @@ impl Candidate<'_> {
         }
     }
 
+    /// How many objects can be named: all but a background.
+    pub(super) fn known_count(&self) -> usize {
+        match self {
+            Self::Full(ensemble) => ensemble.known_count(),
+            Self::Compiled(model) => model.known_count(),
+        }
+    }
+
     fn objects(&self) -> Vec<String> {
         match self {
             Self::Full(ensemble) => ensemble.objects.clone(),
@@ -95,8 +108,8 @@ impl Candidate<'_> {
         }
     }
 
-    /// The descriptor, and for each object of a data set its index in the model; see [`Margins::new`].
-    pub(crate) fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
+    /// The descriptor, if the data set's touches can be evidence; see [`Margins::new`].
+    fn takes(&self, dataset: &Dataset) -> Result<Descriptor> {
         let descriptor = self.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
         let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
@@ -105,7 +118,14 @@ impl Candidate<'_> {
         if let Some((model, data)) = self.probe().zip(StatedProbe::of(dataset)) {
             StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
         }
-        let known = self.objects();
+        Ok(descriptor)
+    }
+
+    /// The same, and for each object of a data set its index in the model.
+    pub(crate) fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
+        let descriptor = self.takes(dataset)?;
+        let mut known = self.objects();
+        known.truncate(self.known_count());
         let index = |touched: &ObjectTouches| {
             let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: known.clone() };
             known.iter().position(|name| *name == touched.name).ok_or_else(|| unknown().into())
@@ -125,9 +145,27 @@ impl<'m> Margins<'m> {
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let (descriptor, known) = candidate.of(dataset)?;
+        Ok(Self::with(candidate, descriptor, &known, dataset))
+    }
+
+    /// The same for objects that the model does not know: no verdict on them is right.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
+    pub fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
+        let descriptor = candidate.takes(dataset)?;
+        let names = candidate.objects();
+        let known = &names[..candidate.known_count()];
+        if let Some(object) = dataset.objects.iter().map(|object| &object.name).find(|name| known.contains(name)) {
+            return Err(EvaluateProblem::KnownObject { object: object.clone() }.into());
+        }
+        Ok(Self::with(candidate, descriptor, &vec![STRANGER; dataset.objects.len()], dataset))
+    }
+
+    fn with(candidate: Candidate<'m>, descriptor: Descriptor, indices: &[usize], dataset: &Dataset) -> Self {
         let objects = candidate.objects();
         let trained = candidate.trained_touches();
-        let tested = dataset.objects.iter().zip(known).map(|(touched, object)| {
+        let tested = dataset.objects.iter().zip(indices).map(|(touched, &object)| {
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
             let evidence: Vec<&Touch> = touched.touches.iter().filter(is_evidence).collect();
             let mut position = 0..;
@@ -144,9 +182,19 @@ impl<'m> Margins<'m> {
         });
         let tested = tested.collect();
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
-        let margins =
-            Self { candidate, descriptor, objects, tested, tested_names, hold_approaches, shares, weights: None };
-        Ok(margins.of_robots(1))
+        let known = candidate.known_count();
+        let margins = Self {
+            candidate,
+            descriptor,
+            objects,
+            known,
+            tested,
+            tested_names,
+            hold_approaches,
+            shares,
+            weights: None,
+        };
+        margins.of_robots(1)
     }
 
     /// The same where `robots` robots made the touches of each object in turn (touch i by robot i modulo `robots`): every
@@ -199,9 +247,14 @@ impl<'m> Margins<'m> {
         self.descriptor
     }
 
-    /// The objects that the model knows, in its order.
+    /// The objects that the model has margins for, in its order; the last one may be a background.
     pub fn objects(&self) -> &[String] {
         &self.objects
+    }
+
+    /// Of the objects that can be named, the one with the most evidence.
+    pub(super) fn best(&self, evidence: &[f64]) -> usize {
+        best(&evidence[..self.known])
     }
 
     /// The objects of the data set, in its order.

@@ -50,6 +50,7 @@ mod poses;
 mod promise;
 mod rows;
 mod sequential;
+mod strangers;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
@@ -71,6 +72,7 @@ pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 #[cfg(feature = "cli")]
 pub(crate) use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
+pub use strangers::{DETECTED_BY, Strangers, strangers};
 pub use switch::{Rule, Stopped, Switched};
 pub use under_plan::evaluate_active;
 
@@ -122,6 +124,14 @@ impl Default for Settings {
         let (at, at_approaches) = (vec![5, 10, 20, 30, 60], vec![10, 20, 60]);
         let noise = Noise::default();
         Self { at, at_approaches, groups: 1000, error_rate: None, max_touches: None, seed: 1, noise }
+    }
+}
+
+impl Settings {
+    /// How sequences are drawn and stopped.
+    pub fn sequential(&self) -> SequentialSettings {
+        let &Self { error_rate, max_touches, groups, seed, .. } = self;
+        SequentialSettings { error_rate, max_touches, sequences: groups, seed }
     }
 }
 

@@ -31,8 +31,10 @@ pub struct PromiseCheck {
     pub exceeded_by: f64,
     /// What differs from the calibration: with any of these the promise is void.
     pub void: Vec<String>,
-    /// What the error rate is at most by theory, whatever the priors and the objects, if posteriors can be believed.
-    pub by_theory: f64,
+    /// What the error rate is at most by theory, whatever the priors and the objects, if posteriors can be believed: which
+    /// they cannot with other noise than the calibration's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_theory: Option<f64>,
 }
 
 impl Margins<'_> {
@@ -70,7 +72,7 @@ impl Margins<'_> {
             of,
             exceeded_by: error.value - promise.rate,
             void,
-            by_theory: by_theory(model),
+            by_theory: (promise.noise == noise.promised()).then(|| by_theory(model)),
         })
     }
 

@@ -48,6 +48,8 @@ pub struct Sequential {
     pub error_standard_error: f64,
     /// Share of sequences without a verdict.
     pub undecided: f64,
+    /// Share of sequences that ended as unknown, although the object is known.
+    pub unknown: f64,
     /// Touches used on average, for each object.
     pub per_object: BTreeMap<String, f64>,
     /// Share of sequences with a wrong verdict, for each object.
@@ -68,8 +70,10 @@ pub struct Outcome {
     pub touches: usize,
     /// Approaches used: these touches, and those in between that were no evidence.
     pub approaches: usize,
-    /// The object recognized (its index in the model), or none where the recognizer gave up.
+    /// The object recognized (its index in the model), or none.
     pub recognized: Option<usize>,
+    /// Whether the touches fitted no object. Neither this nor recognized: the recognizer gave up.
+    pub unknown: bool,
 }
 
 /// A figure of sequences.
@@ -109,6 +113,7 @@ impl Margins<'_> {
             error: error.all.value,
             error_standard_error: error.all.standard_error,
             undecided: undecided.all.value,
+            unknown: self.unknown(&outcomes).all.value,
             per_object: touches.per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
@@ -129,7 +134,15 @@ impl Margins<'_> {
     /// The share of sequences without a verdict.
     pub(super) fn undecided(&self, outcomes: &[Vec<Outcome>]) -> Figure {
         self.figure(outcomes, |_, outcomes| {
-            Estimate::share(outcomes.iter().filter(|outcome| outcome.recognized.is_none()).count(), outcomes.len())
+            let is_undecided = |outcome: &&Outcome| outcome.recognized.is_none() && !outcome.unknown;
+            Estimate::share(outcomes.iter().filter(is_undecided).count(), outcomes.len())
+        })
+    }
+
+    /// The share of sequences that ended as unknown.
+    pub(super) fn unknown(&self, outcomes: &[Vec<Outcome>]) -> Figure {
+        self.figure(outcomes, |_, outcomes| {
+            Estimate::share(outcomes.iter().filter(|outcome| outcome.unknown).count(), outcomes.len())
         })
     }
 
@@ -215,7 +228,8 @@ impl Margins<'_> {
                 }
             }
             Values::Full(values) => {
-                let mut recognizer = FullRecognizer::new(self.prior(), stopping, None);
+                let known = self.candidate.known_count();
+                let mut recognizer = FullRecognizer::new(self.prior(), known, stopping, None);
                 let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
                 until_sure(rows.map(|margins| margins.map(|margins| recognizer.push(margins))))
             }
@@ -244,7 +258,7 @@ fn onboard<'r, const N: usize>(
 ) -> Outcome {
     let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
         // Room was made for at least as many objects as the model has.
-        return Outcome { touches: 0, approaches: 0, recognized: None };
+        return Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
     };
     if let Some(weights) = weights {
         // Of which one is above 0.
@@ -255,7 +269,7 @@ fn onboard<'r, const N: usize>(
 
 /// Counts approaches, and touches that are evidence, up to the first verdict.
 pub(super) fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
-    let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None };
+    let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
     for verdict in verdicts {
         outcome.approaches += 1;
         outcome.touches += usize::from(verdict.is_some());
@@ -265,7 +279,11 @@ pub(super) fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Out
                 outcome.recognized = Some(object.into());
                 break;
             }
-            Some(Verdict::Unknown) => break,
+            Some(Verdict::Unknown) => {
+                outcome.unknown = true;
+                break;
+            }
+            Some(Verdict::GaveUp) => break,
         }
     }
     outcome

@@ -122,7 +122,7 @@ fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
                 _ => None,
             };
             let touches = usize::try_from(recognizer.touches()).unwrap();
-            assert_eq!(*outcome, Outcome { touches, approaches: touches, recognized });
+            assert_eq!(*outcome, Outcome { touches, approaches: touches, recognized, unknown: false });
         }
     }
 }

@@ -13,6 +13,14 @@ pub(super) fn one(name: &str) -> Result<Object> {
     Err(absent(name))
 }
 
+/// As many as make no difference.
+pub(super) const BACKGROUND_SHAPES: usize = 200;
+
+/// No shapes.
+pub(super) fn background(_: usize, _: u64) -> Result<Object> {
+    Err(absent(super::source::BACKGROUND))
+}
+
 fn absent(name: &str) -> Error {
     Error::setting("source", name, "a file or a directory: the built-in objects need the feature `objects`")
 }

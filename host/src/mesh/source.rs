@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 /// The objects of all `sources`, sorted by name. A source is one of
 ///
 /// - `builtin`: the ten built-in objects;
+/// - `background`: one object of many different shapes, for a model's background column;
 /// - an OBJ file, or a directory, which is searched for OBJ files, subdirectories included;
 /// - the name of a built-in object, if there is no file of that name.
 ///
@@ -37,11 +38,16 @@ pub fn object(source: &str) -> Result<Object> {
     }
 }
 
+/// The name of the object of many different shapes, and of a model's background column.
+pub const BACKGROUND: &str = "background";
+
 /// An object that is found, but not yet made or read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// The built-in object of this name.
     BuiltIn(&'static str),
+    /// The shapes of [`builtin::background`].
+    Background,
     /// An object in a file.
     File {
         /// The object's name.
@@ -63,6 +69,7 @@ impl Source {
     pub fn name(&self) -> &str {
         match self {
             Self::BuiltIn(name) => name,
+            Self::Background => BACKGROUND,
             Self::File { name, .. } | Self::Instances { name, .. } => name,
         }
     }
@@ -74,6 +81,7 @@ impl Source {
     pub fn read(self) -> Result<Object> {
         match self {
             Self::BuiltIn(name) => builtin::one(name),
+            Self::Background => builtin::background(builtin::BACKGROUND_SHAPES, 1),
             Self::File { name, path } => Ok(Object::new(name, obj::read(&path)?)),
             Self::Instances { name, files } => {
                 let read = |(name, path): (String, PathBuf)| Ok(Instance { name, mesh: obj::read(&path)? });
@@ -113,6 +121,8 @@ fn found(sources: &[String], instances: bool) -> Result<Vec<Source>> {
             for name in builtin::names() {
                 insert(&mut found, name.into(), Source::BuiltIn(name))?;
             }
+        } else if source == BACKGROUND && !Path::new(source).exists() {
+            insert(&mut found, BACKGROUND.into(), Source::Background)?;
         } else if let Some(name) = builtin::names().into_iter().find(|name| name == source)
             && !Path::new(source).exists()
         {
@@ -161,6 +171,7 @@ fn found(sources: &[String], instances: bool) -> Result<Vec<Source>> {
 fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) -> Result<()> {
     let place = |source: &Source| match source {
         Source::BuiltIn(_) => "builtin".into(),
+        Source::Background => BACKGROUND.into(),
         Source::File { path, .. } => path.clone(),
         Source::Instances { files, .. } => files.first().map(|(_, path)| path.clone()).unwrap_or_default(),
     };

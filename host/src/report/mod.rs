@@ -28,6 +28,7 @@ mod settings;
 mod simulator;
 mod stages;
 pub(crate) mod statistics;
+mod strangers;
 pub mod view;
 
 pub use settings::Settings;

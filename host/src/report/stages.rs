@@ -5,7 +5,7 @@ use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
     approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
-    published, results, sequential, simulator,
+    published, results, sequential, simulator, strangers,
 };
 use crate::capture;
 use crate::compile;
@@ -120,6 +120,7 @@ pub fn report_on(
     drop(large);
     let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
     let plans = stages.stage("plan", || plan::measure(&context))?;
+    let unknown = stages.stage("strangers", || strangers::measure(&context))?;
     let engines = stages.stage("simulator", || simulator::measure(&context))?;
     let grown = if settings.growth {
         let growth = stages.stage("growth", || growth::measure(&context))?;
@@ -147,6 +148,7 @@ pub fn report_on(
         sequential::section(&context, &sequences)?,
         calibration::section(&context, &calibration)?,
         promises::section(&context, &promised)?,
+        strangers::section(&context, &unknown)?,
         costs,
     ];
     sections.extend(grown);

@@ -64,14 +64,25 @@ impl Dataset {
     /// missing, has another number of touches than stated, or is a Parquet file with another checksum; when a file
     /// holds no touch, and when a line or row is wrong (it is named).
     pub fn read(directory: &Path) -> Result<Self> {
+        let dataset = Self::read_any(directory)?;
+        match dataset.objects.as_slice() {
+            [one] => Err(Error::at(Place::file(directory), TouchesProblem::OneObject { name: one.name.clone() })),
+            _ => Ok(dataset),
+        }
+    }
+
+    /// The same for a data set that may hold a single object: a background, or a stranger.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), but for the number of objects: at least one.
+    pub fn read_any(directory: &Path) -> Result<Self> {
         let dataset = match Listing::read(directory)? {
             Some(listing) => Self::listed(directory, listing)?,
             None => Self::found(directory)?,
         };
-        match dataset.objects.as_slice() {
-            [] => Err(Error::at(Place::file(directory), TouchesProblem::NoObjects)),
-            [one] => Err(Error::at(Place::file(directory), TouchesProblem::OneObject { name: one.name.clone() })),
-            _ => Ok(dataset),
+        match dataset.objects.is_empty() {
+            true => Err(Error::at(Place::file(directory), TouchesProblem::NoObjects)),
+            false => Ok(dataset),
         }
     }
 

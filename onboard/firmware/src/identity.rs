@@ -15,6 +15,7 @@ pub fn record(model: &Model<'_>, recognizer: &mut Recognizer<'_, 10>, touch: &To
         Ok(Verdict::Undecided) => 0,
         Ok(Verdict::Recognized { object, touches, .. }) => 1 << 30 | u32::from(object) << 16 | touches,
         Ok(Verdict::Unknown) => 2 << 30,
+        Ok(Verdict::GaveUp) => 2 << 30 | 1,
         Err(_) => 3 << 30,
     };
     let posterior = recognizer.posterior(recognizer.best()).q56();

@@ -1,4 +1,4 @@
-//! Margins to a verdict: evidence, its exponential, when to stop, and the state as bytes.
+//! Margins to a verdict: evidence, its exponential, when to stop, what fits no object, and the state as bytes.
 
 mod approach;
 mod evidence;
@@ -9,6 +9,7 @@ mod recognizer;
 #[cfg(feature = "link")]
 mod snapshot;
 mod stopping;
+mod strangers;
 
 pub use approach::Proposal;
 #[cfg(feature = "station")]
@@ -23,3 +24,4 @@ pub use recognizer::{CapacityError, Recognizer, Verdict};
 #[cfg(feature = "link")]
 pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;
+pub use strangers::Fit;

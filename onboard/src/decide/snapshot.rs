@@ -1,7 +1,7 @@
 //! A recognizer's state as bytes, so that a power cut loses no touch.
 //!
 //! The bytes are postcard's: the model's checksum, the number of touches, the verdict (0 undecided, 1 recognized,
-//! 2 unknown) and its object, then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
+//! 2 unknown, 3 gave up) and its object, then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
 
 use super::recognizer::{Recognizer, State, Verdict};
 use crate::Model;
@@ -80,6 +80,7 @@ impl<const N: usize> Recognizer<'_, N> {
                 Verdict::Recognized { object, touches, rivals }
             }
             2 => Verdict::Unknown,
+            3 => Verdict::GaveUp,
             _ => return Err(SnapshotError::Damaged),
         };
         self.state_mut().set(evidence, touches, verdict);
@@ -94,6 +95,7 @@ impl<const N: usize> State<N> {
             Verdict::Undecided => (0, 0),
             Verdict::Recognized { object, .. } => (1, object),
             Verdict::Unknown => (2, 0),
+            Verdict::GaveUp => (3, 0),
         };
         let head: Head = (model.checksum(), self.touches(), verdict, object);
         let mut length = postcard::to_slice(&head, buffer).map_err(|_| SnapshotError::Short)?.len();

@@ -22,7 +22,19 @@ impl Model<'_> {
     /// [`f32_key`](palpate_shared::format::f32_key)s as [`Model::key`] says,
     /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where one is missing, as it is for all features beyond the end of a short row.
     pub fn margins_of(&self, features: &[i32], margins: &mut [i32]) -> bool {
-        let Some(margins) = self.sum(features, margins) else { return false };
+        let Some(margins) = margins.get_mut(..self.object_count()) else { return false };
+        margins.fill(0);
+        self.margins_in_zeros(features, margins)
+    }
+
+    /// [`Model::margins`] where zeros are already.
+    pub(crate) fn touch_in_zeros(&self, touch: &Touch, zeros: &mut [i32]) {
+        let features = self.descriptor().map(|descriptor| descriptor.features(touch));
+        self.margins_in_zeros(features.as_ref().map_or(&[], Features::as_slice), zeros);
+    }
+
+    fn margins_in_zeros(&self, features: &[i32], zeros: &mut [i32]) -> bool {
+        let Some(margins) = self.sum(features, zeros) else { return false };
         if self.is_float() {
             for margin in margins {
                 *margin = fixed::q16_from_f32_bits(margin.cast_unsigned());
@@ -46,7 +58,7 @@ impl Model<'_> {
         true
     }
 
-    /// Adds up all trees: in units, or in f32 values' bits.
+    /// Adds up all trees, in what has to be zeros: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
         if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
@@ -65,7 +77,6 @@ impl Model<'_> {
             self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
             return Some(margins);
         }
-        margins.fill(0);
         let bias = self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
         margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base).wrapping_sub(bias));
         Some(margins)

@@ -13,7 +13,7 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
     Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
-    Section, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
+    Section, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -36,9 +36,12 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none.
+    /// Where thresholds by object stand; 0 if there are none. The highest bit: whether there is a section about strangers.
     by_object: u32,
 }
+
+/// See [`Stated::by_object`]: no model is as long.
+const HAS_STRANGERS: u32 = 1 << 31;
 
 impl Stated {
     /// What a model without optional sections states.
@@ -104,9 +107,32 @@ impl<'a> Model<'a> {
         self.sections.bytes
     }
 
-    /// How many objects the model knows: 1 to 256.
+    /// How many objects the model has margins for: 1 to 256. The last of them may be the
+    /// [background](Model::background).
     pub fn object_count(&self) -> usize {
         self.sections.objects()
+    }
+
+    /// What the model knows about objects that it does not know, if it states it.
+    ///
+    /// Cost: about 30 instructions for each optional section, and 100 for its own. Cannot fail.
+    pub fn strangers(&self) -> Option<Strangers<'a>> {
+        if !cfg!(feature = "strangers") || self.stated.by_object & HAS_STRANGERS == 0 {
+            return None;
+        }
+        Strangers::opened(optional::find(self.optional(), Tag::Strangers))
+    }
+
+    /// The object that stands for all that the model does not know: the last one, if the model was trained with a
+    /// background. It is a rival of the others, and never named.
+    pub fn background(&self) -> Option<usize> {
+        self.strangers().filter(|strangers| strangers.background).map(|_| self.known_count())
+    }
+
+    /// How many objects can be named: all but the background.
+    pub fn known_count(&self) -> usize {
+        let background = self.strangers().is_some_and(|strangers| strangers.background);
+        self.object_count().saturating_sub(background.into())
     }
 
     /// How many features a row has: 1 to 256.
@@ -185,7 +211,7 @@ impl<'a> Model<'a> {
     ///
     /// Cost: about 15 instructions. Cannot fail.
     pub fn odds_of(&self, object: usize) -> Option<u64> {
-        let start = usize::try_from(self.stated.by_object).ok().filter(|&start| start > 0)?;
+        let start = usize::try_from(self.stated.by_object & !HAS_STRANGERS).ok().filter(|&start| start > 0)?;
         let section = self.sections.bytes.get(start..)?;
         OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
     }

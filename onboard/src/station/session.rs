@@ -169,6 +169,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
                 Verdict::Undecided => Decision::Undecided,
                 Verdict::Recognized { object, .. } => Decision::Recognized(object),
                 Verdict::Unknown => Decision::Unknown,
+                Verdict::GaveUp => Decision::GaveUp,
             };
             let best = recognizer.best();
             let detail = detail.then(|| Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));

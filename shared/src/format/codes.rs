@@ -103,6 +103,16 @@ impl Counted {
 }
 
 codes! {
+    /// How long a name is held back from what may be an object that the model does not know.
+    Held {
+        /// Only while the touches do not fit it.
+        Likely = 1, "likely";
+        /// Until an object that the model does not know would very probably have been found out.
+        Certain = 2, "certain";
+    }
+}
+
+codes! {
     /// Of what an error rate is promised. A name that is given and wrong is an error; no name, at the limit of touches, is
     /// neither right nor wrong.
     Per {

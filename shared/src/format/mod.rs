@@ -10,15 +10,17 @@ mod key;
 mod plan;
 mod promise;
 mod records;
+mod strangers;
 mod trained;
 
 pub use crate::checksum::checksum;
-pub use codes::{Counted, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
+pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
 pub use plan::Plan;
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
+pub use strangers::{FitTerms, FitTest, ObjectFit, Strangers};
 pub use trained::{
     Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
     TrainedTouches, take_feature, take_section, write_section,

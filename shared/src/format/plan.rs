@@ -36,14 +36,18 @@ impl<'a> Plan<'a> {
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
         let (&[kind, rolls, _, _], rest) = bytes.split_first_chunk::<4>()?;
         let poses = Poses::with_rolls(rolls).filter(|_| kind == 0)?;
-        let length = Self::pairs(objects).checked_mul(poses.count().into())?;
+        // `pairs`, without overflow: a model has at most 256 objects, which nine bits hold.
+        let objects = objects & 0x1ff;
+        let length = objects.wrapping_mul(objects.wrapping_sub(1)) / 2 * usize::from(poses.count());
         let separations = rest.get(..length).filter(|separations| !separations.is_empty())?;
         Some(Self { poses, separations })
     }
 
     /// How many pairs this many objects make.
     pub const fn pairs(objects: usize) -> usize {
-        objects.saturating_mul(objects.saturating_sub(1)) / 2
+        // No model has more than 256, so nothing here needs 64 bits.
+        let objects = if objects < 1 << 16 { objects } else { (1 << 16) - 1 };
+        objects.wrapping_mul(objects.saturating_sub(1)) / 2
     }
 
     /// The number of a pair of two different objects: (0, 1), (0, 2), (1, 2), (0, 3) and so on, in any order of the two.

@@ -18,8 +18,8 @@ pub enum Tag {
     ThresholdsByTouches,
     /// Stopping thresholds by object: [`OddsByObject`](super::OddsByObject).
     ThresholdsByObject,
-    /// Reserved: a test for objects that the model does not know.
-    FitTest,
+    /// A test for objects that the model does not know: [`Strangers`](super::Strangers).
+    Strangers,
     /// [`Plan`](super::Plan).
     Plan,
     /// The features' names and scales, for models over rows of features: see [`take_feature`].
@@ -41,7 +41,7 @@ impl Tag {
             Self::Noise => 3,
             Self::ThresholdsByTouches => 4,
             Self::ThresholdsByObject => 5,
-            Self::FitTest => 6,
+            Self::Strangers => 6,
             Self::Plan => 7,
             Self::FeatureNames => 8,
             Self::PatternShares => 9,

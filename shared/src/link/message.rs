@@ -368,8 +368,10 @@ pub enum Decision {
     Undecided,
     /// The object with this index.
     Recognized(u8),
-    /// Most likely no object of the model.
+    /// No object of the model: the touches fit none.
     Unknown,
+    /// Nothing, and the limit of touches is reached. Chips whose programs are older said unknown then.
+    GaveUp,
 }
 
 /// An approach that a chip proposes.

@@ -563,7 +563,9 @@ fn golden_frames_pin_the_format() {
     let detail = Detail { posterior: [8, 7, 6, 5, 4, 3, 2, 1], evidence: [4, 3, 2, 1] };
     let verdict = VerdictMessage { decision: Decision::Recognized(4), best: 4, touches: 17, detail: Some(detail) };
     // Written out by hand but for the checksums: version, session, message, CRC-32, in COBS.
-    let frames: [(Message<'_>, &[u8]); 4] = [
+    let (mut without, down) = ([0; POSE_BYTES], Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] });
+    (without[0], without[12]) = (255, 1);
+    let frames: [(Message<'_>, &[u8]); 6] = [
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
             &[
@@ -585,6 +587,14 @@ fn golden_frames_pin_the_format() {
         (
             Message::Answer { asker: 2, tag: 5, answer: Answer::Name("spoon") },
             &[0, 3, 3, 2, 1, 1, 15, 1, 2, 5, 2, 5, 115, 112, 111, 111, 110, 220, 237, 239, 183, 0],
+        ),
+        (
+            Message::Query { tag: 5, query: Query::NextApproach { without } },
+            &[0, 3, 3, 2, 1, 1, 1, 4, 5, 7, 255, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 6, 1, 159, 153, 119, 236, 0],
+        ),
+        (
+            Message::Answer { asker: 2, tag: 5, answer: Answer::NextApproach(ApproachMessage::new(48, -5, &down)) },
+            &[0, 3, 3, 2, 1, 1, 7, 1, 2, 5, 7, 48, 9, 1, 1, 1, 5, 1, 128, 255, 127, 1, 1, 1, 5, 49, 88, 154, 7, 0],
         ),
     ];
     for (message, golden) in frames {

@@ -126,6 +126,7 @@ fn known(text: &mut String, model: &Model<'_>, recognizer: &Recognizer<'_, 256>,
         Verdict::Undecided => "verdict undecided\n".to_string(),
         Verdict::Recognized { object, touches, .. } => format!("verdict recognized {object} {touches}\n"),
         Verdict::Unknown => "verdict unknown\n".to_string(),
+        Verdict::GaveUp => "verdict gave-up\n".to_string(),
     };
     // The leader's, and now and then the last one's.
     let last = recognizer.touches().is_multiple_of(3).then(|| model.object_count() - 1);

@@ -136,6 +136,7 @@ fn heading(status: &Status) -> Vec<Text> {
     let verdict = match status.verdict.as_str() {
         "undecided" => "undecided".to_owned().stylize(),
         "unknown" => "unknown".to_owned().bold().yellow(),
+        "gave-up" => "gave up".to_owned().bold().yellow(),
         object => format!("recognized {object}").bold().green(),
     };
     vec![status.source.clone().bold(), format!("  {truth}").stylize(), verdict]

@@ -11,9 +11,10 @@
 use crate::ensemble::check::check_names;
 use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Trained, Tree, feature_row};
 use crate::error::{EnsembleProblem, Error, Result};
+use crate::mesh::source::BACKGROUND;
 use crate::progress::Progress;
-use crate::touches::Dataset;
 use crate::touches::noise::Noise;
+use crate::touches::{Dataset, ObjectTouches};
 use hessboost::config::MultiStrategy;
 use hessboost::data::DMatrix;
 use hessboost::model::BoostedModel;
@@ -165,6 +166,42 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = (!settings.noise.is_none()).then_some(settings.noise);
     ensemble.origin = Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) };
+    Ok(ensemble)
+}
+
+/// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,
+/// which are to be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
+/// ensemble does not know, and is called [`BACKGROUND`].
+///
+/// # Errors
+/// As [`train`]; [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if the data sets were captured with
+/// different probes; [`EnsembleProblem::Background`] if only one of them holds approaches, or an object has the
+/// background's name.
+pub fn train_with_background(
+    dataset: &Dataset,
+    background: &Dataset,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Ensemble> {
+    if let Some((own, other)) = StatedProbe::of(dataset).zip(StatedProbe::of(background)) {
+        StatedProbe::compare(["the data set", "the background"], [own.trained(), other.trained()])?;
+    }
+    if dataset.holds_approaches() != background.holds_approaches() {
+        let detail = "one of the data sets holds approaches and the other full touches only";
+        return Err(EnsembleProblem::Background { detail }.into());
+    }
+    if dataset.objects.iter().any(|object| object.name == BACKGROUND) {
+        let detail = "an object of the data set is called background";
+        return Err(EnsembleProblem::Background { detail }.into());
+    }
+    let touches = background.objects.iter().flat_map(|object| object.touches.iter().copied()).collect();
+    let mut both = dataset.clone();
+    both.objects.push(ObjectTouches { name: BACKGROUND.into(), touches });
+    let mut ensemble = train(&both, settings, progress)?;
+    ensemble.origin.background = true;
+    if let Some(trained) = &mut ensemble.origin.trained {
+        trained.shares = dataset.holds_approaches().then(|| dataset.shares());
+    }
     Ok(ensemble)
 }
 

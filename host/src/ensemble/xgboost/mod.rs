@@ -12,6 +12,7 @@
 //! | `palpate_objects` | a JSON array of the objects' names, in the order of the labels |
 //! | `palpate_probe` | optional: the probe of the training touches, a JSON object of `radius`, `spacing`, `speed`, `tilt` and `length` |
 //! | `palpate_noise` | optional: what was added to the training touches ([`Noise`](crate::touches::noise::Noise)), a JSON object |
+//! | `palpate_background` | optional: `true` where the last object is a background, which is never named |
 //! | `palpate_touches` | optional: fingerprints of the training touches, a JSON object of hexadecimal numbers by object |
 //!
 //! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.

@@ -183,7 +183,12 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         let expected = "a JSON object of what was added to the touches in training";
         parsed("palpate_noise", expected, text)
     });
+    let background = attributes.get("palpate_background").map(|text| {
+        let expected = "true where the last object is a background, else false";
+        parsed("palpate_background", expected, text)
+    });
     Ok(Origin {
+        background: background.transpose()?.unwrap_or_default(),
         probe: probe.transpose()?,
         trained: trained.transpose()?,
         noise: noise.transpose()?,

@@ -69,6 +69,9 @@ pub(super) fn attributes(descriptor: Descriptor, objects: &[String], origin: &Or
     if let Some(noise) = origin.noise.and_then(|noise| serde_json::to_string(&noise).ok()) {
         attributes.insert("palpate_noise".into(), noise);
     }
+    if origin.background {
+        attributes.insert("palpate_background".into(), "true".into());
+    }
     if !origin.touches.is_empty() {
         let hexadecimal = origin.touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
         if let Ok(touches) = serde_json::to_string(&hexadecimal.collect::<BTreeMap<_, _>>()) {

@@ -149,3 +149,23 @@ fn an_unknown_name_is_an_argument_error_that_lists_the_known_ones() {
     assert_eq!(error.exit_code(), 2);
     assert!(error.to_string().contains("teapot") && error.to_string().contains("winebottle"), "{error}");
 }
+
+#[test]
+fn shapes_of_a_background_are_closed_right_side_out_and_of_their_own() {
+    let object = background(20, 5).unwrap();
+    assert_eq!(object.instances().len(), 20);
+    let mut volumes: Vec<f64> = Vec::new();
+    for instance in object.instances() {
+        assert_closed(&instance.name, &instance.mesh);
+        let size = volume(&instance.mesh);
+        assert!(size > 0.0, "{} is inside out", instance.name);
+        let count = instance.mesh.triangles.len();
+        assert!((200..=200_000).contains(&count), "{}: {count} triangles", instance.name);
+        assert!(volumes.iter().all(|other| (size / other - 1.0).abs() > 1e-4), "{} is another", instance.name);
+        volumes.push(size);
+    }
+    let again = background(3, 5).unwrap();
+    assert!(again.instances().zip(object.instances()).all(|(a, b)| a.mesh == b.mesh), "the same seed, other shapes");
+    let other = background(3, 6).unwrap();
+    assert!(other.instances().zip(object.instances()).all(|(a, b)| a.mesh != b.mesh), "another seed, the same shapes");
+}

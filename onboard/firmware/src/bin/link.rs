@@ -23,6 +23,7 @@ impl Device for Chip<'_> {
             Ok(Verdict::Undecided) => Decision::Undecided,
             Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
             Ok(Verdict::Unknown) => Decision::Unknown,
+            Ok(Verdict::GaveUp) => Decision::GaveUp,
             Err(_) => return Outcome::Refused(Refusal::Pattern),
         };
         Outcome::Verdict(VerdictMessage { decision, best: 0, touches: self.0.touches(), detail: None })

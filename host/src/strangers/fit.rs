@@ -1,0 +1,174 @@
+//! What touches of each object give, and how far evidence is from it.
+
+use super::FIRST;
+use super::follow::early;
+use nalgebra::{DMatrix, DVector};
+use palpate_shared::format::FitTest;
+use rayon::prelude::*;
+
+/// The touches at which the spread of other shapes is weighed against that of touches.
+const AT: f64 = 40.0;
+/// How much of touches' own covariance is added to that of shapes, for the directions that few shapes show; and what
+/// takes the shapes' place where there are none.
+const OWN: f64 = 0.003;
+const WITHOUT_SHAPES: f64 = 0.03;
+/// How far an object may be behind the leader of a shape's touches, in nats per touch, for the shape to count e times
+/// less.
+const NEAR: f64 = 0.05;
+
+/// Means and covariances of the margins of one touch, in nats.
+pub(super) struct Moments {
+    /// Of each known object.
+    of: Vec<(DVector<f64>, DMatrix<f64>)>,
+    /// Of each of many other shapes, the mean.
+    shapes: Vec<DVector<f64>>,
+    known: usize,
+    objects: usize,
+}
+
+/// What touches of one object give, in nats: see [`super`].
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Fit {
+    /// Whose evidence against the object counts.
+    pub(super) rivals: Vec<usize>,
+    /// Of this evidence per touch.
+    pub(super) mean: DVector<f64>,
+    pub(super) slope: DVector<f64>,
+    /// Lower triangular.
+    pub(super) weights: DMatrix<f64>,
+    pub(super) constant: f64,
+}
+
+impl Moments {
+    /// Of rows of margins in units, for each known object; `shapes` are mean rows.
+    pub(super) fn new(rows: &[&[i32]], shapes: &[Vec<f64>], known: usize, objects: usize, unit: f64) -> Self {
+        let of = rows.par_iter().map(|rows| {
+            let count = (rows.len() / objects).max(1) as f64;
+            let mut mean = DVector::zeros(objects);
+            for row in rows.chunks_exact(objects) {
+                mean.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += f64::from(margin) * unit / count);
+            }
+            let mut covariance = DMatrix::zeros(objects, objects);
+            for row in rows.chunks_exact(objects) {
+                let away = DVector::from_iterator(objects, row.iter().map(|&margin| f64::from(margin) * unit)) - &mean;
+                covariance.ger(1.0 / count, &away, &away, 1.0);
+            }
+            (mean, covariance)
+        });
+        let shapes = shapes.iter().map(|mean| DVector::from_iterator(objects, mean.iter().map(|margin| margin * unit)));
+        Self { of: of.collect(), shapes: shapes.collect(), known, objects }
+    }
+
+    /// The fit of an object as if the model did not have the column `without`; none if its touches are too few or too
+    /// much alike to have a covariance.
+    fn fit(&self, leader: usize, without: Option<usize>) -> Option<Fit> {
+        let (mean, covariance) = self.of.get(leader)?;
+        let rivals = self.rivals(leader, without);
+        let count = rivals.len();
+        let against = |row: &DVector<f64>| DVector::from_iterator(count, rivals.iter().map(|&r| row[r] - row[leader]));
+        let own = covariance[(leader, leader)];
+        let mut spread = DMatrix::from_fn(count, count, |a, b| {
+            let (a, b) = (rivals[a], rivals[b]);
+            covariance[(a, b)] - covariance[(a, leader)] - covariance[(leader, b)] + own
+        });
+        // Columns that never differ have none.
+        let floor = 1e-9 * spread.trace() / count as f64 + 1e-12;
+        (0..count).for_each(|index| spread[(index, index)] += floor);
+        let expected = against(mean);
+
+        let named = |row: &DVector<f64>| {
+            let others = (0..self.known).filter(|object| Some(*object) != without);
+            others.map(|object| row[object]).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let weigh = |row: &DVector<f64>| ((row[leader] - named(row)) / NEAR).exp();
+        let total: f64 = self.shapes.iter().map(weigh).sum();
+        let (mut shift, mut between) = (DVector::zeros(count), &spread * WITHOUT_SHAPES);
+        if total > 1e-12 {
+            let shapes: Vec<_> = self.shapes.iter().map(|row| (weigh(row) / total, against(row))).collect();
+            shift = shapes.iter().fold(shift, |sum, (weight, row)| sum + row * *weight);
+            between = &spread * OWN;
+            for (weight, row) in &shapes {
+                let away = row - &shift;
+                between.ger(*weight, &away, &away, 1.0);
+            }
+            shift -= &expected;
+        }
+        let precise = spread.clone().cholesky()?.inverse();
+        let wide = (&spread + between * AT).cholesky()?.inverse();
+        let slope = &wide * &shift;
+        let constant = shift.dot(&slope) / 2.0;
+        let form = (precise - wide) / 2.0;
+        // Lᵀ·L of the form with its rows and columns in reverse is a lower triangle again once it is reversed.
+        let reversed = DMatrix::from_fn(count, count, |a, b| {
+            let (a, b) = (count - 1 - a, count - 1 - b);
+            (form[(a, b)] + form[(b, a)]) / 2.0
+        });
+        let factor = reversed.cholesky()?.l();
+        let weights =
+            DMatrix::from_fn(count, count, |a, b| if b > a { 0.0 } else { factor[(count - 1 - b, count - 1 - a)] });
+        Some(Fit { rivals, mean: expected, slope, weights, constant })
+    }
+
+    /// The rivals of an object: all others, or those whose evidence is nearest to its own; the background always.
+    fn rivals(&self, leader: usize, without: Option<usize>) -> Vec<usize> {
+        let mut rivals: Vec<usize> =
+            (0..self.objects).filter(|&other| other != leader && Some(other) != without).collect();
+        if rivals.len() > FitTest::MOST_RIVALS {
+            let mean = &self.of[leader].0;
+            let ahead = |&rival: &usize| if rival >= self.known { f64::INFINITY } else { mean[rival] };
+            rivals.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
+            rivals.truncate(FitTest::MOST_RIVALS);
+            rivals.sort_unstable();
+        }
+        rivals
+    }
+}
+
+/// The fit of every known object; none if one has none.
+pub(super) fn fits(moments: &Moments, without: Option<usize>) -> Option<Vec<Fit>> {
+    let fits: Option<Vec<Fit>> =
+        (0..moments.known).map(|object| moments.fit(object, without.filter(|other| *other != object))).collect();
+    fits.filter(|fits| fits.iter().all(|fit| !fit.rivals.is_empty()))
+}
+
+impl Fit {
+    /// How badly evidence of so many touches fits, in nats.
+    pub(super) fn misfit(&self, evidence: &[f64], leader: usize, touches: u32) -> f64 {
+        let count = f64::from(touches);
+        let against =
+            self.rivals.iter().zip(self.mean.iter()).map(|(&r, mean)| evidence[r] - evidence[leader] - count * mean);
+        let against = DVector::from_iterator(self.rivals.len(), against);
+        (&self.weights * &against).norm_squared() / count + self.slope.dot(&against) - count * self.constant
+    }
+}
+
+/// For each known object, and each number of touches up to `last`, the share of its sequences that are found out when
+/// the model does not use its column: at a level of misfit of `threshold`.
+pub(super) fn left_out(moments: &Moments, rows: &[&[i32]], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
+    let of = |stranger: usize| {
+        let objects = moments.objects;
+        // With two objects, none is left that could be told from the other.
+        let Some(fits) = fits(moments, Some(stranger)) else { return vec![0.0; last as usize] };
+        let mut found = vec![0_usize; last as usize];
+        let sequences = rows[stranger].chunks_exact(objects * last as usize);
+        let count = sequences.len();
+        for sequence in sequences {
+            let mut evidence = vec![0.0; objects];
+            for (touches, row) in (1..=last).zip(sequence.chunks_exact(objects)) {
+                evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += f64::from(margin) * unit);
+                let known = (0..moments.known).filter(|&object| object != stranger);
+                let Some(leader) =
+                    known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best })
+                else {
+                    break;
+                };
+                if touches >= FIRST && fits[leader].misfit(&evidence, leader, touches) - early(touches) > threshold {
+                    found.iter_mut().skip(touches as usize - 1).for_each(|found| *found += 1);
+                    break;
+                }
+            }
+        }
+        found.into_iter().map(|found| found as f64 / count.max(1) as f64).collect()
+    };
+    (0..moments.known).into_par_iter().map(of).collect()
+}

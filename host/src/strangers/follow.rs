@@ -1,0 +1,153 @@
+//! Sequences of touches, and how badly they fit at each look.
+
+use super::{EARLY, FIRST, HALVED_AFTER, NAT};
+use crate::random::{self, Purpose};
+use palpate_onboard::{Model, Stopping};
+use rand::seq::SliceRandom;
+use rayon::prelude::*;
+
+/// Where sequences end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Until {
+    /// After so many touches.
+    Touches(u32),
+    /// Where a name would be given at a threshold of misfit at this level, in nats; at the limit of touches at the latest.
+    Named { level: f64 },
+}
+
+/// How sequences are followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Policy {
+    pub(super) until: Until,
+    /// Touches from which on names are given.
+    pub(super) least: u32,
+}
+
+impl Policy {
+    /// The number of touches that all sequences have; without meaning where they end at a name.
+    pub(super) fn last(&self) -> u32 {
+        match self.until {
+            Until::Touches(touches) => touches,
+            Until::Named { .. } => u32::MAX,
+        }
+    }
+}
+
+/// What is known at a look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Look {
+    /// The misfit of the leading object less what is allowed at first, in nats; infinitely small before the first test.
+    level: f64,
+    /// Whether the leading object's posterior has passed the model's threshold.
+    is_decided: bool,
+}
+
+/// One sequence of a known object's touches.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Sequence(Vec<Look>);
+
+/// How a sequence ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct End {
+    pub(super) is_alarm: bool,
+    pub(super) touches: u64,
+}
+
+impl Sequence {
+    /// How it ends with these limits of misfit and names from `least` touches on.
+    pub(super) fn end(&self, threshold: f64, doubt: f64, least: u32) -> End {
+        for (look, touches) in self.0.iter().zip(1_u64..) {
+            if look.level > threshold {
+                return End { is_alarm: true, touches };
+            }
+            if touches >= u64::from(least) && look.is_decided && look.level <= doubt {
+                return End { is_alarm: false, touches };
+            }
+        }
+        End { is_alarm: false, touches: self.0.len() as u64 }
+    }
+
+    /// The touches after which it ends without a test.
+    pub(super) fn decided_after(&self) -> u32 {
+        self.0.iter().position(|look| look.is_decided).map_or(self.0.len(), |at| at + 1) as u32
+    }
+
+    /// The highest level up to the last look.
+    fn highest(&self) -> f64 {
+        self.0.iter().map(|look| look.level).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// Puts touches in a random order.
+pub(super) fn shuffle<T>(touches: &mut [T], name: &str, seed: u64) {
+    touches.shuffle(&mut random::generator(seed, Purpose::Fit, name, 0));
+}
+
+/// What is allowed after so many touches beyond the threshold, in nats.
+pub(super) fn early(touches: u32) -> f64 {
+    EARLY * libm::exp2(-f64::from(touches) / HALVED_AFTER)
+}
+
+/// Follows as many sequences of each object as its touches allow, each touch in one only, at most `most` of all
+/// together. A sequence that the touches end in is left out.
+pub(super) fn sequences(model: &Model<'_>, supplies: &[&[i32]], policy: &Policy, most: usize) -> Vec<Vec<Sequence>> {
+    let objects = model.object_count();
+    let of_each = most.div_ceil(supplies.len().max(1));
+    let limit = match policy.until {
+        Until::Touches(touches) => touches,
+        Until::Named { .. } => Stopping::from_model(model).max_touches(),
+    };
+    let of = |rows: &&[i32]| {
+        let mut rows = rows.chunks_exact(objects);
+        let mut all = Vec::new();
+        while all.len() < of_each {
+            match one(model, &mut rows, policy, limit) {
+                Some(sequence) => all.push(sequence),
+                None => break,
+            }
+        }
+        all
+    };
+    supplies.par_iter().map(of).collect()
+}
+
+fn one<'r>(
+    model: &Model<'_>,
+    rows: &mut impl Iterator<Item = &'r [i32]>,
+    policy: &Policy,
+    limit: u32,
+) -> Option<Sequence> {
+    let mut evidence: Vec<i64> = (0..model.object_count()).map(|object| model.prior(object).into()).collect();
+    let mut looks = Vec::new();
+    for touches in 1..=limit {
+        evidence.iter_mut().zip(rows.next()?).for_each(|(sum, &margin)| *sum += i64::from(margin));
+        let misfit = model.misfit(&evidence, touches).filter(|_| touches >= FIRST);
+        let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
+        let look = Look { level, is_decided: is_decided(model, &evidence) };
+        looks.push(look);
+        match policy.until {
+            Until::Named { level } if touches >= policy.least && look.is_decided && look.level <= level => break,
+            _ => {}
+        }
+    }
+    Some(Sequence(looks))
+}
+
+/// Whether the leader's posterior passes the model's threshold.
+fn is_decided(model: &Model<'_>, evidence: &[i64]) -> bool {
+    let known = 0..model.known_count();
+    let leader = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best }).unwrap_or(0);
+    let ahead = |other: i64| (other - evidence[leader]) as f64 * f64::from(model.unit());
+    let others = evidence.iter().enumerate().filter(|(object, _)| *object != leader);
+    let rivals: f64 = others.map(|(_, &other)| ahead(other).exp()).sum();
+    rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56)
+}
+
+/// The level that this share of sequences stays at or below, each object weighted equally.
+pub(super) fn quantile(sequences: &[Vec<Sequence>], share: f64) -> f64 {
+    let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
+    let mut levels: Vec<f64> = sequences.iter().flat_map(|of| of.iter().take(fewest)).map(Sequence::highest).collect();
+    levels.sort_unstable_by(f64::total_cmp);
+    let position = (levels.len() as f64 * share).floor() as usize;
+    levels.get(position.min(levels.len().saturating_sub(1))).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,110 @@
+//! Objects that a model does not know: from shapes to figures, as a user does it.
+
+use crate::{command, stderr, stdout};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Output;
+
+/// Touches of objects that bend by up to so many microseconds; other seeds are other touches.
+fn touches(directory: &Path, objects: &[(&str, u64)], count: u64, seed: u64) {
+    std::fs::create_dir(directory).unwrap();
+    for &(name, most) in objects {
+        // A small generator, so that sequences are not in any order.
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ most;
+        let mut random = |range: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % range
+        };
+        let text = (0..count).fold(String::new(), |mut text, _| {
+            let (slope, bend) = (random(300_000), random(most) / 2 + random(most) / 2);
+            let times = [0, slope / 2 + bend, slope].map(|micros| micros as f64 * 1e-6);
+            _ = writeln!(text, "{:.6} {:.6} {:.6}", times[0], times[1], times[2]);
+            text
+        });
+        std::fs::write(directory.join(format!("{name}.txt")), text).unwrap();
+    }
+}
+
+const KNOWN: [(&str, u64); 2] = [("bowl", 100_000), ("fork", 200_000)];
+const SHAPES: [(&str, u64); 3] = [("shape-a", 50_000), ("shape-b", 400_000), ("shape-c", 700_000)];
+
+fn palpate(directory: &Path, arguments: &[&str]) -> Output {
+    command(arguments).current_dir(directory).output().unwrap()
+}
+
+fn succeeds(directory: &Path, arguments: &[&str]) -> String {
+    stdout(palpate(directory, arguments))
+}
+
+#[test]
+fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    touches(&at.join("data"), &KNOWN, 3_000, 1);
+    touches(&at.join("shapes"), &SHAPES, 2_000, 1);
+    touches(&at.join("fresh"), &KNOWN, 40_000, 2);
+    touches(&at.join("unseen"), &KNOWN, 4_000, 3);
+    touches(&at.join("others"), &[("kettle", 550_000)], 4_000, 3);
+    let trained =
+        succeeds(at, &["train", "data", "-o", "e.json", "--rounds", "10", "--background", "shapes", "--json"]);
+    let trained: Value = serde_json::from_str(&trained).unwrap();
+    assert_eq!(trained["objects"], 2, "a background is no object");
+    succeeds(at, &["export", "e.json", "-o", "m.palpate"]);
+    let wanted = ["--strangers", "certain", "--background", "shapes", "--json"];
+    let calibrated = succeeds(at, &[&["calibrate", "m.palpate", "fresh", "-o", "c.palpate"][..], &wanted].concat());
+    let calibrated: Value = serde_json::from_str(&calibrated).unwrap();
+    assert_eq!(calibrated["strangers"]["held"], "certain");
+    assert!(calibrated["strangers"]["false_alarms"].as_f64().unwrap() <= 0.02, "{calibrated}");
+
+    let arguments = ["evaluate", "c.palpate", "unseen", "--strangers", "others", "--json"];
+    let figures: Value = serde_json::from_str(&succeeds(at, &arguments)).unwrap();
+    let strangers = &figures["strangers"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    assert!(number(&strangers["false_alarms"]) < 0.03, "{strangers}");
+    assert!(number(&strangers["detected"]["120"]) > 0.9 && number(&strangers["wrong_name"]) < 0.05, "{strangers}");
+    assert!(strangers["detected"]["30"].is_number() && strangers["detected"]["60"].is_number());
+    assert!(succeeds(at, &arguments[..5]).contains("kettle"));
+
+    // Line by line: the stranger's first verdict is unknown, and never the background's name.
+    let verdicts = succeeds(at, &["recognize", "c.palpate", "others/kettle.txt", "--json"]);
+    assert!(!verdicts.contains("background"));
+    let first = verdicts.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let first = first.map(|line| line["verdict"].as_str().unwrap().to_owned()).find(|verdict| verdict != "undecided");
+    assert_eq!(first.as_deref(), Some("unknown"));
+
+    let inspected: Value = serde_json::from_str(&succeeds(at, &["inspect", "c.palpate", "--json"])).unwrap();
+    assert_eq!((&inspected["background"], &inspected["strangers"]["held"]), (&true.into(), &"certain".into()));
+    assert_eq!(inspected["objects"].as_array().unwrap().len(), 2);
+    assert!(succeeds(at, &["inspect", "c.palpate"]).contains("strangers"));
+}
+
+#[test]
+fn a_known_object_is_no_stranger_and_says_so() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    touches(&at.join("data"), &KNOWN, 400, 1);
+    succeeds(at, &["train", "data", "-o", "e.json", "--rounds", "3"]);
+    let message = stderr(palpate(at, &["evaluate", "e.json", "data", "--strangers", "data"]), 1);
+    assert!(message.contains("data: the model knows the object bowl"), "{message}");
+    succeeds(at, &["export", "e.json", "-o", "m.palpate"]);
+    let arguments = ["calibrate", "m.palpate", "data", "-o", "c.palpate", "--strangers", "maybe"];
+    assert!(stderr(palpate(at, &arguments), 2).contains("off, likely, certain"));
+    assert!(!at.join("c.palpate").exists());
+}
+
+#[test]
+fn a_background_that_was_captured_otherwise_is_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    touches(&at.join("data"), &KNOWN, 400, 1);
+    touches(&at.join("shapes"), &SHAPES, 400, 1);
+    std::fs::write(at.join("shapes/partial.txt"), "0 - 0.1\n".repeat(100)).unwrap();
+    let message = stderr(palpate(at, &["train", "data", "-o", "e.json", "--background", "shapes"]), 1);
+    assert!(message.contains("approaches") && message.contains("palpate capture background"), "{message}");
+    touches(&at.join("named"), &[("background", 100_000), ("fork", 200_000)], 400, 1);
+    std::fs::remove_file(at.join("shapes/partial.txt")).unwrap();
+    let message = stderr(palpate(at, &["train", "named", "-o", "e.json", "--background", "shapes"]), 1);
+    assert!(message.contains("called background"), "{message}");
+    assert!(!at.join("e.json").exists());
+}

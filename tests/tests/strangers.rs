@@ -1,0 +1,154 @@
+//! Tests of fit in models: bytes that make no sense are refused, and those that pass can be walked.
+
+use palpate::compile::{Settings, compile};
+use palpate_onboard::{Fit, Model, Recognizer, Rivals, Stopping, Verdict};
+use palpate_shared::Descriptor;
+use palpate_shared::format::{FitTerms, Held, ObjectFit, Strangers, Tag};
+use palpate_tests::random::{self, Shape};
+
+const OBJECTS: usize = 4;
+
+fn model() -> Vec<u8> {
+    let descriptor = Descriptor::Curvature;
+    let shape = Shape { descriptor, objects: OBJECTS, trees: 4, depth: 3, each: true, thresholds: 6, leaf: 1.0 };
+    compile(&random::ensemble(shape, 5), &Settings::default()).unwrap().bytes
+}
+
+const TERMS: FitTerms = FitTerms {
+    held: Held::Likely,
+    rivals: 3,
+    first: 1,
+    least: 3,
+    threshold: 0,
+    early: 0,
+    doubt: 0,
+    halving: 0,
+    alarms: 20_000,
+    sequences: 1_000,
+    confidence: 950_000,
+};
+
+/// A section in which every number of every record is the same.
+fn section(terms: FitTerms, background: bool, shift: u8, constant: i32, number: i16) -> Vec<u8> {
+    let mut bytes = Strangers::header(background, true).to_vec();
+    bytes.extend(terms.to_bytes());
+    for object in 0..OBJECTS as u8 - u8::from(background) {
+        let rivals: Vec<u8> = (0..OBJECTS as u8).filter(|&rival| rival != object).collect();
+        let numbers = (0..12).map(|_| number);
+        ObjectFit::write([shift; 3], constant, &rivals, numbers, &mut |part| bytes.extend_from_slice(part));
+    }
+    bytes
+}
+
+fn with(model: &[u8], section: Vec<u8>) -> Result<Vec<u8>, palpate::Error> {
+    use palpate::compile::{Restated, restate};
+    let restated = Restated { sections: vec![(Tag::Strangers, Some((true, section)))], ..Restated::default() };
+    restate(&Model::new(model).unwrap(), &restated)
+}
+
+#[test]
+fn nothing_overflows_at_any_numbers_and_any_evidence() {
+    let bytes = model();
+    for shift in [0, 1, 20, 40] {
+        for constant in [i32::MIN, -1, 0, i32::MAX] {
+            for number in [i16::MIN, -1, 0, i16::MAX] {
+                let terms = FitTerms { threshold: i32::MAX, doubt: i32::MAX, early: i32::MAX as u32, ..TERMS };
+                let bytes = with(&bytes, section(terms, shift == 1, shift, constant, number)).unwrap();
+                let model = Model::new(&bytes).unwrap();
+                for evidence in [[0; 4], [i64::MAX, i64::MIN, 0, -1], [i64::MIN; 4], [i64::MAX, 1 << 40, -(1 << 31), 7]]
+                {
+                    for touches in [0, 1, 2, 1_000, u32::MAX] {
+                        assert!(model.misfit(&evidence, touches).is_some());
+                    }
+                }
+                assert!(model.misfit(&[], 1).is_some());
+                let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
+                for margins in [[i32::MAX, i32::MIN, 0, 1], [i32::MIN; 4], [1, 2, 3, 1 << 30]] {
+                    recognizer.push_margins(&margins);
+                    recognizer.fit();
+                    recognizer.posterior(0);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_name_waits_for_enough_touches_and_a_stranger_for_none_after_the_first_look() {
+    let bytes = model();
+    // Nothing fits better or worse than anything else: the misfit is always 0.
+    let neutral = |threshold: i32, doubt: i32| {
+        let terms = FitTerms { first: 2, least: 4, threshold, doubt, ..TERMS };
+        with(&bytes, section(terms, false, 0, 0, 0)).unwrap()
+    };
+    let verdicts = |bytes: &[u8]| {
+        let model = Model::new(bytes).unwrap();
+        let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model).with_max_touches(6)).unwrap();
+        (0..6).map(|_| recognizer.push_margins(&[1 << 28, 0, 0, 0])).collect::<Vec<_>>()
+    };
+    use Verdict::{GaveUp, Recognized, Undecided, Unknown};
+    let named = Recognized { object: 0, touches: 4, rivals: Rivals::from_q56(0) };
+    assert_eq!(verdicts(&neutral(0, 0)), [Undecided, Undecided, Undecided, named, named, named]);
+    assert_eq!(verdicts(&neutral(-1, -1)), [Undecided, Unknown, Unknown, Unknown, Unknown, Unknown]);
+    assert_eq!(verdicts(&neutral(0, -1)), [Undecided, Undecided, Undecided, Undecided, Undecided, GaveUp]);
+    let model = neutral(-1, -1);
+    let model = Model::new(&model).unwrap();
+    let recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
+    assert_eq!(recognizer.fit(), Fit::Fits, "nothing was touched yet");
+}
+
+#[test]
+fn a_background_with_more_evidence_than_any_object_lets_none_be_named() {
+    let bytes = with(&model(), Strangers::header(true, false).to_vec()).unwrap();
+    let model = Model::new(&bytes).unwrap();
+    assert_eq!((model.known_count(), model.background()), (3, Some(3)));
+    let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
+    for _ in 0..3 {
+        assert_eq!(recognizer.push_margins(&[1 << 24, 0, 0, 1 << 28]), Verdict::Undecided);
+        assert_eq!((recognizer.best(), recognizer.rivals()), (0, u64::MAX));
+    }
+    // As a rival it counts as any other.
+    recognizer.reset();
+    assert!(matches!(recognizer.push_margins(&[1 << 28, 0, 0, 0]), Verdict::Recognized { object: 0, .. }));
+}
+
+#[test]
+fn verdicts_survive_a_snapshot() {
+    let bytes = with(&model(), section(FitTerms { threshold: -1, doubt: -1, ..TERMS }, false, 0, 0, 0)).unwrap();
+    let model = Model::new(&bytes).unwrap();
+    let stopping = Stopping::from_model(&model);
+    let mut recognizer = Recognizer::<4>::new(&model, stopping).unwrap();
+    recognizer.push_margins(&[0; 4]);
+    assert_eq!(recognizer.verdict(), Verdict::Unknown);
+    let mut buffer = [0; 80];
+    let snapshot = recognizer.snapshot(&mut buffer).unwrap();
+    let mut other = Recognizer::<4>::new(&model, stopping).unwrap();
+    other.restore(snapshot).unwrap();
+    assert_eq!(other.verdict(), Verdict::Unknown);
+    let plain = self::model();
+    let plain = Model::new(&plain).unwrap();
+    let mut recognizer = Recognizer::<4>::new(&plain, Stopping::from_model(&plain).with_max_touches(1)).unwrap();
+    recognizer.push_margins(&[0; 4]);
+    let snapshot = recognizer.snapshot(&mut buffer).unwrap();
+    let mut other = Recognizer::<4>::new(&plain, stopping).unwrap();
+    other.restore(snapshot).unwrap();
+    assert_eq!(other.verdict(), Verdict::GaveUp);
+}
+
+#[test]
+fn a_changed_byte_of_the_section_is_refused_or_can_be_walked() {
+    let bytes = model();
+    let original = section(TERMS, true, 3, 5, 77);
+    for position in 0..original.len() {
+        for wrong in [0, 1, 16, 127, 255] {
+            let mut section = original.clone();
+            section[position] = wrong;
+            let Ok(bytes) = with(&bytes, section) else { continue };
+            let model = Model::new(&bytes).unwrap();
+            let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
+            for touch in random::touches(8, 3) {
+                _ = recognizer.push(&touch);
+            }
+        }
+    }
+}
