@@ -19,6 +19,7 @@
  * Before the #include may be defined:
  *   PALPATE_LAYOUTS      which layouts are read, as PALPATE_COMPACT | PALPATE_COMPLETE; all of them by default
  *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
+ *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default. 8 bytes of state, and 4 of stack, for each
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
  *   PALPATE_API          instead of `static inline`
@@ -45,6 +46,9 @@
 #endif
 #ifndef PALPATE_LEAVES
 #define PALPATE_LEAVES 7
+#endif
+#ifndef PALPATE_STRANGERS
+#define PALPATE_STRANGERS 1
 #endif
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 32
@@ -116,7 +120,7 @@ typedef enum {
 typedef enum {
     PALPATE_UNDECIDED = 0,
     PALPATE_RECOGNIZED, /* an object, until the reset */
-    PALPATE_UNKNOWN,    /* the touches fit no object: only of models with a test of fit, which this header refuses */
+    PALPATE_UNKNOWN,    /* the touches fit no object that the model knows, until the reset: by a test of fit */
     PALPATE_GAVE_UP     /* the limit of touches was reached, until the reset */
 } palpate_verdict;
 
@@ -138,9 +142,11 @@ typedef struct {
     const uint8_t *part_[8]; /* starts of text, sections, margins, axes, groups, splits, leaves, checksum */
     const uint8_t *cuts_;    /* thresholds of the axes */
     const uint8_t *odds_;    /* thresholds by object, or NULL */
+    const uint8_t *strangers_; /* what it states of objects that it does not know, or NULL */
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
-    uint16_t objects;        /* 1 to 256 */
+    uint16_t objects;        /* that there are margins for, 1 to 256 */
+    uint16_t known;          /* that can be named: all, or all but the last, a background */
     uint16_t features;       /* of a row, 1 to 256 */
     uint8_t layout_;
     uint8_t leaf_;
@@ -274,6 +280,50 @@ static inline int palpate_trained_(palpate_model *model, const uint8_t *content)
     return 1;
 }
 
+/* Bytes of an object's record in a test of fit with so many rivals. */
+static inline uint32_t palpate_record_(uint32_t rivals)
+{
+    return (8 + rivals + (rivals & 1) + 4 * rivals + rivals * (rivals + 1) + 3) & ~(uint32_t)3;
+}
+
+/* A background, and a test of fit; 0 if they make no sense. */
+static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *content, uint32_t length)
+{
+    const uint8_t *record = content + 44;
+    uint32_t rivals, size, first;
+    uint_fast16_t object;
+    if (length < 4 || PALPATE_BYTE(content) > 1 || PALPATE_BYTE(content + 1) > 1 || model->objects == PALPATE_BYTE(content)) {
+        return 0;
+    }
+    model->strangers_ = content;
+    model->known = (uint16_t)(model->objects - PALPATE_BYTE(content));
+    if (PALPATE_BYTE(content + 1) == 0) {
+        return 1;
+    }
+    if (length < 44) {
+        return 0;
+    }
+    rivals = PALPATE_BYTE(content + 5);
+    size = palpate_record_(rivals);
+    first = palpate_u32_(content + 8);
+    if (PALPATE_BYTE(content + 4) - 1u > 1 || rivals - 1 > 15 || first == 0 || palpate_u32_(content + 12) < first ||
+        (int32_t)palpate_u32_(content + 24) > (int32_t)palpate_u32_(content + 16) || palpate_u32_(content + 20) >> 31 != 0 ||
+        size * model->known > length - 44) {
+        return 0;
+    }
+    for (object = 0; object < model->known; object++) {
+        uint_fast8_t i;
+        for (i = 0; i < 8 + rivals; i++) {
+            const uint8_t byte = PALPATE_BYTE(record + i);
+            if (i < 3 ? byte > 40 : i >= 8 && byte >= model->objects) {
+                return 0;
+            }
+        }
+        record += size;
+    }
+    return 1;
+}
+
 /* Sections that are whole, in order, valid, and understood where they must be. */
 static inline palpate_error palpate_check_sections_(palpate_model *model)
 {
@@ -317,7 +367,11 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
             least = 4 + pairs * 26 * least;
             break;
         default:
-            if (tag != last) {
+            if (PALPATE_STRANGERS && last == 6) {
+                if (!palpate_check_strangers_(model, content, length)) {
+                    return PALPATE_FIELD;
+                }
+            } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
         }
@@ -578,6 +632,8 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
         return palpate_wrong_(model, PALPATE_NOT_BUILT_IN, bytes + 7);
     }
     model->odds_ = NULL;
+    model->strangers_ = NULL;
+    model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
     model->needs_pose = (uint8_t)(model->descriptor < 7 && (0x6cu >> model->descriptor & 1) != 0);
@@ -1109,16 +1165,37 @@ static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uin
     return units * palpate_u32_(bytes + 36) >> (PALPATE_BYTE(bytes + 40) & 63);
 }
 
-/* The object with the most evidence; the first of several. */
-PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
+/* Of the first objects, the one with the most evidence; the first of several. */
+static inline uint_fast16_t palpate_leader_(const palpate_recognizer *recognizer, uint_fast16_t count)
 {
     uint_fast16_t best = 0, i;
-    for (i = 1; i < recognizer->model->objects; i++) {
+    for (i = 1; i < count; i++) {
         if (recognizer->evidence[i] > recognizer->evidence[best]) {
             best = i;
         }
     }
-    return (uint16_t)best;
+    return best;
+}
+
+/* Of the objects that can be named, the one with the most evidence; the first of several. */
+PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
+{
+    return (uint16_t)palpate_leader_(recognizer, recognizer->model->known);
+}
+
+/* The prior of an object, in units. */
+static inline int32_t palpate_prior_(const palpate_model *model, uint_fast16_t object)
+{
+    return (int32_t)palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * ((size_t)model->objects + object));
+}
+
+/* A sum that stays within 64 bits. */
+static inline int64_t palpate_add_(int64_t a, int64_t b)
+{
+    if (b >= 0) {
+        return a > INT64_MAX - b ? INT64_MAX : a + b;
+    }
+    return a < INT64_MIN - b ? INT64_MIN : a + b;
 }
 
 /* Forgets all touches, for the next object. Whoever expects some objects more often than others can set `evidence`
@@ -1131,7 +1208,7 @@ PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
     recognizer->verdict = PALPATE_UNDECIDED;
     recognizer->object = 0;
     for (i = 0; i < model->objects; i++) {
-        recognizer->evidence[i] = (int32_t)palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * ((size_t)model->objects + i));
+        recognizer->evidence[i] = palpate_prior_(model, i);
     }
 }
 
@@ -1152,43 +1229,147 @@ PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_
     return PALPATE_OK;
 }
 
+/* A difference that stays within 64 bits. */
+static inline int64_t palpate_subtract_(int64_t a, int64_t b)
+{
+    if (b >= 0) {
+        return a < INT64_MIN + b ? INT64_MIN : a - b;
+    }
+    return a > INT64_MAX + b ? INT64_MAX : a - b;
+}
+
+/* Within 2^31 - 1. */
+static inline int32_t palpate_held_(int64_t number)
+{
+    return number > INT32_MAX ? INT32_MAX : number < -INT32_MAX ? -INT32_MAX : (int32_t)number;
+}
+
+/* Divided by a power of two, rounded down. */
+static inline int64_t palpate_down_(int64_t number, uint8_t shift)
+{
+    return number >= 0 ? number >> shift : -1 - ((-1 - number) >> shift);
+}
+
+static inline int32_t palpate_i16_(const uint8_t *p)
+{
+    const int16_t number = (int16_t)palpate_u16_(p);
+    return number;
+}
+
+/* The evidence for an object without its prior; `is_there` becomes 0 for one that cannot be there, of which nothing is
+ * known. */
+static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fast16_t object, int *is_there)
+{
+    const int64_t sum = recognizer->evidence[object];
+    *is_there = *is_there && sum > INT64_MIN / 2;
+    return palpate_subtract_(sum, palpate_prior_(recognizer->model, object));
+}
+
+/* How badly the touches fit the leader, in 2^-16 nats, by the model's test. */
+static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
+{
+    const uint8_t *test = recognizer->model->strangers_;
+    const uint_fast8_t rivals = PALPATE_BYTE(test + 5);
+    const uint8_t *record = test + 44 + (size_t)(palpate_record_(rivals) * leader);
+    const uint8_t *means = record + 8 + rivals + (rivals & 1), *slopes = means + 2 * rivals, *weights = slopes + 2 * rivals;
+    int32_t ahead[16];
+    uint64_t squares = 0;
+    int64_t slope = 0;
+    uint_fast8_t row, column;
+    for (row = 0; row < rivals; row++) {
+        int is_there = 1;
+        const int64_t rival = palpate_own_(recognizer, PALPATE_BYTE(record + 8 + row), &is_there);
+        const int64_t own = palpate_own_(recognizer, leader, &is_there);
+        int64_t mean = (int64_t)palpate_i16_(means + 2 * row) * ((int64_t)1 << PALPATE_BYTE(record));
+        const uint64_t size = mean < 0 ? 0u - (uint64_t)mean : (uint64_t)mean;
+        if (size > (uint64_t)INT64_MAX / recognizer->touches) {
+            mean = mean < 0 ? INT64_MIN : INT64_MAX;
+        } else {
+            mean *= recognizer->touches;
+        }
+        ahead[row] = is_there ? palpate_held_(palpate_subtract_(palpate_subtract_(rival, own), mean)) : 0;
+    }
+    for (row = 0; row < rivals; row++) {
+        int64_t sum = 0;
+        uint64_t square;
+        for (column = 0; column <= row; column++) {
+            sum += (int64_t)palpate_i16_(weights) * ahead[column];
+            weights += 2;
+        }
+        sum = palpate_held_(palpate_down_(sum, PALPATE_BYTE(record + 1)));
+        square = (uint64_t)(sum * sum);
+        squares = squares > UINT64_MAX - square ? UINT64_MAX : squares + square;
+        slope += (int64_t)palpate_i16_(slopes + 2 * row) * ahead[row];
+    }
+    squares /= recognizer->touches;
+    slope = palpate_add_(squares > INT64_MAX ? INT64_MAX : (int64_t)squares, palpate_down_(slope, PALPATE_BYTE(record + 2)));
+    return palpate_subtract_(slope, (int64_t)(int32_t)palpate_u32_(record + 4) * recognizer->touches);
+}
+
+/* Whether the leader may be named by the model's test of fit: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
+static inline palpate_verdict palpate_fit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
+{
+    const palpate_model *model = recognizer->model;
+    const uint8_t *test = model->strangers_;
+    const uint32_t touches = recognizer->touches;
+    int64_t misfit;
+    if (test == NULL) {
+        return PALPATE_RECOGNIZED;
+    }
+    if (PALPATE_BYTE(test + 1) != 0) {
+        if (touches < palpate_u32_(test + 8)) {
+            return PALPATE_UNDECIDED;
+        }
+        /* Limits are higher at first. */
+        misfit = (int64_t)(palpate_u32_(test + 20) * (palpate_exp2((uint64_t)touches * palpate_u32_(test + 28)) >> 24) >> 32);
+        misfit = palpate_subtract_(palpate_misfit_(recognizer, leader), misfit);
+        if (misfit > (int32_t)palpate_u32_(test + 16)) {
+            return PALPATE_UNKNOWN;
+        }
+        if (touches < palpate_u32_(test + 12) || misfit > (int32_t)palpate_u32_(test + 24)) {
+            return PALPATE_UNDECIDED;
+        }
+    }
+    if (model->known != model->objects && recognizer->evidence[model->known] > recognizer->evidence[leader]) {
+        return PALPATE_UNDECIDED; /* the background has more */
+    }
+    return PALPATE_RECOGNIZED;
+}
+
 /* Takes in a touch or row by its margins. */
 PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins)
 {
     const palpate_model *model = recognizer->model;
     uint64_t left = recognizer->odds;
+    palpate_verdict verdict = PALPATE_RECOGNIZED;
     uint_fast16_t best, i;
     if (recognizer->verdict != PALPATE_UNDECIDED) {
         return;
     }
     for (i = 0; i < model->objects; i++) {
-        const int64_t before = recognizer->evidence[i], margin = margins[i];
-        int64_t after;
-        if (margin >= 0) {
-            after = before > INT64_MAX - margin ? INT64_MAX : before + margin;
-        } else {
-            after = before < INT64_MIN - margin ? INT64_MIN : before + margin;
-        }
-        recognizer->evidence[i] = after;
+        recognizer->evidence[i] = palpate_add_(recognizer->evidence[i], margins[i]);
     }
     recognizer->touches += recognizer->touches != UINT32_MAX;
     best = palpate_best(recognizer);
+    if (PALPATE_STRANGERS) {
+        verdict = palpate_fit_(recognizer, best);
+    }
     if (recognizer->by_object != 0 && model->odds_ != NULL) {
         left = (uint64_t)palpate_u32_(model->odds_ + 4 * (size_t)best) << 24;
     }
-    for (i = 0; i < model->objects; i++) {
+    for (i = 0; verdict == PALPATE_RECOGNIZED && i < model->objects; i++) {
         if (i != best) {
             const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i));
             if (weight > left) {
-                if (recognizer->touches >= recognizer->max_touches) {
-                    recognizer->verdict = PALPATE_GAVE_UP;
-                }
-                return;
+                verdict = PALPATE_UNDECIDED;
             }
             left -= weight;
         }
     }
-    recognizer->verdict = PALPATE_RECOGNIZED;
+    if (verdict == PALPATE_UNDECIDED && recognizer->touches >= recognizer->max_touches) {
+        verdict = PALPATE_GAVE_UP;
+    }
+    recognizer->verdict = (uint8_t)verdict;
     recognizer->object = (uint8_t)best;
 }
 
@@ -1248,7 +1429,7 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
 {
     const palpate_model *model = recognizer->model;
     const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
-    const uint16_t best = palpate_best(recognizer);
+    const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
     uint32_t sharpness = 65536;
     uint64_t own = 0, others = 0, all;
     uint_fast16_t i;
@@ -1383,7 +1564,7 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     for (i = 0; i < model->objects; i++) {
         const uint64_t number = palpate_take_(snapshot, &at, length, 10, 1);
         const int64_t evidence = (int64_t)(number >> 1 ^ (0u - (number & 1)));
-        if (i == 0 || evidence > most) {
+        if (i == 0 || (evidence > most && i < model->known)) {
             most = evidence;
             best = i;
         }

@@ -2,7 +2,10 @@
 
 use palpate::compile::{Language, emit};
 use palpate_onboard::Model;
-use palpate_shared::format::{MUST_UNDERSTAND, OddsByObject, Plan, Section, Tag, Temperature, f32_key, write_section};
+use palpate_shared::format::{
+    FitTerms, Held, MUST_UNDERSTAND, ObjectFit, OddsByObject, Plan, Section, Strangers, Tag, Temperature, f32_key,
+    write_section,
+};
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use palpate_tests::replay::{Script, is_specified};
 use palpate_tests::sections::with_sections;
@@ -40,12 +43,51 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     let own = model.optional_sections().filter(|section| section.tag < Tag::ThresholdsByObject.code());
     own.for_each(|section| section.write(&mut put));
     write_section(Tag::ThresholdsByObject, true, &odds, &mut put);
+    let background = rng.random_bool(0.5) && objects > 1;
+    if rng.random_bool(0.7) {
+        write_section(Tag::Strangers, true, &strangers(objects, background, rng), &mut put);
+    }
     if objects > 1 {
         write_section(Tag::Plan, false, &plan, &mut put);
     }
     write_section(Tag::Temperature, false, &temperature.to_bytes(), &mut put);
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
     with_sections(bytes, &sections)
+}
+
+/// A background, and mostly a test of fit, with limits that some touches pass and some do not.
+fn strangers(objects: usize, background: bool, rng: &mut SmallRng) -> Vec<u8> {
+    let has_test = rng.random_bool(0.8);
+    let mut content = Strangers::header(background, has_test).to_vec();
+    if !has_test {
+        return content;
+    }
+    let rivals: u8 = rng.random_range(1..=16);
+    let first = rng.random_range(1..4);
+    let doubt = rng.random_range(-(1 << 20)..1 << 20);
+    let terms = FitTerms {
+        held: Held::Likely,
+        rivals,
+        first,
+        least: first + rng.random_range(0..3),
+        threshold: doubt + rng.random_range(0..1 << 20),
+        early: rng.random_range(0..1 << 20),
+        doubt,
+        halving: rng.random_range(0..u32::MAX),
+        alarms: 10_000,
+        sequences: 1_000,
+        confidence: 950_000,
+    };
+    content.extend(terms.to_bytes());
+    for _ in 0..objects - usize::from(background) {
+        let shifts = [rng.random_range(0..12), rng.random_range(8..24), rng.random_range(8..24)];
+        let own: Vec<u8> = (0..rivals).map(|_| rng.random_range(0..objects) as u8).collect();
+        let count = usize::from(rivals);
+        let numbers: Vec<i16> = (0..2 * count + count * (count + 1) / 2).map(|_| rng.random()).collect();
+        let constant = rng.random_range(-100_000..100_000);
+        ObjectFit::write(shifts, constant, &own, numbers.into_iter(), &mut |part| content.extend_from_slice(part));
+    }
+    content
 }
 
 /// A touch, now and then a partial one, or one at the limits of features.
@@ -204,7 +246,8 @@ fn touches_and_rows_give_the_bits_of_the_crate() {
     let counted = [count(&script, "touch"), count(&script, "features"), count(&script, "verdict")];
     println!("{counted:?} touches, features, verdicts; {} sums in f32", count(&script, "sums"));
     let verdicts = |verdict: &str| script.expected.lines().filter(|line| line.starts_with(verdict)).count();
-    let verdicts = ["verdict 0", "verdict 1", "verdict 2", "refused 1", "refused 2", "refused 3"].map(verdicts);
+    let verdicts =
+        ["verdict 0", "verdict 1", "verdict 2", "verdict 3", "refused 1", "refused 2", "refused 3"].map(verdicts);
     assert!(counted[0] >= 100_000 && counted[1] >= counted[0] + 100_000, "{counted:?}");
     assert!(verdicts.iter().all(|&count| count > 100), "{verdicts:?}");
 }
