@@ -50,6 +50,7 @@ fn c(model: &Model<'_>, name: &str) -> String {
     let guard = format!("{}_MODEL_H", name.to_uppercase());
     let layout = model.layout().name().to_uppercase();
     let leaf = model.leaf_type().name().to_uppercase();
+    let strangers = u8::from(model.strangers().is_some());
     let (objects, length) = (model.object_count(), model.bytes().len());
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
@@ -57,11 +58,12 @@ fn c(model: &Model<'_>, name: &str) -> String {
          /* What of palpate.h this model needs. For several models in one program: define these before including the first. */\n\
          #ifndef PALPATE_LAYOUTS\n#define PALPATE_LAYOUTS PALPATE_{layout}\n#endif\n\
          #ifndef PALPATE_LEAVES\n#define PALPATE_LEAVES PALPATE_{leaf}\n#endif\n\
+         #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
-         #if (PALPATE_LAYOUTS & PALPATE_{layout}) == 0 || (PALPATE_LEAVES & PALPATE_{leaf}) == 0 || PALPATE_MAX_OBJECTS < {objects}\n\
-         #error \"this model needs PALPATE_{layout} in PALPATE_LAYOUTS, PALPATE_{leaf} in PALPATE_LEAVES, and room for {objects} objects\"\n\
+         #if (PALPATE_LAYOUTS & PALPATE_{layout}) == 0 || (PALPATE_LEAVES & PALPATE_{leaf}) == 0 || \\\n    PALPATE_STRANGERS < {strangers} || PALPATE_MAX_OBJECTS < {objects}\n\
+         #error \"this model needs PALPATE_{layout} in PALPATE_LAYOUTS, PALPATE_{leaf} in PALPATE_LEAVES, PALPATE_STRANGERS {strangers} or more, and room for {objects} objects\"\n\
          #endif\n\n\
          /* palpate_open(&model, {name}_model, sizeof {name}_model) */\n\
          static const uint8_t {name}_model[{length}]\n\

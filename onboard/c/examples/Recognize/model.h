@@ -10,6 +10,9 @@
 #ifndef PALPATE_LEAVES
 #define PALPATE_LEAVES PALPATE_I8
 #endif
+#ifndef PALPATE_STRANGERS
+#define PALPATE_STRANGERS 0
+#endif
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 2
 #endif
@@ -19,8 +22,9 @@
 #endif
 #include "palpate.h"
 
-#if (PALPATE_LAYOUTS & PALPATE_COMPLETE) == 0 || (PALPATE_LEAVES & PALPATE_I8) == 0 || PALPATE_MAX_OBJECTS < 2
-#error "this model needs PALPATE_COMPLETE in PALPATE_LAYOUTS, PALPATE_I8 in PALPATE_LEAVES, and room for 2 objects"
+#if (PALPATE_LAYOUTS & PALPATE_COMPLETE) == 0 || (PALPATE_LEAVES & PALPATE_I8) == 0 || \
+    PALPATE_STRANGERS < 0 || PALPATE_MAX_OBJECTS < 2
+#error "this model needs PALPATE_COMPLETE in PALPATE_LAYOUTS, PALPATE_I8 in PALPATE_LEAVES, PALPATE_STRANGERS 0 or more, and room for 2 objects"
 #endif
 
 /* palpate_open(&model, model_model, sizeof model_model) */
