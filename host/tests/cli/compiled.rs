@@ -408,3 +408,23 @@ fn an_ensemble_trained_on_seconds_is_refused_at_export_with_its_feature() {
     assert!(message.contains("seconds.json: ") && message.contains("of curvature is neither whole"), "{message}");
     assert!(!place.path("seconds.palpate").exists());
 }
+
+#[test]
+fn export_emits_sources_beside_the_model_and_refuses_a_name_that_leaves_no_room_for_them() {
+    let place = Place::new();
+    let (ensemble, model) = (place.text("ensemble.json"), place.text("cup.palpate"));
+    let exported = json(&["export", &ensemble, "-o", &model, "--emit", "c,rust", "--json"]);
+    let sources: Vec<&str> =
+        exported["sources"].as_array().unwrap().iter().map(|path| path.as_str().unwrap()).collect();
+    assert_eq!(sources, [place.text("cup.h"), place.text("cup.rs")]);
+    let read = |name: &str| std::fs::read_to_string(place.path(name)).unwrap();
+    assert!(read("cup.h").contains(&format!("cup_model[{}]", std::fs::read(&model).unwrap().len())));
+    assert!(read("cup.rs").contains("pub static CUP:"));
+    assert_eq!(read("palpate.h"), palpate_onboard::C_HEADER);
+    for (output, language) in [("model.h", "c"), ("palpate.palpate", "c"), ("-", "rust"), ("model.palpate", "cobol")] {
+        let output = if output == "-" { output.to_owned() } else { place.text(output) };
+        let (code, message) = refusal(&["export", &ensemble, "-o", &output, "--emit", language]);
+        assert_eq!(code, 2, "{message}");
+    }
+    assert!(!place.path("model.h").exists() && !place.path("palpate.palpate").exists());
+}
