@@ -33,7 +33,7 @@ Examples:
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
   palpate export lightgbm.txt -o model.palpate --for speed
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
-  palpate export ensemble.json -o model.palpate --emit c    # also model.h and palpate.h")]
+  palpate export ensemble.json -o model.palpate --emit c  # also model.h")]
 pub(crate) struct Arguments {
     /// Ensemble that `palpate train` or another library saved
     ensemble: PathBuf,

@@ -1,7 +1,7 @@
 //! Where to touch next.
 
 use super::evidence::{Unit, best};
-use super::recognizer::{Recognizer, unit};
+use super::recognizer::{Recognizer, State, unit};
 use crate::model::Model;
 use palpate_shared::MOST_POSES;
 use palpate_shared::format::Plan;
@@ -29,16 +29,12 @@ impl<const N: usize> Recognizer<'_, N> {
     /// for ten objects and 104 poses), about ten instructions for each candidate, and a division. Stack: 4 bytes per pose,
     /// at most 416. Cannot fail.
     pub fn next_approach(&self, candidates: impl IntoIterator<Item = u16>) -> Option<Proposal> {
-        propose(self.model(), self.evidence(), candidates)
+        self.state().propose(self.model(), candidates)
     }
 }
 
 /// See [`Recognizer::next_approach`].
-pub(crate) fn propose(
-    model: &Model<'_>,
-    evidence: &[i64],
-    candidates: impl IntoIterator<Item = u16>,
-) -> Option<Proposal> {
+fn propose(model: &Model<'_>, evidence: &[i64], candidates: impl IntoIterator<Item = u16>) -> Option<Proposal> {
     let plan = model.plan()?;
     let mut scores = [0; MOST_POSES];
     let weights = add_up(&plan, evidence, unit(model), &mut scores);
@@ -57,6 +53,13 @@ pub(crate) fn propose(
 fn mean(sum: i32, weights: i32) -> i32 {
     let weights = weights.max(1);
     sum / weights * 256 + sum % weights * 256 / weights
+}
+
+impl<const N: usize> State<N> {
+    /// What [`propose`] proposes by the evidence so far: before the first touch, by the priors.
+    pub(crate) fn propose(&self, model: &Model<'_>, candidates: impl IntoIterator<Item = u16>) -> Option<Proposal> {
+        propose(model, self.evidence_or_priors(model, &mut [0; N]), candidates)
+    }
 }
 
 /// Adds up the separations of the object with the most evidence from each other one, times this one's weight in Q15, that

@@ -12,8 +12,6 @@ mod stopping;
 mod strangers;
 
 pub use approach::Proposal;
-#[cfg(feature = "station")]
-pub(crate) use approach::propose;
 pub use evidence::{Posterior, Rivals};
 pub use expected::NothingExpected;
 pub use exponential::exp2_negative;

@@ -84,6 +84,11 @@ impl<const N: usize> Recognizer<'_, N> {
             _ => return Err(SnapshotError::Damaged),
         };
         self.state_mut().set(evidence, touches, verdict);
+        // Without a touch, what was told of priors, or nothing at all.
+        let mut priors = self.model().priors().iter().map(|prior| i64::from(i32::from_le_bytes(*prior)));
+        if touches == 0 && evidence.iter().take(self.model().object_count()).all(|own| priors.next() == Some(*own)) {
+            self.reset();
+        }
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use super::record::{Record, Source, Staged, record_length};
 use super::storage::{NoStorage, Place, Storage};
-use crate::decide::{State, propose};
+use crate::decide::State;
 use crate::model::Opened;
 use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
 use core::fmt;
@@ -328,7 +328,7 @@ impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
         };
         let proposal = self.ask(|model, state| {
             let poses = model.plan()?.poses();
-            let proposal = propose(model, state.evidence(model), (0..poses.count()).filter(within))?;
+            let proposal = state.propose(model, (0..poses.count()).filter(within))?;
             Some(ApproachMessage::new(proposal.pose, proposal.score, &poses.pose(proposal.pose)?))
         })?;
         proposal.ok_or(Refusal::NoPlan)
