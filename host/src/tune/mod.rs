@@ -191,7 +191,7 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     let test = evaluated(Candidate::Compiled(&opened), &test, None, settings)?;
     let mut rows: Vec<Row> = models.into_iter().map(|(row, ..)| row).collect();
     // Without a promise, if there were too few touches for one.
-    rows[chosen].bytes = model.len();
+    rows[chosen].bytes = Some(model.len());
     let uncalibrated = calibration.as_ref().err().cloned();
     Ok(Tuned { unlimited, rows, chosen, calibration: calibration.ok(), uncalibrated, test, model, ensemble })
 }
