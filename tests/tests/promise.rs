@@ -1,7 +1,7 @@
 //! What a model promises is read back, thresholds by object decide on the chip as on the host, and priors and subsets are
 //! exact.
 
-use palpate::compile::{Leaf, Restated, Settings, compile, restate};
+use palpate::compile::{Leaf, Restated, RestatedSection, Settings, compile, restate};
 use palpate_onboard::{Model, ModelError, NothingExpected, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
 use palpate_shared::format::{OddsByObject, Per, Promise, PromisedNoise, Tag, Temperature, TrainedNoise};
 use palpate_shared::{Descriptor, Touch};
@@ -28,11 +28,11 @@ fn touches(count: usize, seed: u64) -> Vec<Touch> {
     palpate_tests::random::touches(4 * count, seed).into_iter().filter(Touch::is_full).take(count).collect()
 }
 
-fn with(plain: &[u8], sections: Vec<(Tag, Option<(bool, Vec<u8>)>)>) -> palpate::Result<Vec<u8>> {
+fn with(plain: &[u8], sections: Vec<RestatedSection>) -> palpate::Result<Vec<u8>> {
     restate(&Model::new(plain).unwrap(), &Restated { sections, ..Restated::default() })
 }
 
-fn by_object(odds: &[u64]) -> (Tag, Option<(bool, Vec<u8>)>) {
+fn by_object(odds: &[u64]) -> RestatedSection {
     (Tag::ThresholdsByObject, Some((true, odds.iter().flat_map(|&odds| OddsByObject::to_bytes(odds)).collect())))
 }
 

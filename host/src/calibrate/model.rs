@@ -8,7 +8,7 @@ use super::{Per, Tally};
 use crate::compile::{self, Restated, restate};
 use crate::ensemble::StatedProbe;
 use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result};
-use crate::evaluate::Candidate;
+use crate::evaluate::{Candidate, least_common_multiple};
 use crate::progress::Progress;
 use crate::touches::Dataset;
 use crate::touches::noise::Noise;
@@ -179,7 +179,7 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
 
 fn check(settings: &Settings) -> Result<()> {
     let Settings { rate, confidence, sequences, .. } = *settings;
-    if !(rate >= 1e-9 && rate < 0.5) {
+    if !(1e-9..0.5).contains(&rate) {
         return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
     }
     if !((0.5..=0.999_999).contains(&confidence)) {
@@ -205,7 +205,7 @@ fn add_noise(model: &Model<'_>, dataset: &mut Dataset, settings: &Settings, max_
     };
     let fewest = dataset.objects.iter().map(|object| robots(&object.touches)).min().unwrap_or(0);
     // A robot's touches are then of one instance, also where objects have different numbers of them.
-    let instances = dataset.instances.values().fold(1, |all, &instances| lcm(all, instances.max(1)));
+    let instances = dataset.instances.values().fold(1, |all, &instances| least_common_multiple(all, instances.max(1)));
     let robots = if noise.has_bias() { (fewest / instances * instances).max(1) } else { 1 };
     // Another seed than those of training and tests.
     let seed = settings.seed.wrapping_add(0x9e37_79b9);
@@ -217,11 +217,6 @@ fn add_noise(model: &Model<'_>, dataset: &mut Dataset, settings: &Settings, max_
         };
     }
     Ok(robots)
-}
-
-/// The least common multiple of two positive numbers.
-fn lcm(a: usize, b: usize) -> usize {
-    (1..=b).find(|times| a * times % b == 0).unwrap_or(1) * a
 }
 
 /// How often each object of the data set is touched: as its prior says.

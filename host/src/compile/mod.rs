@@ -56,7 +56,7 @@ pub use cost::{Core, Instructions, Memory};
 pub use emit::{Language, emit};
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
-pub use restate::{Restated, restate};
+pub use restate::{Restated, RestatedSection, restate};
 
 use crate::ensemble::Ensemble;
 use crate::error::{CompileProblem, Error, Result};

@@ -15,8 +15,11 @@ pub struct Restated {
     pub priors: Option<Vec<i32>>,
     /// Sections to write instead of those with their tags: whether they have to be understood, and their content. `None`
     /// removes a section.
-    pub sections: Vec<(Tag, Option<(bool, Vec<u8>)>)>,
+    pub sections: Vec<RestatedSection>,
 }
+
+/// A section to write or, where there is none, to leave out: its tag, whether it has to be understood, and its content.
+pub type RestatedSection = (Tag, Option<(bool, Vec<u8>)>);
 
 /// The bytes of `model` with what is restated. Other sections stay as they are, also those that nobody knows.
 ///
@@ -50,7 +53,7 @@ pub fn restate(model: &Model<'_>, restated: &Restated) -> Result<Vec<u8>> {
 }
 
 /// The optional sections, in the order of their tags.
-fn sections(model: &Model<'_>, restated: &[(Tag, Option<(bool, Vec<u8>)>)]) -> Vec<u8> {
+fn sections(model: &Model<'_>, restated: &[RestatedSection]) -> Vec<u8> {
     let is_restated = |tag: u16| restated.iter().any(|(other, _)| other.code() == tag);
     let kept = model.optional_sections().filter(|section| !is_restated(section.tag));
     let new = restated.iter().filter_map(|(tag, section)| {

@@ -380,7 +380,8 @@ impl Tested<'_> {
     }
 }
 
-fn least_common_multiple(a: usize, b: usize) -> usize {
+/// The least common multiple of two positive numbers.
+pub(crate) fn least_common_multiple(a: usize, b: usize) -> usize {
     let (mut divisor, mut rest) = (a, b);
     while rest > 0 {
         (divisor, rest) = (rest, divisor % rest);

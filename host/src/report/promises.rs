@@ -236,10 +236,11 @@ fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
     let mut chart = Chart::new("promised", axis(), "measured", axis()).sized(520, 420);
     chart.marks.push(Mark::Line { points: vec![(low, low), (high, high)], color: color::GRAY, stroke: Stroke::Dashed });
     let mut data = Records::new(["thresholds", "promised", "measured", "low", "high"]);
-    let ways: [(&str, _, _, &dyn Fn(&Promised) -> Option<Stopped>); 3] = [
-        ("uncalibrated", color::GRAY, Shape::Ring, &|of| Some(of.uncalibrated)),
-        ("average", color::OURS, Shape::Disc, &|of| of.average),
-        ("worst name", color::PAPER, Shape::Disc, &|of| of.name),
+    type Of = fn(&Promised) -> Option<Stopped>;
+    let ways = [
+        ("uncalibrated", color::GRAY, Shape::Ring, (|of| Some(of.uncalibrated)) as Of),
+        ("average", color::OURS, Shape::Disc, |of| of.average),
+        ("worst name", color::PAPER, Shape::Disc, |of| of.name),
     ];
     for (name, color, shape, of) in ways {
         let measured: Vec<(f64, Stopped)> =
