@@ -8,6 +8,7 @@ pub mod identity;
 pub mod plain;
 pub mod random;
 pub mod replay;
+pub mod scripts;
 pub mod sections;
 pub mod unaligned;
 pub mod vectors;

@@ -1,0 +1,202 @@
+//! Models, touches and rows that the C header is compared on.
+
+use crate::replay::Script;
+use crate::sections::with_sections;
+use crate::vectors;
+use palpate_onboard::Model;
+use palpate_shared::format::{
+    FitTerms, Held, ObjectFit, OddsByObject, Plan, Section, Strangers, Tag, Temperature, f32_key, write_section,
+};
+use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
+use rand::RngExt;
+use rand::rngs::SmallRng;
+use std::path::Path;
+
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
+
+/// The test vectors' models: every layout, type of leaf, and descriptor, and rows of features; and the real one.
+///
+/// # Panics
+/// If a model is none.
+pub fn models() -> Vec<Vec<u8>> {
+    let words = VECTORS.lines().filter_map(|line| line.strip_prefix("model "));
+    let models = words.map(|words| vectors::bytes(words.split(' ').next().expect("bytes")));
+    let mut models: Vec<Vec<u8>> = models.collect();
+    assert!(models.len() > 60, "{} models", models.len());
+    models.push(std::fs::read(Path::new(ROOT).join("models/household.palpate")).expect("the committed model"));
+    models
+}
+
+/// The model with sections that the header has to understand or to leave alone.
+fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
+    let model = Model::new(bytes).expect("a model");
+    let objects = model.object_count();
+    let odds: Vec<u8> = (0..objects).flat_map(|_| OddsByObject::to_bytes(rng.random_range(0..1 << 56))).collect();
+    let poses = Poses::with_rolls(2).expect("rolls");
+    let mut plan = Plan::header(poses).to_vec();
+    plan.extend((0..Plan::pairs(objects) * usize::from(poses.count())).map(|_| rng.random::<u8>()));
+    let temperature = Temperature::new(rng.random_range(0.1..10.0)).expect("a temperature");
+    let mut sections = Vec::new();
+    let mut put = |bytes: &[u8]| sections.extend_from_slice(bytes);
+    let own = model.optional_sections().filter(|section| section.tag < Tag::ThresholdsByObject.code());
+    own.for_each(|section| section.write(&mut put));
+    write_section(Tag::ThresholdsByObject, true, &odds, &mut put);
+    let background = rng.random_bool(0.5) && objects > 1;
+    if rng.random_bool(0.7) {
+        write_section(Tag::Strangers, true, &strangers(objects, background, rng), &mut put);
+    }
+    if objects > 1 {
+        write_section(Tag::Plan, false, &plan, &mut put);
+    }
+    write_section(Tag::Temperature, false, &temperature.to_bytes(), &mut put);
+    Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
+    with_sections(bytes, &sections)
+}
+
+/// A background, and mostly a test of fit, with limits that some touches pass and some do not.
+fn strangers(objects: usize, background: bool, rng: &mut SmallRng) -> Vec<u8> {
+    let has_test = rng.random_bool(0.8);
+    let mut content = Strangers::header(background, has_test).to_vec();
+    if !has_test {
+        return content;
+    }
+    let rivals: u8 = rng.random_range(1..=16);
+    let first = rng.random_range(1..4);
+    let doubt = rng.random_range(-(1 << 20)..1 << 20);
+    let terms = FitTerms {
+        held: Held::Likely,
+        rivals,
+        first,
+        least: first + rng.random_range(0..3),
+        threshold: doubt + rng.random_range(0..1 << 20),
+        early: rng.random_range(0..1 << 20),
+        doubt,
+        halving: rng.random_range(0..u32::MAX),
+        alarms: 10_000,
+        sequences: 1_000,
+        confidence: 950_000,
+    };
+    content.extend(terms.to_bytes());
+    for _ in 0..objects - usize::from(background) {
+        let shifts = [rng.random_range(0..12), rng.random_range(8..24), rng.random_range(8..24)];
+        let own: Vec<u8> = (0..rivals).map(|_| rng.random_range(0..objects) as u8).collect();
+        let count = usize::from(rivals);
+        let numbers: Vec<i16> = (0..2 * count + count * (count + 1) / 2).map(|_| rng.random()).collect();
+        let constant = rng.random_range(-100_000..100_000);
+        ObjectFit::write(shifts, constant, &own, numbers.into_iter(), &mut |part| content.extend_from_slice(part));
+    }
+    content
+}
+
+/// A touch, now and then a partial one, or one at the limits of features.
+fn touch(rng: &mut SmallRng) -> Touch {
+    let common = rng.random_range(0..3) * 1_000_000_000;
+    let mut time = || match rng.random_range(0..12) {
+        0 => ContactTime::MISSING,
+        1 => ContactTime::from_micros(common),
+        2 => ContactTime::from_micros(rng.random_range(0..50)),
+        3 => ContactTime::from_micros(rng.random_range(0..u32::MAX)),
+        _ => ContactTime::from_micros(common + rng.random_range(0..150_000)),
+    };
+    let touch = Touch::new([time(), time(), time()]);
+    if rng.random_bool(0.1) {
+        return touch;
+    }
+    let mut vector = || {
+        [(); 3].map(|()| match rng.random_range(0..5) {
+            0 => 0,
+            1 => i16::MIN,
+            _ => rng.random_range(-32_767..=32_767),
+        })
+    };
+    touch.with_pose(Pose { direction: vector(), alignment: vector() })
+}
+
+/// A row; of any length.
+fn row(features: usize, rng: &mut SmallRng) -> Vec<i32> {
+    let length = if rng.random_bool(0.95) { features } else { rng.random_range(0..=(features + 2).min(256)) };
+    let value = |_| match rng.random_range(0..8) {
+        0 => MISSING_FEATURE,
+        1 => rng.random_range(i32::MIN..=i32::MAX),
+        2 => rng.random_range(-300..300),
+        3 => rng.random_range(-200_000..200_000),
+        _ => f32_key(rng.random_range(-200.0..200.0_f32)),
+    };
+    (0..length).map(value).collect()
+}
+
+/// Touches, or rows, of a model that is open, and now and then what else there is to ask.
+///
+/// # Panics
+/// If a model is none.
+pub fn play(script: &mut Script<'_>, count: usize, rng: &mut SmallRng) {
+    let model = *script.recognizer().model();
+    let objects = model.object_count();
+    for index in 0..count {
+        if model.descriptor().is_some() {
+            script.touch(&touch(rng));
+        } else {
+            script.row(&row(model.feature_count(), rng));
+        }
+        if rng.random_bool(0.3 / objects as f64) {
+            script.posteriors();
+        }
+        if index == 2 || rng.random_bool(0.1 / objects as f64) {
+            let mut snapshot = script.snapshot();
+            if rng.random_bool(0.5) {
+                script.reset();
+            }
+            if rng.random_bool(0.5) {
+                let at = rng.random_range(0..snapshot.len());
+                snapshot[at] ^= 1 << rng.random_range(0..8);
+                if rng.random_bool(0.7) {
+                    sealed(&mut snapshot);
+                }
+            }
+            script.restore(&snapshot);
+        }
+        if rng.random_bool(0.05) {
+            script.reset();
+        }
+    }
+}
+
+/// Puts the checksum at the end right.
+pub fn sealed(bytes: &mut [u8]) {
+    if let Some((body, sum)) = bytes.split_last_chunk_mut() {
+        *sum = palpate_shared::format::checksum(body).to_le_bytes();
+    }
+}
+
+/// Models, and together so many touches and rows.
+///
+/// # Panics
+/// If a model is none.
+pub fn script<'m>(models: &'m [Vec<u8>], touches: usize, rows: usize, rng: &mut SmallRng) -> Script<'m> {
+    let is_touches = |bytes: &&Vec<u8>| bytes[12] != 255;
+    let of_touches = models.iter().filter(is_touches).count();
+    let mut script = Script::default();
+    for bytes in models {
+        assert!(script.open(bytes));
+        script.names();
+        script.posteriors();
+        script.snapshot();
+        // What the other kind of model takes is refused.
+        script.touch(&touch(rng));
+        script.row(&[1, 2, 3]);
+        let (all, of) = if is_touches(&bytes) { (touches, of_touches) } else { (rows, models.len() - of_touches) };
+        play(&mut script, all.div_ceil(of), rng);
+    }
+    script
+}
+
+/// Every model as it is and with all sections.
+///
+/// # Panics
+/// If a model is none.
+pub fn all_models(rng: &mut SmallRng) -> Vec<Vec<u8>> {
+    let models = models();
+    let stated: Vec<Vec<u8>> = models.iter().map(|bytes| with_all_sections(bytes, rng)).collect();
+    [models, stated].concat()
+}
