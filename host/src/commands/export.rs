@@ -172,7 +172,14 @@ fn sources(arguments: &Arguments) -> Result<Vec<(Language, PathBuf)>> {
         let path = output.with_extension(language.extension());
         let taken = path == *output || path.file_name().is_some_and(|name| name == HEADER);
         if output::is_stdout(output) || taken {
-            return Err(Error::setting("output", output.display(), format!("a file beside which another one can have the extension .{} (but not {HEADER}), for --emit", language.extension())));
+            return Err(Error::setting(
+                "output",
+                output.display(),
+                format!(
+                    "a file beside which another one can have the extension .{} (but not {HEADER}), for --emit",
+                    language.extension()
+                ),
+            ));
         }
         output::refuse_input(&path, [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten())?;
         sources.push((language, path));
