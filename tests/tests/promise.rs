@@ -42,6 +42,7 @@ fn promise() -> Promise {
         confidence: 0.95,
         per: Per::Name,
         approaches: false,
+        active: false,
         sequences: 50_000,
         given: 49_000,
         wrong: 201,

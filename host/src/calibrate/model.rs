@@ -261,6 +261,7 @@ fn finished(
         confidence: settings.confidence,
         per: settings.per,
         approaches,
+        active: settings.active,
         sequences: count(chosen.sequences),
         given: count(chosen.given),
         wrong: count(chosen.wrong),

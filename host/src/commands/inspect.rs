@@ -104,6 +104,8 @@ struct Promised {
     confidence: f64,
     /// "touches" or "approaches".
     counted: &'static str,
+    /// Whether each approach was in the pose that the plan proposed.
+    active: bool,
     sequences: u32,
     /// Names given in these sequences, and wrong ones of them.
     given: u32,
@@ -218,6 +220,7 @@ fn promised(model: &Model<'_>) -> Option<Promised> {
         per: promise.per.name(),
         confidence: promise.confidence,
         counted: if promise.approaches { "approaches" } else { "touches" },
+        active: promise.active,
         sequences: promise.sequences,
         given: promise.given,
         wrong: promise.wrong,
@@ -451,7 +454,7 @@ fn text(inspected: &Inspected<'_>) -> String {
                 super::percent(promise.confidence),
                 promise.sequences,
                 promise.mean,
-                promise.counted,
+                if promise.active { "approaches as planned" } else { promise.counted },
                 promise.given,
                 promise.wrong,
                 100.0 * promise.undecided,

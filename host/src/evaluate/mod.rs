@@ -182,7 +182,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     let approaches = approaches.transpose()?;
     let outcomes = approaches.as_ref().map_or(&sequential.outcomes, |approaches| &approaches.sequential.outcomes);
     let promise = match settings.error_rate {
-        None => margins.check_promise(outcomes, sequential.max_touches, &settings.noise),
+        None => margins.check_promise(outcomes, sequential.max_touches, &settings.noise, false),
         Some(_) => None,
     };
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));

@@ -44,6 +44,7 @@ impl Margins<'_> {
         outcomes: &[Vec<Outcome>],
         max_touches: u32,
         noise: &Noise,
+        active: bool,
     ) -> Option<PromiseCheck> {
         let Candidate::Compiled(model) = self.candidate else { return None };
         let promise = model.promise()?;
@@ -55,6 +56,11 @@ impl Margins<'_> {
         let mut void = Vec::new();
         if promise.noise != noise.promised() {
             void.push(format!("promised with {}, tested with {noise}", Noise::of_promise(&promise.noise)));
+        }
+        if promise.active != active {
+            let how = |active| if active { "as the plan proposes" } else { "at random" };
+            let (promised, tested) = (how(promise.active), how(active));
+            void.push(format!("promised for approaches {promised}, tested with approaches {tested}"));
         }
         if promise.max_touches != max_touches {
             void.push(format!("promised for at most {} touches, tested with {max_touches}", promise.max_touches));

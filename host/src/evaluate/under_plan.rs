@@ -45,7 +45,7 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
         .collect();
     let (stated, most) = (|| margins.stated(&settings.sequences(), rule), rule.max_touches());
     let promise = match settings.error_rate {
-        None => margins.check_promise(&outcomes, most, &settings.noise),
+        None => margins.check_promise(&outcomes, most, &settings.noise, true),
         Some(_) => None,
     };
     let in_approaches = margins.summary(outcomes.clone(), stated(), most);

@@ -158,6 +158,11 @@ fn a_promise_is_calibrated_under_the_plan_and_kept_under_it() {
     let sequential = &evaluated["approaches"]["sequential"];
     assert_eq!(sequential["promised"], 0.05);
     assert!(sequential["error"].as_f64().unwrap() < 0.06, "{sequential:#}");
+    assert_eq!(evaluated["promise"]["void"], serde_json::json!([]));
+    // At random it is another promise.
+    let passive = place.json(&["evaluate", "calibrated.palpate", "unseen", "--groups", "200", "--json"]);
+    let void = passive["promise"]["void"].to_string();
+    assert!(void.contains("as the plan proposes") && void.contains("at random"), "{void}");
     place.fails(&["calibrate", "model.palpate", "more", "-o", "x.palpate", "--active"], 1, "has no plan");
 }
 

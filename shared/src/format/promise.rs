@@ -46,6 +46,8 @@ pub struct Promise {
     pub per: Per,
     /// Whether sequences were of approaches, of which some are no evidence, or of touches only.
     pub approaches: bool,
+    /// Whether each approach was in the pose that the model's plan proposed.
+    pub active: bool,
     /// Sequences that it rests on.
     pub sequences: u32,
     /// Names given in these.
@@ -98,7 +100,7 @@ impl Promise {
     pub fn write<T>(&self, put: impl FnOnce(&[u8]) -> T) -> T {
         let billionths = |share: f64| (share * BILLION + 0.5) as u32;
         let Self { sequences, given, wrong, mean_thousandths, max_touches, noise, .. } = *self;
-        let codes = u32::from_le_bytes([self.per.code(), self.approaches.into(), 0, 0]);
+        let codes = u32::from_le_bytes([self.per.code(), self.approaches.into(), self.active.into(), 0]);
         let TrainedNoise { least, largest, timer, pose } = noise.touch;
         let [first, second, third] = noise.bent.map(i32::cast_unsigned);
         let head = [billionths(self.rate), billionths(self.confidence), codes, sequences, given, wrong];
@@ -124,7 +126,7 @@ impl Promise {
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let words = bytes.as_chunks::<4>().0;
         let (head, rest) = words.split_first_chunk::<12>()?;
-        let [_, _, [per, approaches, ..], ..] = *head;
+        let [_, _, [per, approaches, active, _], ..] = *head;
         let [rate, confidence, _, sequences, given, wrong, mean, touches, least, largest, timer, pose] =
             head.map(u32::from_le_bytes);
         let more = rest.first_chunk::<9>().map_or([0; 9], |more| more.map(u32::from_le_bytes));
@@ -133,7 +135,7 @@ impl Promise {
             let share = f64::from(billionths) / BILLION;
             (billionths > 0 && share < 1.0).then_some(share)
         };
-        if wrong > given || given > sequences || approaches > 1 || least > largest {
+        if wrong > given || given > sequences || approaches > 1 || active > 1 || least > largest {
             return None;
         }
         Some(Self {
@@ -141,6 +143,7 @@ impl Promise {
             confidence: share(confidence)?,
             per: Per::from_code(per)?,
             approaches: approaches == 1,
+            active: active == 1,
             sequences,
             given,
             wrong,
@@ -215,6 +218,7 @@ mod tests {
         confidence: 0.95,
         per: Per::Name,
         approaches: true,
+        active: true,
         sequences: 100_000,
         given: 99_321,
         wrong: 900,
@@ -253,8 +257,16 @@ mod tests {
 
     #[test]
     fn promises_that_promise_nothing_are_refused() {
-        let wrong: [(usize, &[u8]); 7] =
-            [(0, &[0; 4]), (0, &[0xff; 4]), (4, &[0; 4]), (8, &[3]), (9, &[2]), (16, &[0xff; 4]), (20, &[0xff; 4])];
+        let wrong: [(usize, &[u8]); 8] = [
+            (0, &[0; 4]),
+            (0, &[0xff; 4]),
+            (4, &[0; 4]),
+            (8, &[3]),
+            (9, &[2]),
+            (10, &[2]),
+            (16, &[0xff; 4]),
+            (20, &[0xff; 4]),
+        ];
         for (place, value) in wrong {
             let mut bytes = bytes(&PROMISE);
             bytes[place..place + value.len()].copy_from_slice(value);
