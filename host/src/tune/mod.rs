@@ -99,7 +99,7 @@ pub struct Row {
     pub leaf: Option<&'static str>,
     /// How trees are laid out.
     pub layout: Option<&'static str>,
-    /// Size of the model, calibrated.
+    /// Size of the model with what a calibration adds, also where there are too few touches for one.
     pub bytes: Option<usize>,
     /// Instructions per touch on a Cortex-M4F, estimated.
     pub instructions: Option<u64>,
@@ -189,9 +189,7 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     }
     let opened = compile::open(&model)?;
     let test = evaluated(Candidate::Compiled(&opened), &test, None, settings)?;
-    let mut rows: Vec<Row> = models.into_iter().map(|(row, ..)| row).collect();
-    // Without a promise, if there were too few touches for one.
-    rows[chosen].bytes = Some(model.len());
+    let rows = models.into_iter().map(|(row, ..)| row).collect();
     let uncalibrated = calibration.as_ref().err().cloned();
     Ok(Tuned { unlimited, rows, chosen, calibration: calibration.ok(), uncalibrated, test, model, ensemble })
 }

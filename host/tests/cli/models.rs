@@ -157,7 +157,10 @@ fn tuning_writes_a_model_within_the_limit() {
     let chosen = usize::try_from(tuned["chosen"].as_u64().unwrap()).unwrap();
     let bytes = std::fs::metadata(directory.path().join("tuned.palpate")).unwrap().len();
     assert!(bytes <= 2048);
-    assert_eq!(tuned["rows"][chosen]["bytes"].as_u64(), Some(bytes));
+    // With the bytes of a promise, for which there are too few touches here.
+    assert!(tuned["calibration"].is_null(), "{tuned:#}");
+    let stated = tuned["rows"][chosen]["bytes"].as_u64().unwrap();
+    assert!((bytes..=2048).contains(&stated), "{stated} for {bytes}");
     succeeds(directory.path(), &["evaluate", "tuned.palpate", "data", "--groups", "20"]);
 }
 

@@ -353,7 +353,7 @@ fn limits(text: &mut String) {
     for (bytes, answer) in [
         (own[..own.len() - 1].to_vec(), "damaged"),
         (changed, "damaged"),
-        (abuse::snapshot(&model, 7, 3, 0, &[1, 2, 3]), "damaged"),
+        (abuse::snapshot(&model, 7, 4, 0, &[1, 2, 3]), "damaged"),
         (abuse::snapshot(&model, 7, 1, 0, &[1, 2, 3]), "damaged"),
         (abuse::snapshot(&model, 7, 1, 3, &[1, 2, 3]), "damaged"),
         (abuse::snapshot(&model, 0, 2, 0, &[1, 2, 3]), "damaged"),
