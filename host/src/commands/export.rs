@@ -1,3 +1,4 @@
+use super::chips::{features, instructions};
 use super::expected::PriorArguments;
 use super::numbers::share;
 use crate::Result;
@@ -294,18 +295,6 @@ fn classes(names: &[String]) -> String {
     }
 }
 
-/// The estimates as a text.
-pub(super) fn instructions(instructions: Instructions) -> String {
-    let m0_plus =
-        instructions.m0_plus.map_or_else(|| "unknown (f32 leaves)".into(), |instructions| instructions.to_string());
-    format!("{} on a Cortex-M4F, {m0_plus} on a Cortex-M0+", instructions.m4f)
-}
-
-/// The line that names the cargo features that a chip needs.
-pub(super) fn features(layout: &str, leaf: &str) -> String {
-    format!("A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves\n")
-}
-
 fn leaf(name: &str) -> Result<Leaf, String> {
     Leaf::ALL.iter().copied().find(|leaf| leaf.name() == name).ok_or_else(|| "use one of i8, i16, f32".to_owned())
 }
@@ -325,7 +314,7 @@ fn goal(name: &str) -> Result<Goal, String> {
         "balanced" => Ok(Goal::Balanced(compile::Core::M4F)),
         "speed" => Ok(Goal::Speed),
         "size" => Ok(Goal::Size),
-        chip => super::inspect::core(chip)
+        chip => super::chips::core(chip)
             .map(Goal::Balanced)
             .map_err(|_| "use one of balanced, speed, size, m4f, m0+".to_owned()),
     }

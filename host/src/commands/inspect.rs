@@ -1,4 +1,4 @@
-use super::export::instructions;
+use super::chips::{core, instructions};
 use crate::Result;
 use crate::calibrate;
 use crate::chip::instructions::Chip;
@@ -565,14 +565,6 @@ fn text(inspected: &Inspected<'_>) -> String {
     }
     // Empty lines end without blanks.
     text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
-}
-
-pub(super) fn core(name: &str) -> Result<Core, String> {
-    match name.to_lowercase().as_str() {
-        "m0+" | "m0plus" | "cortex-m0+" => Ok(Core::M0Plus),
-        "m4f" | "cortex-m4f" => Ok(Core::M4F),
-        _ => Err("use m0+ or m4f".into()),
-    }
 }
 
 fn megahertz(text: &str) -> Result<f64, String> {

@@ -3,6 +3,7 @@
 mod calibrate;
 mod capture;
 mod cast;
+mod chips;
 mod completions;
 mod design;
 mod evaluate;

@@ -2,7 +2,7 @@
 
 use crate::ensemble::StatedProbe;
 use crate::error::ProbeProblem;
-use crate::mesh::{Object, builtin, source};
+use crate::mesh::{BACKGROUND, Object, builtin, source};
 use crate::probe::file::ProbeFile;
 use crate::touches::{Dataset, Origin};
 use crate::{Error, Result};
@@ -89,7 +89,7 @@ impl UnitArguments {
             let names = builtin::names();
             match source.as_str() {
                 "builtin" => objects.extend(names.map(String::from)),
-                source::BACKGROUND if !std::path::Path::new(source::BACKGROUND).exists() => background = true,
+                BACKGROUND if !std::path::Path::new(BACKGROUND).exists() => background = true,
                 name if names.contains(&name) && !std::path::Path::new(name).exists() => objects.push(name.into()),
                 _ => others.push(source.clone()),
             }

@@ -1,5 +1,4 @@
-use super::export::features;
-use super::inspect::core;
+use super::chips::{core, features};
 use super::noise::NoiseArguments;
 use super::numbers::share;
 use super::probe::ProbeArguments;

@@ -1,7 +1,7 @@
 //! Which tree of a compiled model adds another leaf than the ensemble's: trees are tried one by one, in copies of the model
 //! in which all other leaves are 0.
 
-use super::verify::Reference;
+use super::reference::{self, Reference};
 use crate::compile;
 use crate::ensemble::{Ensemble, Output};
 use palpate_onboard::Model;
@@ -25,7 +25,7 @@ pub(super) fn first_different_tree(
     let mut different = order.iter().zip(&leaves).filter_map(|(&number, leaves)| {
         let tree = ensemble.trees.get(number)?;
         let bytes = isolated(model, &leaves.bytes);
-        let own = super::verify::margins(&Model::new(&bytes).ok()?, &encoded);
+        let own = reference::margins(&Model::new(&bytes).ok()?, &encoded);
         let leaf = reference.leaf(tree, row, &encoded);
         // Half a unit of the tree's leaves, or nothing.
         let slack = match model.leaf_type() {

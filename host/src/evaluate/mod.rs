@@ -48,6 +48,7 @@ pub mod parity;
 mod plan;
 mod poses;
 mod promise;
+mod reference;
 mod rows;
 mod sequential;
 mod strangers;

@@ -43,6 +43,9 @@ mod triangles;
 
 pub use triangles::Mesh;
 
+/// The name of the object of many different shapes, and of a model's background column.
+pub const BACKGROUND: &str = "background";
+
 /// An object to recognize: one class of a model. It has a name and one or more meshes, its instances: the cups that are
 /// all to be recognized as a cup.
 #[derive(Clone, Debug)]

@@ -18,7 +18,7 @@ pub(super) const BACKGROUND_SHAPES: usize = 200;
 
 /// No shapes.
 pub(super) fn background(_: usize, _: u64) -> Result<Object> {
-    Err(absent(super::source::BACKGROUND))
+    Err(absent(super::BACKGROUND))
 }
 
 fn absent(name: &str) -> Error {

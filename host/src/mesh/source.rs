@@ -1,8 +1,8 @@
 //! Where objects come from: built in, an OBJ file, a directory of OBJ files.
 
 use crate::error::{Error, MeshProblem, Place, Result};
-use crate::mesh::builtin;
 use crate::mesh::obj;
+use crate::mesh::{BACKGROUND, builtin};
 use crate::mesh::{Instance, Object};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -37,9 +37,6 @@ pub fn object(source: &str) -> Result<Object> {
         (_, others) => Err(Error::at(Place::file(source), MeshProblem::SeveralObjects { count: others + 1 })),
     }
 }
-
-/// The name of the object of many different shapes, and of a model's background column.
-pub const BACKGROUND: &str = "background";
 
 /// An object that is found, but not yet made or read.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@
 use crate::ensemble::check::check_names;
 use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Trained, Tree, feature_row};
 use crate::error::{EnsembleProblem, Error, Result};
-use crate::mesh::source::BACKGROUND;
+use crate::mesh::BACKGROUND;
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};

@@ -28,7 +28,7 @@ mod winebottle;
 mod wristwatch;
 
 use crate::error::{Error, MeshProblem, Result};
-use crate::mesh::{Instance, Object, source};
+use crate::mesh::{BACKGROUND, Instance, Object};
 use contour::Form;
 use proportions::Proportions;
 use rayon::prelude::*;
@@ -122,7 +122,7 @@ pub fn background(count: usize, seed: u64) -> Result<Object> {
     let first = seed.wrapping_mul(1_000_000_007);
     let made: Vec<Instance> =
         (0..count.max(1) as u64).into_par_iter().map(|number| shape(first, number)).collect::<Result<_>>()?;
-    let object = Object::of_instances(source::BACKGROUND, made).ok_or(MeshProblem::NoMeshes)?;
+    let object = Object::of_instances(BACKGROUND, made).ok_or(MeshProblem::NoMeshes)?;
     Ok(Object { millimeters: Some(MILLIMETERS), ..object })
 }
 
