@@ -94,9 +94,9 @@ fn stored(margin: f64) -> u64 {
 #[derive(Clone, Copy)]
 enum By {
     All,
-    /// The object that was touched, of so many.
+    /// The object that was touched, of this number of objects.
     Touched(usize),
-    /// The object that was named, of so many.
+    /// The object that was named, of this number of objects.
     Named(usize),
 }
 

@@ -28,9 +28,9 @@ pub struct Moment<'s> {
 /// Where sequences end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Until {
-    /// Once the leader has so much more evidence than all others together, in nats.
+    /// Once the leader has this much more evidence than all others together, in nats.
     pub margin: f64,
-    /// After so many touches that are evidence.
+    /// After this number of touches that are evidence, if no sooner.
     pub max_touches: u32,
 }
 
@@ -77,7 +77,7 @@ impl<'d> Supply<'d> {
         Self { object, touches, pools: (0..pools).map(pool).collect(), next: 0, is_once, candidates: Vec::new() }
     }
 
-    /// Takes one in `parts` of the touches off, as a supply of its own; of robots, one in so many.
+    /// Splits off one in `parts` of the touches as a supply of its own; where there are robots, one in `parts` of them.
     pub fn take_part(&mut self, parts: usize) -> Self {
         let part = |all: usize| all / parts.max(1);
         let pools = if self.is_once {

@@ -17,7 +17,7 @@ use palpate_shared::format::{OddsByObject, Promise, PromisedNoise, SECTION_HEADE
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// One in so many touches only says how strict to begin, and so does no more than one in so many sequences.
+/// One touch in this many serves the pilot alone, which says how strict to begin; its sequences are at most one in this many.
 const PILOT: usize = 30;
 /// The strictest threshold beyond that of the posterior, in nats: usually, and where a tenth of that is not enough.
 pub(super) const STRICTEST: [f64; 2] = [2.5, 10.0];

@@ -89,7 +89,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     active: bool,
     /// Say as well what an object that is exchanged at a random approach comes to, with and without forgetting: restarting
-    /// once recent touches speak by so many nats against the likeliest object
+    /// once recent touches speak by this many nats against the likeliest object
     #[arg(long, value_name = "NATS", num_args = 0..=1, default_missing_value = "5")]
     switch: Option<f32>,
     /// Print the figures as JSON
@@ -518,7 +518,7 @@ fn strangers_table(strangers: &Strangers) -> String {
     let (alarms, undecided) = (percent(strangers.false_alarms), percent(strangers.undecided));
     _ = writeln!(
         text,
-        "\nObjects that the model does not know: the share found out by so many touches, and the share that got a name; \
+        "\nObjects that the model does not know: the share found out by each number of touches, and the share that got a name; \
          {undecided} got no verdict.\nOf the objects that it knows, {alarms} were taken for unknown."
     );
     text

@@ -125,7 +125,7 @@ impl Found {
             shares.values().for_each(|share| _ = write!(text, " {:>8}", percent(*share)));
             text.push('\n');
         }
-        text + "The share found out after so many touches when the model does not use the object's column: about what \
+        text + "The share found out after each number of touches when the model does not use the object's column: about what \
                 happens to strangers.\n"
     }
 }

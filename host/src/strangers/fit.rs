@@ -132,7 +132,7 @@ pub(super) fn fits(moments: &Moments, without: Option<usize>) -> Option<Vec<Fit>
 }
 
 impl Fit {
-    /// How badly evidence of so many touches fits, in nats.
+    /// How badly the evidence of `touches` touches fits, in nats.
     pub(super) fn misfit(&self, evidence: &[f64], leader: usize, touches: u32) -> f64 {
         let count = f64::from(touches);
         let against =

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 /// Where sequences end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Until {
-    /// After so many touches.
+    /// After this number of touches.
     Touches(u32),
     /// Where a name would be given at a threshold of misfit at this level, in nats; at the limit of touches at the latest.
     Named { level: f64 },
@@ -83,7 +83,7 @@ pub(super) fn shuffle<T>(touches: &mut [T], name: &str, seed: u64) {
     touches.shuffle(&mut random::generator(seed, Purpose::Fit, name, 0));
 }
 
-/// What is allowed after so many touches beyond the threshold, in nats.
+/// How far beyond the threshold a misfit may be after this number of touches, in nats.
 pub(super) fn early(touches: u32) -> f64 {
     EARLY * libm::exp2(-f64::from(touches) / HALVED_AFTER)
 }

@@ -27,7 +27,7 @@ pub(crate) fn prior(weight: u32, most: u32, unit: Unit) -> i64 {
         return IMPOSSIBLE;
     }
     let bits = log2(most).saturating_sub(log2(weight));
-    // The largest number of units that are at most so many bits: at least 2^-24 nats each, so below 2^29. Found bit by
+    // The largest number of units that are at most that number of bits: at least 2^-24 nats each, so below 2^29. Found bit by
     // bit, since a division of 64 bits is dear where there is none.
     let mut units = 0_u64;
     for bit in (0..30).rev() {

@@ -53,7 +53,7 @@ pub(crate) fn fit(model: &Model<'_>, evidence: &[i64], leader: usize, touches: u
 const IMPOSSIBLE: i64 = i64::MIN / 2;
 
 impl Model<'_> {
-    /// How badly evidence for each object, priors included, of so many touches fits the object with the most, in 2^-16
+    /// How badly the evidence for each object, priors included, of `touches` touches fits the object with the most, in 2^-16
     /// nats: what the model's test compares with its limits. `None` without a test.
     ///
     /// Cost: as the test in [`Recognizer::push`](crate::Recognizer::push). Cannot fail.
@@ -108,7 +108,7 @@ fn held(number: i64) -> i32 {
     i32::try_from(number.clamp(-MOST, MOST)).unwrap_or(i32::MAX)
 }
 
-/// How much higher the limits are after so many touches, in 2^-16 nats.
+/// How much higher the limits are after this number of touches, in 2^-16 nats.
 fn early(terms: &FitTerms, touches: u32) -> i64 {
     let left = exp2_negative(u64::from(touches) * u64::from(terms.halving)) >> 24;
     // Below 2^31 · 2^32.
