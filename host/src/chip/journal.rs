@@ -52,7 +52,7 @@ pub enum Entry {
         direction: [f64; 3],
         /// Unit vector along the row of fingers.
         alignment: [f64; 3],
-        /// How well it tells the likeliest object from the others, from 0 to 1.
+        /// How well it distinguishes the likeliest object from the others, from 0 (not at all) to 1.
         score: f64,
     },
     /// A fault of the chip's own fingers.

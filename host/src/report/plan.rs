@@ -178,7 +178,7 @@ pub(super) fn section(context: &Context, plans: &Plans) -> Result<Section> {
     section.table(objects(context, plans));
     section.text(
         "An object may be exchanged, or slip, while it is being touched. Forgetting restarts the recognizer once recent \
-         touches speak for another object by that many nats against the likeliest one.",
+         touches speak for another object against the likeliest one, by the number of nats in the table.",
     );
     section.table(switched(context, plans));
     Ok(section)
