@@ -2,24 +2,18 @@
 
 use palpate::compile::{Leaf, Settings, compile};
 use palpate_onboard::{Model, ModelError};
+use palpate_shared::Descriptor;
 use palpate_shared::format::{
-    Counted, Length, MUST_UNDERSTAND, PatternShares, Tag, Trained, TrainedNoise, TrainedProbe, TrainedTouches,
-    checksum, write_section,
+    MUST_UNDERSTAND, PatternShares, Tag, Trained, TrainedNoise, TrainedTouches, checksum, write_section,
 };
-use palpate_shared::{Descriptor, Patterns};
+use palpate_tests::abuse;
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::{trained, with_sections};
 
 const TRAINED: Trained = Trained {
-    probe: Some(TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Millimeter }),
-    touches: Some(TrainedTouches {
-        patterns: Patterns::CONTACTS,
-        counted: Counted::Contacts,
-        needs_pose: false,
-        largest_spread: 1_050_000,
-    }),
     noise: Some(TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 0 }),
     shares: Some(PatternShares([1, 2, 3, 4, 5, 65_520])),
+    ..abuse::TRAINED
 };
 
 fn model(descriptor: Descriptor) -> Vec<u8> {

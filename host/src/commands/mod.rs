@@ -9,6 +9,7 @@ mod design;
 mod evaluate;
 mod expected;
 mod export;
+mod figures;
 mod inspect;
 mod link;
 mod noise;
