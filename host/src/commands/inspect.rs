@@ -1,15 +1,16 @@
 use super::chips::{core, instructions};
+use super::stated::{
+    Defaults, Feature, Noise, PlanOf, Probe, Promised, Tested, Touches, evidence, features, noise, pattern, plan,
+    priors, probe, promised, tested,
+};
 use crate::Result;
-use crate::calibrate;
 use crate::chip::instructions::Chip;
 use crate::compile::{self, CompiledModel, Core, Instructions, Memory};
 use crate::evaluate;
 use crate::output;
-use crate::rows::{Encoder, feature_names};
-use crate::touches;
 use palpate_onboard::{Model, Stopping};
-use palpate_shared::format::{CHECKSUM_LENGTH, FitTerms, HEADER_LENGTH, Length, TrainedNoise, TrainedProbe};
-use palpate_shared::{ContactPattern, Pose, Q15_ONE, Touch};
+use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
+use palpate_shared::{Pose, Q15_ONE, Touch};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -82,201 +83,6 @@ struct Inspected<'a> {
     instructions: Instructions,
     #[serde(skip_serializing_if = "Option::is_none")]
     chip: Option<OnChip>,
-}
-
-#[derive(serde::Serialize)]
-struct Feature {
-    name: String,
-    scale: Option<f32>,
-}
-
-#[derive(serde::Serialize)]
-struct Defaults {
-    error_rate: f64,
-    max_touches: u32,
-}
-
-#[derive(serde::Serialize)]
-struct Promised {
-    error_rate: f64,
-    /// "average", "name" or "object".
-    per: &'static str,
-    confidence: f64,
-    /// "touches" or "approaches".
-    counted: &'static str,
-    /// Whether each approach was in the pose that the plan proposed.
-    active: bool,
-    sequences: u32,
-    /// Names given in these sequences, and wrong ones of them.
-    given: u32,
-    wrong: u32,
-    undecided: f64,
-    /// Touches, or approaches, of a sequence on average.
-    mean: f64,
-    max_touches: u32,
-    /// What was added to the touches.
-    noise: touches::noise::Noise,
-    /// Nats by which an object has to be ahead of all others for its name to be given.
-    margins: BTreeMap<String, f64>,
-    /// What the error rate is at most by theory, with any priors.
-    by_theory: f64,
-}
-
-#[derive(serde::Serialize)]
-struct Tested {
-    /// How long names are held back: "likely" or "certain".
-    held: &'static str,
-    /// The promised share of known objects' sequences that end as unknown.
-    promised: f64,
-    confidence: f64,
-    sequences: u32,
-    /// Touches before which nothing is tested, and no name is given.
-    first_touches: u32,
-    /// Touches before which no name is given.
-    least_touches: u32,
-    /// The misfit above which an object is unknown, after many touches, in nats.
-    threshold: f64,
-}
-
-fn tested(terms: &FitTerms) -> Tested {
-    Tested {
-        held: terms.held.name(),
-        promised: f64::from(terms.alarms) / 1e6,
-        confidence: f64::from(terms.confidence) / 1e6,
-        sequences: terms.sequences,
-        first_touches: terms.first,
-        least_touches: terms.least,
-        threshold: f64::from(terms.threshold) / 65_536.0,
-    }
-}
-
-#[derive(serde::Serialize)]
-struct Probe {
-    /// Radius of a finger; null if the model does not state its probe.
-    radius: Option<f32>,
-    spacing: f32,
-    speed: f32,
-    /// What lengths are measured in: "unit", a tenth of the object's longest side, or "mm".
-    unit: &'static str,
-    /// Whether the model states its probe; otherwise the published one is assumed.
-    stated: bool,
-}
-
-#[derive(serde::Serialize)]
-struct Touches {
-    /// "full", "contacts" or "all".
-    counted: &'static str,
-    patterns: Vec<&'static str>,
-    needs_pose: bool,
-    /// The largest time between the first and the last contact in microseconds; null if the model does not state it.
-    largest_spread: Option<u32>,
-}
-
-#[derive(serde::Serialize)]
-struct Noise {
-    /// Standard deviations of contact times in microseconds.
-    least: u32,
-    largest: u32,
-    /// The timer's resolution in microseconds; 0 for none.
-    timer: u32,
-    /// Standard deviation of the pose in degrees; 0 for none.
-    pose_degrees: f64,
-}
-
-/// The features of a model over rows.
-fn features(model: &Model<'_>) -> Vec<Feature> {
-    let scales: Vec<Option<f32>> = match Encoder::of(model) {
-        Encoder::Real => vec![None; model.feature_count()],
-        Encoder::Scaled(scales) => scales.into_iter().map(Some).collect(),
-    };
-    feature_names(model).into_iter().zip(scales).map(|(name, scale)| Feature { name, scale }).collect()
-}
-
-/// The probe that a model states, or the one that its header assumes.
-fn probe(model: &Model<'_>) -> Probe {
-    match model.probe() {
-        Some(TrainedProbe { radius, spacing, speed, length }) => {
-            Probe { radius: Some(radius), spacing, speed, unit: length.name(), stated: true }
-        }
-        None => {
-            let header = model.header();
-            Probe {
-                radius: None,
-                spacing: header.spacing(),
-                speed: header.speed(),
-                unit: Length::Tenth.name(),
-                stated: false,
-            }
-        }
-    }
-}
-
-fn promised(model: &Model<'_>) -> Option<Promised> {
-    let promise = model.promise()?;
-    let stopping = Stopping::from_model(model);
-    let margin = |object| calibrate::margin_of(stopping.odds_of(object, model));
-    Some(Promised {
-        error_rate: promise.rate,
-        per: promise.per.name(),
-        confidence: promise.confidence,
-        counted: if promise.approaches { "approaches" } else { "touches" },
-        active: promise.active,
-        sequences: promise.sequences,
-        given: promise.given,
-        wrong: promise.wrong,
-        undecided: 1.0 - f64::from(promise.given) / f64::from(promise.sequences.max(1)),
-        mean: f64::from(promise.mean_thousandths) / 1e3,
-        max_touches: promise.max_touches,
-        noise: touches::noise::Noise::of_promise(&promise.noise),
-        margins: compile::names(model).into_iter().enumerate().map(|(object, name)| (name, margin(object))).collect(),
-        by_theory: evaluate::by_theory(model),
-    })
-}
-
-fn priors<'a>(model: &Model<'a>) -> Option<BTreeMap<&'a str, f64>> {
-    let objects = 0..model.object_count();
-    let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
-    let is_flat = objects.clone().all(|object| model.prior(object) == model.prior(0));
-    (!is_flat).then(|| objects.map(|object| (model.object_name(object), prior(object))).collect())
-}
-
-fn evidence(model: &Model<'_>) -> Touches {
-    let trained = model.trained_touches();
-    Touches {
-        counted: trained.counted.name(),
-        patterns: trained.patterns.iter().map(ContactPattern::name).collect(),
-        needs_pose: trained.needs_pose,
-        largest_spread: (trained.largest_spread < u32::MAX).then_some(trained.largest_spread),
-    }
-}
-
-fn noise(model: &Model<'_>) -> Option<Noise> {
-    let TrainedNoise { least, largest, timer, pose } = model.noise()?;
-    Some(Noise { least, largest, timer, pose_degrees: f64::from(pose) / 1000.0 })
-}
-
-fn pattern(model: &Model<'_>) -> Option<BTreeMap<&'static str, f64>> {
-    // Three digits: they are stored in steps of 1/65535.
-    let share = |share: u16| (f64::from(share) / 65.535).round() / 1000.0;
-    let shares = model.pattern_shares()?.0.map(share);
-    Some(ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(shares).collect())
-}
-
-/// The plan of approaches.
-#[derive(serde::Serialize)]
-struct PlanOf {
-    /// Rolls of the row of fingers for each of 26 directions.
-    rolls: u8,
-    poses: u16,
-    /// Poses in which nothing is ever touched.
-    left_out: usize,
-}
-
-fn plan(model: &Model<'_>) -> Option<PlanOf> {
-    let plan = model.plan()?;
-    let poses = plan.poses();
-    let left_out = (0..poses.count()).filter(|&pose| !plan.may_touch(pose)).count();
-    Some(PlanOf { rolls: poses.rolls(), poses: poses.count(), left_out })
 }
 
 /// What the model costs on a chip.

@@ -24,6 +24,7 @@ mod recognize_rows;
 mod report;
 mod run;
 mod shell;
+mod stated;
 mod strangers;
 mod train;
 mod tune;
