@@ -1,7 +1,7 @@
 //! `TreeEnsembleClassifier` and `TreeEnsembleRegressor`: lists of nodes that name their tree and themselves.
 
 use super::wire::Node;
-use super::{Comparison, Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
 use crate::ensemble::import::unsupported;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -59,14 +59,11 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
             };
             let mode = modes[at].strip_prefix("BRANCH_").unwrap_or(modes[at]);
             let missing_is_true = tracks.get(at).is_some_and(|&flag| flag != 0);
-            let Comparison { threshold, swapped, missing_left } = comparison(mode, values[at], missing_is_true)?;
-            let (mut left, mut right) = (child(trues[at])?, child(falses[at])?);
-            if swapped {
-                (left, right) = (right, left);
-            }
+            let comparison = comparison(mode, values[at], missing_is_true)?;
+            let branches = [child(trues[at])?, child(falses[at])?];
             let feature = index(features[at], "a feature's number")?;
             most = most.max(feature.saturating_add(1));
-            Ok(Targeted::Split { feature, threshold, missing_left, left, right })
+            Ok(comparison.split(feature, branches))
         })?;
     }
     Ok(most)

@@ -1,7 +1,7 @@
 //! `TreeEnsemble` of `ai.onnx.ml` 5: splits and leaves in lists of their own, by position.
 
 use super::wire::Node;
-use super::{Comparison, Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
 
 /// The modes' names, by their codes.
 const MODES: [&str; 7] = ["LEQ", "LT", "GTE", "GT", "EQ", "NEQ", "MEMBER"];
@@ -60,15 +60,11 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
             };
             let mode = usize::try_from(modes[at]).ok().and_then(|code| MODES.get(code)).copied().unwrap_or("unknown");
             let missing_is_true = tracks.get(at).is_some_and(|&flag| flag != 0);
-            let Comparison { threshold, swapped, missing_left } = comparison(mode, values[at], missing_is_true)?;
-            let mut left = child(true_leaves[at], trues[at], 0)?;
-            let mut right = child(false_leaves[at], falses[at], 1)?;
-            if swapped {
-                (left, right) = (right, left);
-            }
+            let comparison = comparison(mode, values[at], missing_is_true)?;
+            let branches = [child(true_leaves[at], trues[at], 0)?, child(false_leaves[at], falses[at], 1)?];
             let feature = index(features[at], "a feature's number")?;
             most = most.max(feature.saturating_add(1));
-            Ok(Targeted::Split { feature, threshold, missing_left, left, right })
+            Ok(comparison.split(feature, branches))
         })?;
     }
     Ok(most)

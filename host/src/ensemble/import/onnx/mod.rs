@@ -96,6 +96,15 @@ struct Comparison {
     missing_left: bool,
 }
 
+impl Comparison {
+    /// The split of a feature by it, with the nodes where the comparison of the file holds and where it does not.
+    fn split(self, feature: usize, [holds, fails]: [usize; 2]) -> Targeted {
+        let Self { threshold, swapped, missing_left } = self;
+        let (left, right) = if swapped { (fails, holds) } else { (holds, fails) };
+        Targeted::Split { feature, threshold, missing_left, left, right }
+    }
+}
+
 /// `mode` as one of the names of modes, without `BRANCH_`.
 fn comparison(mode: &str, value: f64, missing_is_true: bool) -> Result<Comparison> {
     if value.is_nan() {
