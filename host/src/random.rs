@@ -54,7 +54,7 @@ impl Purpose {
             Self::Sequences => Some(3),
             Self::View => Some(4),
             Self::Casts => Some(5),
-            Self::Approaches => Some(7),
+            Self::Approaches => Some(10),
             Self::Calibration => Some(9),
             Self::Active => Some(16),
             Self::Switch => Some(17),
@@ -93,9 +93,12 @@ mod tests {
     }
 
     #[test]
-    fn folds_noise_and_groups_of_one_seed_share_no_stream() {
-        use Purpose::{Calibration, Casts, Folds, Groups, Noise, Robot, Sensor, Sequences, Synthetic, View};
-        let purposes = [Folds, Noise, Sensor, Robot, Groups, Sequences, View, Casts, Calibration, Synthetic];
+    fn purposes_of_one_seed_share_no_stream() {
+        use Purpose::*;
+        let purposes = [
+            Folds, Noise, Sensor, Robot, Groups, Sequences, View, Casts, Approaches, Calibration, Active, Switch, Fit,
+            Synthetic,
+        ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();
         assert_eq!(purposes.map(draw).into_iter().collect::<BTreeSet<_>>().len(), purposes.len());
     }
