@@ -96,7 +96,19 @@ mod tests {
     fn purposes_of_one_seed_share_no_stream() {
         use Purpose::*;
         let purposes = [
-            Folds, Noise, Sensor, Robot, Groups, Sequences, View, Casts, Approaches, Calibration, Active, Switch, Fit,
+            Folds,
+            Noise,
+            Sensor,
+            Robot,
+            Groups,
+            Sequences,
+            View,
+            Casts,
+            Approaches,
+            Calibration,
+            Active,
+            Switch,
+            Fit,
             Synthetic,
         ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();

@@ -36,7 +36,7 @@ pub(super) struct Promises {
     sequences: [usize; 2],
     /// For each of [`RATES`].
     rates: Vec<Promised>,
-    /// For each object at [`SHOWN`], where that could be promised.
+    /// For each object at [`SHOWN`].
     objects: Vec<OfObject>,
 }
 
@@ -68,16 +68,23 @@ struct Stopped {
     undecided: f64,
 }
 
-/// What a promise on average, and one per name, mean for an object.
+/// What a promise means for an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct OfObject {
     name: String,
-    /// Touches until a verdict, promised on average and per name.
-    touches: [f64; 2],
+    /// Of a promise on average, and of one per name; none where there were too few sequences for it.
+    promised: [Option<Meaning>; 2],
+}
+
+/// What thresholds come to for an object.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Meaning {
+    /// Touches until a verdict.
+    touches: f64,
     /// Share of wrong names among those given to the object.
-    error: [f64; 2],
+    error: f64,
     /// Share of wrong ones when its name is given.
-    named_wrongly: [f64; 2],
+    named_wrongly: f64,
 }
 
 /// Finds thresholds on a capture of their own and tests them on another.
@@ -108,8 +115,8 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
         let [average, name, object] = [Per::Average, Per::Name, Per::Object].map(|per| chosen(&ours[0], rate, per));
         let (average, name, object) = (average?, name?, object?);
         let of_limit = chosen(&limit[0], rate, Per::Average)?;
-        if let (true, Some(average), Some(name)) = (rate == SHOWN, &average, &name) {
-            objects = of_objects(&ours[1], &names, [average, name]);
+        if rate == SHOWN {
+            objects = of_objects(&ours[1], &names, [&average, &name]);
         }
         let by = |of: &dyn Fn(&Sequence, usize) -> usize, odds: &Odds| worst(&ours[1], names.len(), odds, of);
         found.push(Promised {
@@ -189,7 +196,7 @@ fn worst(sequences: &[Sequence], groups: usize, odds: &Odds, of: &dyn Fn(&Sequen
     Stopped { error: wrong / given, low, high, ..stopped(sequences, odds) }
 }
 
-fn of_objects(sequences: &[Sequence], names: &[String], odds: [&Odds; 2]) -> Vec<OfObject> {
+fn of_objects(sequences: &[Sequence], names: &[String], odds: [&Option<Odds>; 2]) -> Vec<OfObject> {
     let of = |object: usize, odds: &Odds| {
         let own: Vec<Sequence> = sequences.iter().filter(|sequence| sequence.object == object).cloned().collect();
         let named: Vec<Sequence> = sequences
@@ -198,16 +205,11 @@ fn of_objects(sequences: &[Sequence], names: &[String], odds: [&Odds; 2]) -> Vec
             .cloned()
             .collect();
         let own = stopped(&own, odds);
-        [own.touches, own.error, stopped(&named, odds).error]
+        Meaning { touches: own.touches, error: own.error, named_wrongly: stopped(&named, odds).error }
     };
-    let objects = names.iter().enumerate().map(|(object, name)| {
-        let [average, by_name] = odds.map(|odds| of(object, odds));
-        OfObject {
-            name: name.clone(),
-            touches: [average[0], by_name[0]],
-            error: [average[1], by_name[1]],
-            named_wrongly: [average[2], by_name[2]],
-        }
+    let objects = names.iter().enumerate().map(|(object, name)| OfObject {
+        name: name.clone(),
+        promised: odds.map(|odds| odds.as_ref().map(|odds| of(object, odds))),
     });
     objects.collect()
 }
@@ -323,21 +325,20 @@ fn objects(context: &Context, promises: &Promises) -> Table {
         "named wrongly",
     ]);
     for object in &promises.objects {
-        let of = |way: usize| {
-            [
-                Cell::Number(object.touches[way], 1),
-                Cell::Percent(object.error[way], 2),
-                Cell::Percent(object.named_wrongly[way], 2),
-            ]
-        };
-        data.push(std::iter::once(object.name.as_str().into()).chain(of(0)).chain(of(1)));
+        let cells = object.promised.iter().flat_map(|meaning| match meaning {
+            Some(Meaning { touches, error, named_wrongly }) => {
+                [Cell::Number(*touches, 1), Cell::Percent(*error, 2), Cell::Percent(*named_wrongly, 2)]
+            }
+            None => [Cell::Missing, Cell::Missing, Cell::Missing],
+        });
+        data.push(std::iter::once(object.name.as_str().into()).chain(cells));
     }
     Table {
         id: "promises-objects".into(),
         title: "A promise of 1 % for each object".into(),
         caption:
             "Mistaken: share of wrong names among those given to the object. Named wrongly: share of wrong ones when \
-                  its name is given."
+                  its name is given. Dashes: too few sequences for the promise."
                 .into(),
         command: context.settings.command.clone(),
         data,

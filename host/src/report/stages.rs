@@ -296,6 +296,10 @@ mod tests {
             assert!(ids.contains(&section), "{section}");
         }
         assert!(files.contains("published.csv") && files.contains("summary.json"));
+        for file in written.files.iter().filter(|file| file.extension().is_some_and(|extension| extension == "csv")) {
+            let lines = std::fs::read_to_string(file).unwrap().lines().count();
+            assert!(lines > 1, "{} has no row", file.display());
+        }
         assert!(!html.contains("NaN"), "a number is none");
         assert_eq!(html.matches("<img ").count(), 3);
 
