@@ -1,6 +1,6 @@
 //! What a chip's own fingers report, into a data set.
 
-use super::{Connection, Received, Transport};
+use super::{ChipModel, Connection, Received, Transport};
 use crate::error::{ChipProblem, Error, Problem, Result};
 use crate::touches::Recording;
 use palpate_shared::Touch;
@@ -19,6 +19,8 @@ pub enum Heard<'a> {
     Connected {
         /// Its program, where it says so.
         program: Option<&'a str>,
+        /// Its model, if it has one.
+        model: Option<&'a ChipModel>,
         /// Another program made the newest touches of the data set: this one.
         other: Option<&'a str>,
     },
@@ -125,12 +127,13 @@ fn greet(
 ) -> Result<ControlFlow<()>> {
     let program = connection.program()?;
     let model = match connection.model() {
-        Ok(model) => Some(model.info.checksum),
+        Ok(model) => Some(model),
         Err(error) if is(&error, |problem| *problem == ChipProblem::NoModel) => None,
         Err(error) => return Err(error),
     };
-    let other = recording.made_by(program.clone(), model)?;
-    let flow = each(&Heard::Connected { program: program.as_deref(), other: other.as_deref() });
+    let other = recording.made_by(program.clone(), model.as_ref().map(|model| model.info.checksum))?;
+    let heard = Heard::Connected { program: program.as_deref(), model: model.as_ref(), other: other.as_deref() };
+    let flow = each(&heard);
     summary.firmware = program;
     flow
 }

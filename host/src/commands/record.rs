@@ -82,12 +82,13 @@ impl LinkArguments {
         count: Option<u64>,
         json: bool,
     ) -> Result<()> {
-        let names = connection.model().map_or_else(|_| Vec::new(), |model| model.names);
+        let mut names = Vec::new();
         let directory = self.record.clone().unwrap_or_default();
         let object = recording.object().to_owned();
         let summarized = record(&mut connection, reopen, &mut recording, count, |heard| {
             match heard {
-                Heard::Connected { program, other } => {
+                Heard::Connected { program, model, other } => {
+                    names = model.map(|model| model.names.clone()).unwrap_or_default();
                     if let (Some(program), Some(other)) = (program, other) {
                         eprintln!("palpate: warning: {other} made the newest touches here, now it is {program}");
                     }

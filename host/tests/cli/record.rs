@@ -76,7 +76,7 @@ fn a_recording_trains_and_is_recognized_like_any_other_data_set() {
     }
     let ensemble = place.path().join("model.json");
     let [data, ensemble] = [&data, &ensemble].map(|path| path.to_str().unwrap());
-    stdout(run(["train", data, "-o", ensemble, "--trees", "3", "--depth", "2"]));
+    stdout(run(["train", data, "-o", ensemble, "--rounds", "3", "--depth", "2"]));
     let said = json(run(["evaluate", ensemble, data, "--json"]));
     assert!(said["sequential"].is_object() || said.is_object(), "{said}");
     let verdicts = stdout(run(["recognize", ensemble, &format!("{data}/mug.txt")]));

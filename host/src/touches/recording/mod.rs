@@ -215,8 +215,7 @@ impl Recording {
             (&other.object, other.crc32, other.touches) == (&self.recorded.object, Some(crc32), touches.len() as u64)
         };
         if let Some(Recorded { object, touches, began, .. }) = self.listing.recorded.iter().find(is_same).cloned() {
-            let problem = TouchesProblem::RecordedBefore { object, touches, began };
-            return Err(Error::at(Place::file(&self.directory), problem));
+            return Err(TouchesProblem::RecordedBefore { object, touches, began }.into());
         }
         self.recorded.crc32 = Some(crc32);
         self.append(touches)?;
