@@ -30,6 +30,10 @@ pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) ->
         }
         return Ok(Admission { replaced: None, listing: wanted });
     };
+    if found.is_recorded() {
+        let touches = touches(&found.objects);
+        return refuse(CaptureProblem::HoldsRecorded { touches, objects: found.names() });
+    }
     if settings.force {
         return Ok(Admission { replaced: Some(found), listing: wanted });
     }
@@ -96,7 +100,7 @@ fn merged(found: Listing, wanted: &Listing) -> Listing {
     }
     objects.sort_by(|a, b| a.name.cmp(&b.name));
     let complete = false;
-    Listing { palpate: wanted.palpate.clone(), complete, origin: found.origin, objects }
+    Listing { palpate: wanted.palpate.clone(), complete, origin: found.origin, objects, recorded: Vec::new() }
 }
 
 /// Which settings differ, and how: "touches is 20 there and 30 here". Empty if none does.

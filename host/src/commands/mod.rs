@@ -5,6 +5,7 @@ mod capture;
 mod cast;
 mod chips;
 mod completions;
+mod data;
 mod design;
 mod evaluate;
 mod expected;
@@ -21,6 +22,7 @@ mod probe;
 mod progress;
 mod recognize;
 mod recognize_rows;
+mod record;
 mod report;
 mod run;
 mod shell;
@@ -66,6 +68,8 @@ commands! {
     View => view,
     /// Touch objects with the virtual probe
     Capture => capture,
+    /// Add the touches of a real probe to a data set
+    Data => data,
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     Cast => cast,
     /// Train an ensemble on captured touches

@@ -1,7 +1,7 @@
 //! A data set: a directory with one file per object.
 
 use super::checksum::checksum;
-use super::{Entry, Format, Listing, Origin};
+use super::{Entry, Format, Listing, Origin, Recorded, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
 use palpate_shared::Touch;
@@ -18,6 +18,8 @@ pub struct Dataset {
     /// How many instances the objects have that have several, by name: touch i is of instance i modulo their number.
     /// Empty after a split, which shuffles touches.
     pub instances: BTreeMap<String, usize>,
+    /// The recordings that the touches are from; empty for simulated touches, and where that is not known.
+    pub recorded: Vec<Recorded>,
     /// What looked wrong when the data set was read, and may be meant.
     pub warnings: Vec<Warning>,
 }
@@ -41,9 +43,20 @@ pub enum Warning {
         /// The file.
         path: PathBuf,
     },
+    /// The last line of a recorded file is not whole.
+    #[error("{}: its last line is not whole and was not read: a recording was interrupted", path.display())]
+    HalfLine {
+        /// The file.
+        path: PathBuf,
+    },
 }
 
 impl Dataset {
+    /// Whether a real probe made the touches, as far as the data set states it.
+    pub fn is_recorded(&self) -> bool {
+        !self.recorded.is_empty()
+    }
+
     /// Touches that nothing is known about: no origin, no warnings. The objects are to be sorted by name.
     pub fn new(objects: Vec<ObjectTouches>) -> Self {
         Self { objects, ..Self::default() }
@@ -51,7 +64,7 @@ impl Dataset {
 
     /// Other touches of the same origin, such as a part of these.
     pub fn with(&self, objects: Vec<ObjectTouches>) -> Self {
-        Self { objects, origin: self.origin.clone(), ..Self::default() }
+        Self { objects, origin: self.origin.clone(), recorded: self.recorded.clone(), ..Self::default() }
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
@@ -93,16 +106,24 @@ impl Dataset {
         }
         let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
         let mut instances = BTreeMap::new();
+        let is_recorded = listing.is_recorded();
         for entry in listing.objects {
             let path = entry.file(directory, listing.origin.format);
-            let touches = read_listed(&entry, listing.origin.format, &path, &mut warnings)?;
+            let touches = match is_recorded {
+                true => recording::read(&entry, &path, &mut warnings)?,
+                false => read_listed(&entry, listing.origin.format, &path, &mut warnings)?,
+            };
+            // Of an object whose recording was interrupted before its first touch.
+            if is_recorded && touches.is_empty() {
+                continue;
+            }
             if entry.instances.len() > 1 {
                 instances.insert(entry.name.clone(), entry.instances.len());
             }
             objects.push(ObjectTouches { name: entry.name, touches });
         }
         objects.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(Self { objects, origin: Some(listing.origin), instances, warnings })
+        Ok(Self { objects, origin: Some(listing.origin), instances, recorded: listing.recorded, warnings })
     }
 
     /// Every file of touches that there is.

@@ -5,6 +5,9 @@
 //! [`Listing`]: which objects there are, how many touches of each, their files' checksums, and how the touches were made
 //! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe.
 //!
+//! [`Recording`] adds the touches of a real probe to such a directory, one by one as they come; its listing says when, from
+//! where and by which firmware ([`Recorded`]).
+//!
 //! [`noise`] adds what a real sensor, timer and robot add; [`folds`] divides touches into some to train on and others to test on.
 //!
 //! ```
@@ -35,6 +38,7 @@ pub mod noise;
 mod origin;
 #[cfg(feature = "parquet")]
 pub mod parquet;
+mod recording;
 mod shard;
 #[cfg(all(test, feature = "train"))]
 pub(crate) mod synthetic;
@@ -47,5 +51,6 @@ pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use origin::Origin;
 pub(crate) use origin::{tenth, unit};
+pub use recording::{Recorded, Recording};
 pub use shard::Shard;
 pub use text::{parse_touch, write_touch};

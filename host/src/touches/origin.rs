@@ -56,6 +56,11 @@ impl Default for Origin {
 }
 
 impl Origin {
+    /// How recorded touches are made: every touch with a contact is kept, nothing is drawn.
+    pub fn recorded(probe: Probe, unit: Length, pose: bool) -> Self {
+        Self { touches: 0, seed: 0, probe, unit, pose, approaches: true, ..Self::default() }
+    }
+
     /// Refuses what no touches can be made by.
     ///
     /// # Errors

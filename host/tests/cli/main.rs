@@ -11,6 +11,7 @@ mod models;
 mod objects;
 mod plan;
 mod probe;
+mod record;
 mod reports;
 mod rows;
 mod strangers;
