@@ -36,6 +36,12 @@ pub(crate) enum Purpose {
     Switch,
     /// The order in which touches are used to calibrate a test of fit.
     Fit,
+    /// What a real probe adds to the touches of a capture.
+    Capture,
+    /// Touches as a fitted probe would make them.
+    Fitted,
+    /// The folds of a comparison of two data sets, and its repetitions.
+    Compare,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -59,6 +65,9 @@ impl Purpose {
             Self::Active => Some(16),
             Self::Switch => Some(17),
             Self::Fit => Some(11),
+            Self::Capture => Some(28),
+            Self::Fitted => Some(29),
+            Self::Compare => Some(30),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }
@@ -109,6 +118,9 @@ mod tests {
             Active,
             Switch,
             Fit,
+            Capture,
+            Fitted,
+            Compare,
             Synthetic,
         ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();

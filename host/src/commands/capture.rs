@@ -25,6 +25,9 @@ Examples:
   palpate capture meshes/ -o data --approaches    every approach, also misses
   palpate capture meshes/ -o data --true-size --unit mm --probe probe.toml
                                                   as large as they are
+  palpate capture meshes/ -o data --probe probe.toml
+                                                  as your probe would: the file's
+                                                  [real] is added to each touch
   palpate capture meshes/ -o data --instances     a directory for each object
   palpate capture builtin -o data --instances 20  twenty forks are a fork
   palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts
@@ -140,6 +143,7 @@ impl Arguments {
             approaches: self.approaches || base.approaches,
             format: self.format.unwrap_or(base.format),
             shard: self.shard.unwrap_or(base.shard),
+            real: self.size.probe.read()?.map_or(base.real, |file| file.real),
         })
     }
 }

@@ -1,4 +1,4 @@
-//! `palpate probe design`.
+//! `palpate probe`, and `palpate probe design`.
 
 use super::numbers::share;
 use super::probe::UnitArguments;
@@ -27,6 +27,8 @@ pub(crate) struct Arguments {
 enum Command {
     /// Find the probe that needs the fewest approaches to recognize your objects
     Design(DesignArguments),
+    /// Find out what is crooked about your probe from touches that it made of objects whose meshes you have
+    Fit(super::fit::FitArguments),
 }
 
 #[derive(clap::Args)]
@@ -90,7 +92,13 @@ struct DesignArguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Command::Design(arguments) = arguments.command;
+    match arguments.command {
+        Command::Design(arguments) => run_design(&arguments),
+        Command::Fit(arguments) => super::fit::run(&arguments),
+    }
+}
+
+fn run_design(arguments: &DesignArguments) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
     let objects = arguments.units.objects(&arguments.sources, arguments.seed)?;
     let settings = arguments.settings(&objects)?;

@@ -11,6 +11,7 @@ mod evaluate;
 mod expected;
 mod export;
 mod figures;
+mod fit;
 mod inspect;
 mod link;
 mod noise;
@@ -88,7 +89,7 @@ commands! {
     Calibrate => calibrate,
     /// Find the best model that fits a chip
     Tune => tune,
-    /// Find out which probe to build for your objects
+    /// Find out which probe to build for your objects, and what is crooked about the one you have
     Probe => design,
     /// Compare a compiled model with its ensemble
     Parity => parity,

@@ -4,6 +4,7 @@ use crate::ensemble::StatedProbe;
 use crate::error::ProbeProblem;
 use crate::mesh::{BACKGROUND, Object, builtin, source};
 use crate::probe::file::ProbeFile;
+use crate::touches::noise::Noise;
 use crate::touches::{Dataset, Origin};
 use crate::{Error, Result};
 use palpate_shared::format::Length;
@@ -42,6 +43,27 @@ impl ProbeArguments {
             StatedProbe::compare([&name, "the data set"], [given.trained(), own.trained()])?;
         }
         Ok(own.or(Some(given)))
+    }
+
+    /// What is to be added to the touches of a data set: what the file says under `[real]`, without a file `usual`, and
+    /// nothing where the touches were captured with such a file and have it already.
+    ///
+    /// # Errors
+    /// If the data set was captured with another `[real]`.
+    pub(crate) fn noise(&self, file: Option<&ProbeFile>, dataset: &Dataset, usual: Noise) -> Result<Noise> {
+        let there = dataset.real();
+        let asked = file.map(|file| file.real).filter(|real| !real.is_none());
+        match asked {
+            None if there.is_none() => Ok(usual),
+            Some(real) if there.is_none() => Ok(real),
+            Some(real) if real != there => Err(ProbeProblem::Differs {
+                first: self.probe.as_ref().map_or_else(String::new, |path| path.display().to_string()),
+                second: "the data set".into(),
+                differences: format!("[real]: {real}; and {there}"),
+            }
+            .into()),
+            _ => Ok(Noise::default()),
+        }
     }
 }
 

@@ -5,7 +5,6 @@ use crate::Result;
 use crate::ensemble::train::{self, Engine, Settings};
 use crate::evaluate::{self, CostOfNoise};
 use crate::output;
-use crate::probe::file::ProbeFile;
 use crate::touches::Dataset;
 use crate::touches::noise::Noise;
 use palpate_onboard::Refused;
@@ -25,7 +24,7 @@ A data set of approaches also holds touches with one or two contacts, and approa
 
 The ensemble states the probe that the data set was captured with; models exported from it do as well. With --probe, \
 the data set must have been captured with the probe of the file, and what the file says under [real] is added to the \
-touches.
+touches, unless they were captured with it and have it already.
 
 Examples:
   palpate train data -o ensemble.json
@@ -147,8 +146,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let dataset = super::dataset(&arguments.directory)?;
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let settings = Settings { probe, ..arguments.settings(file.as_ref()) };
-    let is_clean = settings.noise.is_none();
+    let mut settings = Settings { probe, ..arguments.settings() };
+    settings.noise = arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, settings.noise)?);
+    let is_clean = dataset.real().and(&settings.noise).is_none();
     let start = Instant::now();
     let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
     let trained = match &background {
@@ -226,7 +226,8 @@ fn cost(trained: &Trained, is_clean: bool) -> String {
 }
 
 impl Arguments {
-    fn settings(&self, probe: Option<&ProbeFile>) -> Settings {
+    /// All but the noise and the probe.
+    fn settings(&self) -> Settings {
         let preset = match self.preset {
             Preset::Compact => Settings::compact(),
             Preset::Paper => Settings::paper(),
@@ -247,7 +248,7 @@ impl Arguments {
             bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
             feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
             leaf_bits: self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-            noise: self.noise.over(probe.map_or(preset.noise, |file| file.real)),
+            noise: preset.noise,
             seed: self.seed,
             threads: self.threads,
             probe: None,

@@ -1,6 +1,7 @@
 //! A data set: a directory with one file per object.
 
 use super::checksum::checksum;
+use super::noise::Noise;
 use super::{Entry, Format, Listing, Origin, Recorded, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
@@ -151,6 +152,11 @@ impl Dataset {
     pub fn holds_approaches(&self) -> bool {
         let any_partial = || self.objects.iter().flat_map(|object| &object.touches).any(|touch| !touch.is_full());
         self.origin.as_ref().map_or_else(any_partial, |origin| origin.approaches)
+    }
+
+    /// What a real probe added to the touches, as far as the data set states it: noise that they have already.
+    pub fn real(&self) -> Noise {
+        self.origin.as_ref().map_or_else(Noise::default, |origin| origin.real)
     }
 
     /// The share of each contact pattern among all touches, in the order of the patterns' codes, each object weighted

@@ -71,7 +71,8 @@ pub struct Settings {
     /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
     /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
     pub leaf_bits: Option<u32>,
-    /// What is added to the touches before training, every touch made by a robot of its own.
+    /// What is added to the touches before training, every touch made by a robot of its own; on top of what the data set
+    /// states that they have already ([`Dataset::real`]).
     pub noise: Noise,
     /// Seed of the noise.
     pub seed: u64,
@@ -164,7 +165,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
         round_leaves(&mut ensemble, bits);
     }
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
-    let noise = (!settings.noise.is_none()).then_some(settings.noise);
+    let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
     ensemble.origin = Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) };
     Ok(ensemble)
 }
