@@ -63,6 +63,9 @@ mod single {
         pub const FLAT: Real = 1e-4;
         pub const PARALLEL: Real = 1e-6;
         pub const PLANE: Real = 1e-5;
+        pub const NARROW: Real = 1e-3;
+        pub const STEEP: Real = 1e-3;
+        pub const CLEAR: Real = 1.0 + 1e-5;
     }
 
     #[path = "narrow.rs"]
