@@ -41,15 +41,63 @@ impl Pack {
 
     /// For each triangle, a distance before which the sphere does not touch it; infinite if it does not before `limit`.
     #[inline]
-    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> [f32; LANES] {
-        let mut earliest = [f32::INFINITY; LANES];
-        let used = self.count as usize;
-        for (half, places) in self.halves.iter().zip(earliest.chunks_exact_mut(WIDTH)).take(used.div_ceil(WIDTH)) {
-            places.copy_from_slice(&half_earliest(half, ray, limit).to_array());
-        }
-        earliest[used..].fill(f32::INFINITY);
-        earliest
+    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> Earliest {
+        let first = half_earliest(&self.halves[0], ray, limit);
+        let is_half = self.count as usize <= WIDTH;
+        let second = if is_half { Vec4::INFINITY } else { half_earliest(&self.halves[1], ray, limit) };
+        Earliest::new([first, second], self.count)
     }
+}
+
+/// Distances before which the triangles of a pack are not touched.
+pub(super) struct Earliest {
+    places: [f32; LANES],
+    /// A bit for each triangle that is left.
+    left: u32,
+}
+
+impl Earliest {
+    /// Of the first `count` triangles.
+    #[inline]
+    fn new(halves: [Vec4; 2], count: u32) -> Self {
+        let [low, high] = halves.map(|half| half.cmplt(Vec4::INFINITY).bitmask());
+        let mut places = [0.0; LANES];
+        for (places, half) in places.chunks_exact_mut(WIDTH).zip(halves) {
+            places.copy_from_slice(&half.to_array());
+        }
+        Self { places, left: (low | high << WIDTH) & all(count) }
+    }
+
+    /// Distances that exclude none of this many triangles.
+    #[cfg(feature = "experiments")]
+    pub(super) fn at_once(count: u32) -> Self {
+        Self { places: [0.0; LANES], left: all(count) }
+    }
+
+    /// The triangle with the least distance, if that is at most `limit`. Each is returned only once.
+    #[inline]
+    pub(super) fn pop(&mut self, limit: f32) -> Option<usize> {
+        if self.left == 0 {
+            return None;
+        }
+        let mut least = self.left.trailing_zeros() as usize;
+        let mut others = self.left & (self.left - 1);
+        while others != 0 {
+            let lane = others.trailing_zeros() as usize;
+            others &= others - 1;
+            if self.places[lane % LANES] < self.places[least % LANES] {
+                least = lane;
+            }
+        }
+        self.left &= !(1 << least);
+        (self.places[least % LANES] <= limit).then_some(least)
+    }
+}
+
+/// A bit for each of this many lanes.
+#[inline]
+fn all(count: u32) -> u32 {
+    (1 << count) - 1
 }
 
 #[inline]
