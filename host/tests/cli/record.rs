@@ -76,11 +76,14 @@ fn a_recording_trains_and_is_recognized_like_any_other_data_set() {
     }
     let ensemble = place.path().join("model.json");
     let [data, ensemble] = [&data, &ensemble].map(|path| path.to_str().unwrap());
+    let model = place.path().join("model.palpate");
+    let model = model.to_str().unwrap();
     stdout(run(["train", data, "-o", ensemble, "--rounds", "3", "--depth", "2"]));
-    let said = json(run(["evaluate", ensemble, data, "--json"]));
-    assert!(said["sequential"].is_object() || said.is_object(), "{said}");
-    let verdicts = stdout(run(["recognize", ensemble, &format!("{data}/mug.txt")]));
-    assert!(verdicts.contains("mug") && !verdicts.contains("recognized bowl"), "{verdicts}");
+    let said = stdout(run(["evaluate", ensemble, data]));
+    assert!(said.contains("\nall     100.0 % 100.0 %"), "{said}");
+    stdout(run(["export", ensemble, "-o", model]));
+    let verdicts = stdout(run(["recognize", model, &format!("{data}/mug.txt")]));
+    assert!(verdicts.contains("mug") && !verdicts.contains("bowl"), "{verdicts}");
 }
 
 #[test]
