@@ -1,7 +1,8 @@
 //! What `palpate train` takes and says about recorded touches.
 
 use crate::error::{Error, Place, Result, TouchesProblem};
-use crate::teach::{Needed, Taught, TaughtObject};
+use crate::report::teach::{more_approaches, page, promise};
+use crate::teach::{Taught, TaughtObject};
 use crate::touches::{Dataset, ObjectTouches};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,9 @@ pub(crate) struct TeachArguments {
         ]
     )]
     pub(crate) extend: Option<PathBuf>,
+    /// Write a page that shows how well the recorded objects are recognized, and what more approaches would come to
+    #[arg(long, value_name = "FILE", requires = "teach")]
+    pub(crate) page: Option<PathBuf>,
 }
 
 impl TeachArguments {
@@ -40,6 +44,14 @@ impl TeachArguments {
             }
         }
         Ok(all)
+    }
+
+    /// Writes the page, if one is wanted. The command that remakes it is this program's own.
+    pub(crate) fn write_page(&self, taught: Option<&Taught>) -> Result<()> {
+        let Some((path, taught)) = self.page.as_ref().zip(taught) else { return Ok(()) };
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        let command = super::shell::command(std::iter::once("palpate").chain(words.iter().map(String::as_str)));
+        page(taught, &command)?.write(path).map(drop)
     }
 
     /// The files that are read, none of which may be written.
@@ -77,7 +89,7 @@ pub(crate) fn text(taught: &Taught) -> String {
     for object in &taught.objects {
         _ = writeln!(text, "\n{}", of_object(object, taught));
         _ = writeln!(text, "{}", table(object));
-        _ = writeln!(text, "{}", more(object));
+        _ = writeln!(text, "{}", more_approaches(object));
     }
     if let Some(others) = taught.others {
         _ = writeln!(
@@ -87,8 +99,7 @@ pub(crate) fn text(taught: &Taught) -> String {
             taught.approaches
         );
     }
-    let fewest = taught.objects.iter().map(|object| object.approaches).min().unwrap_or(0);
-    _ = writeln!(text, "\n{}", promise(&taught.promise, fewest));
+    _ = writeln!(text, "\n{}", promise(taught));
     text
 }
 
@@ -123,37 +134,6 @@ fn table(object: &TaughtObject) -> String {
         );
     }
     text
-}
-
-/// Whether more approaches would help.
-fn more(object: &TaughtObject) -> String {
-    let Some(last) = object.curve.points.last() else { return String::new() };
-    let (now, then) = (last.error, object.curve.with_twice);
-    let twice = 2 * object.approaches;
-    if now - then < 0.005 {
-        format!("Recording more approaches to {} would hardly help.", object.name)
-    } else {
-        format!(
-            "With {twice} approaches to {} the error would be about {} % instead of {} %.",
-            object.name,
-            percent(then),
-            percent(now)
-        )
-    }
-}
-
-/// Whether there is enough for a promise.
-fn promise(needed: &Needed, recorded: usize) -> String {
-    let Needed { sequences, of_each, approaches } = *needed;
-    let what = format!(
-        "To promise 1 % wrong names takes {sequences} sequences without an error, {of_each} of each object: about \
-         {approaches} approaches that the object was not taught with"
-    );
-    if recorded < approaches + crate::teach::LEAST {
-        format!("No promise can be made yet. {what}, and {recorded} were recorded in all.")
-    } else {
-        format!("{what}. Teach with the others only, and keep these for palpate calibrate.")
-    }
 }
 
 fn percent(share: f64) -> String {

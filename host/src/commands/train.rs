@@ -46,8 +46,9 @@ Examples:
   palpate train data -o robust.json --noise 0..10ms --timer 1ms
   palpate train data -o real.json --probe probe.toml
   palpate train approaches -o taught.json --teach pot.txt
-  palpate train approaches -o taught.json --extend contacts.json --teach recorded
-  palpate train --teach recorded -o own.json  no simulation at all
+  palpate train approaches -o taught.json --teach pot.txt --page pot.html
+  palpate train approaches -o more.json --extend taught.json --teach real
+  palpate train --teach real -o own.json  no simulation at all
   palpate train data -o turned.json --descriptor oriented --pose-noise 5deg")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
@@ -169,7 +170,9 @@ struct Made {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let read = arguments.directory.iter().flat_map(|directory| super::files_of(directory));
-    output::refuse_input(&arguments.output, read.chain(arguments.teach.files()))?;
+    let read: Vec<PathBuf> = read.chain(arguments.teach.files()).collect();
+    output::refuse_input(&arguments.output, &read)?;
+    arguments.teach.page.iter().try_for_each(|page| output::refuse_input(page, &read))?;
     let start = Instant::now();
     let recorded = arguments.teach.read()?;
     let Made { ensemble, dataset, taught, is_clean, settings } = match (&arguments.directory, recorded) {
@@ -178,6 +181,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     let seconds = start.elapsed().as_secs_f64();
     ensemble.save(&arguments.output)?;
+    arguments.teach.write_page(taught.as_ref())?;
     let evidence = ensemble.trained_touches();
     let is_used = |touch: &&Touch| Refused::check(&evidence, touch).is_ok();
     let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
@@ -212,7 +216,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         trained.used,
         trained.touches,
         if dataset.holds_approaches() { "approaches" } else { "touches" },
-        trained.objects,
+        dataset.objects.len(),
         match evidence.counted {
             Counted::Full => "full touches",
             Counted::Contacts => "those with a contact",
