@@ -29,6 +29,7 @@ mod run;
 mod shell;
 mod stated;
 mod strangers;
+mod teach;
 mod train;
 mod tune;
 mod verify;

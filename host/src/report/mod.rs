@@ -29,6 +29,7 @@ mod simulator;
 mod stages;
 pub(crate) mod statistics;
 mod strangers;
+pub(crate) mod teach;
 pub mod view;
 
 pub use settings::Settings;

@@ -16,6 +16,7 @@ mod reports;
 mod rows;
 mod strangers;
 mod support;
+mod teach;
 mod view;
 
 use support::{command, globe, json, listing, run, stderr, stdout};

@@ -170,9 +170,7 @@ impl Plate {
         let [curvature, slope] = [first - 2.0 * middle + third, third - first];
         let count = self.presses.len().max(1) as f64;
         let tilt: f64 = self.presses.iter().map(|(turn, press)| turn * (press.second - slope)).sum::<f64>() / count;
-        let normal = |x: f64, deviation: f64| {
-            (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt())
-        };
+        let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt());
         let [root6, root2] = [6.0_f64.sqrt() * noise, 2.0_f64.sqrt() * noise];
         let of = |(turn, press): &(f64, Observed)| {
             let times = normal(press.first - curvature, root6) * normal(press.second - slope - turn * tilt, root2);

@@ -168,7 +168,8 @@ fn simulated(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
         return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
     }
     let real = crate::touches::noise::Noise::default();
-    let origin = Origin { approaches: true, touches: settings.approaches, seed: settings.seed, real, ..settings.origin.clone() };
+    let origin =
+        Origin { approaches: true, touches: settings.approaches, seed: settings.seed, real, ..settings.origin.clone() };
     let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
     progress.begin("touching", Some(objects.len() as u64));
     let one = |(object, scenes): (&Object, &Vec<_>)| {
@@ -198,7 +199,8 @@ fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, V
         best = search::near(&likelihood, &better.candidate);
     }
     progress::check(progress)?;
-    let ends = (0..likelihood::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
+    let ends =
+        (0..likelihood::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
     Ok((best, ends))
 }
 

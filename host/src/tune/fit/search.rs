@@ -66,9 +66,9 @@ fn climb(likelihood: Likelihood<'_>, start: [f64; NUMBERS], fixed: Option<usize>
         let corner = free(&best);
         let mut simplex = vec![corner.clone(); corner.len() + 1];
         simplex.iter_mut().skip(1).enumerate().for_each(|(index, corner)| corner[index] += size);
-        let found = NelderMead::new(simplex)
-            .with_sd_tolerance(CLOSE)
-            .and_then(|solver| Executor::new(cost, solver).configure(|state| state.max_iters(ITERATIONS)).timer(false).run());
+        let found = NelderMead::new(simplex).with_sd_tolerance(CLOSE).and_then(|solver| {
+            Executor::new(cost, solver).configure(|state| state.max_iters(ITERATIONS)).timer(false).run()
+        });
         // The search itself cannot fail: its cost function does not.
         let Ok(found) = found else { break };
         let Some(numbers) = found.state().get_best_param() else { break };
@@ -160,7 +160,9 @@ pub(super) fn interval(likelihood: Likelihood<'_>, best: &Best, index: usize) ->
             }
             let slope = |(at, height): (f64, f64)| (root - inside.1) * (at - inside.0) / (height - inside.1).max(1e-9);
             step = match outside {
-                Some(outside) => inside.0 + slope(outside).clamp(0.1 * (outside.0 - inside.0), 0.9 * (outside.0 - inside.0)),
+                Some(outside) => {
+                    inside.0 + slope(outside).clamp(0.1 * (outside.0 - inside.0), 0.9 * (outside.0 - inside.0))
+                }
                 // Nothing outside yet: as far as a straight line from the center says, and at most four times as far.
                 None => (step * (root / here.max(0.05)) * 1.05).clamp(1.3 * step, 4.0 * step),
             };
