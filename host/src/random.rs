@@ -40,8 +40,6 @@ pub(crate) enum Purpose {
     Capture,
     /// Touches as a fitted probe would make them.
     Fitted,
-    /// The folds of a comparison of two data sets, and its repetitions.
-    Compare,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -67,7 +65,6 @@ impl Purpose {
             Self::Fit => Some(11),
             Self::Capture => Some(28),
             Self::Fitted => Some(29),
-            Self::Compare => Some(30),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }
@@ -120,7 +117,6 @@ mod tests {
             Fit,
             Capture,
             Fitted,
-            Compare,
             Synthetic,
         ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();

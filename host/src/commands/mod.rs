@@ -5,6 +5,7 @@ mod capture;
 mod cast;
 mod chips;
 mod completions;
+mod data;
 mod design;
 mod evaluate;
 mod expected;
@@ -69,6 +70,8 @@ commands! {
     Capture => capture,
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     Cast => cast,
+    /// Look at data sets: compare recorded touches with simulated ones
+    Data => data,
     /// Train an ensemble on captured touches
     Train => train,
     /// Compile an ensemble to the bytes that the chip reads

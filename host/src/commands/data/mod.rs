@@ -1,0 +1,24 @@
+//! `palpate data`: what is done with data sets of touches.
+
+mod compare;
+
+use crate::Result;
+
+#[derive(clap::Args)]
+#[command(arg_required_else_help = true, subcommand_required = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Say how far recorded touches are from simulated ones, and what that costs
+    Compare(compare::CompareArguments),
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    match arguments.command {
+        Command::Compare(arguments) => compare::run(&arguments),
+    }
+}
