@@ -40,8 +40,6 @@ pub(crate) enum Purpose {
     Capture,
     /// Touches as a fitted probe would make them.
     Fitted,
-    /// The folds of a comparison of two data sets, and its repetitions.
-    Compare,
     /// Which recorded touches are held out together, and groups of them.
     Teach,
     /// Made-up touches for tests.
@@ -69,7 +67,6 @@ impl Purpose {
             Self::Fit => Some(11),
             Self::Capture => Some(28),
             Self::Fitted => Some(29),
-            Self::Compare => Some(30),
             Self::Teach => Some(18),
             #[cfg(test)]
             Self::Synthetic => Some(6),
@@ -123,7 +120,6 @@ mod tests {
             Fit,
             Capture,
             Fitted,
-            Compare,
             Teach,
             Synthetic,
         ];

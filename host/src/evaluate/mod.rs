@@ -35,6 +35,8 @@
 mod active;
 mod approaches;
 #[cfg(feature = "train")]
+pub mod compare;
+#[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
 mod draws;

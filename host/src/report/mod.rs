@@ -21,6 +21,7 @@ mod objects;
 mod plan;
 mod promises;
 mod published;
+mod recorded;
 pub(crate) mod results;
 pub(crate) mod run_page;
 mod sequential;

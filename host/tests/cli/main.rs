@@ -5,6 +5,7 @@ mod cast;
 mod chip;
 mod compiled;
 mod design;
+mod fit;
 mod help;
 mod mesh;
 mod models;

@@ -23,9 +23,9 @@ const LEAST: f64 = 0.1;
 const RATIO: f64 = 1.3;
 const LEVELS: usize = 22;
 /// By how much of its distance from 0 a simulated touch is smoothed.
-const SMOOTHING: f64 = 0.045;
+const SMOOTHING: f64 = 0.03;
 /// Growth of cells with the distance from 0, as a share of it.
-const GROWTH: f64 = 0.03;
+const GROWTH: f64 = 0.02;
 /// Cells to a standard deviation near 0.
 const CELLS: f64 = 2.0;
 /// How many standard deviations a kernel reaches.

@@ -1,6 +1,6 @@
 //! Recordings that look wrong: of another object than their name says, of two objects, of a probe that was changed.
 //!
-//! Each recording is compared under the probe that fits the others. Likelihood ratios of the right object against a wrong
+//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits all. Likelihood ratios of the right object against a wrong
 //! one pass e^x with a probability of at most e^−x, wherever in the recording one looks (Ville's inequality), so that a
 //! few hundred comparisons at [`CERTAIN`] nats together give a false alarm once in a thousand recordings.
 
@@ -133,7 +133,7 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
         touches.iter().map(|touch| explained.log_density(touch)).collect()
     };
     let sum = |values: &[f64]| values.iter().sum::<f64>();
-    let mine = by(&rest.candidate, own);
+    let mine = by(&best.candidate, own);
     // How likely the touches are as each object's; where there is nothing else to go by, each under the probe that suits it.
     let rivals: Vec<(usize, Vec<f64>)> = (0..evidence.objects.len())
         .filter(|&object| object != own)
@@ -142,7 +142,8 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
                 return (object, by(&rest.candidate, object));
             }
             let likelihood = |candidate: &Candidate| {
-                Explained::new(candidate, &evidence.objects[object], recording.kept).log_likelihood(touches)
+                let explained = Explained::new(candidate, &evidence.objects[object], recording.kept);
+                explained.log_likelihood(touches) + candidate.usual()
             };
             (object, by(&search::best(&likelihood, None).candidate, object))
         })
@@ -152,7 +153,16 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
     let stretch = rivals.iter().map(|(object, theirs)| (*object, longest_gain(theirs, &mine)));
     let stretch = stretch.max_by(|a, b| a.1.2.total_cmp(&b.1.2));
     let object = |object: usize| evidence.objects[object].name.clone();
-    if let Some((other, gain)) = whole.filter(|(_, gain)| *gain > CERTAIN) {
+    // With few recordings the others may tell too little about the probe: the name is wrong only if all of them together
+    // are likelier with the other one.
+    let renamed = |other: usize| {
+        let likelihood = |candidate: &Candidate| {
+            let explained = Explained::new(candidate, &evidence.objects[other], recording.kept);
+            others(candidate) + explained.log_likelihood(touches)
+        };
+        only || search::near(&likelihood, &rest.candidate).log_likelihood - best.log_likelihood > CERTAIN
+    };
+    if let Some((other, gain)) = whole.filter(|(other, gain)| *gain > CERTAIN && renamed(*other)) {
         // A part of the recording may still be the object's own.
         if let Some((part, (from, to, _))) = stretch.filter(|(_, (from, to, most))| {
             *most > gain + CERTAIN && to - from >= LEAST && touches.len() - (to - from) >= LEAST
@@ -214,7 +224,7 @@ fn changed(evidence: &Evidence<'_>, best: &Best, rest: &Best, index: usize) -> O
     let explained =
         |candidate: &Candidate| Explained::new(candidate, &evidence.objects[evidence.of[index]], recording.kept);
     let fit = |part: &[Observed]| {
-        let likelihood = |candidate: &Candidate| explained(candidate).log_likelihood(part);
+        let likelihood = |candidate: &Candidate| explained(candidate).log_likelihood(part) + candidate.usual();
         search::near(&likelihood, &best.candidate)
     };
     let whole = fit(touches);
@@ -247,8 +257,8 @@ fn changed(evidence: &Evidence<'_>, best: &Best, rest: &Best, index: usize) -> O
             what: difference(&before.candidate, &after.candidate),
         });
     }
-    let lost = whole.log_likelihood - explained(&rest.candidate).log_likelihood(touches);
-    (evidence.recordings.len() > 1 && lost > CERTAIN_PROBE)
+    let gained = whole.log_likelihood + rest.log_likelihood - best.log_likelihood;
+    (evidence.recordings.len() > 1 && gained > CERTAIN_PROBE)
         .then(|| Suspect::OtherProbe { object: name, what: difference(&rest.candidate, &whole.candidate) })
 }
 
