@@ -255,7 +255,10 @@ fn simulated(arguments: &Arguments, directory: &PathBuf, recorded: Option<&Datas
         let touches = background.objects.into_iter().flat_map(|object| object.touches).collect();
         known.objects.push(ObjectTouches { name: BACKGROUND.into(), touches });
     }
-    let (ensemble, taught) = teach::teach(&ensemble, &known, recorded, &teaching(&settings), &Bar::new())?;
+    // An ensemble that is there states what it was trained for.
+    let noise = arguments.teach.extend.is_none().then_some(settings.noise);
+    let how = teach::Settings { noise, ..teaching(&settings) };
+    let (ensemble, taught) = teach::teach(&ensemble, &known, recorded, &how, &Bar::new())?;
     Ok(Made { ensemble, dataset, taught: Some(taught), is_clean, settings })
 }
 

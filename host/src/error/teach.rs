@@ -38,6 +38,14 @@ pub enum TeachProblem {
         /// Which touches are evidence.
         counted: Counted,
     },
+    /// The known objects' touches have other noise than the ensemble was trained for.
+    #[error("the ensemble was trained for {stated}, and the touches of its objects have {there} already")]
+    OtherNoise {
+        /// What the ensemble was trained for.
+        stated: String,
+        /// What the touches have.
+        there: String,
+    },
     /// A pose is missing.
     #[error("touches of {object} have no pose, which the descriptor {} needs", descriptor.name())]
     NoPose {
@@ -72,6 +80,7 @@ impl TeachProblem {
             Self::FullTouches { .. } => {
                 "Record every approach, also those that missed a finger, or train on full touches."
             }
+            Self::OtherNoise { .. } => "Give simulated touches without noise, or train again on these.",
             Self::NoPose { .. } => "Record the pose with every touch, or train without.",
             Self::TooFew { .. } => "Record more approaches; 300 are a good start.",
         }

@@ -4,6 +4,7 @@ use super::{LEAST, Settings};
 use crate::ensemble::{Ensemble, Output, StatedProbe};
 use crate::error::{Error, Result, TeachProblem};
 use crate::mesh::BACKGROUND;
+use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
@@ -92,6 +93,17 @@ pub(super) fn enough(recorded: &Dataset, evidence: &[usize]) -> Result<()> {
     }
 }
 
+/// What touches of the known objects lack of the noise that the ensemble was trained for.
+pub(super) fn missing_noise(ensemble: &Ensemble, known: &Dataset) -> Result<Noise> {
+    let (stated, there) = (ensemble.origin.noise.unwrap_or_default(), known.real());
+    match there {
+        _ if there == stated => Ok(Noise::default()),
+        _ if there.is_none() => Ok(stated),
+        // What was added to noise that was there is not stated.
+        _ => Err(TeachProblem::OtherNoise { stated: stated.to_string(), there: there.to_string() }.into()),
+    }
+}
+
 /// Settings in their ranges.
 pub(super) fn settings(settings: &Settings) -> Result<()> {
     if settings.approaches == 0 {
@@ -103,5 +115,6 @@ pub(super) fn settings(settings: &Settings) -> Result<()> {
     if settings.threads == Some(0) {
         return Err(Error::setting("threads", 0, "at least 1"));
     }
+    settings.noise.iter().try_for_each(Noise::check)?;
     Ok(())
 }

@@ -28,6 +28,7 @@ use crate::ensemble::train::{BASE_MARGIN, round_leaves};
 use crate::ensemble::{Ensemble, Node, Origin};
 use crate::error::Result;
 use crate::progress::Progress;
+use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 use balance::Groups;
 use held_out::{Division, Material};
@@ -64,11 +65,14 @@ pub struct Settings {
     pub threads: Option<usize>,
     /// As [`crate::ensemble::train::Settings::leaf_bits`].
     pub leaf_bits: Option<u32>,
+    /// What is added to the touches of the known objects; `None` takes what the ensemble states, less what they have
+    /// already.
+    pub noise: Option<Noise>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { approaches: 60, groups: 500, seed: 1, threads: None, leaf_bits: Some(16) }
+        Self { approaches: 60, groups: 500, seed: 1, threads: None, leaf_bits: Some(16), noise: None }
     }
 }
 
@@ -123,8 +127,7 @@ pub struct TaughtObject {
 }
 
 /// Adds the objects of `recorded` to `ensemble`, without changing its trees' splits or the values of the objects that it
-/// knows. `known` holds touches of these objects, such as those that the ensemble was trained on; the noise that it states
-/// is added to them. The same touches and settings give the same ensemble on any number of threads.
+/// knows. `known` holds touches of these objects, such as those that the ensemble was trained on. The same touches and settings give the same ensemble on any number of threads.
 ///
 /// # Errors
 /// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
@@ -139,8 +142,9 @@ pub fn teach(
     progress: &dyn Progress,
 ) -> Result<(Ensemble, Taught)> {
     let descriptor = check::check(ensemble, known, recorded, settings)?;
+    let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
     on_threads(settings.threads, || {
-        let known = known_touches(ensemble, known, settings.seed);
+        let known = known_touches(ensemble, known, &noise, settings.seed);
         let touches: Vec<(&str, &[Touch])> =
             recorded.objects.iter().map(|object| (object.name.as_str(), &object.touches[..])).collect();
         let material = Material::new(ensemble, descriptor, &known, &touches, settings.seed);
@@ -204,8 +208,8 @@ fn on_threads<T: Send>(threads: Option<usize>, run: impl FnOnce() -> Result<T> +
     }
 }
 
-/// The touches of each object that the ensemble knows, in its order, with the noise that it was trained for.
-fn known_touches(ensemble: &Ensemble, known: &Dataset, seed: u64) -> Vec<Vec<Touch>> {
+/// The touches of each object that the ensemble knows, in its order, with this noise.
+fn known_touches(ensemble: &Ensemble, known: &Dataset, noise: &Noise, seed: u64) -> Vec<Vec<Touch>> {
     let most = (KNOWN[1] / ensemble.objects.len().max(1)).clamp(LEAST_KNOWN, KNOWN[0]);
     let of = |name: &String| {
         let object = known.objects.iter().find(|object| object.name == *name);
@@ -213,7 +217,7 @@ fn known_touches(ensemble: &Ensemble, known: &Dataset, seed: u64) -> Vec<Vec<Tou
         // Evenly from all of them: instances and a background's shapes stand one after the other.
         let step = touches.len().div_ceil(most).max(1);
         let some: Vec<Touch> = touches.iter().step_by(step).copied().collect();
-        ensemble.origin.noise.map_or_else(|| some.clone(), |noise| noise.add(name, &some, seed))
+        if noise.is_none() { some } else { noise.add(name, &some, seed) }
     };
     ensemble.objects.iter().map(of).collect()
 }

@@ -318,11 +318,21 @@ fn recorded_touches_alone_make_an_ensemble_that_states_them() {
 }
 
 #[test]
-fn recorded_touches_keep_the_noise_that_they_have_and_known_ones_get_that_of_the_ensemble() {
+fn known_touches_get_the_noise_that_the_ensemble_was_trained_for_once() {
     let [known, _, _] = setting(60);
     let ensemble = train(&known, &train::Settings { noise: Noise::gaussian(5_000.0), ..quick() }, &()).unwrap();
-    let touches = known_touches(&ensemble, &known, 1);
+    let noise = |ensemble: &Ensemble, known: &Dataset| super::check::missing_noise(ensemble, known);
+    let added = noise(&ensemble, &known).unwrap();
+    let touches = known_touches(&ensemble, &known, &added, 1);
     assert_eq!(touches[0], Noise::gaussian(5_000.0).add("object0", &known.objects[0].touches, 1));
     let clean = train(&known, &quick(), &()).unwrap();
-    assert_eq!(known_touches(&clean, &known, 1)[1], known.objects[1].touches);
+    assert!(noise(&clean, &known).unwrap().is_none());
+    assert_eq!(known_touches(&clean, &known, &Noise::default(), 1)[1], known.objects[1].touches);
+    // Touches that have it already get it once only, and other noise is named.
+    let real = |deviation| crate::touches::Origin { real: Noise::gaussian(deviation), ..Default::default() };
+    let there = Dataset { origin: Some(real(5_000.0)), ..known.clone() };
+    assert!(noise(&ensemble, &there).unwrap().is_none());
+    let other = Dataset { origin: Some(real(3_000.0)), ..known };
+    let error = noise(&ensemble, &other).unwrap_err().to_string();
+    assert!(error.contains("noise of 5 ms") && error.contains("noise of 3 ms already"), "{error}");
 }
