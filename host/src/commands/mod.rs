@@ -5,6 +5,7 @@ mod capture;
 mod cast;
 mod chips;
 mod completions;
+mod data;
 mod design;
 mod evaluate;
 mod expected;
@@ -68,6 +69,8 @@ commands! {
     Capture => capture,
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     Cast => cast,
+    /// Look after data sets of touches
+    Data => data,
     /// Train an ensemble on captured touches
     Train => train,
     /// Compile an ensemble to the bytes that the chip reads
@@ -112,7 +115,7 @@ commands! {
     after_help = "\
 Examples:
   palpate run                 capture, train and recognize built-in objects
-  palpate run meshes/ -o out  the same for your own OBJ files
+  palpate run meshes/ -o out  the same for your own meshes
   palpate help capture        what a command does, with examples"
 )]
 pub(crate) struct Cli {

@@ -172,6 +172,12 @@ pub enum TouchesProblem {
         /// What to write, with an example.
         example: &'static str,
     },
+    /// A check of a data set found what would make training wrong.
+    #[error("training on these touches would be wrong, for {count} reason{}", if *count == 1 { "" } else { "s" })]
+    WouldTrainWrong {
+        /// How many reasons there are.
+        count: usize,
+    },
     /// An object has too few touches to be divided.
     #[error("{name} has only {touches} touches, too few to split")]
     TooFew {
@@ -222,6 +228,7 @@ impl TouchesProblem {
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
             Self::BadQuantity { example, .. } => return format!("Give {example}."),
+            Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }
         .into()

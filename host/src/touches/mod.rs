@@ -5,7 +5,7 @@
 //! [`Listing`]: which objects there are, how many touches of each, their files' checksums, and how the touches were made
 //! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe.
 //!
-//! [`noise`] adds what a real sensor, timer and robot add; [`folds`] divides touches into some to train on and others to test on.
+//! [`check`] says what is wrong with a data set, line by line; [`noise`] adds what a real sensor, timer and robot add; [`folds`] divides touches into some to train on and others to test on.
 //!
 //! ```
 //! use palpate::touches::{Dataset, folds};
@@ -26,6 +26,7 @@
 //! # }
 //! ```
 
+pub mod check;
 mod checksum;
 mod dataset;
 pub mod folds;
