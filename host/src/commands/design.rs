@@ -42,7 +42,7 @@ Examples:
   palpate probe design meshes/ -o design --aim box --noise 5ms
   palpate probe design meshes/ -o design --error-rate 0.1% --approaches 20000")]
 struct DesignArguments {
-    /// What to touch: `builtin` or a built-in object's name, an OBJ file, or a directory that is searched for OBJ files
+    /// What to touch: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory that is searched for meshes
     #[arg(value_name = "MESHES", required = true)]
     sources: Vec<String>,
     /// Directory for probe.toml and design.html, such as design; created if it is missing

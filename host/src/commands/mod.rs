@@ -70,11 +70,9 @@ commands! {
     View => view,
     /// Touch objects with the virtual probe
     Capture => capture,
-    /// Add the touches of a real probe to a data set
-    Data => data,
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     Cast => cast,
-    /// Look at data sets: compare recorded touches with simulated ones
+    /// Look after data sets of touches: record, check, compare
     Data => data,
     /// Train an ensemble on captured touches
     Train => train,
@@ -120,7 +118,7 @@ commands! {
     after_help = "\
 Examples:
   palpate run                 capture, train and recognize built-in objects
-  palpate run meshes/ -o out  the same for your own OBJ files
+  palpate run meshes/ -o out  the same for your own meshes
   palpate help capture        what a command does, with examples"
 )]
 pub(crate) struct Cli {

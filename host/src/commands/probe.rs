@@ -79,10 +79,10 @@ pub(crate) struct SizeArguments {
 /// Whether objects keep their true sizes, and whether they have instances.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct UnitArguments {
-    /// Touch objects at their true size, with a probe in millimeters; built-in objects have one, for others say --unit
+    /// Touch objects at their true size, with a probe in millimeters; built-in objects, glTF and COLLADA state their unit, for others say --unit
     #[arg(long)]
     true_size: bool,
-    /// The unit of the meshes: mm, cm, m or in; for one object NAME=cm; may be given several times
+    /// The unit of the meshes that do not state one: mm, cm, m or in; for one object, whatever its file states, NAME=cm; may be given several times
     #[arg(long, value_name = "[NAME=]mm|cm|m|in", value_parser = mesh_unit, requires = "true_size")]
     unit: Vec<(Option<String>, f64)>,
     /// Objects with several meshes: of a directory inside a directory each mesh is an instance; with a number N, each built-in object has N varied instances
@@ -97,6 +97,7 @@ impl UnitArguments {
             None => source::objects(sources)?,
             Some(count) => self.of_instances(sources, count, seed)?,
         };
+        tell(&objects);
         self.add_units(&mut objects)?;
         Ok(objects)
     }
@@ -138,6 +139,7 @@ impl UnitArguments {
     /// One object, with its true size as far as it is known.
     pub(crate) fn object(&self, source: &str) -> Result<Object> {
         let mut object = [source::object(source)?];
+        tell(&object);
         self.add_units(&mut object)?;
         let [object] = object;
         Ok(object)
@@ -232,6 +234,13 @@ pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
     match size.lacks_probe() {
         true => Err(Error::setting("probe", "not given", "a file with unit = \"mm\": the published probe is in units")),
         false => Ok(()),
+    }
+}
+
+/// Tells on stderr how objects were found and read, where that may surprise.
+fn tell(objects: &[Object]) {
+    for object in objects {
+        object.notes.iter().for_each(|note| eprintln!("{}: {note}", object.name));
     }
 }
 

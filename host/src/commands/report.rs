@@ -14,7 +14,7 @@ use std::path::PathBuf;
 Examples:
   palpate report                    the built-in objects, in about ten minutes
   palpate report --quick -o quick   fewer touches, in half a minute
-  palpate report meshes/ -o report  your own OBJ files
+  palpate report meshes/ -o report  your own meshes
   palpate report meshes/ --true-size --unit mm --probe probe.toml
                                     objects as large as they are, and your probe
   palpate report --noise 0..10ms    with our robust model trained for this noise
@@ -22,7 +22,7 @@ Examples:
                                     is the simulation of your probe right?
   palpate report --resume           continue an interrupted report")]
 pub(crate) struct Arguments {
-    /// Where objects come from: `builtin` or a built-in object's name, an OBJ file, or a directory of OBJ files
+    /// Where objects come from: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory of meshes
     #[arg(default_value = "builtin", value_name = "SOURCE")]
     sources: Vec<String>,
     /// Where the page, its figures and tables go

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate run                  ten built-in objects; results in out/
-  palpate run meshes/ -o mine  your own OBJ files
+  palpate run meshes/ -o mine  your own meshes
   palpate run --touches 2000   a quick look
   palpate run --noise 0..5ms --timer 1ms
                                trained for a real switch, and tested with one
@@ -29,7 +29,7 @@ The models promise an error rate of 1 %: their thresholds are found on touches t
 
 Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html.")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin` or built-in objects' names, OBJ files, directories of them
+    /// What to touch: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// Directory for the results

@@ -217,6 +217,12 @@ pub enum TouchesProblem {
         /// The object.
         name: String,
     },
+    /// A check of a data set found what would make training wrong.
+    #[error("training on these touches would be wrong, for {count} reason{}", if *count == 1 { "" } else { "s" })]
+    WouldTrainWrong {
+        /// How many reasons there are.
+        count: usize,
+    },
     /// An object has too few touches to be divided.
     #[error("{name} has only {touches} touches, too few to split")]
     TooFew {
@@ -275,6 +281,7 @@ impl TouchesProblem {
             Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
             Self::BadQuantity { example, .. } => return format!("Give {example}."),
+            Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }
         .into()

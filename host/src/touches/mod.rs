@@ -8,7 +8,8 @@
 //! [`Recording`] adds the touches of a real probe to such a directory, one by one as they come; its listing says when, from
 //! where and by which firmware ([`Recorded`]).
 //!
-//! [`noise`] adds what a real sensor, timer and robot add; [`folds`] divides touches into some to train on and others to test on.
+//! [`check`] says what is wrong with a data set, line by line; [`noise`] adds what a real sensor, timer and robot add;
+//! [`folds`] divides touches into some to train on and others to test on.
 //!
 //! ```
 //! use palpate::touches::{Dataset, folds};
@@ -29,6 +30,7 @@
 //! # }
 //! ```
 
+pub mod check;
 mod checksum;
 mod dataset;
 pub mod folds;
