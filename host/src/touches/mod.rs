@@ -35,6 +35,8 @@ pub mod noise;
 mod origin;
 #[cfg(feature = "parquet")]
 pub mod parquet;
+mod save;
+mod seconds;
 mod shard;
 #[cfg(all(test, feature = "train"))]
 pub(crate) mod synthetic;
@@ -47,5 +49,6 @@ pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use origin::Origin;
 pub(crate) use origin::{tenth, unit};
+pub use seconds::touch_of_seconds;
 pub use shard::Shard;
 pub use text::{parse_touch, write_touch};

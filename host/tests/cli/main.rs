@@ -13,6 +13,7 @@ mod plan;
 mod probe;
 mod reports;
 mod rows;
+mod shards;
 mod strangers;
 mod support;
 mod view;
