@@ -26,6 +26,7 @@
 //! ```
 
 mod admission;
+mod memory;
 mod pipeline;
 mod sample;
 mod store;
@@ -42,6 +43,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
+pub use memory::in_memory;
 pub use sample::{MOST_ATTEMPTS, Sampler};
 
 /// What to capture, and what to do with what is there.

@@ -39,6 +39,7 @@ mod axes;
 mod cells;
 mod cost;
 mod emit;
+mod fit;
 mod forest;
 mod layout;
 mod model;
@@ -54,6 +55,7 @@ mod write;
 
 pub use cost::{Core, Instructions, Memory};
 pub use emit::{Language, emit};
+pub use fit::compile_within;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};

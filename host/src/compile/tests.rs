@@ -424,3 +424,23 @@ fn the_longest_time_is_that_of_ten_units_or_follows_larger_thresholds() {
         assert!((longest(-16_000_000.0, layout) - 64.0).abs() < 1e-9, "{}", longest(-16_000_000.0, layout));
     }
 }
+
+#[test]
+fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
+    let leaf_of = |compiled: &Compiled| open(&compiled.bytes).unwrap().leaf_type();
+    let trees = (0..40).map(|i| vec![split(0, 10.0 * i as f32, 1, 2), leaf(&[0.7, -0.3]), leaf(&[-0.123, 0.456])]);
+    let ensemble = ensemble(Descriptor::Oriented, trees.collect());
+    let settings = with(Some(Layout::Compact), Leaf::F32);
+    let [f32, i16, i8] = [Leaf::F32, Leaf::I16, Leaf::I8]
+        .map(|leaf| compile(&ensemble, &with(Some(Layout::Compact), leaf)).unwrap().bytes.len());
+    assert!(f32 > i16 && i16 > i8);
+    for (most, leaf) in
+        [(usize::MAX, Leaf::F32), (f32, Leaf::F32), (f32 - 1, Leaf::I16), (i16 - 1, Leaf::I8), (i8, Leaf::I8)]
+    {
+        let compiled = compile_within(&ensemble, &settings, most).unwrap();
+        assert!(compiled.bytes.len() <= most && leaf_of(&compiled) == leaf, "{most}");
+    }
+    let problem = compile_within(&ensemble, &settings, i8 - 1).unwrap_err().problem().cloned();
+    let over = CompileProblem::OverBudget { bytes: i8, most: i8 - 1 };
+    assert_eq!(problem, Some(crate::error::Problem::Compile(over)));
+}

@@ -81,6 +81,14 @@ pub enum CompileProblem {
     /// There is more of something than the format can count.
     #[error("the ensemble is too large for the model format")]
     TooLarge,
+    /// There is no room for the model.
+    #[error("the model has {bytes} bytes at least, more than the {most} that there is room for")]
+    OverBudget {
+        /// The fewest bytes that were found.
+        bytes: usize,
+        /// The most that were asked for.
+        most: usize,
+    },
 }
 
 fn limit(layout: Layout) -> &'static str {
@@ -116,7 +124,7 @@ impl CompileProblem {
                 "Train on features in whole units: times in microseconds, direction cosines times 32767. If it is not a model of touches, remove its attribute palpate_descriptor: then its features are compared as they are."
             }
             Self::DoesNotFit { .. } => "Choose another layout, or leave the choice to the compiler (auto).",
-            Self::FitsNoLayout | Self::TooLarge => "Train fewer trees, or trees with fewer splits.",
+            Self::FitsNoLayout | Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",
             Self::NameTooLong { .. } => "Use names of at most 255 bytes.",
         }
         .into()

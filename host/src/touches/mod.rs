@@ -41,6 +41,8 @@ mod origin;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 mod recording;
+mod save;
+mod seconds;
 mod shard;
 #[cfg(all(test, feature = "train"))]
 pub(crate) mod synthetic;
@@ -54,5 +56,6 @@ pub use listing::{Entry, Listing};
 pub use origin::Origin;
 pub(crate) use origin::{tenth, unit};
 pub use recording::{Recorded, Recording};
+pub use seconds::touch_of_seconds;
 pub use shard::Shard;
 pub use text::{parse_touch, write_touch};

@@ -3,10 +3,10 @@
 //! One row per touch: `object` (string), `t1`, `t2`, `t3` (seconds, null where a finger never touched), `direction` and
 //! `alignment` (lists of three, null where unknown). Row groups of about a million rows.
 
-use super::text::{contact_time, unit_vector};
+use super::touch_of_seconds;
 use crate::error::{Error, Place, Result, TouchesProblem};
 use bytes::Bytes;
-use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
+use palpate_shared::{Pose, Q15_ONE, Touch};
 use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType};
@@ -227,29 +227,10 @@ fn read_group(group: &dyn RowGroupReader, touches: &mut Vec<Touch>) -> Result<()
         let times = first.iter().zip(middle).zip(last);
         for (((first, middle), last), (direction, alignment)) in times.zip(directions.iter().zip(&alignments)) {
             let row = touches.len() as u64 + 1;
-            let touch = touch([*first, *middle, *last], *direction, *alignment);
+            let times = [*first, *middle, *last].map(|time| time.map(|[seconds]| seconds));
+            let touch = touch_of_seconds(times, *direction, *alignment);
             touches.push(touch.map_err(|problem| TouchesProblem::Row { row, problem: Box::new(problem) })?);
         }
-    }
-}
-
-/// The touch of one row, checked as a line of text is.
-fn touch(
-    times: [Option<[f64; 1]>; 3],
-    direction: Option<[f64; 3]>,
-    alignment: Option<[f64; 3]>,
-) -> Result<Touch, TouchesProblem> {
-    let time = |time: Option<[f64; 1]>| time.map_or(Ok(ContactTime::MISSING), |[seconds]| contact_time(seconds));
-    let [first, middle, last] = times;
-    let touch = Touch::new([time(first)?, time(middle)?, time(last)?]);
-    match (direction, alignment) {
-        (None, None) => Ok(touch),
-        (Some(direction), Some(alignment)) => Ok(touch.with_pose(Pose {
-            direction: unit_vector("direction", direction)?,
-            alignment: unit_vector("alignment", alignment)?,
-        })),
-        (Some(_), None) => Err(TouchesProblem::HalfPose { there: "direction", missing: "alignment" }),
-        (None, Some(_)) => Err(TouchesProblem::HalfPose { there: "alignment", missing: "direction" }),
     }
 }
 

@@ -17,6 +17,7 @@ mod probe;
 mod record;
 mod reports;
 mod rows;
+mod shards;
 mod strangers;
 mod support;
 mod teach;

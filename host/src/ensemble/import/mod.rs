@@ -7,6 +7,8 @@
 //! | CatBoost 1 | JSON of `save_model(…, format="json")` | the same |
 //! | scikit-learn and others | ONNX: `TreeEnsembleClassifier`, `TreeEnsembleRegressor`, `TreeEnsemble` | the same |
 //!
+//! [`Parts`] are trees that another program holds in memory, such as scikit-learn's in Python.
+//!
 //! All of them become an [`Ensemble`] over rows of f32 features, with the features' names and the classes' where the file
 //! has them. Comparisons are exact: `x <= t` is `x < c` with the next f32 c, whatever t's precision. How far margins can
 //! be from the library's own is computed from the leaves and stated in [`Imported::rounding`]. What cannot be taken over
@@ -16,7 +18,10 @@ mod catboost;
 mod draft;
 mod lightgbm;
 mod onnx;
+mod parts;
 mod ubjson;
+
+pub use parts::{PartTree, Parts};
 
 use super::{Ensemble, Imported, xgboost};
 use crate::error::{EnsembleProblem, Error, Place, Result};

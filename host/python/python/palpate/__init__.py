@@ -1,0 +1,45 @@
+"""Recognize objects by touch.
+
+A simulated probe touches meshes (`capture`), boosted trees learn from the touches (`train`) and are compiled for a
+microcontroller (`compile`), whose code also runs here (`Recognizer`, `Model.margins`).
+
+>>> import palpate
+>>> data = palpate.capture(["bowl", "mouse"], touches=1000)
+>>> train, test = data.split(test_share=0.2)
+>>> model = palpate.compile(palpate.train(train))
+>>> evaluation = palpate.evaluate(model, test)
+>>> evaluation.accuracy[10] > 0.9
+True
+"""
+
+from ._errors import FileError, InputError, PalpateError, SettingError
+from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
+from ._import import compile, to_ensemble
+from ._native import DataSet, Ensemble, Model, Recognizer, Surface, capture, train
+from ._types import Meshes, Probe, Progress, Touch, Verdict
+
+__all__ = [
+    "DataSet",
+    "Ensemble",
+    "Evaluation",
+    "FileError",
+    "InputError",
+    "Meshes",
+    "Model",
+    "PalpateError",
+    "Parity",
+    "Probe",
+    "Progress",
+    "Recognizer",
+    "Sequential",
+    "SettingError",
+    "Surface",
+    "Touch",
+    "Verdict",
+    "capture",
+    "compile",
+    "evaluate",
+    "parity",
+    "to_ensemble",
+    "train",
+]

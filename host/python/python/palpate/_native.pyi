@@ -1,0 +1,449 @@
+"""
+What is written in Rust of the package palpate.
+"""
+
+from _typeshed import SupportsGetItem
+from numpy import float32, float64, int16
+from numpy.typing import ArrayLike, NDArray
+from os import PathLike
+from palpate._types import Meshes, Probe, Progress, Touch, Verdict
+from pandas import DataFrame
+from typing import SupportsFloat, SupportsIndex, final
+
+__all__ = ["DataSet", "Ensemble", "Model", "Recognizer", "Surface", "capture", "compile", "evaluate", "parity", "sources", "train"]
+
+@final
+class DataSet:
+    """
+    Touches of one or more objects.
+
+    Its arrays have one row per touch, the objects one after the other. They are made when they are first asked for, belong
+    to the data set, and cannot be written to: every access gives the same memory.
+
+    >>> import numpy, palpate
+    >>> data = palpate.DataSet.from_arrays(
+    ...     times=[[0.0, 0.012, 0.031], [0.004, 0.0, numpy.nan], [0.0, 0.2, 0.1]],
+    ...     objects=[0, 0, 1],
+    ...     names=["cup", "fork"],
+    ... )
+    >>> len(data), data.names, data.counts
+    (3, ['cup', 'fork'], [2, 1])
+    >>> data.times
+    array([[0.   , 0.012, 0.031],
+           [0.004, 0.   ,   nan],
+           [0.   , 0.2  , 0.1  ]])
+    """
+    def __len__(self, /) -> int: ...
+    def __repr__(self, /) -> str: ...
+    @property
+    def alignment(self, /) -> NDArray[float32] | None:
+        """
+        The direction of the row of fingers at each touch, a unit vector; `None` if no touch has a pose.
+        """
+    @property
+    def approaches(self, /) -> list[int] | None:
+        """
+        How many approaches each object took, where that is known.
+        """
+    @property
+    def counts(self, /) -> list[int]:
+        """
+        How many touches each object has, in the order of the names.
+        """
+    @property
+    def direction(self, /) -> NDArray[float32] | None:
+        """
+        The probe's direction at each touch, a unit vector; `None` if no touch has a pose.
+        """
+    def features(self, /, descriptor: str = "curvature") -> NDArray[float32]:
+        """
+        What a descriptor turns each touch into, one row of whole numbers per touch (microseconds, and direction cosines times
+        32767), NaN where one is missing: for training with another library. The code is the chip's.
+        """
+    @staticmethod
+    def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False) -> DataSet:
+        """
+        A data set of touches from elsewhere.
+
+        `times` has three contact times per touch, in seconds on any clock, NaN for a finger that did not touch; they are
+        rounded to microseconds, and the earliest becomes 0. `objects` says which of the `names` each touch is of.
+        `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it.
+        """
+    @property
+    def holds_approaches(self, /) -> bool:
+        """
+        Whether every approach is kept, also those that not all three fingers touched.
+        """
+    @property
+    def names(self, /) -> list[str]:
+        """
+        The objects' names, sorted.
+        """
+    def noisy(self, /, noise: str = "", timer: str = "", seed: SupportsIndex = 1) -> DataSet:
+        """
+        The touches with noise: `noise` is a standard deviation such as "5ms" or a range such as "0..10ms", `timer` the
+        timer's resolution. Every touch is made by a robot of its own.
+        """
+    @property
+    def objects(self, /) -> NDArray[int16]:
+        """
+        Which object each touch is of: its position in the names.
+        """
+    @property
+    def probe(self, /) -> Probe | None:
+        """
+        The probe that made the touches, where that is known.
+        """
+    @staticmethod
+    def read(directory: str | PathLike[str]) -> DataSet:
+        """
+        Reads the data set in a directory, which `capture` or `palpate capture` wrote, or which holds `<object>.txt` or
+        `<object>.parquet` for each object.
+        """
+    def split(self, /, test_share: SupportsFloat | SupportsIndex = 0.1, seed: SupportsIndex = 1) -> tuple[DataSet, DataSet]:
+        """
+        Some touches to train on and others to test on: `test_share` of each object's touches are drawn for testing.
+        """
+    @property
+    def times(self, /) -> NDArray[float64]:
+        """
+        Contact times in seconds after the first contact, one row of three per touch, NaN for a finger that did not touch.
+        Columns are contiguous.
+        """
+    def to_pandas(self, /) -> DataFrame:
+        """
+        The touches as a table: object (a category), t1, t2 and t3, and where it is known direction and alignment.
+        The columns are those of the arrays, without copies. Needs pandas.
+        """
+    def to_parquet(self, /, directory: str | PathLike[str]) -> None:
+        """
+        Writes `<object>.parquet` for each object and, if the probe is known, `dataset.json`, into a directory that holds
+        no touches yet: what `read`, `palpate train` and pandas read.
+        """
+    def to_text(self, /, directory: str | PathLike[str]) -> None:
+        """
+        The same as text, one line per touch.
+        """
+    @property
+    def warnings(self, /) -> list[str]:
+        """
+        What looked wrong when the data set was read, and may be meant.
+        """
+
+@final
+class Ensemble:
+    """
+    The full model: boosted trees in f32, from `train` or from another library.
+
+    >>> import palpate
+    >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+    >>> ensemble = palpate.train(data, rounds=5)
+    >>> ensemble.objects, ensemble.features, ensemble.trees
+    (['bowl', 'mouse'], ['curvature', 'slope'], 5)
+    """
+    def __repr__(self, /) -> str: ...
+    @property
+    def descriptor(self, /) -> str | None:
+        """
+        Which features a touch is turned into; `None` for an ensemble over rows of features.
+        """
+    @property
+    def features(self, /) -> list[str]:
+        """
+        The features' names.
+        """
+    @staticmethod
+    def from_bytes(content: SupportsGetItem[int, SupportsIndex], names: SupportsGetItem[int, str] | None = None) -> Ensemble:
+        """
+        The same from the bytes of such a file.
+        """
+    @staticmethod
+    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ...) -> Ensemble:
+        """
+        An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
+        leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
+        a leaf), the right child, the feature, the threshold, whether a missing value goes left, and the values. `base` is
+        what margins start from; an empty name stands for a feature that has none.
+        """
+    @staticmethod
+    def load(path: str | PathLike[str], names: SupportsGetItem[int, str] | None = None) -> Ensemble:
+        """
+        Reads what `save` or `palpate train` wrote, or a model of XGBoost, LightGBM, CatBoost or ONNX; the content says
+        which. `names` are the classes'.
+        """
+    def margins(self, /, rows: ArrayLike) -> NDArray[float32]:
+        """
+        The margins of rows of features (of an ensemble over touches, of its descriptor's), one column per object: added
+        in f32, as XGBoost does.
+        """
+    def margins_of(self, /, data: DataSet) -> NDArray[float32]:
+        """
+        The margins of each touch of a data set.
+        """
+    @property
+    def notes(self, /) -> list[str]:
+        """
+        What to know about an ensemble that another library trained, each a sentence.
+        """
+    @property
+    def objects(self, /) -> list[str]:
+        """
+        The objects' (classes') names, in the order of the margins.
+        """
+    def save(self, /, path: str | PathLike[str]) -> None:
+        """
+        Writes an ensemble over touches as XGBoost's JSON.
+        """
+    @property
+    def trees(self, /) -> int:
+        """
+        How many trees there are.
+        """
+
+@final
+class Model:
+    """
+    A compiled model: the bytes that a microcontroller reads, and that are read here by the same code.
+
+    >>> import palpate
+    >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+    >>> model = palpate.compile(palpate.train(data, rounds=5))
+    >>> model.objects
+    ['bowl', 'mouse']
+    >>> model.margins(data).shape
+    (600, 2)
+    >>> palpate.Model(model.to_bytes()).checksum == model.checksum
+    True
+    """
+    def __getnewargs__(self, /) -> tuple[bytes]:
+        """
+        What a pickle holds.
+        """
+    def __new__(cls, /, content: SupportsGetItem[int, SupportsIndex]) -> Model:
+        """
+        A model in memory; `content` is checked.
+        """
+    def __repr__(self, /) -> str: ...
+    @property
+    def checksum(self, /) -> int:
+        """
+        A number that names the model: two with the same are the same.
+        """
+    @property
+    def descriptor(self, /) -> str | None:
+        """
+        Which features a touch is turned into; `None` for a model over rows of features.
+        """
+    @property
+    def features(self, /) -> list[str]:
+        """
+        The features' names.
+        """
+    @property
+    def layout(self, /) -> str:
+        """
+        How the trees are laid out.
+        """
+    @property
+    def leaf(self, /) -> str:
+        """
+        What leaves are stored as: "i8", "i16" or "f32".
+        """
+    @staticmethod
+    def load(path: str | PathLike[str]) -> Model:
+        """
+        Reads a model that `save` or `palpate export` wrote.
+        """
+    @property
+    def margin_error(self, /) -> float:
+        """
+        The farthest that a margin can be from the full model's, in nats.
+        """
+    def margins(self, /, rows: DataSet | ArrayLike) -> NDArray[float64]:
+        """
+        The margins of each row, in nats, one column per object: unnormalized log-probabilities, to be added up over the
+        touches of one object.
+
+        A model over touches takes a data set, or rows of three contact times in seconds (NaN where a finger did not
+        touch), with the probe's direction and alignment nine numbers. A model over features takes rows of those, NaN where
+        one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit.
+        """
+    @property
+    def objects(self, /) -> list[str]:
+        """
+        The objects' (classes') names, in the order of the margins.
+        """
+    def save(self, /, path: str | PathLike[str]) -> None:
+        """
+        Writes the model, whole or not at all.
+        """
+    @property
+    def size(self, /) -> int:
+        """
+        How many bytes the model has.
+        """
+    def to_bytes(self, /) -> bytes:
+        """
+        The model's bytes, for the chip.
+        """
+
+@final
+class Recognizer:
+    """
+    Recognizes objects by touch, by the code that runs on the chip.
+
+    It stops where the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
+
+    >>> import palpate
+    >>> model = palpate.compile(palpate.train(palpate.capture(["bowl", "mouse"], touches=1000)))
+    >>> recognizer = palpate.Recognizer(model)
+    >>> for touch in palpate.capture(["bowl", "fork"], touches=100, seed=2).times:
+    ...     verdict = recognizer.push(touch)
+    ...     if verdict.decided:
+    ...         break
+    >>> verdict.object
+    'bowl'
+    """
+    def __new__(cls, /, model: Model, *, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None) -> Recognizer: ...
+    @property
+    def best(self, /) -> str:
+        """
+        The object with the most evidence so far.
+        """
+    @property
+    def posteriors(self, /) -> dict[str, float]:
+        """
+        The posterior of each object so far.
+        """
+    def push(self, /, touch: Touch) -> Verdict:
+        """
+        Takes in a touch: three contact times in seconds on any clock, `None` or NaN for a finger that did not touch, with
+        the probe's direction and alignment nine numbers. A touch that the model was not trained for is not counted: the
+        verdict says why.
+        """
+    def push_row(self, /, row: ArrayLike) -> Verdict:
+        """
+        Takes in a row of features, for a model over those; NaN where one is missing.
+        """
+    def reset(self, /, weights: SupportsGetItem[int, SupportsIndex] | None = None) -> None:
+        """
+        Forgets all touches, for the next object. `weights` say how often each object is touched, in place of the model's
+        priors, in any unit.
+        """
+    @property
+    def touches(self, /) -> int:
+        """
+        How many touches were counted since the last `reset`.
+        """
+    @property
+    def verdict(self, /) -> Verdict:
+        """
+        The verdict after the last touch.
+        """
+
+@final
+class Surface:
+    """
+    A mesh that spheres are cast at: exact first contacts with its triangles, found through a tree of bounding boxes.
+
+    `vertices` are rows of three numbers, in any unit, and are kept as float32; `faces` are rows of three positions among
+    them.
+
+    >>> import palpate
+    >>> square = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+    >>> surface = palpate.Surface(square, [[0, 1, 2], [0, 2, 3]])
+    >>> surface.first_contact([[0, 0, 5], [9, 9, 5]], [[0, 0, -1]], radius=0.5)
+    array([4.5, nan])
+    """
+    def __new__(cls, /, vertices: ArrayLike, faces: ArrayLike) -> Surface: ...
+    def __repr__(self, /) -> str: ...
+    @property
+    def bounds(self, /) -> tuple[list[float], list[float]]:
+        """
+        The lowest and the highest corner of the bounding box.
+        """
+    def first_contact(self, /, origins: ArrayLike, directions: ArrayLike, radius: SupportsFloat | SupportsIndex) -> NDArray[float64]:
+        """
+        When a sphere that starts at each origin and moves along its direction first touches: the t at which its center is
+        at origin + t * direction; 0 if it starts in contact, NaN if it never touches. One row of `directions` serves all.
+        """
+    @property
+    def triangles(self, /) -> int:
+        """
+        How many triangles there are.
+        """
+
+def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
+    """
+    Touches objects with a simulated probe.
+
+    `meshes` are files, directories or built-in objects as `palpate capture` takes them, such as "meshes/" or
+    ["bowl", "cup.obj"], or a mapping from names to files, to pairs of arrays (vertices, faces) or to meshes of trimesh. Each is
+    scaled so that its longest side has `length` units; with `millimeters`, the length of a unit of the meshes, it keeps
+    its true size and the `probe` is in millimeters.
+
+    `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
+    `pose` keeps the probe's direction and alignment. The same `seed` gives the same touches on any number of `threads`, and
+    the same as the program's. `shard` is "K/N" for a part. With `instances` a directory inside a directory is one object.
+    With `out` the touches are written there, as "text" or "parquet", as `palpate capture` does: `resume`, `add` and `force`
+    are its options.
+
+    `progress` is called with a stage, the steps done and their number. Ctrl-C stops the call.
+
+    >>> import palpate
+    >>> data = palpate.capture(["bowl", "mouse"], touches=100, seed=7)
+    >>> data
+    DataSet(200 touches of 2 objects)
+    >>> data.times.shape, bool(data.times.min() == 0.0)
+    ((200, 3), True)
+    """
+
+def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf: str = "i16", layout: str | None = None, goal: str = "balanced", error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 200, priors: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, scales: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None) -> Model:
+    """
+    Compiles an ensemble to the bytes that a microcontroller reads. (`palpate.compile` also takes models of other
+    libraries.)
+
+    `leaf` is "i8", "i16" or "f32": what leaves are stored as. `layout` is "compact", "complete", "grid", "wide" or
+    "patterns"; without one, the best for the `goal` is taken, which is "balanced", "speed" or "size". With `max_bytes` the
+    layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if it still is, that is an
+    error. `error_rate` and `max_touches` are where recognizers stop; `priors` say how likely each object is. `scales` say how
+    many units make up 1 of each feature, for a chip that measures in whole numbers.
+
+    >>> import palpate
+    >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+    >>> model = palpate.compile(palpate.train(data, rounds=5), max_bytes=4000)
+    >>> model.size <= 4000
+    True
+    """
+
+def evaluate(model: Model | Ensemble, data: DataSet, *, at: SupportsGetItem[int, SupportsIndex] | None = None, groups: SupportsIndex = 1000, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None, noise: str = "", timer: str = "", seed: SupportsIndex = 1) -> str:
+    """
+    Evaluates a model on touches that it was not trained on, and returns what `palpate evaluate --json` prints.
+    """
+
+def parity(ensemble: Ensemble, model: Model, data: DataSet, *, sequences: SupportsIndex = 10000, seed: SupportsIndex = 1, progress: Progress | None = None) -> str:
+    """
+    Compares a compiled model with its ensemble on every touch of a data set and on random sequences, and returns what
+    `palpate parity --json` prints.
+    """
+
+def sources(meshes: SupportsGetItem[int, str | PathLike[str]]) -> list[tuple[str, str]]:
+    """
+    The objects that sources stand for: their names, sorted, and what `capture` takes for each alone. Nothing is read.
+    """
+
+def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = None, counted: str | None = None, rounds: SupportsIndex | None = None, depth: SupportsIndex | None = None, eta: SupportsFloat | SupportsIndex | None = None, min_child_weight: SupportsFloat | SupportsIndex | None = None, bins: SupportsIndex | None = None, leaf_bits: SupportsIndex | None = None, multi_output: bool | None = None, noise: str = "", timer: str = "", background: DataSet | None = None, seed: SupportsIndex = 1, threads: SupportsIndex | None = None, progress: Progress | None = None) -> Ensemble:
+    """
+    Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
+
+    `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope) or "paper" (the published
+    method); whatever else is given replaces a part of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
+    `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
+    approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
+    `background` is a data set of many other shapes, which stand for all that the model does not know.
+
+    >>> import palpate
+    >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+    >>> palpate.train(data, rounds=5, noise="0..5ms", timer="1ms")
+    Ensemble(5 trees, curvature, 2 objects)
+    """

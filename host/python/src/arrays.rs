@@ -1,0 +1,116 @@
+//! Arrays in and out, with the types that the stub states: numpy's own types state none.
+
+use numpy::ndarray::{Dimension, Ix1, Ix2};
+use numpy::{Element, IntoPyArray, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArrayMethods, dtype};
+use pyo3::inspect::PyStaticExpr;
+use pyo3::prelude::*;
+use pyo3::types::IntoPyDict;
+use pyo3::{Borrowed, type_hint_identifier, type_hint_subscript};
+use std::convert::Infallible;
+
+/// The hint of what numpy can make an array of.
+pub(crate) const ARRAY_LIKE: PyStaticExpr = type_hint_identifier!("numpy.typing", "ArrayLike");
+
+/// A number that arrays are made of.
+pub(crate) trait Number: Element {
+    /// The hint of an array of such numbers.
+    const ARRAY: PyStaticExpr;
+}
+
+impl Number for f64 {
+    const ARRAY: PyStaticExpr = type_hint_subscript!(
+        type_hint_identifier!("numpy.typing", "NDArray"),
+        type_hint_identifier!("numpy", "float64")
+    );
+}
+
+impl Number for f32 {
+    const ARRAY: PyStaticExpr = type_hint_subscript!(
+        type_hint_identifier!("numpy.typing", "NDArray"),
+        type_hint_identifier!("numpy", "float32")
+    );
+}
+
+impl Number for i16 {
+    const ARRAY: PyStaticExpr =
+        type_hint_subscript!(type_hint_identifier!("numpy.typing", "NDArray"), type_hint_identifier!("numpy", "int16"));
+}
+
+/// An array in C order: the caller's own if it is one of such numbers, or else a converted copy.
+pub(crate) struct Input<'py, T: Element, D: Dimension>(PyReadonlyArray<'py, T, D>);
+
+impl<'a, 'py, T: Element, D: Dimension> FromPyObject<'a, 'py> for Input<'py, T, D> {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = ARRAY_LIKE;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = object.extract::<PyReadonlyArray<'py, T, D>>()
+            && array.is_c_contiguous()
+        {
+            return Ok(Self(array));
+        }
+        let py = object.py();
+        let any = py.import("numpy")?.call_method1("asarray", (object,))?;
+        let like = [("order", "C".into_pyobject(py)?), ("casting", "same_kind".into_pyobject(py)?)].into_py_dict(py)?;
+        let array = any.call_method("astype", (dtype::<T>(py),), Some(&like))?;
+        let found: usize = array.getattr("ndim")?.extract()?;
+        match D::NDIM {
+            Some(wanted) if wanted != found => Err(pyo3::exceptions::PyValueError::new_err(format!(
+                "an array of {found} dimensions, where {wanted} are needed"
+            ))),
+            _ => array.extract().map(Self),
+        }
+    }
+}
+
+impl<T: Element> Input<'_, T, Ix1> {
+    /// The numbers.
+    pub(crate) fn values(&self) -> PyResult<&[T]> {
+        Ok(self.0.as_slice()?)
+    }
+}
+
+impl<T: Element> Input<'_, T, Ix2> {
+    /// The numbers, row after row, and how many a row has.
+    pub(crate) fn rows(&self) -> PyResult<(&[T], usize)> {
+        let columns = self.0.shape().get(1).copied().unwrap_or_default();
+        Ok((self.0.as_slice()?, columns))
+    }
+}
+
+/// An array of three numbers in each row.
+pub(crate) fn triples<'a, T: Element>(array: &'a Input<'_, T, Ix2>, name: &str) -> PyResult<&'a [[T; 3]]> {
+    match array.rows()? {
+        (values, 3) => Ok(values.as_chunks().0),
+        (_, columns) => {
+            Err(pyo3::exceptions::PyValueError::new_err(format!("{name} has {columns} columns, where 3 are needed")))
+        }
+    }
+}
+
+/// An array that is handed to Python.
+pub(crate) struct Output<'py, T, D>(pub(crate) Bound<'py, PyArray<T, D>>);
+
+impl<'py, T: Number, D: Dimension> IntoPyObject<'py> for Output<'py, T, D> {
+    type Target = PyArray<T, D>;
+    type Output = Bound<'py, Self::Target>;
+    type Error = Infallible;
+
+    const OUTPUT_TYPE: PyStaticExpr = T::ARRAY;
+
+    fn into_pyobject(self, _: Python<'py>) -> Result<Self::Output, Infallible> {
+        Ok(self.0)
+    }
+}
+
+/// The numbers as an array, without a copy.
+pub(crate) fn one<T: Number>(py: Python<'_>, values: Vec<T>) -> Output<'_, T, Ix1> {
+    Output(values.into_pyarray(py))
+}
+
+/// Rows of `columns` numbers as an array, without a copy.
+pub(crate) fn two<T: Number>(py: Python<'_>, values: Vec<T>, columns: usize) -> PyResult<Output<'_, T, Ix2>> {
+    let rows = values.len().checked_div(columns).unwrap_or_default();
+    Ok(Output(values.into_pyarray(py).reshape([rows, columns])?))
+}

@@ -1,0 +1,201 @@
+//! Touching meshes.
+
+use crate::arrays::{Input, triples};
+use crate::data::DataSet;
+use crate::failure::Failure;
+use crate::objects::Probe;
+use crate::work::{Callback, long};
+use numpy::ndarray::Ix2;
+use palpate::capture::{self as library, Settings};
+use palpate::error::Error;
+use palpate::mesh::source::{self, Source};
+use palpate::mesh::{Mesh, Object};
+use palpate::probe::approach::Aim;
+use palpate::shared::format::Length;
+use palpate::touches::Origin;
+use pyo3::exceptions::PyTypeError;
+use pyo3::inspect::PyStaticExpr;
+use pyo3::prelude::*;
+use pyo3::types::{PyMapping, PyString};
+use pyo3::{Borrowed, type_hint_identifier};
+use std::path::PathBuf;
+
+/// What is touched: sources that name themselves, or names with what stands for them.
+pub(crate) enum Meshes {
+    Sources(Vec<String>),
+    Named(Vec<(String, Given)>),
+}
+
+/// What stands for one object.
+pub(crate) enum Given {
+    Source(String),
+    Mesh(Mesh),
+}
+
+impl Meshes {
+    /// The objects, read.
+    fn objects(self, instances: bool) -> palpate::Result<Vec<Object>> {
+        match self {
+            Self::Sources(sources) if instances => source::objects_of_instances(&sources),
+            Self::Sources(sources) => source::objects(&sources),
+            Self::Named(named) => named
+                .into_iter()
+                .map(|(name, given)| match given {
+                    Given::Mesh(mesh) => Ok(Object::new(name, mesh)),
+                    Given::Source(source) => {
+                        let mut object = source::object(&source)?;
+                        object.name = name;
+                        Ok(object)
+                    }
+                })
+                .collect(),
+        }
+    }
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Meshes {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_identifier!("palpate._types", "Meshes");
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(mapping) = object.cast::<PyMapping>() {
+            let of = |pair: Bound<'py, PyAny>| {
+                let (name, mesh): (String, Bound<'py, PyAny>) = pair.extract()?;
+                let given =
+                    if is_source(&mesh)? { Given::Source(source_of(&mesh)?) } else { Given::Mesh(mesh_of(&mesh)?) };
+                Ok((name, given))
+            };
+            return mapping.items()?.iter().map(of).collect::<PyResult<_>>().map(Self::Named);
+        }
+        if is_source(&object)? {
+            return Ok(Self::Sources(vec![source_of(&object)?]));
+        }
+        let sources = object.try_iter()?.map(|source| source_of(&source?)).collect::<PyResult<_>>()?;
+        Ok(Self::Sources(sources))
+    }
+}
+
+fn is_source(object: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(object.is_instance_of::<PyString>() || object.hasattr("__fspath__")?)
+}
+
+fn source_of(object: &Bound<'_, PyAny>) -> PyResult<String> {
+    let path: PathBuf = object.extract()?;
+    let text = path.into_os_string().into_string();
+    text.map_err(|path| pyo3::exceptions::PyValueError::new_err(format!("{} is not UTF-8", path.display())))
+}
+
+/// A mesh as a pair of arrays, or as an object that has them, such as one of trimesh.
+fn mesh_of(object: &Bound<'_, PyAny>) -> PyResult<Mesh> {
+    let (vertices, faces): (Bound<'_, PyAny>, Bound<'_, PyAny>) = if object.hasattr("faces")? {
+        (object.getattr("vertices")?, object.getattr("faces")?)
+    } else {
+        object.extract().map_err(|_| PyTypeError::new_err("a mesh is a pair of arrays: vertices and faces"))?
+    };
+    mesh(&vertices.extract()?, &faces.extract()?)
+}
+
+pub(crate) fn mesh(vertices: &Input<'_, f32, Ix2>, faces: &Input<'_, i64, Ix2>) -> PyResult<Mesh> {
+    // Beyond the last vertex: refused with its number when the mesh is used.
+    let index = |&index: &i64| u32::try_from(index).unwrap_or(u32::MAX);
+    let triangles = triples(faces, "faces")?.iter().map(|face| face.each_ref().map(index)).collect();
+    Ok(Mesh { vertices: triples(vertices, "vertices")?.to_vec(), triangles })
+}
+
+/// The objects that sources stand for: their names, sorted, and what `capture` takes for each alone. Nothing is read.
+#[pyo3::pyfunction]
+pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Failure> {
+    let given: Vec<String> = meshes.into_iter().map(|path| path.to_string_lossy().into_owned()).collect();
+    let of = |source: Source| {
+        let name = source.name().to_owned();
+        let path = match source {
+            Source::File { path, .. } => path.to_string_lossy().into_owned(),
+            _ => name.clone(),
+        };
+        (name, path)
+    };
+    Ok(source::files(&given)?.into_iter().map(of).collect())
+}
+
+/// Touches objects with a simulated probe.
+///
+/// `meshes` are files, directories or built-in objects as `palpate capture` takes them, such as "meshes/" or
+/// ["bowl", "cup.obj"], or a mapping from names to files, to pairs of arrays (vertices, faces) or to meshes of trimesh. Each is
+/// scaled so that its longest side has `length` units; with `millimeters`, the length of a unit of the meshes, it keeps
+/// its true size and the `probe` is in millimeters.
+///
+/// `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
+/// `pose` keeps the probe's direction and alignment. The same `seed` gives the same touches on any number of `threads`, and
+/// the same as the program's. `shard` is "K/N" for a part. With `instances` a directory inside a directory is one object.
+/// With `out` the touches are written there, as "text" or "parquet", as `palpate capture` does: `resume`, `add` and `force`
+/// are its options.
+///
+/// `progress` is called with a stage, the steps done and their number. Ctrl-C stops the call.
+///
+/// >>> import palpate
+/// >>> data = palpate.capture(["bowl", "mouse"], touches=100, seed=7)
+/// >>> data
+/// DataSet(200 touches of 2 objects)
+/// >>> data.times.shape, bool(data.times.min() == 0.0)
+/// ((200, 3), True)
+#[pyo3::pyfunction]
+#[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=false, pose=false, aim="box", length=10.0,
+    millimeters=None, instances=false, shard="1/1", out=None, format="text", resume=false, add=false, force=false,
+    threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "they are keywords in Python")]
+pub(crate) fn capture(
+    py: Python<'_>,
+    meshes: Meshes,
+    touches: u64,
+    seed: u64,
+    probe: Option<Probe>,
+    approaches: bool,
+    pose: bool,
+    aim: &str,
+    length: f64,
+    millimeters: Option<f64>,
+    instances: bool,
+    shard: &str,
+    out: Option<PathBuf>,
+    format: &str,
+    resume: bool,
+    add: bool,
+    force: bool,
+    threads: Option<usize>,
+    progress: Option<Callback>,
+) -> Result<DataSet, Failure> {
+    if millimeters.is_some() && probe.is_none() {
+        return Err(Error::setting("probe", "not given", "a probe in millimeters, as millimeters is given").into());
+    }
+    let origin = Origin {
+        touches,
+        seed,
+        unit: if millimeters.is_some() { Length::Millimeter } else { Length::Tenth },
+        length,
+        probe: probe.map(|Probe(probe)| probe).unwrap_or_default(),
+        aim: Aim::from_name(aim).ok_or_else(|| Error::setting("aim", aim, "box, middle or mass"))?,
+        pose,
+        approaches,
+        format: format.parse().map_err(Error::from)?,
+        shard: shard.parse().map_err(Error::from)?,
+    };
+    let settings = Settings { origin, resume, add, force, threads };
+    settings.check()?;
+    long(py, progress.as_ref(), |progress| {
+        let mut objects = meshes.objects(instances)?;
+        if millimeters.is_some() {
+            objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(millimeters));
+        }
+        match out {
+            Some(directory) => {
+                library::capture(&objects, &settings, &directory, progress)?;
+                DataSet::of_directory(&directory)
+            }
+            None => {
+                let (dataset, approaches) = library::in_memory(&objects, &settings, progress)?;
+                Ok(DataSet::new(dataset, Some(approaches)))
+            }
+        }
+    })
+}

@@ -1,0 +1,318 @@
+//! Data sets.
+
+use crate::arrays::{Input, Output, one, triples, two};
+use crate::failure::Failure;
+use crate::objects::{DataFrame, Probe};
+use crate::work::long;
+use numpy::ndarray::{Ix1, Ix2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use palpate::ensemble::feature_row;
+use palpate::error::Error;
+use palpate::shared::{Q15_ONE, Touch};
+use palpate::touches::noise::{Noise, quantity};
+use palpate::touches::{Dataset, Format, Listing, ObjectTouches, Origin, folds, touch_of_seconds};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Touches of one or more objects.
+///
+/// Its arrays have one row per touch, the objects one after the other. They are made when they are first asked for, belong
+/// to the data set, and cannot be written to: every access gives the same memory.
+///
+/// >>> import numpy, palpate
+/// >>> data = palpate.DataSet.from_arrays(
+/// ...     times=[[0.0, 0.012, 0.031], [0.004, 0.0, numpy.nan], [0.0, 0.2, 0.1]],
+/// ...     objects=[0, 0, 1],
+/// ...     names=["cup", "fork"],
+/// ... )
+/// >>> len(data), data.names, data.counts
+/// (3, ['cup', 'fork'], [2, 1])
+/// >>> data.times
+/// array([[0.   , 0.012, 0.031],
+///        [0.004, 0.   ,   nan],
+///        [0.   , 0.2  , 0.1  ]])
+#[pyo3::pyclass(frozen, module = "palpate._native")]
+pub(crate) struct DataSet {
+    pub(crate) dataset: Arc<Dataset>,
+    approaches: Option<Vec<u64>>,
+    times: PyOnceLock<Py<PyArray2<f64>>>,
+    objects: PyOnceLock<Py<PyArray1<i16>>>,
+    poses: PyOnceLock<[Py<PyArray2<f32>>; 2]>,
+}
+
+impl DataSet {
+    pub(crate) fn new(dataset: Dataset, approaches: Option<Vec<u64>>) -> Self {
+        Self {
+            dataset: Arc::new(dataset),
+            approaches,
+            times: PyOnceLock::new(),
+            objects: PyOnceLock::new(),
+            poses: PyOnceLock::new(),
+        }
+    }
+
+    /// Reads a directory.
+    pub(crate) fn of_directory(directory: &std::path::Path) -> palpate::Result<Self> {
+        let approaches = Listing::read(directory)?.map(|listing| {
+            let mut entries = listing.objects;
+            entries.sort_by(|a, b| a.name.cmp(&b.name));
+            entries.iter().map(|entry| entry.approaches).collect()
+        });
+        Ok(Self::new(Dataset::read_any(directory)?, approaches))
+    }
+
+    pub(crate) fn touches(&self) -> impl Iterator<Item = &Touch> {
+        self.dataset.objects.iter().flat_map(|object| &object.touches)
+    }
+
+    /// Columns one after the other as an array with one row for each touch, without a copy.
+    fn columns<'py, T: numpy::Element>(py: Python<'py>, values: Vec<T>) -> PyResult<Py<PyArray2<T>>> {
+        let rows = values.len() / 3;
+        let array = values.into_pyarray(py).reshape([3, rows])?;
+        array.call_method("setflags", (), Some(&pyo3::types::IntoPyDict::into_py_dict([("write", false)], py)?))?;
+        Ok(array.getattr("T")?.cast_into::<PyArray2<T>>().map_err(PyErr::from)?.unbind())
+    }
+
+    fn poses(&self, py: Python<'_>) -> PyResult<Option<&[Py<PyArray2<f32>>; 2]>> {
+        if self.touches().all(|touch| touch.pose().is_none()) {
+            return Ok(None);
+        }
+        let made = self.poses.get_or_try_init(py, || {
+            let cosine = |value: Option<i16>| value.map_or(f32::NAN, |value| f32::from(value) / f32::from(Q15_ONE));
+            let column = |axis: usize, alignment: bool| {
+                self.touches().map(move |touch| {
+                    cosine(touch.pose().map(|pose| if alignment { pose.alignment[axis] } else { pose.direction[axis] }))
+                })
+            };
+            let all = |alignment| (0..3).flat_map(|axis| column(axis, alignment)).collect::<Vec<_>>();
+            PyResult::Ok([Self::columns(py, all(false))?, Self::columns(py, all(true))?])
+        })?;
+        Ok(Some(made))
+    }
+}
+
+#[pyo3::pymethods]
+impl DataSet {
+    /// Reads the data set in a directory, which `capture` or `palpate capture` wrote, or which holds `<object>.txt` or
+    /// `<object>.parquet` for each object.
+    #[staticmethod]
+    fn read(py: Python<'_>, directory: PathBuf) -> Result<Self, Failure> {
+        long(py, None, |_| Self::of_directory(&directory))
+    }
+
+    /// A data set of touches from elsewhere.
+    ///
+    /// `times` has three contact times per touch, in seconds on any clock, NaN for a finger that did not touch; they are
+    /// rounded to microseconds, and the earliest becomes 0. `objects` says which of the `names` each touch is of.
+    /// `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it.
+    #[staticmethod]
+    #[pyo3(signature = (times, objects, names, *, direction=None, alignment=None, probe=None, approaches=false))]
+    fn from_arrays(
+        times: Input<'_, f64, Ix2>,
+        objects: Input<'_, i64, Ix1>,
+        names: Vec<String>,
+        direction: Option<Input<'_, f64, Ix2>>,
+        alignment: Option<Input<'_, f64, Ix2>>,
+        probe: Option<Probe>,
+        approaches: bool,
+    ) -> Result<Self, Failure> {
+        let times = triples(&times, "times")?;
+        let objects = objects.values()?;
+        let direction = direction.as_ref().map(|array| triples(array, "direction")).transpose()?;
+        let alignment = alignment.as_ref().map(|array| triples(array, "alignment")).transpose()?;
+        let lengths = [Some(objects.len()), direction.map(<[_]>::len), alignment.map(<[_]>::len)].into_iter().flatten();
+        if lengths.into_iter().any(|length| length != times.len()) {
+            let rows = "as many rows as times";
+            return Err(Error::setting("objects, direction and alignment", "of another length", rows).into());
+        }
+        let mut order: Vec<usize> = (0..names.len()).collect();
+        order.sort_by(|&a, &b| names[a].cmp(&names[b]));
+        if let Some(pair) = order.windows(2).find(|pair| names[pair[0]] == names[pair[1]]) {
+            return Err(Error::setting("names", format!("{} twice", names[pair[0]]), "different names").into());
+        }
+        let mut touches = vec![Vec::new(); names.len()];
+        for (row, (times, object)) in times.iter().zip(objects).enumerate() {
+            let there = |vectors: Option<&[[f64; 3]]>| {
+                vectors.map(|vectors| vectors[row]).filter(|vector| !vector.iter().all(|cosine| cosine.is_nan()))
+            };
+            let touch = touch_of_seconds(
+                times.map(|time| Some(time).filter(|time| !time.is_nan())),
+                there(direction),
+                there(alignment),
+            );
+            let touch = touch.map_err(|problem| palpate::error::TouchesProblem::Row {
+                row: row as u64 + 1,
+                problem: Box::new(problem),
+            });
+            let slot = usize::try_from(*object).ok().and_then(|object| touches.get_mut(object));
+            let slot =
+                slot.ok_or_else(|| Error::setting("objects", object, format!("0 to {}", names.len().max(1) - 1)))?;
+            slot.push(touch.map_err(Error::from)?);
+        }
+        let objects = order
+            .into_iter()
+            .map(|index| ObjectTouches { name: names[index].clone(), touches: std::mem::take(&mut touches[index]) });
+        let objects: Vec<ObjectTouches> = objects.collect();
+        if objects.is_empty() || objects.iter().any(|object| object.touches.is_empty()) {
+            return Err(Error::from(palpate::error::EvaluateProblem::NoTouches).into());
+        }
+        let origin = probe.map(|Probe(probe)| Origin {
+            probe,
+            approaches,
+            pose: direction.is_some(),
+            touches: objects.iter().map(|object| object.touches.len()).max().unwrap_or(0) as u64,
+            ..Origin::default()
+        });
+        Ok(Self::new(Dataset { origin, ..Dataset::new(objects) }, None))
+    }
+
+    /// The objects' names, sorted.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.dataset.names()
+    }
+
+    /// How many touches each object has, in the order of the names.
+    #[getter]
+    fn counts(&self) -> Vec<usize> {
+        self.dataset.objects.iter().map(|object| object.touches.len()).collect()
+    }
+
+    /// How many approaches each object took, where that is known.
+    #[getter]
+    fn approaches(&self) -> Option<Vec<u64>> {
+        self.approaches.clone()
+    }
+
+    /// Whether every approach is kept, also those that not all three fingers touched.
+    #[getter]
+    fn holds_approaches(&self) -> bool {
+        self.dataset.holds_approaches()
+    }
+
+    /// The probe that made the touches, where that is known.
+    #[getter]
+    fn probe(&self) -> Option<Probe> {
+        self.dataset.probe().copied().map(Probe)
+    }
+
+    /// What looked wrong when the data set was read, and may be meant.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.dataset.warnings.iter().map(ToString::to_string).collect()
+    }
+
+    fn __len__(&self) -> usize {
+        self.dataset.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("DataSet({} touches of {} objects)", self.dataset.len(), self.dataset.objects.len())
+    }
+
+    /// Contact times in seconds after the first contact, one row of three per touch, NaN for a finger that did not touch.
+    /// Columns are contiguous.
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> PyResult<Output<'py, f64, Ix2>> {
+        let made = self.times.get_or_try_init(py, || {
+            let seconds = |micros: Option<u32>| micros.map_or(f64::NAN, |micros| f64::from(micros) / 1e6);
+            let column = |finger: usize| self.touches().map(move |touch| seconds(touch.times()[finger].micros()));
+            Self::columns(py, (0..3).flat_map(column).collect::<Vec<_>>())
+        })?;
+        Ok(Output(made.bind(py).clone()))
+    }
+
+    /// Which object each touch is of: its position in the names.
+    #[getter]
+    fn objects<'py>(&self, py: Python<'py>) -> PyResult<Output<'py, i16, Ix1>> {
+        let made = self.objects.get_or_try_init(py, || {
+            let numbers = (0_i16..).zip(&self.dataset.objects);
+            let all: Vec<i16> =
+                numbers.flat_map(|(number, object)| std::iter::repeat_n(number, object.touches.len())).collect();
+            let Output(array) = one(py, all);
+            array.call_method("setflags", (), Some(&pyo3::types::IntoPyDict::into_py_dict([("write", false)], py)?))?;
+            PyResult::Ok(array.unbind())
+        })?;
+        Ok(Output(made.bind(py).clone()))
+    }
+
+    /// The probe's direction at each touch, a unit vector; `None` if no touch has a pose.
+    #[getter]
+    fn direction<'py>(&self, py: Python<'py>) -> PyResult<Option<Output<'py, f32, Ix2>>> {
+        Ok(self.poses(py)?.map(|[direction, _]| Output(direction.bind(py).clone())))
+    }
+
+    /// The direction of the row of fingers at each touch, a unit vector; `None` if no touch has a pose.
+    #[getter]
+    fn alignment<'py>(&self, py: Python<'py>) -> PyResult<Option<Output<'py, f32, Ix2>>> {
+        Ok(self.poses(py)?.map(|[_, alignment]| Output(alignment.bind(py).clone())))
+    }
+
+    /// What a descriptor turns each touch into, one row of whole numbers per touch (microseconds, and direction cosines times
+    /// 32767), NaN where one is missing: for training with another library. The code is the chip's.
+    #[pyo3(signature = (descriptor="curvature"))]
+    fn features<'py>(&self, py: Python<'py>, descriptor: &str) -> Result<Output<'py, f32, Ix2>, Failure> {
+        let descriptor = crate::ensemble::descriptor_of(descriptor)?;
+        let rows = py.detach(|| self.touches().flat_map(|touch| feature_row(descriptor, touch)).collect());
+        Ok(two(py, rows, descriptor.feature_count())?)
+    }
+
+    /// Some touches to train on and others to test on: `test_share` of each object's touches are drawn for testing.
+    #[pyo3(signature = (test_share=0.1, seed=1))]
+    fn split(&self, py: Python<'_>, test_share: f64, seed: u64) -> Result<(Self, Self), Failure> {
+        let split = py.detach(|| folds::split(&self.dataset, test_share, seed))?;
+        Ok((Self::new(split.train, None), Self::new(split.test, None)))
+    }
+
+    /// The touches with noise: `noise` is a standard deviation such as "5ms" or a range such as "0..10ms", `timer` the
+    /// timer's resolution. Every touch is made by a robot of its own.
+    #[pyo3(signature = (noise="", timer="", seed=1))]
+    fn noisy(&self, py: Python<'_>, noise: &str, timer: &str, seed: u64) -> Result<Self, Failure> {
+        let noise = noise_of(noise, timer)?;
+        noise.check()?;
+        let noisy = |object: &ObjectTouches| ObjectTouches {
+            name: object.name.clone(),
+            touches: noise.add(&object.name, &object.touches, seed),
+        };
+        let objects = py.detach(|| self.dataset.objects.iter().map(noisy).collect());
+        Ok(Self::new(Dataset { objects, ..(*self.dataset).clone() }, self.approaches.clone()))
+    }
+
+    /// The touches as a table: object (a category), t1, t2 and t3, and where it is known direction and alignment.
+    /// The columns are those of the arrays, without copies. Needs pandas.
+    fn to_pandas<'py>(slf: Bound<'py, Self>) -> PyResult<DataFrame<'py>> {
+        let frames = slf.py().import("palpate._frames")?;
+        Ok(DataFrame(frames.call_method1("to_pandas", (slf,))?))
+    }
+
+    /// Writes `<object>.parquet` for each object and, if the probe is known, `dataset.json`, into a directory that holds
+    /// no touches yet: what `read`, `palpate train` and pandas read.
+    fn to_parquet(&self, py: Python<'_>, directory: PathBuf) -> Result<(), Failure> {
+        self.write(py, directory, Format::Parquet)
+    }
+
+    /// The same as text, one line per touch.
+    fn to_text(&self, py: Python<'_>, directory: PathBuf) -> Result<(), Failure> {
+        self.write(py, directory, Format::Text)
+    }
+}
+
+impl DataSet {
+    fn write(&self, py: Python<'_>, directory: PathBuf, format: Format) -> Result<(), Failure> {
+        long(py, None, |_| self.dataset.write(&directory, format, self.approaches.as_deref()))
+    }
+}
+
+/// Noise as users write it.
+pub(crate) fn noise_of(deviation: &str, timer: &str) -> Result<Noise, Failure> {
+    let mut noise = Noise::default();
+    if !deviation.is_empty() {
+        noise.deviation = deviation.parse().map_err(Error::from)?;
+    }
+    if !timer.is_empty() {
+        noise.timer = quantity::duration(timer).map_err(Error::from)?;
+    }
+    Ok(noise)
+}

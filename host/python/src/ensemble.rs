@@ -1,0 +1,244 @@
+//! Full models: trained here, or by other libraries.
+
+use crate::arrays::{Input, Output, two};
+use crate::data::{DataSet, noise_of};
+use crate::failure::Failure;
+use crate::work::{Callback, long};
+use numpy::ndarray::{Ix1, Ix2};
+use palpate::ensemble::import::{self, PartTree, Parts};
+use palpate::ensemble::train::{self as library, Settings};
+use palpate::ensemble::{self, Inputs, StatedProbe};
+use palpate::error::{Error, EvaluateProblem, RowsProblem};
+use palpate::shared::Descriptor;
+use palpate::shared::format::Counted;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The full model: boosted trees in f32, from `train` or from another library.
+///
+/// >>> import palpate
+/// >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+/// >>> ensemble = palpate.train(data, rounds=5)
+/// >>> ensemble.objects, ensemble.features, ensemble.trees
+/// (['bowl', 'mouse'], ['curvature', 'slope'], 5)
+#[pyo3::pyclass(frozen, module = "palpate._native")]
+pub(crate) struct Ensemble {
+    pub(crate) ensemble: Arc<ensemble::Ensemble>,
+}
+
+/// A tree as columns: output, left, right, feature, threshold, missing_left, values.
+type Columns<'py> = (
+    Option<usize>,
+    Input<'py, i64, Ix1>,
+    Input<'py, i64, Ix1>,
+    Input<'py, i64, Ix1>,
+    Input<'py, f64, Ix1>,
+    Input<'py, bool, Ix1>,
+    Input<'py, f64, Ix1>,
+);
+
+#[pyo3::pymethods]
+impl Ensemble {
+    /// Reads what `save` or `palpate train` wrote, or a model of XGBoost, LightGBM, CatBoost or ONNX; the content says
+    /// which. `names` are the classes'.
+    #[staticmethod]
+    #[pyo3(signature = (path, names=None))]
+    fn load(py: Python<'_>, path: PathBuf, names: Option<Vec<String>>) -> Result<Self, Failure> {
+        let ensemble = py.detach(|| ensemble::Ensemble::load_named(&path, names.as_deref()))?;
+        Ok(Self { ensemble: Arc::new(ensemble) })
+    }
+
+    /// The same from the bytes of such a file.
+    #[staticmethod]
+    #[pyo3(signature = (content, names=None))]
+    fn from_bytes(py: Python<'_>, content: Vec<u8>, names: Option<Vec<String>>) -> Result<Self, Failure> {
+        let ensemble = py.detach(|| import::read(Path::new("the model"), &content, names.as_deref()))?;
+        Ok(Self { ensemble: Arc::new(ensemble) })
+    }
+
+    /// An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
+    /// leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
+    /// a leaf), the right child, the feature, the threshold, whether a missing value goes left, and the values. `base` is
+    /// what margins start from; an empty name stands for a feature that has none.
+    #[staticmethod]
+    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new()))]
+    fn from_trees(
+        py: Python<'_>,
+        kind: String,
+        features: Vec<String>,
+        base: Vec<f64>,
+        trees: Vec<Columns<'_>>,
+        names: Option<Vec<String>>,
+        notes: Vec<String>,
+    ) -> Result<Self, Failure> {
+        let tree = |(output, left, right, feature, threshold, missing_left, values): Columns<'_>| {
+            PyResult::Ok(PartTree {
+                output,
+                left: left.values()?.to_vec(),
+                right: right.values()?.to_vec(),
+                feature: feature.values()?.to_vec(),
+                threshold: threshold.values()?.to_vec(),
+                missing_left: missing_left.values()?.to_vec(),
+                values: values.values()?.to_vec(),
+            })
+        };
+        let trees = trees.into_iter().map(tree).collect::<PyResult<_>>()?;
+        let parts = Parts { kind, features, names: Vec::new(), base, trees, notes };
+        let ensemble = py.detach(|| parts.into_ensemble(names.as_deref())).map_err(Error::from)?;
+        Ok(Self { ensemble: Arc::new(ensemble) })
+    }
+
+    /// Writes an ensemble over touches as XGBoost's JSON.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
+        Ok(py.detach(|| self.ensemble.save(&path))?)
+    }
+
+    /// The objects' (classes') names, in the order of the margins.
+    #[getter]
+    fn objects(&self) -> Vec<String> {
+        self.ensemble.objects.clone()
+    }
+
+    /// The features' names.
+    #[getter]
+    fn features(&self) -> Vec<String> {
+        self.ensemble.inputs.names().into_iter().map(String::from).collect()
+    }
+
+    /// Which features a touch is turned into; `None` for an ensemble over rows of features.
+    #[getter]
+    fn descriptor(&self) -> Option<&'static str> {
+        self.ensemble.descriptor().map(Descriptor::name)
+    }
+
+    /// How many trees there are.
+    #[getter]
+    fn trees(&self) -> usize {
+        self.ensemble.trees.len()
+    }
+
+    /// What to know about an ensemble that another library trained, each a sentence.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.ensemble.origin.imported.as_ref().map(|imported| imported.notes.clone()).unwrap_or_default()
+    }
+
+    /// The margins of rows of features (of an ensemble over touches, of its descriptor's), one column per object: added
+    /// in f32, as XGBoost does.
+    fn margins<'py>(&self, py: Python<'py>, rows: Input<'py, f32, Ix2>) -> Result<Output<'py, f32, Ix2>, Failure> {
+        let (values, found) = rows.rows()?;
+        let wanted = self.ensemble.inputs.count();
+        if found != wanted {
+            return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
+        }
+        let margins = py.detach(|| {
+            values
+                .par_chunks_exact(wanted)
+                .with_min_len(64)
+                .flat_map_iter(|row| self.ensemble.margins_of_features(row))
+                .collect()
+        });
+        Ok(two(py, margins, self.ensemble.objects.len())?)
+    }
+
+    /// The margins of each touch of a data set.
+    fn margins_of<'py>(&self, py: Python<'py>, data: Bound<'py, DataSet>) -> Result<Output<'py, f32, Ix2>, Failure> {
+        if self.ensemble.descriptor().is_none() {
+            return Err(Error::from(EvaluateProblem::RawFeatures).into());
+        }
+        let data = data.get();
+        let margins = py.detach(|| {
+            let touches: Vec<_> = data.touches().collect();
+            touches.par_iter().with_min_len(64).flat_map_iter(|touch| self.ensemble.margins(touch)).collect()
+        });
+        Ok(two(py, margins, self.ensemble.objects.len())?)
+    }
+
+    fn __repr__(&self) -> String {
+        let kind = match &self.ensemble.inputs {
+            Inputs::Touches(descriptor) => descriptor.name().to_owned(),
+            Inputs::Rows(names) => format!("{} features", names.len()),
+        };
+        format!("Ensemble({} trees, {kind}, {} objects)", self.ensemble.trees.len(), self.ensemble.objects.len())
+    }
+}
+
+/// Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
+///
+/// `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope) or "paper" (the published
+/// method); whatever else is given replaces a part of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
+/// `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
+/// approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
+/// `background` is a data set of many other shapes, which stand for all that the model does not know.
+///
+/// >>> import palpate
+/// >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+/// >>> palpate.train(data, rounds=5, noise="0..5ms", timer="1ms")
+/// Ensemble(5 trees, curvature, 2 objects)
+#[pyo3::pyfunction]
+#[pyo3(signature = (data, *, preset="compact", descriptor=None, counted=None, rounds=None, depth=None, eta=None,
+    min_child_weight=None, bins=None, leaf_bits=None, multi_output=None, noise="", timer="", background=None, seed=1,
+    threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn train(
+    py: Python<'_>,
+    data: Bound<'_, DataSet>,
+    preset: &str,
+    descriptor: Option<&str>,
+    counted: Option<&str>,
+    rounds: Option<usize>,
+    depth: Option<usize>,
+    eta: Option<f64>,
+    min_child_weight: Option<f64>,
+    bins: Option<usize>,
+    leaf_bits: Option<u32>,
+    multi_output: Option<bool>,
+    noise: &str,
+    timer: &str,
+    background: Option<Bound<'_, DataSet>>,
+    seed: u64,
+    threads: Option<usize>,
+    progress: Option<Callback>,
+) -> Result<Ensemble, Failure> {
+    let preset = match preset {
+        "compact" => Settings::compact(),
+        "paper" => Settings::paper(),
+        other => return Err(Error::setting("preset", other, "compact or paper").into()),
+    };
+    let descriptor = descriptor.map(descriptor_of);
+    let counted = counted.map(|name| {
+        let found = Counted::ALL.iter().copied().find(|counted| counted.name() == name);
+        found.ok_or_else(|| Error::setting("counted", name, "full, contacts or all"))
+    });
+    let dataset = &data.get().dataset;
+    let settings = Settings {
+        descriptor: descriptor.transpose()?.unwrap_or(preset.descriptor),
+        counted: counted.transpose()?.or(preset.counted),
+        rounds: rounds.unwrap_or(preset.rounds),
+        depth: depth.unwrap_or(preset.depth),
+        eta: eta.unwrap_or(preset.eta),
+        min_child_weight: min_child_weight.unwrap_or(preset.min_child_weight),
+        bins: bins.unwrap_or(preset.bins),
+        leaf_bits: leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
+        multi_output: multi_output.unwrap_or(preset.multi_output),
+        noise: noise_of(noise, timer)?,
+        seed,
+        threads,
+        probe: StatedProbe::of(dataset),
+        ..preset
+    };
+    let background = background.as_ref().map(|background| &background.get().dataset);
+    let ensemble = long(py, progress.as_ref(), |progress| match background {
+        None => library::train(dataset, &settings, progress),
+        Some(background) => library::train_with_background(dataset, background, &settings, progress),
+    })?;
+    Ok(Ensemble { ensemble: Arc::new(ensemble) })
+}
+
+/// The descriptor with this name.
+pub(crate) fn descriptor_of(name: &str) -> palpate::Result<Descriptor> {
+    let all = || Descriptor::ALL.map(Descriptor::name).join(", ");
+    Descriptor::from_name(name).ok_or_else(|| Error::setting("descriptor", name, format!("one of {}", all())))
+}

@@ -1,0 +1,86 @@
+//! How often a model is right; how far it is from its ensemble. What is found comes as JSON, which `palpate` turns into
+//! values of its own classes.
+
+use crate::data::{DataSet, noise_of};
+use crate::ensemble::Ensemble;
+use crate::failure::Failure;
+use crate::model::Model;
+use crate::work::{Callback, long};
+use palpate::ensemble::StatedProbe;
+use palpate::error::Error;
+use palpate::evaluate::{
+    self as library, Candidate, LEAST_GROUPS, Margins, Settings, add_noise, parity::parity as compare,
+};
+use pyo3::prelude::*;
+
+/// A model of either kind.
+#[derive(pyo3::FromPyObject)]
+pub(crate) enum Evaluated<'py> {
+    /// A compiled one.
+    Model(Bound<'py, Model>),
+    /// The full one.
+    Ensemble(Bound<'py, Ensemble>),
+}
+
+/// Evaluates a model on touches that it was not trained on, and returns what `palpate evaluate --json` prints.
+#[pyo3::pyfunction]
+#[pyo3(signature = (model, data, *, at=None, groups=1000, error_rate=None, max_touches=None, noise="", timer="", seed=1))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn evaluate(
+    py: Python<'_>,
+    model: Evaluated<'_>,
+    data: Bound<'_, DataSet>,
+    at: Option<Vec<usize>>,
+    groups: usize,
+    error_rate: Option<f64>,
+    max_touches: Option<u32>,
+    noise: &str,
+    timer: &str,
+    seed: u64,
+) -> Result<String, Failure> {
+    let noise = noise_of(noise, timer)?;
+    let candidate = match &model {
+        Evaluated::Model(model) => Candidate::Compiled(model.get().model()),
+        Evaluated::Ensemble(ensemble) => Candidate::Full(&ensemble.get().ensemble),
+    };
+    let data = &data.get().dataset;
+    let evaluation = long(py, None, |_| {
+        let mut dataset = (**data).clone();
+        let robots = add_noise(&mut dataset, &noise, seed)?;
+        let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
+        let (usual, enough) = (Settings::default(), |count: u64| count >= LEAST_GROUPS);
+        let at_approaches = at.clone().unwrap_or(usual.at_approaches);
+        let at = at.unwrap_or_else(|| usual.at.into_iter().filter(|&at| enough(margins.distinct_groups(at))).collect());
+        let fewest = data.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
+        let at_approaches = at_approaches.into_iter().filter(|&at| at < fewest).collect();
+        let settings = Settings { at, at_approaches, groups, error_rate, max_touches, seed, noise };
+        library::evaluate(&margins, &settings)
+    })?;
+    json(&evaluation)
+}
+
+/// Compares a compiled model with its ensemble on every touch of a data set and on random sequences, and returns what
+/// `palpate parity --json` prints.
+#[pyo3::pyfunction]
+#[pyo3(signature = (ensemble, model, data, *, sequences=10_000, seed=1, progress=None))]
+pub(crate) fn parity(
+    py: Python<'_>,
+    ensemble: Bound<'_, Ensemble>,
+    model: Bound<'_, Model>,
+    data: Bound<'_, DataSet>,
+    sequences: usize,
+    seed: u64,
+    progress: Option<Callback>,
+) -> Result<String, Failure> {
+    let (ensemble, model, data) = (&ensemble.get().ensemble, model.get().model(), &data.get().dataset);
+    if let Some((own, other)) = StatedProbe::of(data).zip(model.probe()) {
+        StatedProbe::compare(["the model", "the data set"], [other, own.trained()]).map_err(Error::from)?;
+    }
+    let found = long(py, progress.as_ref(), |progress| compare(ensemble, model, data, sequences, seed, progress))?;
+    json(&found)
+}
+
+fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    // Numbers, names and lists are always JSON.
+    Ok(serde_json::to_string(value).unwrap_or_default())
+}

@@ -1,0 +1,52 @@
+//! Errors of the library as exceptions of `palpate._errors`, with the same text.
+
+use palpate::error::{Error, Place, Problem};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// What a call fails with.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// What the library said.
+    Library(Error),
+    /// What Python said.
+    Python(PyErr),
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Library(error)
+    }
+}
+
+impl From<PyErr> for Failure {
+    fn from(error: PyErr) -> Self {
+        Self::Python(error)
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Python(error) => error,
+            Failure::Library(error) => Python::attach(|py| exception(py, &error).unwrap_or_else(|failed| failed)),
+        }
+    }
+}
+
+fn exception(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
+    let place: (Option<PathBuf>, Option<u64>) = match error {
+        Error::Io { path, .. } => (Some(path.clone()), None),
+        Error::At { place: Place::File(path) | Place::Byte(path, _), .. } => (Some(path.clone()), None),
+        Error::At { place: Place::Line(path, line), .. } => (Some(path.clone()), Some(*line)),
+        _ => (None, None),
+    };
+    let name = match error {
+        Error::Io { .. } => "FileError",
+        Error::At { problem: Problem::Setting { .. }, .. } => "SettingError",
+        Error::At { .. } => "InputError",
+        _ => "PalpateError",
+    };
+    let class = py.import("palpate._errors")?.getattr(name)?;
+    Ok(PyErr::from_value(class.call1((error.to_string(), place.0, place.1))?))
+}

@@ -1,0 +1,33 @@
+//! Palpate for Python: the native half of the package `palpate`. What users see is documented there.
+
+mod arrays;
+mod capture;
+mod cells;
+mod data;
+mod ensemble;
+mod evaluate;
+mod failure;
+mod model;
+mod objects;
+mod recognizer;
+mod surface;
+mod work;
+
+/// What is written in Rust of the package palpate.
+#[pyo3::pymodule(module = "palpate")]
+mod _native {
+    #[pymodule_export]
+    use crate::capture::{capture, sources};
+    #[pymodule_export]
+    use crate::data::DataSet;
+    #[pymodule_export]
+    use crate::ensemble::{Ensemble, train};
+    #[pymodule_export]
+    use crate::evaluate::{evaluate, parity};
+    #[pymodule_export]
+    use crate::model::{Model, compile};
+    #[pymodule_export]
+    use crate::recognizer::Recognizer;
+    #[pymodule_export]
+    use crate::surface::Surface;
+}

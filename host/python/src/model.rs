@@ -1,0 +1,335 @@
+//! Compiled models.
+
+use crate::arrays::{ARRAY_LIKE, Input, Output, two};
+use crate::cells::OpenedModel;
+use crate::data::DataSet;
+use crate::ensemble::Ensemble;
+use crate::failure::Failure;
+use numpy::ndarray::Ix2;
+use palpate::compile::{self as library, CompiledModel, Core, Goal, Layout, Leaf, Settings};
+use palpate::error::{CompileProblem, Error, RowsProblem, TouchesProblem};
+use palpate::onboard;
+use palpate::output;
+use palpate::rows::{Encoder, feature_names};
+use palpate::shared::{Descriptor, Touch};
+use palpate::touches::touch_of_seconds;
+use pyo3::inspect::PyStaticExpr;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use pyo3::{Borrowed, PyTypeInfo, type_hint_union};
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A compiled model: the bytes that a microcontroller reads, and that are read here by the same code.
+///
+/// >>> import palpate
+/// >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+/// >>> model = palpate.compile(palpate.train(data, rounds=5))
+/// >>> model.objects
+/// ['bowl', 'mouse']
+/// >>> model.margins(data).shape
+/// (600, 2)
+/// >>> palpate.Model(model.to_bytes()).checksum == model.checksum
+/// True
+#[pyo3::pyclass(frozen, module = "palpate._native")]
+pub(crate) struct Model {
+    pub(crate) opened: Arc<OpenedModel>,
+    /// What the model compares of a row of features.
+    pub(crate) encoder: Encoder,
+}
+
+impl Model {
+    fn of(bytes: Vec<u8>) -> palpate::Result<Self> {
+        let opened = OpenedModel::try_new(bytes, |bytes| {
+            onboard::Model::new(bytes).map_err(|error| Error::from(CompileProblem::Model(error)))
+        })?;
+        let encoder = Encoder::of(opened.borrow_dependent());
+        Ok(Self { opened: Arc::new(opened), encoder })
+    }
+
+    pub(crate) fn model(&self) -> &onboard::Model<'_> {
+        self.opened.borrow_dependent()
+    }
+}
+
+/// Rows, or the touches of a data set.
+pub(crate) enum Rows<'py> {
+    Data(Bound<'py, DataSet>),
+    Array(Bound<'py, PyAny>),
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Rows<'py> {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_union!(<DataSet as PyTypeInfo>::TYPE_HINT, ARRAY_LIKE);
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        Ok(match object.cast::<DataSet>() {
+            Ok(data) => Self::Data(data.to_owned()),
+            Err(_) => Self::Array(object.to_owned()),
+        })
+    }
+}
+
+/// With fewer rows than this the lock is kept, and one thread does it all.
+const FEW: usize = 256;
+
+/// How many rows are computed between two looks for signals.
+const BATCH: usize = 1 << 20;
+
+impl Model {
+    /// The margins of some rows, one after the other.
+    fn fill<R: Sync>(&self, py: Python<'_>, rows: &[R], margins: impl Fn(&R, &mut [f64]) + Sync) -> PyResult<Vec<f64>> {
+        let objects = self.model().object_count();
+        let mut all = vec![0.0; rows.len() * objects];
+        if rows.len() < FEW {
+            rows.iter().zip(all.chunks_exact_mut(objects)).for_each(|(row, slot)| margins(row, slot));
+            return Ok(all);
+        }
+        for (rows, slots) in rows.chunks(BATCH).zip(all.chunks_mut(BATCH * objects)) {
+            py.check_signals()?;
+            py.detach(|| {
+                let slots = slots.par_chunks_exact_mut(objects).with_min_len(64);
+                rows.par_iter().with_min_len(64).zip(slots).for_each(|(row, slot)| margins(row, slot));
+            });
+        }
+        Ok(all)
+    }
+
+    fn of_touch(&self, touch: &Touch, slot: &mut [f64]) {
+        let model = self.model();
+        let mut margins = [0; 256];
+        model.margins(touch, &mut margins);
+        let unit = f64::from(model.unit());
+        slot.iter_mut().zip(margins).for_each(|(slot, margin)| *slot = f64::from(margin) * unit);
+    }
+
+    fn of_row(&self, row: &[f32], slot: &mut [f64]) {
+        let (model, row) = (self.model(), self.encoder.row(row));
+        let mut exact = [0.0; 256];
+        if model.f32_margins_of(&row, &mut exact[..slot.len()]) {
+            slot.iter_mut().zip(exact).for_each(|(slot, margin)| *slot = margin.into());
+            return;
+        }
+        let mut margins = [0; 256];
+        model.margins_of(&row, &mut margins);
+        let unit = f64::from(model.unit());
+        slot.iter_mut().zip(margins).for_each(|(slot, margin)| *slot = f64::from(margin) * unit);
+    }
+}
+
+#[pyo3::pymethods]
+impl Model {
+    /// A model in memory; `content` is checked.
+    #[new]
+    fn new(content: Vec<u8>) -> Result<Self, Failure> {
+        Ok(Self::of(content)?)
+    }
+
+    /// Reads a model that `save` or `palpate export` wrote.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
+        Ok(py.detach(|| CompiledModel::read(&path).and_then(|model| Self::of(model.into_bytes())))?)
+    }
+
+    /// Writes the model, whole or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
+        Ok(py.detach(|| output::write_bytes(&path, self.model().bytes()))?)
+    }
+
+    /// The model's bytes, for the chip.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.model().bytes())
+    }
+
+    /// What a pickle holds.
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyBytes>,) {
+        (self.to_bytes(py),)
+    }
+
+    /// How many bytes the model has.
+    #[getter]
+    fn size(&self) -> usize {
+        self.model().bytes().len()
+    }
+
+    /// The objects' (classes') names, in the order of the margins.
+    #[getter]
+    fn objects(&self) -> Vec<String> {
+        library::names(self.model())
+    }
+
+    /// The features' names.
+    #[getter]
+    fn features(&self) -> Vec<String> {
+        match self.model().descriptor() {
+            Some(descriptor) => descriptor.feature_names().iter().map(|&name| name.into()).collect(),
+            None => feature_names(self.model()),
+        }
+    }
+
+    /// Which features a touch is turned into; `None` for a model over rows of features.
+    #[getter]
+    fn descriptor(&self) -> Option<&'static str> {
+        self.model().descriptor().map(Descriptor::name)
+    }
+
+    /// How the trees are laid out.
+    #[getter]
+    fn layout(&self) -> &'static str {
+        self.model().layout().name()
+    }
+
+    /// What leaves are stored as: "i8", "i16" or "f32".
+    #[getter]
+    fn leaf(&self) -> &'static str {
+        self.model().leaf_type().name()
+    }
+
+    /// The farthest that a margin can be from the full model's, in nats.
+    #[getter]
+    fn margin_error(&self) -> f32 {
+        self.model().margin_error()
+    }
+
+    /// A number that names the model: two with the same are the same.
+    #[getter]
+    fn checksum(&self) -> u32 {
+        self.model().checksum()
+    }
+
+    /// The margins of each row, in nats, one column per object: unnormalized log-probabilities, to be added up over the
+    /// touches of one object.
+    ///
+    /// A model over touches takes a data set, or rows of three contact times in seconds (NaN where a finger did not
+    /// touch), with the probe's direction and alignment nine numbers. A model over features takes rows of those, NaN where
+    /// one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit.
+    fn margins<'py>(&self, py: Python<'py>, rows: Rows<'py>) -> Result<Output<'py, f64, Ix2>, Failure> {
+        let objects = self.model().object_count();
+        let margins = match (rows, self.model().descriptor()) {
+            (Rows::Data(_), None) => return Err(Error::from(palpate::error::EvaluateProblem::RawFeatures).into()),
+            (Rows::Data(data), Some(_)) => {
+                let touches: Vec<Touch> = data.get().touches().copied().collect();
+                self.fill(py, &touches, |touch, slot| self.of_touch(touch, slot))?
+            }
+            (Rows::Array(array), Some(_)) => {
+                let array: Input<'_, f64, Ix2> = array.extract()?;
+                let (values, columns) = array.rows()?;
+                let touches = touches(values, columns)?;
+                self.fill(py, &touches, |touch, slot| self.of_touch(touch, slot))?
+            }
+            (Rows::Array(array), None) => {
+                let array: Input<'_, f32, Ix2> = array.extract()?;
+                let (values, found) = array.rows()?;
+                let wanted = self.model().feature_count();
+                if found != wanted {
+                    return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
+                }
+                let rows: Vec<&[f32]> = values.chunks_exact(wanted).collect();
+                self.fill(py, &rows, |row, slot| self.of_row(row, slot))?
+            }
+        };
+        Ok(two(py, margins, objects)?)
+    }
+
+    fn __repr__(&self) -> String {
+        let model = self.model();
+        format!("Model({} bytes, {} objects, {})", model.bytes().len(), model.object_count(), model.layout().name())
+    }
+}
+
+/// Touches from rows of three or nine numbers.
+fn touches(values: &[f64], columns: usize) -> palpate::Result<Vec<Touch>> {
+    if columns != 3 && columns != 9 {
+        return Err(TouchesProblem::Fields { count: columns }.into());
+    }
+    let of = |(row, numbers): (usize, &[f64])| {
+        let problem = |problem| TouchesProblem::Row { row: row as u64 + 1, problem: Box::new(problem) }.into();
+        touch(numbers).map_err(problem)
+    };
+    values.chunks_exact(columns).enumerate().map(of).collect()
+}
+
+/// A touch from three or nine numbers, NaN where one is missing.
+pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
+    let time = |time: f64| Some(time).filter(|time| !time.is_nan());
+    let vector = |vector: [f64; 3]| Some(vector).filter(|vector| !vector.iter().all(|cosine| cosine.is_nan()));
+    match *numbers {
+        [a, b, c] => touch_of_seconds([a, b, c].map(time), None, None),
+        [a, b, c, dx, dy, dz, ax, ay, az] => {
+            touch_of_seconds([a, b, c].map(time), vector([dx, dy, dz]), vector([ax, ay, az]))
+        }
+        _ => Err(TouchesProblem::Fields { count: numbers.len() }),
+    }
+}
+
+/// Compiles an ensemble to the bytes that a microcontroller reads. (`palpate.compile` also takes models of other
+/// libraries.)
+///
+/// `leaf` is "i8", "i16" or "f32": what leaves are stored as. `layout` is "compact", "complete", "grid", "wide" or
+/// "patterns"; without one, the best for the `goal` is taken, which is "balanced", "speed" or "size". With `max_bytes` the
+/// layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if it still is, that is an
+/// error. `error_rate` and `max_touches` are where recognizers stop; `priors` say how likely each object is. `scales` say how
+/// many units make up 1 of each feature, for a chip that measures in whole numbers.
+///
+/// >>> import palpate
+/// >>> data = palpate.capture(["bowl", "mouse"], touches=300)
+/// >>> model = palpate.compile(palpate.train(data, rounds=5), max_bytes=4000)
+/// >>> model.size <= 4000
+/// True
+#[pyo3::pyfunction]
+#[pyo3(signature = (ensemble, *, max_bytes=None, leaf="i16", layout=None, goal="balanced", error_rate=0.01,
+    max_touches=200, priors=None, scales=None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn compile(
+    py: Python<'_>,
+    ensemble: Bound<'_, Ensemble>,
+    max_bytes: Option<usize>,
+    leaf: &str,
+    layout: Option<&str>,
+    goal: &str,
+    error_rate: f64,
+    max_touches: u32,
+    priors: Option<Vec<f64>>,
+    scales: Option<Vec<f32>>,
+) -> Result<Model, Failure> {
+    let ensemble = &ensemble.get().ensemble;
+    let layouts = "compact, complete, grid, wide or patterns";
+    let layout = layout.map(|name| {
+        let found = Layout::ALL.iter().copied().find(|layout| layout.name() == name);
+        found.ok_or_else(|| Error::setting("layout", name, layouts))
+    });
+    let counts = [
+        ("priors", priors.as_ref().map(Vec::len), ensemble.objects.len()),
+        ("scales", scales.as_ref().map(Vec::len), ensemble.inputs.count()),
+    ];
+    for (name, found, wanted) in counts {
+        if let Some(found) = found.filter(|&found| found != wanted) {
+            return Err(Error::setting(name, format!("a list of {found}"), format!("a list of {wanted}")).into());
+        }
+    }
+    let settings = Settings {
+        leaf: Leaf::ALL
+            .iter()
+            .copied()
+            .find(|known| known.name() == leaf)
+            .ok_or_else(|| Error::setting("leaf", leaf, "i8, i16 or f32"))?,
+        layout: layout.transpose()?,
+        goal: match goal {
+            "balanced" => Goal::Balanced(Core::M4F),
+            "speed" => Goal::Speed,
+            "size" => Goal::Size,
+            other => return Err(Error::setting("goal", other, "balanced, speed or size").into()),
+        },
+        error_rate,
+        max_touches,
+        priors,
+        scales,
+    };
+    let compiled = py.detach(|| match max_bytes {
+        None => library::compile(ensemble, &settings),
+        Some(most) => library::compile_within(ensemble, &settings, most),
+    })?;
+    Ok(Model::of(compiled.bytes)?)
+}

@@ -1,0 +1,74 @@
+//! Values whose classes are written in Python, with the types that the stub states.
+
+use palpate::probe::approach::Probe as Measures;
+use pyo3::Borrowed;
+use pyo3::inspect::PyStaticExpr;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::type_hint_identifier;
+use pyo3::types::PyType;
+use std::convert::Infallible;
+
+/// A class of `palpate._types`.
+pub(crate) fn class<'py>(
+    py: Python<'py>,
+    name: &'static str,
+    cell: &'static PyOnceLock<Py<PyType>>,
+) -> PyResult<&'py Bound<'py, PyType>> {
+    cell.import(py, "palpate._types", name)
+}
+
+macro_rules! handed_out {
+    ($($(#[$doc:meta])* $name:ident is $module:literal . $class:literal;)*) => {$(
+        $(#[$doc])*
+        pub(crate) struct $name<'py>(pub(crate) Bound<'py, PyAny>);
+
+        impl<'py> IntoPyObject<'py> for $name<'py> {
+            type Target = PyAny;
+            type Output = Bound<'py, PyAny>;
+            type Error = Infallible;
+
+            const OUTPUT_TYPE: PyStaticExpr = type_hint_identifier!($module, $class);
+
+            fn into_pyobject(self, _: Python<'py>) -> Result<Self::Output, Infallible> {
+                Ok(self.0)
+            }
+        }
+    )*};
+}
+
+handed_out! {
+    /// A verdict.
+    Verdict is "palpate._types"."Verdict";
+    /// A table of pandas.
+    DataFrame is "pandas"."DataFrame";
+}
+
+/// A probe's measures.
+pub(crate) struct Probe(pub(crate) Measures);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Probe {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_identifier!("palpate._types", "Probe");
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let number = |name: &str| object.getattr(name)?.extract::<f64>();
+        let (radius, spacing) = (number("radius")?, number("spacing")?);
+        Ok(Self(Measures { radius, spacing, speed: number("speed")?, tilt: number("tilt")? }))
+    }
+}
+
+impl<'py> IntoPyObject<'py> for Probe {
+    type Target = PyAny;
+    type Output = Bound<'py, PyAny>;
+    type Error = PyErr;
+
+    const OUTPUT_TYPE: PyStaticExpr = type_hint_identifier!("palpate._types", "Probe");
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let Measures { radius, spacing, speed, tilt } = self.0;
+        class(py, "Probe", &CLASS)?.call1((radius, spacing, speed, tilt))
+    }
+}

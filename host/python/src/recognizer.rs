@@ -1,0 +1,203 @@
+//! Touch by touch to a verdict.
+
+use crate::arrays::Input;
+use crate::cells::OpenedRecognizer;
+use crate::failure::Failure;
+use crate::model::{Model, touch};
+use crate::objects::{self, class};
+use numpy::ndarray::Ix1;
+use palpate::compile::{self, longest_time};
+use palpate::error::{Error, EvaluateProblem, RowsProblem, TouchesProblem};
+use palpate::onboard::{Refused, Stopping, Verdict};
+use palpate::rows::Encoder;
+use palpate::shared::Touch;
+use pyo3::inspect::PyStaticExpr;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyList, PyString, PyTuple, PyType};
+use pyo3::{Borrowed, intern, type_hint_identifier};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A touch: three contact times in seconds, with the pose nine numbers.
+pub(crate) struct TouchInput(Touch);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for TouchInput {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_identifier!("palpate._types", "Touch");
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let mut numbers = [f64::NAN; 9];
+        let mut count = 0;
+        let mut take = |item: Bound<'py, PyAny>| {
+            if let Some(slot) = numbers.get_mut(count)
+                && !item.is_none()
+            {
+                *slot = item.extract()?;
+            }
+            count += 1;
+            PyResult::Ok(())
+        };
+        if let Ok(tuple) = object.cast::<PyTuple>() {
+            tuple.iter().try_for_each(&mut take)?;
+        } else if let Ok(list) = object.cast::<PyList>() {
+            list.iter().try_for_each(&mut take)?;
+        } else {
+            object.try_iter()?.try_for_each(|item| take(item?))?;
+        }
+        let touch = match numbers.get(..count) {
+            Some(numbers) => touch(numbers),
+            None => Err(TouchesProblem::Fields { count }),
+        };
+        touch.map(Self).map_err(|problem| Failure::from(Error::from(problem)).into())
+    }
+}
+
+/// Recognizes objects by touch, by the code that runs on the chip.
+///
+/// It stops where the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
+///
+/// >>> import palpate
+/// >>> model = palpate.compile(palpate.train(palpate.capture(["bowl", "mouse"], touches=1000)))
+/// >>> recognizer = palpate.Recognizer(model)
+/// >>> for touch in palpate.capture(["bowl", "fork"], touches=100, seed=2).times:
+/// ...     verdict = recognizer.push(touch)
+/// ...     if verdict.decided:
+/// ...         break
+/// >>> verdict.object
+/// 'bowl'
+#[pyo3::pyclass(module = "palpate._native")]
+pub(crate) struct Recognizer {
+    cell: OpenedRecognizer,
+    encoder: Encoder,
+    names: Vec<Py<PyString>>,
+    /// The longest time between contacts that makes sense, in seconds.
+    longest: f64,
+}
+
+#[pyo3::pymethods]
+impl Recognizer {
+    #[new]
+    #[pyo3(signature = (model, *, error_rate=None, max_touches=None))]
+    fn new(
+        py: Python<'_>,
+        model: Bound<'_, Model>,
+        error_rate: Option<f64>,
+        max_touches: Option<u32>,
+    ) -> Result<Self, Failure> {
+        let model = model.get();
+        let own = Stopping::from_model(model.model());
+        let limit = max_touches.unwrap_or(own.max_touches());
+        let stopping = compile::stopping(error_rate.unwrap_or(own.error_rate()), limit)?;
+        // The model's own threshold stays as it is, to the last bit.
+        let stopping = if error_rate.is_none() { own.with_max_touches(limit) } else { stopping };
+        let cell = OpenedRecognizer::try_new(Arc::clone(&model.opened), |opened| {
+            palpate::onboard::Recognizer::new(opened.borrow_dependent(), stopping).map_err(|error| {
+                let (objects, capacity) = (error.objects, error.capacity);
+                Error::from(EvaluateProblem::TooManyObjects { objects, capacity })
+            })
+        })?;
+        let names = compile::names(model.model()).iter().map(|name| PyString::new(py, name).unbind()).collect();
+        let longest = if model.model().descriptor().is_some() { longest_time(model.model()) } else { f64::INFINITY };
+        Ok(Self { cell, encoder: model.encoder.clone(), names, longest })
+    }
+
+    /// Takes in a touch: three contact times in seconds on any clock, `None` or NaN for a finger that did not touch, with
+    /// the probe's direction and alignment nine numbers. A touch that the model was not trained for is not counted: the
+    /// verdict says why.
+    fn push<'py>(&mut self, py: Python<'py>, touch: TouchInput) -> Result<objects::Verdict<'py>, Failure> {
+        let TouchInput(touch) = touch;
+        let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
+        let seconds = f64::from(last) * 1e-6;
+        if seconds > self.longest {
+            let speed = self.cell.borrow_dependent().model().header().speed();
+            let problem = EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed };
+            return Err(Error::from(problem).into());
+        }
+        let pushed = self.cell.with_dependent_mut(|_, recognizer| recognizer.push(&touch));
+        self.say(py, pushed)
+    }
+
+    /// Takes in a row of features, for a model over those; NaN where one is missing.
+    fn push_row<'py>(&mut self, py: Python<'py>, row: Input<'py, f32, Ix1>) -> Result<objects::Verdict<'py>, Failure> {
+        let row = row.values()?;
+        let model = self.cell.borrow_dependent().model();
+        if model.descriptor().is_none() && row.len() != model.feature_count() {
+            let (found, wanted) = (row.len(), model.feature_count());
+            return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
+        }
+        let row = self.encoder.row(row);
+        let pushed = self.cell.with_dependent_mut(|_, recognizer| recognizer.push_features(&row));
+        self.say(py, pushed)
+    }
+
+    /// The verdict after the last touch.
+    #[getter]
+    fn verdict<'py>(&self, py: Python<'py>) -> Result<objects::Verdict<'py>, Failure> {
+        self.say(py, Ok(self.cell.borrow_dependent().verdict()))
+    }
+
+    /// How many touches were counted since the last `reset`.
+    #[getter]
+    fn touches(&self) -> u32 {
+        self.cell.borrow_dependent().touches()
+    }
+
+    /// The object with the most evidence so far.
+    #[getter]
+    fn best(&self, py: Python<'_>) -> Py<PyString> {
+        self.names[self.cell.borrow_dependent().best()].clone_ref(py)
+    }
+
+    /// The posterior of each object so far.
+    #[getter]
+    fn posteriors(&self) -> HashMap<String, f64> {
+        let recognizer = self.cell.borrow_dependent();
+        let names = compile::names(recognizer.model());
+        names.into_iter().enumerate().map(|(object, name)| (name, recognizer.posterior(object).to_f64())).collect()
+    }
+
+    /// Forgets all touches, for the next object. `weights` say how often each object is touched, in place of the model's
+    /// priors, in any unit.
+    #[pyo3(signature = (weights=None))]
+    fn reset(&mut self, weights: Option<Vec<u32>>) -> Result<(), Failure> {
+        self.cell.with_dependent_mut(|_, recognizer| match weights {
+            None => {
+                recognizer.reset();
+                Ok(())
+            }
+            Some(weights) => recognizer.reset_to(&weights).map_err(|_| {
+                Error::setting("weights", "0 for every object", "a weight above 0 for an object at least")
+            }),
+        })?;
+        Ok(())
+    }
+}
+
+impl Recognizer {
+    /// The verdict, or why the touch was not counted beside the verdict so far.
+    fn say<'py>(&self, py: Python<'py>, pushed: Result<Verdict, Refused>) -> Result<objects::Verdict<'py>, Failure> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let recognizer = self.cell.borrow_dependent();
+        let refused = pushed.err().map(|refused| refused.to_string());
+        let verdict = pushed.unwrap_or_else(|_| recognizer.verdict());
+        let class = class(py, "Verdict", &CLASS)?;
+        let made = match verdict {
+            Verdict::Recognized { object, touches, .. } => {
+                let object = usize::from(object);
+                let posterior = recognizer.posterior(object).to_f64();
+                class.call1((intern!(py, "recognized"), self.names[object].bind(py), posterior, touches, refused))?
+            }
+            other => {
+                let state = match other {
+                    Verdict::Unknown => intern!(py, "unknown"),
+                    Verdict::GaveUp => intern!(py, "gave-up"),
+                    _ => intern!(py, "undecided"),
+                };
+                class.call1((state, py.None(), py.None(), recognizer.touches(), refused))?
+            }
+        };
+        Ok(objects::Verdict(made))
+    }
+}

@@ -1,0 +1,114 @@
+"""Touching meshes, and data sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import palpate
+import pandas
+import pytest
+
+SQUARE = ([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+TENT = ([[-1, -1, 0], [1, -1, 0], [1, 1, 1], [-1, 1, 1]], [[0, 1, 2], [0, 2, 3]])
+
+
+def test_a_capture_in_memory_is_the_one_on_the_disk(tmp_path: Path) -> None:
+    options = {"touches": 300, "seed": 5, "pose": True, "approaches": True}
+    memory = palpate.capture(["bowl", "mouse"], **options)
+    disk = palpate.capture(["bowl", "mouse"], out=tmp_path / "data", **options)
+    assert memory.names == disk.names and memory.counts == disk.counts == [300, 300]
+    np.testing.assert_array_equal(memory.times, disk.times)
+    np.testing.assert_array_equal(memory.direction, disk.direction)
+    assert memory.approaches == disk.approaches == [300, 300]
+    assert memory.holds_approaches and np.isnan(memory.times).any()
+
+
+def test_threads_and_shards_change_no_touch() -> None:
+    whole = palpate.capture(["bowl", "mouse"], touches=90, threads=1)
+    parts = [palpate.capture(["bowl", "mouse"], touches=90, shard=f"{part}/3", threads=2) for part in (1, 2, 3)]
+    joined = [part.times[part.objects == 0] for part in parts]
+    np.testing.assert_array_equal(np.concatenate(joined), whole.times[whole.objects == 0])
+
+
+def test_arrays_are_meshes() -> None:
+    data = palpate.capture({"square": SQUARE, "tent": TENT}, touches=50)
+    assert data.names == ["square", "tent"] and len(data) == 100
+
+    class Trimesh:
+        vertices, faces = SQUARE
+
+    again = palpate.capture({"square": Trimesh(), "tent": TENT}, touches=50)
+    np.testing.assert_array_equal(again.times, data.times)
+    with pytest.raises(palpate.InputError, match="vertex 9"):
+        palpate.capture({"square": (SQUARE[0], [[0, 1, 9]])}, touches=50)
+    with pytest.raises(TypeError, match="float64"):
+        palpate.capture({"square": (SQUARE[0], [[0.5, 1.0, 2.0]])}, touches=50)
+
+
+def test_the_probe_is_the_one_that_was_given() -> None:
+    probe = palpate.Probe(spacing=1.0)
+    assert palpate.capture("bowl", touches=20, probe=probe).probe == probe
+    millimeters = palpate.Probe(radius=1.5, spacing=15.0, speed=100.0)
+    data = palpate.capture({"square": SQUARE}, touches=20, probe=millimeters, millimeters=50.0)
+    assert data.probe == millimeters
+
+
+def test_arrays_belong_to_the_data_set_and_cannot_be_written_to(touches: palpate.DataSet) -> None:
+    times = touches.times
+    assert np.shares_memory(times, touches.times) and times.shape == (len(touches), 3)
+    assert all(times[:, finger].flags.c_contiguous for finger in range(3))
+    for array in (times, touches.objects):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    assert np.bincount(touches.objects).tolist() == touches.counts
+
+
+def test_tables_share_the_arrays_memory() -> None:
+    data = palpate.capture(["bowl", "mouse"], touches=50, pose=True)
+    table = data.to_pandas()
+    assert list(table.columns[:4]) == ["object", "t1", "t2", "t3"] and len(table.columns) == 10
+    assert np.shares_memory(table["t2"].to_numpy(), data.times)
+    assert table.groupby("object", observed=True).size().to_dict() == {"bowl": 50, "mouse": 50}
+
+
+def test_parquet_and_text_come_back_as_they_were(tmp_path: Path) -> None:
+    data = palpate.capture(["bowl", "mouse"], touches=80, pose=True, approaches=True)
+    data.to_parquet(tmp_path / "parquet")
+    data.to_text(tmp_path / "text")
+    for kind in ("parquet", "text"):
+        read = palpate.DataSet.read(tmp_path / kind)
+        np.testing.assert_array_equal(read.times, data.times)
+        np.testing.assert_array_equal(read.alignment, data.alignment)
+        assert read.probe == data.probe and read.approaches == [80, 80]
+    table = pandas.read_parquet(tmp_path / "parquet" / "bowl.parquet")
+    np.testing.assert_array_equal(table[["t1", "t2", "t3"]].to_numpy(), data.times[:80])
+    with pytest.raises(palpate.InputError, match="bowl.parquet"):
+        data.to_parquet(tmp_path / "parquet")
+
+
+def test_touches_from_arrays_are_rounded_and_start_at_zero() -> None:
+    nan = np.nan
+    data = palpate.DataSet.from_arrays([[0.5, 0.51, nan], [nan] * 3, [0, 1e-7, 2e-6]], [1, 0, 1], ["spoon", "cup"])
+    assert data.names == ["cup", "spoon"] and data.counts == [2, 1] and data.probe is None
+    np.testing.assert_array_equal(data.times, [[0.0, 0.01, nan], [0.0, 0.0, 2e-6], [nan] * 3])
+    for times, objects, message in [
+        ([[0.0, -1.0, 0.0]], [0], "row 1: the time -1 is negative"),
+        ([[0.0, np.inf, 0.0]], [0], "row 1: the time inf is not finite"),
+        ([[0.0, 0.0, 0.0]], [2], "objects is 2"),
+        ([[0.0, 0.0, 0.0]], [0, 0], "another length"),
+        ([[0.0, 0.0]], [0], "times has 2 columns"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            palpate.DataSet.from_arrays(times, objects, ["cup", "spoon"])
+
+
+def test_splits_share_no_touch_and_noise_takes_a_seed(touches: palpate.DataSet) -> None:
+    train, test = touches.split(0.2, seed=3)
+    assert test.counts == [300] * 3 and train.counts == [1200] * 3 and train.probe == touches.probe
+    noisy = touches.noisy("5ms", timer="1ms", seed=4)
+    np.testing.assert_array_equal(noisy.times, touches.noisy("5ms", timer="1ms", seed=4).times)
+    assert (noisy.times != touches.times).any()
+    assert np.allclose(noisy.times * 1e3, np.round(noisy.times * 1e3))
+    with pytest.raises(palpate.InputError, match="such as 5ms"):
+        touches.noisy("5")

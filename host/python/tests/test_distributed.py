@@ -1,0 +1,204 @@
+"""Captures over a cluster: the bytes of one machine's, whatever dies on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cloudpickle
+import distributed
+import palpate
+import palpate.distributed
+import pytest
+
+# Dask warns of much that is its own affair, such as ports and unclosed sockets of processes that were killed.
+pytestmark = pytest.mark.filterwarnings("default")
+
+ENVIRONMENT = {
+    **os.environ,
+    "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
+    # A death is told to the client at once.
+    "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
+}
+OBJECTS = ["bowl", "mouse"]
+
+
+class Cluster:
+    """A scheduler and three workers, each a process of its own."""
+
+    def __init__(self) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.processes: list[subprocess.Popen[bytes]] = []
+        self.start()
+
+    def start(self) -> None:
+        quiet = ["--no-dashboard"]
+        scheduler = ["scheduler", "--host", "127.0.0.1", "--port", str(self.port), *quiet]
+        worker = ["worker", self.address, "--nthreads", "1", "--no-nanny", *quiet]
+        for arguments in (scheduler, worker, worker, worker):
+            self.add(arguments)
+
+    def add(self, arguments: list[str]) -> None:
+        command = [sys.executable, "-m", "dask", *arguments]
+        out = subprocess.DEVNULL
+        self.processes.append(subprocess.Popen(command, env=ENVIRONMENT, stdout=out, stderr=out))
+
+    def kill(self) -> None:
+        for process in self.processes:
+            process.kill()
+        for process in self.processes:
+            process.wait()
+        self.processes = []
+
+
+@pytest.fixture
+def cluster() -> Iterator[Cluster]:
+    cluster = Cluster()
+    yield cluster
+    cluster.kill()
+
+
+@pytest.fixture
+def client(cluster: Cluster) -> Iterator[distributed.Client]:
+    with distributed.Client(cluster.address, timeout=60) as client:
+        client.wait_for_workers(3, timeout=120)
+        yield client
+
+
+def files(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted(directory.iterdir()) if path.is_file() and path.name != ".lock"}
+
+
+def once(act: Callable[[], None], after: int) -> palpate.Progress:
+    """Acts when so many shards are done."""
+    acted = False
+
+    def progress(stage: str, done: int, total: int | None) -> None:
+        nonlocal acted
+        if stage == "touching" and done >= after and not acted:
+            acted = True
+            act()
+
+    return progress
+
+
+@pytest.mark.parametrize("format", ["text", "parquet"])
+def test_the_result_is_that_of_one_machine(
+    client: distributed.Client, tmp_path: Path, format: palpate.distributed.Format
+) -> None:
+    options = {"seed": 3, "approaches": True, "probe": palpate.Probe(spacing=1.25), "format": format}
+    palpate.capture(OBJECTS, touches=700, out=tmp_path / "one", **options)
+    out = tmp_path / "many"
+    summary = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **options)
+    assert files(out) == files(tmp_path / "one")
+    assert (summary.objects, summary.done, summary.kept, summary.refused) == (2, 8, 0, [])
+    # Once more: nothing is done again, but for a part that was damaged.
+    (out / "parts" / "bowl" / "2-of-4.txt").write_bytes(b"0 0 0\n")
+    again = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **options)
+    assert (again.done, again.kept) == (1, 7) and files(out) == files(tmp_path / "one")
+    other = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **{**options, "seed": 4})
+    assert other.done == 8 and files(out) != files(tmp_path / "one")
+
+
+def test_a_worker_that_is_killed_costs_nothing_but_time(client: distributed.Client, cluster: Cluster, tmp_path: Path) -> None:
+    palpate.capture(OBJECTS, touches=6000, out=tmp_path / "one")
+    out = tmp_path / "many"
+    progress = once(cluster.processes[1].kill, after=3)
+    summary = palpate.distributed.capture(
+        client, OBJECTS, 6000, out, format="text", touches_per_shard=300, progress=progress
+    )
+    assert cluster.processes[1].wait() == -signal.SIGKILL
+    assert summary.refused == [] and summary.done == 40
+    assert files(out) == files(tmp_path / "one")
+
+
+def test_a_scheduler_that_is_restarted_costs_nothing_but_time(
+    client: distributed.Client, cluster: Cluster, tmp_path: Path
+) -> None:
+    palpate.capture(OBJECTS, touches=6000, out=tmp_path / "one")
+    out = tmp_path / "many"
+
+    def restart() -> None:
+        cluster.kill()
+        cluster.start()
+
+    progress = once(restart, after=3)
+    summary = palpate.distributed.capture(
+        client, OBJECTS, 6000, out, format="text", touches_per_shard=300, progress=progress
+    )
+    assert summary.refused == [] and summary.resubmitted > 0
+    assert files(out) == files(tmp_path / "one")
+
+
+class Deadly(distributed.WorkerPlugin):
+    """Ends every worker that begins a shard of one object."""
+
+    def __init__(self, key: str) -> None:
+        self.key = key
+
+    def setup(self, worker: object) -> None:
+        pass
+
+    def transition(self, key: object, start: str, finish: str, **_: object) -> None:
+        if finish == "executing" and isinstance(key, tuple) and key[0] == self.key:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_shard_that_kills_its_worker_each_time_is_named_and_the_others_finish(tmp_path: Path) -> None:
+    cloudpickle.register_pickle_by_value(sys.modules[__name__])
+    out = tmp_path / "many"
+    options = {"seed": 1, "probe": None, "approaches": False, "aim": "box", "length": 10.0, "millimeters": None}
+    everything = {"touches": 900, "pose": False, **options}
+    ((_, _, digest),) = palpate.distributed._objects(["fork"], everything, str(out), 3)
+    with (
+        distributed.LocalCluster(n_workers=3, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        cluster.scheduler.allowed_failures = 0
+        client.register_plugin(Deadly(f"capture-{digest}"))
+        summary = palpate.distributed.capture(
+            client, ["fork", *OBJECTS], 900, out, format="text", touches_per_shard=300
+        )
+    assert {(lost.object, lost.shard) for lost in summary.refused} == {("fork", f"{part}/3") for part in (1, 2, 3)}
+    assert all("its worker died in each of 3 attempts" in lost.reason for lost in summary.refused)
+    assert summary.objects == 2 and set(files(out)) == {"bowl.txt", "mouse.txt"}
+
+
+def test_a_mesh_that_is_refused_is_named_and_the_others_finish(client: distributed.Client, tmp_path: Path) -> None:
+    (tmp_path / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    summary = palpate.distributed.capture(
+        client, ["bowl", str(tmp_path / "broken.obj")], 100, tmp_path / "out", format="text"
+    )
+    assert [lost.object for lost in summary.refused] == ["broken"] and "broken.obj" in summary.refused[0].reason
+    assert set(files(tmp_path / "out")) == {"bowl.txt"}
+
+
+def test_xgboost_trains_over_the_cluster_and_its_model_is_imported(client: distributed.Client, tmp_path: Path) -> None:
+    palpate.distributed.capture(client, OBJECTS, 3000, tmp_path / "data", touches_per_shard=1000)
+    assert json.loads((tmp_path / "data" / "dataset.json").read_text())["complete"]
+    ensemble = palpate.distributed.train(client, tmp_path / "data", rounds=8)
+    assert ensemble.objects == OBJECTS and ensemble.descriptor == "curvature" and ensemble.trees == 16
+    unseen = palpate.capture(OBJECTS, touches=300, seed=2)
+    found = palpate.evaluate(palpate.compile(ensemble), unseen, groups=200)
+    assert found.accuracy[10] > 0.9
+
+
+def test_the_program_captures_on_this_machine(tmp_path: Path) -> None:
+    palpate.capture(OBJECTS, touches=200, out=tmp_path / "one")
+    command = [sys.executable, "-m", "palpate.distributed"]
+    out = ["-o", str(tmp_path / "many"), "--touches", "200", "--workers", "2", "--format", "text"]
+    done = subprocess.run([*command, *OBJECTS, *out], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("2 objects are complete; 2 shards were captured, 0 were there")
+    assert files(tmp_path / "many") == files(tmp_path / "one")
+    assert subprocess.run([*command, *OBJECTS, *out, "--touches", "0"], capture_output=True).returncode == 2
+    assert subprocess.run([*command, "mug", *out], capture_output=True).returncode == 1
+    assert "Examples:" in subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout

@@ -1,0 +1,69 @@
+"""The examples in the documentation run, and every part of the native module has its documentation."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+from collections.abc import Iterator
+
+import palpate
+import pytest
+from palpate import _native
+
+
+def documented(prefix: str, holder: object) -> Iterator[tuple[str, str]]:
+    """The names and documentation of what a module or class holds."""
+    for name, member in vars(holder).items():
+        if name.startswith("_"):
+            continue
+        inside = member.__func__ if isinstance(member, staticmethod) else member
+        yield f"{prefix}.{name}", inspect.getdoc(inside) or ""
+        if inspect.isclass(member):
+            yield from documented(f"{prefix}.{name}", member)
+
+
+NATIVE = dict(documented("palpate._native", _native))
+
+
+def test_everything_native_is_documented() -> None:
+    assert [name for name, text in NATIVE.items() if not text] == []
+    assert len(NATIVE) > 50
+
+
+def run(name: str, text: str) -> int:
+    test = doctest.DocTestParser().get_doctest(text, {}, name, None, None)
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    runner.run(test)
+    assert runner.summarize(verbose=False).failed == 0, name
+    return len(test.examples)
+
+
+EXAMPLES = {name: text for name, text in NATIVE.items() if ">>>" in text}
+
+
+def test_the_native_module_has_its_examples() -> None:
+    # pytest finds none of them by itself: a number that falls is an example that nobody runs.
+    assert len(EXAMPLES) == 8, sorted(EXAMPLES)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_native_example(name: str) -> None:
+    assert run(name, EXAMPLES[name]) >= 3
+
+
+@pytest.mark.parametrize("name", ["palpate", "palpate._evaluate", "palpate._import"])
+def test_python_examples(name: str) -> None:
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    tests = [test for test in finder.find(importlib.import_module(name), name) if test.examples]
+    assert tests
+    for test in tests:
+        runner = doctest.DocTestRunner()
+        runner.run(test)
+        assert runner.summarize(verbose=False).failed == 0
+
+
+def test_what_is_exported_exists() -> None:
+    assert sorted(palpate.__all__) == palpate.__all__
+    for name in palpate.__all__:
+        getattr(palpate, name)

@@ -1,0 +1,29 @@
+//! The same trees in as many bytes as there is room for.
+
+use super::{Compiled, Goal, Leaf, Settings, compile};
+use crate::ensemble::Ensemble;
+use crate::error::{CompileProblem, Result};
+
+/// Compiles an ensemble to at most `most` bytes. No tree is left out: first the layout is chosen for size, then leaves are
+/// stored in fewer bits. Of what fits, the first is taken, so that margins are as exact as there is room for.
+///
+/// # Errors
+/// As [`compile`], and [`CompileProblem::OverBudget`] with the fewest bytes that were found.
+pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> Result<Compiled> {
+    let narrower = match settings.leaf {
+        Leaf::F32 => &[Leaf::F32, Leaf::I16, Leaf::I8][..],
+        Leaf::I16 => &[Leaf::I16, Leaf::I8],
+        Leaf::I8 => &[Leaf::I8],
+    };
+    let mut fewest = usize::MAX;
+    for &leaf in narrower {
+        for goal in [settings.goal, Goal::Size] {
+            let compiled = compile(ensemble, &Settings { leaf, goal, ..settings.clone() })?;
+            if compiled.bytes.len() <= most {
+                return Ok(compiled);
+            }
+            fewest = fewest.min(compiled.bytes.len());
+        }
+    }
+    Err(CompileProblem::OverBudget { bytes: fewest, most }.into())
+}

@@ -1,0 +1,165 @@
+//! Trees that another program holds in memory, such as scikit-learn's, which no file holds.
+
+use super::draft::{Draft, DraftNode, DraftTree};
+use crate::ensemble::nodes::after;
+use crate::ensemble::{Ensemble, Output};
+use crate::error::{EnsembleProblem, TreeProblem};
+
+/// An ensemble in parts: what margins start from, and the trees that are added.
+#[derive(Clone, Debug, Default)]
+pub struct Parts {
+    /// The library and the kind of model, such as "scikit-learn HistGradientBoostingClassifier".
+    pub kind: String,
+    /// The features' names; an empty one for a feature that has none of its own.
+    pub features: Vec<String>,
+    /// The classes' names; empty for default names.
+    pub names: Vec<String>,
+    /// What margins start from, one for each output.
+    pub base: Vec<f64>,
+    /// The trees, in the order in which they are added.
+    pub trees: Vec<PartTree>,
+    /// What a user should know about it, each a sentence.
+    pub notes: Vec<String>,
+}
+
+/// A tree as columns, one entry for each node; node 0 is its root.
+#[derive(Clone, Debug, Default)]
+pub struct PartTree {
+    /// The output that its leaves are for, which have one value then; none if they have one for each.
+    pub output: Option<usize>,
+    /// The child where `x <= threshold`; negative for a leaf.
+    pub left: Vec<i64>,
+    /// The other child.
+    pub right: Vec<i64>,
+    /// The feature that is compared.
+    pub feature: Vec<i64>,
+    /// The threshold, in f64.
+    pub threshold: Vec<f64>,
+    /// Whether a missing value goes left.
+    pub missing_left: Vec<bool>,
+    /// Values, of each node as many as a leaf has.
+    pub values: Vec<f64>,
+}
+
+impl Parts {
+    /// The ensemble: comparisons are exact for every f32, and how far margins can be from the f64 sums is computed.
+    ///
+    /// # Errors
+    /// [`EnsembleProblem`] for columns of unequal length, children and features out of range, a node that is reached
+    /// twice, and whatever [`Ensemble::check`] refuses.
+    pub fn into_ensemble(self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
+        let Self { kind, features, names: own, base, trees, notes } = self;
+        let outputs = base.len();
+        let trees = trees
+            .into_iter()
+            .enumerate()
+            .map(|(number, tree)| {
+                tree.draft(outputs).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
+            })
+            .collect::<Result<_, _>>()?;
+        Draft { features, names: own, base, trees, kind, notes, f32_sums: false }.finish(names)
+    }
+}
+
+impl PartTree {
+    fn draft(&self, outputs: usize) -> Result<DraftTree, TreeProblem> {
+        let nodes = self.left.len();
+        let width = if self.output.is_some() { 1 } else { outputs };
+        for (column, found, wanted) in [
+            ("right", self.right.len(), nodes),
+            ("feature", self.feature.len(), nodes),
+            ("threshold", self.threshold.len(), nodes),
+            ("missing_left", self.missing_left.len(), nodes),
+            ("values", self.values.len(), nodes * width),
+        ] {
+            if found != wanted {
+                return Err(TreeProblem::Column { column, found, wanted });
+            }
+        }
+        let index = |number: i64| usize::try_from(number).unwrap_or(usize::MAX);
+        let node = |at: usize| {
+            if self.left[at] < 0 {
+                return DraftNode::Leaf(self.values[at * width..(at + 1) * width].to_vec());
+            }
+            let (feature, threshold, missing_left) =
+                (index(self.feature[at]), self.threshold[at], self.missing_left[at]);
+            let (left, right) = (index(self.left[at]), index(self.right[at]));
+            if threshold == f64::INFINITY {
+                // Every number is at or below, infinity too: nothing is below minus infinity.
+                let (threshold, missing_left) = (f32::NEG_INFINITY, !missing_left);
+                return DraftNode::Split { feature, threshold, missing_left, left: right, right: left };
+            }
+            DraftNode::Split { feature, threshold: after(threshold), missing_left, left, right }
+        };
+        let output = self.output.map_or(Output::Each, Output::One);
+        Ok(DraftTree { nodes: (0..nodes).map(node).collect(), output })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tree() -> PartTree {
+        PartTree {
+            output: Some(0),
+            left: vec![1, -1, -1],
+            right: vec![2, -1, -1],
+            feature: vec![0, 0, 0],
+            threshold: vec![0.1, 0.0, 0.0],
+            missing_left: vec![true, false, false],
+            values: vec![9.0, 1.0, 2.0],
+        }
+    }
+
+    fn parts(tree: PartTree) -> Parts {
+        Parts {
+            kind: "a test".into(),
+            features: vec!["x".into()],
+            base: vec![0.5],
+            trees: vec![tree],
+            ..Parts::default()
+        }
+    }
+
+    #[test]
+    fn at_or_below_the_threshold_is_left_for_every_number() {
+        let ensemble = parts(tree()).into_ensemble(None).unwrap();
+        let margin = |ensemble: &Ensemble, x: f32| ensemble.margins_of_features(&[x])[0];
+        for x in [0.1_f32, 0.1_f32.next_down(), 0.1_f32.next_up(), f32::NEG_INFINITY, f32::INFINITY] {
+            assert_eq!(margin(&ensemble, x), if f64::from(x) <= 0.1 { 1.5 } else { 2.5 }, "{x}");
+        }
+        assert_eq!(margin(&ensemble, f32::NAN), 1.5);
+        let infinite = PartTree { threshold: vec![f64::INFINITY, 0.0, 0.0], missing_left: vec![false; 3], ..tree() };
+        let ensemble = parts(infinite).into_ensemble(None).unwrap();
+        for x in [f32::NEG_INFINITY, 0.0, f32::MAX, f32::INFINITY] {
+            assert_eq!(margin(&ensemble, x), 1.5, "{x}");
+        }
+        assert_eq!(margin(&ensemble, f32::NAN), 2.5);
+    }
+
+    #[test]
+    fn trees_that_contradict_themselves_are_refused() {
+        let column = TreeProblem::Column { column: "right", found: 2, wanted: 3 };
+        for (tree, problem) in [
+            (PartTree { right: vec![2, -1], ..tree() }, column),
+            (PartTree { left: vec![0, -1, -1], ..tree() }, TreeProblem::ReachedTwice { node: 0 }),
+            (
+                PartTree { right: vec![3, -1, -1], ..tree() },
+                TreeProblem::Child { node: 0, side: "right", child: 3, nodes: 3 },
+            ),
+            (PartTree { feature: vec![1, 0, 0], ..tree() }, TreeProblem::Feature { node: 0, feature: 1, features: 1 }),
+            (PartTree { output: Some(1), ..tree() }, TreeProblem::Object { object: 1, objects: 1 }),
+            (PartTree::default(), TreeProblem::NoNodes),
+        ] {
+            let tree = if tree.left.is_empty() { PartTree { output: Some(0), ..tree } } else { tree };
+            assert_eq!(parts(tree).into_ensemble(None), Err(EnsembleProblem::Tree { tree: 0, problem }));
+        }
+        let nan = PartTree { threshold: vec![f64::NAN, 0.0, 0.0], ..tree() };
+        let error = parts(nan).into_ensemble(None).unwrap_err();
+        assert!(
+            matches!(error, EnsembleProblem::Tree { problem: TreeProblem::Threshold { node: 0, .. }, .. }),
+            "{error}"
+        );
+    }
+}

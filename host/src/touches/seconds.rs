@@ -1,0 +1,30 @@
+//! A touch from numbers, as tables and arrays hold them.
+
+use super::text::{contact_time, unit_vector};
+use crate::error::TouchesProblem;
+use palpate_shared::{ContactTime, Pose, Touch};
+
+/// The touch of three contact times in seconds on any common clock, none for a finger that never touched, and the probe's
+/// direction and alignment (unit vectors) where they are known: rounded and checked as [a line of text](super::parse_touch)
+/// is.
+///
+/// # Errors
+/// What is wrong with a number, or that one of direction and alignment is there and the other is not.
+pub fn touch_of_seconds(
+    times: [Option<f64>; 3],
+    direction: Option<[f64; 3]>,
+    alignment: Option<[f64; 3]>,
+) -> Result<Touch, TouchesProblem> {
+    let time = |time: Option<f64>| time.map_or(Ok(ContactTime::MISSING), contact_time);
+    let [first, middle, last] = times;
+    let touch = Touch::new([time(first)?, time(middle)?, time(last)?]);
+    match (direction, alignment) {
+        (None, None) => Ok(touch),
+        (Some(direction), Some(alignment)) => Ok(touch.with_pose(Pose {
+            direction: unit_vector("direction", direction)?,
+            alignment: unit_vector("alignment", alignment)?,
+        })),
+        (Some(_), None) => Err(TouchesProblem::HalfPose { there: "direction", missing: "alignment" }),
+        (None, Some(_)) => Err(TouchesProblem::HalfPose { there: "alignment", missing: "direction" }),
+    }
+}

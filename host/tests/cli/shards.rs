@@ -1,0 +1,40 @@
+use crate::{command, globe, stdout};
+use std::process::Command;
+
+/// The lines for a capture without Dask, as the documentation has them.
+fn documented(start: &str) -> &'static str {
+    let lines = include_str!("../../python/README.md").lines();
+    lines.into_iter().find(|line| line.starts_with(start)).expect("the documentation says how")
+}
+
+#[cfg(unix)]
+#[test]
+fn the_documented_lines_capture_in_parts_that_are_the_whole_together() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path();
+    std::fs::create_dir(path.join("meshes")).unwrap();
+    globe(&path.join("meshes"), "globe", 12);
+    globe(&path.join("meshes"), "apple", 6);
+    let one = ["capture", "meshes/", "-o", "one", "--touches", "500"];
+    stdout(command(one).current_dir(path).output().unwrap());
+    let program = command([""; 0]).get_program().to_owned();
+    // A few touches only.
+    let script = format!(
+        "set -euo pipefail\npalpate() {{ \"$PROGRAM\" \"$@\" --touches 500; }}\nexport -f palpate\n{}\n{}\n",
+        documented("seq 8").replace("palpate capture", "bash -c 'palpate \"$@\"' - capture"),
+        documented("mkdir whole"),
+    );
+    let ran = Command::new("bash").arg("-c").arg(script).env("PROGRAM", program).current_dir(path).output().unwrap();
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    for file in ["apple.txt", "globe.txt"] {
+        let read = |part: &str| std::fs::read(path.join(part).join(file)).unwrap();
+        assert!(read("one") == read("whole"), "{file}");
+        assert_eq!(read("whole").split(|&byte| byte == b'\n').count(), 501);
+    }
+    // A job of a Slurm array is one of these commands.
+    assert!(
+        documented("sbatch").contains(
+            "'palpate capture meshes/ -o part-$SLURM_ARRAY_TASK_ID --shard $SLURM_ARRAY_TASK_ID/8 --threads 1'"
+        )
+    );
+}
