@@ -68,6 +68,7 @@
 //! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
+//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate play` | [`play::Game`] |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
 //!
@@ -114,6 +115,8 @@ pub mod tune;
 
 #[cfg(feature = "train")]
 pub mod strangers;
+
+pub mod play;
 
 pub mod chip;
 

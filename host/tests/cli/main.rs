@@ -10,6 +10,7 @@ mod mesh;
 mod models;
 mod objects;
 mod plan;
+mod play;
 mod probe;
 mod reports;
 mod rows;
