@@ -6,7 +6,7 @@ pub use shown::text;
 
 use crate::calibrate::{self, Calibrated};
 use crate::capture;
-use crate::compile::{self, Compiled};
+use crate::compile::{self, Compiled, CompiledModel};
 use crate::ensemble::{StatedProbe, train};
 use crate::error::{Problem, ReportProblem, Result};
 use crate::evaluate::parity::{self, Parity};
@@ -14,6 +14,7 @@ use crate::evaluate::{self, Candidate, Curve, Evaluation, Margins, SequentialSet
 use crate::mesh::Object;
 use crate::output;
 use crate::progress::{self, Progress};
+use crate::report::play::{self, Contender, Expected};
 use crate::report::results;
 use crate::report::run_page::{RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
@@ -41,8 +42,11 @@ const PARITY_SEQUENCES: usize = 10_000;
 const PICTURE: u32 = 160;
 
 /// Files in the output directory besides `data/`, `approaches/` and `summary.json`.
-const FILES: [&str; 7] =
-    ["paper.json", "paper.palpate", "full.json", "full.palpate", "ensemble.json", "model.palpate", "report.html"];
+const FILES: [&str; 8] =
+    ["paper.json", "paper.palpate", "full.json", "full.palpate", "ensemble.json", "model.palpate", "report.html", PLAY];
+
+/// The page on which the objects can be touched, of [`FILES`].
+const PLAY: &str = "play.html";
 
 /// How to run.
 #[derive(Clone, Debug)]
@@ -255,6 +259,8 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let full = method("ours on full touches", "full", full, &split)?;
     let ours = method("ours on every contact", "ensemble", contacts, &approaches)?;
     let model = compile::open(&ours.compiled.bytes)?;
+    progress.begin("writing the page to play on", None);
+    output::write_bytes(&out.join(PLAY), play_page(objects, [&paper, &full, &ours], settings)?.as_bytes())?;
     let summary = Summary {
         made_from,
         tool_version: env!("CARGO_PKG_VERSION"),
@@ -279,6 +285,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     };
     let page = run_page(&RunResults {
         command: settings.command.clone(),
+        play: PLAY.into(),
         pictures: shown::pictures(objects, &summary.capture),
         methods: vec![
             shown::shown("paper", &paper),
@@ -438,6 +445,22 @@ fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]
     let recognized = matches!(verdict, Some(Verdict::Recognized { .. })).then(|| model.object_name(best).into());
     let posterior = recognizer.posterior(best).to_f64();
     Ok(Recognition { touched: touched.into(), recognized, touches: recognizer.touches(), approaches, posterior })
+}
+
+/// The page on which the objects can be touched, with all models.
+fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Result<String> {
+    let contender = |trial: &Trial| {
+        let measured = trial.method.evaluation.approaches.as_ref();
+        let expected = measured.map(|approaches| Expected::from(&approaches.sequential));
+        Contender::new(CompiledModel::from_bytes(trial.compiled.bytes.clone())?, expected)
+    };
+    let contenders = trials.into_iter().map(contender).collect::<Result<Vec<_>>>()?;
+    let origin = settings.capture.origin.clone();
+    play::page(
+        objects,
+        &contenders,
+        &play::Settings { origin, noise: settings.noise, command: settings.command.clone() },
+    )
 }
 
 #[cfg(test)]

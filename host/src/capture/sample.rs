@@ -79,6 +79,14 @@ impl<'a> Sampler<'a> {
         Err(untouchable().into())
     }
 
+    /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is
+    /// kept.
+    pub fn approach(&self, scene: &Scene, index: u64) -> Approach {
+        let (bounds, origin) = (scene.bounds(), self.origin);
+        let target = origin.aim.target(scene);
+        Approach::draw_at(&mut self.rng(index), bounds, target, origin.probe.tilt, origin.clearance(bounds))
+    }
+
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {
         Xoshiro256PlusPlus::seed_from_u64(mix(self.stream ^ mix(index)))
     }

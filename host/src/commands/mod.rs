@@ -19,6 +19,7 @@ mod numbers;
 mod objects;
 mod parity;
 mod plan;
+mod play;
 mod probe;
 mod progress;
 mod recognize;
@@ -68,6 +69,8 @@ commands! {
     Objects => objects,
     /// Make a page that shows an object and some touches, to look at in a browser
     View => view,
+    /// Make a page on which objects can be touched, with the recognizer inside
+    Play => play,
     /// Touch objects with the virtual probe
     Capture => capture,
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine

@@ -27,7 +27,7 @@ Three methods are trained and compared: the published one, on the times of full 
 
 The models promise an error rate of 1 %: their thresholds are found on touches that are captured for that and nothing else (see `palpate help calibrate`).
 
-Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html.")]
+Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html, and play.html, on which the objects can be touched (see `palpate help play`).")]
 pub(crate) struct Arguments {
     /// What to touch: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]

@@ -1,6 +1,6 @@
 //! What a run prints and shows on its page.
 
-use super::{AT_APPROACHES, Method, PICTURE, Recognition, Summary, TABLE_AT, Trial};
+use super::{AT_APPROACHES, Method, PICTURE, PLAY, Recognition, Summary, TABLE_AT, Trial};
 use crate::capture;
 use crate::evaluate::Approaches;
 use crate::mesh::Object;
@@ -237,9 +237,10 @@ pub fn text(summary: &Summary, out: &Path) -> String {
     }
     _ = writeln!(
         text,
-        "\n± is a standard error. {:.1} s in all. The page: {}",
+        "\n± is a standard error. {:.1} s in all. The page: {}; to touch the objects yourself: {}",
         summary.seconds,
-        out.join("report.html").display()
+        out.join("report.html").display(),
+        out.join(PLAY).display()
     );
     text
 }

@@ -13,6 +13,7 @@ mod mesh;
 mod models;
 mod objects;
 mod plan;
+mod play;
 mod probe;
 mod record;
 mod reports;
