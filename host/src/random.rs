@@ -8,7 +8,7 @@ use rand::rngs::ChaCha8Rng;
 /// What random numbers are for. Each purpose has its own streams, so that drawing more for one changes no other, and
 /// what is drawn for two of them at the same seed is independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "some purposes are the report's"))]
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "some purposes are the report's, one is the trainer's"))]
 pub(crate) enum Purpose {
     /// Which touches train and which test.
     Folds,
@@ -40,8 +40,8 @@ pub(crate) enum Purpose {
     Capture,
     /// Touches as a fitted probe would make them.
     Fitted,
-    /// The folds of a comparison of two data sets, and its repetitions.
-    Compare,
+    /// Which recorded touches are held out together, and groups of them.
+    Teach,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -67,7 +67,7 @@ impl Purpose {
             Self::Fit => Some(11),
             Self::Capture => Some(28),
             Self::Fitted => Some(29),
-            Self::Compare => Some(30),
+            Self::Teach => Some(18),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }
@@ -120,7 +120,7 @@ mod tests {
             Fit,
             Capture,
             Fitted,
-            Compare,
+            Teach,
             Synthetic,
         ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();

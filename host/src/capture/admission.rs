@@ -143,7 +143,9 @@ fn settings(there: &Origin, here: &Origin) -> Vec<String> {
         Some(value) => serde_json::Value::to_string(value),
         None => "the default".to_owned(),
     };
-    let said = names.into_iter().map(|name| format!("{name} is {} there and {} here", value(&there, name), value(&here, name)));
+    let said = names
+        .into_iter()
+        .map(|name| format!("{name} is {} there and {} here", value(&there, name), value(&here, name)));
     said.collect()
 }
 

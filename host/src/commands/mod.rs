@@ -29,6 +29,7 @@ mod run;
 mod shell;
 mod stated;
 mod strangers;
+mod teach;
 mod train;
 mod tune;
 mod verify;
@@ -73,6 +74,8 @@ commands! {
     Data => data,
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     Cast => cast,
+    /// Look at data sets: compare recorded touches with simulated ones
+    Data => data,
     /// Train an ensemble on captured touches
     Train => train,
     /// Compile an ensemble to the bytes that the chip reads

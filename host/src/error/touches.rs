@@ -208,6 +208,15 @@ pub enum TouchesProblem {
         /// What to write, with an example.
         example: &'static str,
     },
+    /// A file whose name does not say what it holds.
+    #[error("not a file of touches by its name")]
+    NoFormat,
+    /// An object was recorded in two places.
+    #[error("the object {name} was given twice")]
+    RecordedTwice {
+        /// The object.
+        name: String,
+    },
     /// An object has too few touches to be divided.
     #[error("{name} has only {touches} touches, too few to split")]
     TooFew {
@@ -262,6 +271,8 @@ impl TouchesProblem {
             Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
             Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
+            Self::NoFormat => "Call it like the object, with the ending .txt or .parquet.",
+            Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
             Self::BadQuantity { example, .. } => return format!("Give {example}."),
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),

@@ -53,7 +53,9 @@ impl TuneProblem {
         match self {
             Self::NothingFits { .. } => "Allow more bytes or more instructions.",
             Self::FewObjects { .. } => "Give two or more objects.",
-            Self::NotRecorded { .. } => "Give its mesh as well, under the recording's name, or leave the recording out.",
+            Self::NotRecorded { .. } => {
+                "Give its mesh as well, under the recording's name, or leave the recording out."
+            }
             Self::FewRecorded { .. } => {
                 "Record a few hundred approaches to objects whose meshes you have; 60 presses on a plate help too."
             }

@@ -169,8 +169,9 @@ fn shares<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], 
         One(String),
         Each([String; FINGERS]),
     }
-    let given = Shares::deserialize(deserializer)
-        .map_err(|_| D::Error::custom("missed is a share such as \"2%\", or one of each finger: [\"1%\", \"2%\", \"0%\"]"))?;
+    let given = Shares::deserialize(deserializer).map_err(|_| {
+        D::Error::custom("missed is a share such as \"2%\", or one of each finger: [\"1%\", \"2%\", \"0%\"]")
+    })?;
     let texts = match given {
         Shares::One(text) => std::array::from_fn(|_| text.clone()),
         Shares::Each(texts) => texts,

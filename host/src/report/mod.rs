@@ -21,6 +21,7 @@ mod objects;
 mod plan;
 mod promises;
 mod published;
+mod recorded;
 pub(crate) mod results;
 pub(crate) mod run_page;
 mod sequential;
@@ -29,6 +30,7 @@ mod simulator;
 mod stages;
 pub(crate) mod statistics;
 mod strangers;
+pub(crate) mod teach;
 pub mod view;
 
 pub use settings::Settings;

@@ -100,6 +100,21 @@ impl Dataset {
         }
     }
 
+    /// The touches of one file, as an object that is called like it.
+    ///
+    /// # Errors
+    /// [`TouchesProblem::NoFormat`] if the file's name says neither what it holds nor of which object; when the file
+    /// cannot be read, holds no touch, or has a wrong line.
+    pub fn read_file(path: &Path) -> Result<ObjectTouches> {
+        let extension = path.extension().unwrap_or_default();
+        let format = Format::ALL.into_iter().find(|format| extension == format.extension());
+        let name = path.file_stem().and_then(|stem| stem.to_str());
+        let Some((format, name)) = format.zip(name) else {
+            return Err(Error::at(Place::file(path), TouchesProblem::NoFormat));
+        };
+        Ok(ObjectTouches { name: name.into(), touches: format.read(path)? })
+    }
+
     /// What a listing names.
     fn listed(directory: &Path, listing: Listing) -> Result<Self> {
         if !listing.complete {

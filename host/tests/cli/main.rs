@@ -5,6 +5,7 @@ mod cast;
 mod chip;
 mod compiled;
 mod design;
+mod fit;
 mod help;
 mod mesh;
 mod models;
@@ -16,6 +17,7 @@ mod reports;
 mod rows;
 mod strangers;
 mod support;
+mod teach;
 mod view;
 
 use support::{command, globe, json, listing, run, stderr, stdout};

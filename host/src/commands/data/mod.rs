@@ -1,5 +1,6 @@
-//! `palpate data`: data sets of recorded touches.
+//! `palpate data`: what is done with data sets of touches.
 
+mod compare;
 mod record;
 
 use crate::Result;
@@ -15,10 +16,13 @@ pub(crate) struct Arguments {
 enum Command {
     /// Add the touches of a real probe to a data set, from a file of lines
     Record(record::Arguments),
+    /// Say how far recorded touches are from simulated ones, and what that costs
+    Compare(compare::CompareArguments),
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     match arguments.command {
         Command::Record(arguments) => record::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
     }
 }

@@ -206,7 +206,7 @@ pub fn train_with_background(
     Ok(ensemble)
 }
 
-/// Rounds every leaf to a whole multiple of a power of two (the unit, at most 2⁻¹ and at least 2⁻¹⁵ nats), the smallest
+/// Rounds every leaf, and what margins start from, to a whole multiple of a power of two (the unit, at most 2⁻¹ and at least 2⁻¹⁵ nats), the smallest
 /// with which the largest leaf still fits `bits` bits, its sign included.
 ///
 /// A 16-bit unit is about 10⁻⁴ nats, far below what a finite number of touches can teach a leaf. In exchange, f32 sums
@@ -218,10 +218,12 @@ pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     let most = 2.0_f32.powi(i32::try_from(bits).unwrap_or(32) - 1) - 1.0;
     let fits = |digits: &i32| (largest * 2.0_f32.powi(*digits)).round() <= most;
     let unit = 2.0_f32.powi(-(1..=15).rev().find(fits).unwrap_or(1));
+    // Multiplying and dividing by a power of two is exact.
+    let rounded = |value: &mut f32| *value = (*value / unit).round() * unit;
+    ensemble.base_margins.iter_mut().for_each(rounded);
     for node in ensemble.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
         if let Node::Leaf(values) = node {
-            // Multiplying and dividing by a power of two is exact.
-            values.iter_mut().for_each(|value| *value = (*value / unit).round() * unit);
+            values.iter_mut().for_each(rounded);
         }
     }
 }

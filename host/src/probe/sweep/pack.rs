@@ -135,8 +135,11 @@ fn half_earliest(corners: &[[Vec4; 3]; 3], ray: &Ray, limit: f32) -> Vec4 {
 /// A motion as the f32 tests need it.
 pub(super) struct Ray {
     pub(super) origin: Vec3,
-    /// One over the direction, with tiny components in place of zeros.
-    pub(super) inverse: Vec3,
+    /// The same, and one over the direction with tiny components in place of zeros, and its absolute value: axis by axis, for
+    /// four boxes at once.
+    pub(super) origins: [Vec4; 3],
+    pub(super) inverse: [Vec4; 3],
+    pub(super) spread: [Vec4; 3],
     /// Two directions perpendicular to the motion, and the direction of the motion.
     axes: [Vec3; 3],
     /// The origin along each of them.
@@ -154,9 +157,13 @@ impl Ray {
         let margin = motion.radius + BOX * (1.0 + motion.radius + motion.origin.abs().max_element());
         let component = |c: f64| if c.abs() < 1e-12 { 1e12_f64.copysign(c) } else { 1.0 / c };
         let across = |axis: DVec3| axis.dot(motion.origin) as f32;
+        let origin = motion.origin.as_vec3();
+        let inverse = direction.to_array().map(|along| Vec4::splat(component(along) as f32));
         Self {
-            origin: motion.origin.as_vec3(),
-            inverse: DVec3::from(direction.to_array().map(component)).as_vec3(),
+            origin,
+            origins: origin.to_array().map(Vec4::splat),
+            inverse,
+            spread: inverse.map(Vec4::abs),
             axes: [u.as_vec3(), v.as_vec3(), direction.as_vec3()],
             offsets: [across(u), across(v), across(direction)],
             margin: margin as f32,

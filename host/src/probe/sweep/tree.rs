@@ -215,8 +215,8 @@ impl Node {
     fn met<const SCALE: u8>(&self, ray: &Ray, limit: f32) -> (Vec4, BVec4A) {
         let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(limit));
         for axis in 0..3 {
-            let middle = (self.center[axis] - ray.origin[axis]) * ray.inverse[axis];
-            let half = (self.half[axis] + ray.margin) * ray.inverse[axis].abs();
+            let middle = (self.center[axis] - ray.origins[axis]) * ray.inverse[axis];
+            let half = (self.half[axis] + ray.margin) * ray.spread[axis];
             near = near.max(middle - half);
             far = far.min(middle + half);
         }

@@ -292,10 +292,8 @@ impl Noise {
     #[must_use]
     pub fn and(&self, more: &Self) -> Self {
         let Deviation { least, largest } = self.deviation;
-        let deviation = Deviation {
-            least: least.hypot(more.deviation.least),
-            largest: largest.hypot(more.deviation.largest),
-        };
+        let deviation =
+            Deviation { least: least.hypot(more.deviation.least), largest: largest.hypot(more.deviation.largest) };
         Self {
             deviation,
             timer: self.timer.max(more.timer),
@@ -370,7 +368,11 @@ mod missed_shares {
 
     pub(super) fn serialize<S: Serializer>(shares: &[f64; FINGERS], serializer: S) -> Result<S::Ok, S::Error> {
         let [first, others @ ..] = shares;
-        if others.iter().all(|other| other == first) { first.serialize(serializer) } else { shares.serialize(serializer) }
+        if others.iter().all(|other| other == first) {
+            first.serialize(serializer)
+        } else {
+            shares.serialize(serializer)
+        }
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], D::Error> {

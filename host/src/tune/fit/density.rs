@@ -23,9 +23,9 @@ const LEAST: f64 = 0.1;
 const RATIO: f64 = 1.3;
 const LEVELS: usize = 22;
 /// By how much of its distance from 0 a simulated touch is smoothed.
-const SMOOTHING: f64 = 0.045;
+const SMOOTHING: f64 = 0.03;
 /// Growth of cells with the distance from 0, as a share of it.
-const GROWTH: f64 = 0.03;
+const GROWTH: f64 = 0.02;
 /// Cells to a standard deviation near 0.
 const CELLS: f64 = 2.0;
 /// How many standard deviations a kernel reaches.
@@ -66,9 +66,7 @@ impl Observed {
             [Some(a), Some(b), None] => (0b011, b - a, 0.0),
             [None, Some(b), Some(c)] => (0b110, c - b, 0.0),
             [Some(a), None, Some(c)] => (OUTER, c - a, 0.0),
-            [a, b, c] => {
-                (u8::from(a.is_some()) | u8::from(b.is_some()) << 1 | u8::from(c.is_some()) << 2, 0.0, 0.0)
-            }
+            [a, b, c] => (u8::from(a.is_some()) | u8::from(b.is_some()) << 1 | u8::from(c.is_some()) << 2, 0.0, 0.0),
         };
         Self { fingers, first, second }
     }
@@ -173,9 +171,8 @@ impl Plane {
             let farthest = samples.iter().fold(1.0_f64, |most, sample| most.max(f64::from(sample[axis].abs())));
             Axis::new(deviations[axis], 1.2 * farthest + 4.0 * deviations[axis])
         });
-        let values = [0, 1].map(|axis: usize| -> Vec<f64> {
-            (0..axes[axis].cells()).map(|cell| axes[axis].value(cell)).collect()
-        });
+        let values = [0, 1]
+            .map(|axis: usize| -> Vec<f64> { (0..axes[axis].cells()).map(|cell| axes[axis].value(cell)).collect() });
         let columns = axes[1].cells();
         let mut density = vec![0.0_f32; axes[0].cells() * columns];
         let (mut down, mut across) = (Vec::new(), Vec::new());

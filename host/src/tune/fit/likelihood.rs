@@ -1,6 +1,7 @@
 //! How well a candidate probe explains recorded touches.
 
 use super::density::{Densities, FULL, NOISE, OUTER, Observed};
+use super::posed::{self, InPose};
 use std::f64::consts::TAU;
 
 /// The share of touches that come from nowhere: so that one odd touch cannot decide a fit.
@@ -44,6 +45,25 @@ impl Candidate {
     }
 }
 
+/// How crooked probes usually are: standard deviations of the logarithm of the factor, of offsets in milliseconds, and of
+/// the logarithm of the noise about [`USUAL_NOISE`]. Of candidates that explain touches equally well the usual one is taken;
+/// a few dozen touches outweigh it wherever they say something.
+const USUAL: [f64; 3] = [0.15, 8.0, 1.0];
+/// In milliseconds.
+const USUAL_NOISE: f64 = 2.0;
+
+impl Candidate {
+    /// The logarithm of how usual it is, but for a constant.
+    pub(super) fn usual(&self) -> f64 {
+        let [factor, offset, noise] = USUAL;
+        // Whichever finger counts as straight.
+        let mean = self.late.iter().sum::<f64>() / 3.0;
+        let late: f64 = self.late.iter().map(|late| ((late - mean) / offset).powi(2)).sum();
+        let own = (self.factor.ln() / factor).powi(2) + ((self.noise / USUAL_NOISE).ln() / noise).powi(2);
+        -0.5 * (own + late)
+    }
+}
+
 /// Which approaches were recorded: what the probability of a touch is relative to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kept {
@@ -56,10 +76,12 @@ pub(super) enum Kept {
 }
 
 /// Recorded touches of one object.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Recording<'a> {
     pub(super) name: &'a str,
     pub(super) touches: Vec<Observed>,
+    /// Simulated approaches in the pose of each touch; empty if no touch has one.
+    pub(super) in_poses: Vec<Option<InPose>>,
     pub(super) kept: Kept,
 }
 
@@ -91,7 +113,20 @@ impl<'a> Explained<'a> {
         }
     }
 
-    /// The logarithm of the density of a touch.
+    pub(super) fn candidate(&self) -> &Candidate {
+        &self.candidate
+    }
+
+    pub(super) fn kept(&self) -> Kept {
+        self.kept
+    }
+
+    /// The logarithm of the share of approaches that were recorded.
+    pub(super) fn recorded(&self) -> f64 {
+        self.recorded
+    }
+
+    /// The logarithm of the density of a touch in any pose.
     pub(super) fn log_density(&self, observed: &Observed) -> f64 {
         let Candidate { factor, late: [first, middle, third], missed, .. } = self.candidate;
         let Observed { fingers, first: x, second: y } = *observed;
@@ -118,13 +153,26 @@ impl<'a> Explained<'a> {
         (density * (1.0 - ODD) + ODD * odd / 8.0).ln() - self.recorded
     }
 
+    /// The logarithm of the likelihood of a recording of the object.
+    pub(super) fn of_recording(&self, recording: &Recording<'_>) -> f64 {
+        if recording.in_poses.is_empty() {
+            return self.log_likelihood(&recording.touches);
+        }
+        let of = |(touch, in_pose): (&Observed, &Option<InPose>)| match in_pose {
+            Some(in_pose) => posed::log_density(self, touch, in_pose),
+            None => self.log_density(touch),
+        };
+        recording.touches.iter().zip(&recording.in_poses).map(of).sum()
+    }
+
+    /// The logarithm of the likelihood of touches in any pose.
     pub(super) fn log_likelihood(&self, touches: &[Observed]) -> f64 {
         touches.iter().map(|touch| self.log_density(touch)).sum()
     }
 }
 
 /// The probability that of the `touched` fingers these are `recorded` and the others missed their contact.
-fn product(touched: u8, recorded: u8, missed: &[f64; 3]) -> f64 {
+pub(super) fn product(touched: u8, recorded: u8, missed: &[f64; 3]) -> f64 {
     let of = |(finger, missed): (u8, &f64)| match (touched >> finger & 1, recorded >> finger & 1) {
         (0, _) => 1.0,
         (_, 0) => *missed,
@@ -170,9 +218,7 @@ impl Plate {
         let [curvature, slope] = [first - 2.0 * middle + third, third - first];
         let count = self.presses.len().max(1) as f64;
         let tilt: f64 = self.presses.iter().map(|(turn, press)| turn * (press.second - slope)).sum::<f64>() / count;
-        let normal = |x: f64, deviation: f64| {
-            (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt())
-        };
+        let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt());
         let [root6, root2] = [6.0_f64.sqrt() * noise, 2.0_f64.sqrt() * noise];
         let of = |(turn, press): &(f64, Observed)| {
             let times = normal(press.first - curvature, root6) * normal(press.second - slope - turn * tilt, root2);

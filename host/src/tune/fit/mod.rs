@@ -2,8 +2,9 @@
 //!
 //! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many times,
 //! with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches' density, which
-//! is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum likelihood, by
-//! Nelder–Mead from several starts). Full and partial touches count, and approaches that touched nothing. Intervals are of
+//! is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum likelihood with a
+//! weak preference for probes that are not very crooked, by Nelder–Mead from several starts). Full and partial touches count, and approaches that touched nothing; where
+//! the pose was recorded, each touch is compared with approaches in its pose. Intervals are of
 //! 95 %, by profile likelihood.
 //!
 //! Only differences of contact times are recorded, so an offset of all three fingers alike cannot be told, and changes
@@ -33,8 +34,11 @@ mod advice;
 mod density;
 mod likelihood;
 mod outcome;
+mod posed;
 mod search;
 mod suspects;
+#[cfg(all(test, feature = "objects"))]
+mod tests;
 mod timer;
 
 pub use advice::Warning;
@@ -45,6 +49,7 @@ pub use suspects::Suspect;
 use crate::capture;
 use crate::error::{Error, Result, TuneProblem};
 use crate::mesh::Object;
+use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Origin};
 use density::{Densities, FULL, Observed};
@@ -68,7 +73,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { origin: Origin::default(), approaches: 60_000, seed: 1 }
+        Self { origin: Origin::default(), approaches: 200_000, seed: 1 }
     }
 }
 
@@ -86,15 +91,15 @@ struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
-    /// The logarithm of the likelihood of the recordings `which` asks for, and of the plate.
+    /// The logarithm of the likelihood of the recordings `which` asks for, and of the plate, with how usual the candidate is.
     fn log_likelihood(&self, candidate: &Candidate, which: impl Fn(usize) -> bool + Sync) -> f64 {
         let of = |index: usize| {
             let recording = &self.recordings[index];
             let explained = Explained::new(candidate, &self.objects[self.of[index]], recording.kept);
-            explained.log_likelihood(&recording.touches)
+            explained.of_recording(recording)
         };
         let plate = self.plate.as_ref().map_or(0.0, |plate| plate.log_likelihood(candidate));
-        (0..self.recordings.len()).filter(|index| which(*index)).map(of).sum::<f64>() + plate
+        (0..self.recordings.len()).filter(|index| which(*index)).map(of).sum::<f64>() + plate + candidate.usual()
     }
 }
 
@@ -121,11 +126,12 @@ pub fn fit(
     if found < LEAST {
         return Err(TuneProblem::FewRecorded { touches: found, least: LEAST }.into());
     }
-    let objects = simulated(objects, settings, progress)?;
+    let (objects, scenes) = simulated(objects, settings, progress)?;
     let kept = kept(recorded);
-    let recordings = recorded.objects.iter().map(|own| Recording {
+    let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
         name: &own.name,
         touches: own.touches.iter().map(Observed::of).collect(),
+        in_poses: posed::in_poses(&own.name, &own.touches, &scenes[object], settings),
         kept,
     });
     let evidence = Evidence {
@@ -162,13 +168,18 @@ fn kept(recorded: &Dataset) -> Kept {
     }
 }
 
-/// Each object, touched by the probe as it should be.
-fn simulated(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Vec<Densities>> {
+/// Each object, touched by the probe as it should be, and the scenes of its instances.
+fn simulated(
+    objects: &[Object],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Vec<Densities>, Vec<Vec<Scene>>)> {
     if settings.approaches < 1_000 {
         return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
     }
     let real = crate::touches::noise::Noise::default();
-    let origin = Origin { approaches: true, touches: settings.approaches, seed: settings.seed, real, ..settings.origin.clone() };
+    let origin =
+        Origin { approaches: true, touches: settings.approaches, seed: settings.seed, real, ..settings.origin.clone() };
     let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
     progress.begin("touching", Some(objects.len() as u64));
     let one = |(object, scenes): (&Object, &Vec<_>)| {
@@ -176,7 +187,8 @@ fn simulated(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
         progress::advance(progress, 1)?;
         Ok(Densities::new(&object.name, &touches))
     };
-    objects.iter().zip(&scenes).map(one).collect()
+    let densities = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
+    Ok((densities, scenes))
 }
 
 /// The best candidate, and its intervals, number by number.
@@ -198,7 +210,8 @@ fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, V
         best = search::near(&likelihood, &better.candidate);
     }
     progress::check(progress)?;
-    let ends = (0..likelihood::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
+    let ends =
+        (0..likelihood::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
     Ok((best, ends))
 }
 

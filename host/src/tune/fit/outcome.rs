@@ -90,7 +90,8 @@ pub(super) fn outcome(
     let ticks = resolution.unwrap_or(0.0) / 12.0_f64.sqrt();
     let noise = |candidate: &Candidate| (candidate.noise.powi(2) - ticks.powi(2)).max(0.0).sqrt();
     let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Kept::Full);
-    let missed = [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
+    let missed =
+        [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
     let mut fit = Fit {
         probe: settings.origin.probe,
         unit: settings.origin.unit,
@@ -132,7 +133,8 @@ impl Fit {
             Length::Millimeter => "unit = \"mm\"\n",
         };
         let offset = |late: &Estimate| -late.value / 1e3 * speed;
-        let presses = if self.presses > 0 { format!(" and {} presses on a plate", self.presses) } else { String::new() };
+        let presses =
+            if self.presses > 0 { format!(" and {} presses on a plate", self.presses) } else { String::new() };
         let mut text = format!(
             "# Found by `palpate probe fit` from {} approaches to {}{presses}.\n\
              # Behind each value, between what it is with a probability of 95 %.\n",

@@ -1,13 +1,13 @@
 //! Recordings that look wrong: of another object than their name says, of two objects, of a probe that was changed.
 //!
-//! Each recording is compared under the probe that fits the others. Likelihood ratios of the right object against a wrong
+//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits all. Likelihood ratios of the right object against a wrong
 //! one pass e^x with a probability of at most e^−x, wherever in the recording one looks (Ville's inequality), so that a
 //! few hundred comparisons at [`CERTAIN`] nats together give a false alarm once in a thousand recordings.
 
+use super::Evidence;
 use super::density::Observed;
 use super::likelihood::{Candidate, Explained};
 use super::search::{self, Best};
-use super::Evidence;
 use crate::error::Result;
 use crate::progress::{self, Progress};
 use rayon::prelude::*;
@@ -83,13 +83,23 @@ impl fmt::Display for Suspect {
                 write!(f, "{object}: touches {from} to {to} look like the {other}'s. Divide the recording")
             }
             Self::TwoObjects { object, other, share, .. } => {
-                write!(f, "{object}: about {:.0} % of the touches look like the {other}'s. Record it again", 100.0 * share)
+                write!(
+                    f,
+                    "{object}: about {:.0} % of the touches look like the {other}'s. Record it again",
+                    100.0 * share
+                )
             }
             Self::Changed { object, from, what } => {
-                write!(f, "{object}: from about touch {from} on, the probe is another one ({what}). Was it moved or bent? Record again with one probe")
+                write!(
+                    f,
+                    "{object}: from about touch {from} on, the probe is another one ({what}). Was it moved or bent? Record again with one probe"
+                )
             }
             Self::OtherProbe { object, what } => {
-                write!(f, "{object}: made by another probe than the other recordings ({what}). Record all with one probe")
+                write!(
+                    f,
+                    "{object}: made by another probe than the other recordings ({what}). Record all with one probe"
+                )
             }
             Self::Unlike { object, .. } => write!(
                 f,
@@ -123,7 +133,7 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
         touches.iter().map(|touch| explained.log_density(touch)).collect()
     };
     let sum = |values: &[f64]| values.iter().sum::<f64>();
-    let mine = by(&rest.candidate, own);
+    let mine = by(&best.candidate, own);
     // How likely the touches are as each object's; where there is nothing else to go by, each under the probe that suits it.
     let rivals: Vec<(usize, Vec<f64>)> = (0..evidence.objects.len())
         .filter(|&object| object != own)
@@ -132,7 +142,8 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
                 return (object, by(&rest.candidate, object));
             }
             let likelihood = |candidate: &Candidate| {
-                Explained::new(candidate, &evidence.objects[object], recording.kept).log_likelihood(touches)
+                let explained = Explained::new(candidate, &evidence.objects[object], recording.kept);
+                explained.log_likelihood(touches) + candidate.usual()
             };
             (object, by(&search::best(&likelihood, None).candidate, object))
         })
@@ -142,7 +153,16 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
     let stretch = rivals.iter().map(|(object, theirs)| (*object, longest_gain(theirs, &mine)));
     let stretch = stretch.max_by(|a, b| a.1.2.total_cmp(&b.1.2));
     let object = |object: usize| evidence.objects[object].name.clone();
-    if let Some((other, gain)) = whole.filter(|(_, gain)| *gain > CERTAIN) {
+    // With few recordings the others may tell too little about the probe: the name is wrong only if all of them together
+    // are likelier with the other one.
+    let renamed = |other: usize| {
+        let likelihood = |candidate: &Candidate| {
+            let explained = Explained::new(candidate, &evidence.objects[other], recording.kept);
+            others(candidate) + explained.log_likelihood(touches)
+        };
+        only || search::near(&likelihood, &rest.candidate).log_likelihood - best.log_likelihood > CERTAIN
+    };
+    if let Some((other, gain)) = whole.filter(|(other, gain)| *gain > CERTAIN && renamed(*other)) {
         // A part of the recording may still be the object's own.
         if let Some((part, (from, to, _))) = stretch.filter(|(_, (from, to, most))| {
             *most > gain + CERTAIN && to - from >= LEAST && touches.len() - (to - from) >= LEAST
@@ -151,11 +171,15 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
         }
         return Some(Suspect::OtherObject { object: name, looks_like: object(other) });
     }
-    if let Some((other, (from, to, _))) = stretch.filter(|(_, (from, to, gain))| *gain > CERTAIN && to - from >= LEAST / 2) {
+    if let Some((other, (from, to, _))) =
+        stretch.filter(|(_, (from, to, gain))| *gain > CERTAIN && to - from >= LEAST / 2)
+    {
         return Some(two(name, object(other), Some((from, to)), touches.len()));
     }
     let mixed = rivals.iter().map(|(other, theirs)| (*other, mixture(theirs, &mine)));
-    if let Some((other, (share, _))) = mixed.filter(|(_, (share, gain))| *gain > CERTAIN && *share > 0.05).max_by(|a, b| a.1.1.total_cmp(&b.1.1)) {
+    if let Some((other, (share, _))) =
+        mixed.filter(|(_, (share, gain))| *gain > CERTAIN && *share > 0.05).max_by(|a, b| a.1.1.total_cmp(&b.1.1))
+    {
         return Some(Suspect::TwoObjects { object: name, other: object(other), from: None, to: None, share });
     }
     changed(evidence, best, &rest, index).or_else(|| unlike(evidence, &rest, index, &mine))
@@ -163,13 +187,7 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
 
 fn two(object: String, other: String, place: Option<(usize, usize)>, all: usize) -> Suspect {
     let share = place.map_or(0.0, |(from, to)| (to - from) as f64 / all as f64);
-    Suspect::TwoObjects {
-        object,
-        other,
-        from: place.map(|(from, _)| from + 1),
-        to: place.map(|(_, to)| to),
-        share,
-    }
+    Suspect::TwoObjects { object, other, from: place.map(|(from, _)| from + 1), to: place.map(|(_, to)| to), share }
 }
 
 /// The stretch of touches that another object explains better by the most nats: from, to (excluded), nats. Kadane's
@@ -203,9 +221,10 @@ fn mixture(theirs: &[f64], mine: &[f64]) -> (f64, f64) {
 fn changed(evidence: &Evidence<'_>, best: &Best, rest: &Best, index: usize) -> Option<Suspect> {
     let recording = &evidence.recordings[index];
     let (touches, name) = (&recording.touches, recording.name.to_owned());
-    let explained = |candidate: &Candidate| Explained::new(candidate, &evidence.objects[evidence.of[index]], recording.kept);
+    let explained =
+        |candidate: &Candidate| Explained::new(candidate, &evidence.objects[evidence.of[index]], recording.kept);
     let fit = |part: &[Observed]| {
-        let likelihood = |candidate: &Candidate| explained(candidate).log_likelihood(part);
+        let likelihood = |candidate: &Candidate| explained(candidate).log_likelihood(part) + candidate.usual();
         search::near(&likelihood, &best.candidate)
     };
     let whole = fit(touches);
@@ -232,13 +251,15 @@ fn changed(evidence: &Evidence<'_>, best: &Best, rest: &Best, index: usize) -> O
                 most = (gain, at);
             }
         }
-        return Some(Suspect::Changed { object: name, from: most.1 + 1, what: difference(&before.candidate, &after.candidate) });
+        return Some(Suspect::Changed {
+            object: name,
+            from: most.1 + 1,
+            what: difference(&before.candidate, &after.candidate),
+        });
     }
-    let lost = whole.log_likelihood - explained(&rest.candidate).log_likelihood(touches);
-    (evidence.recordings.len() > 1 && lost > CERTAIN_PROBE).then(|| Suspect::OtherProbe {
-        object: name,
-        what: difference(&rest.candidate, &whole.candidate),
-    })
+    let gained = whole.log_likelihood + rest.log_likelihood - best.log_likelihood;
+    (evidence.recordings.len() > 1 && gained > CERTAIN_PROBE)
+        .then(|| Suspect::OtherProbe { object: name, what: difference(&rest.candidate, &whole.candidate) })
 }
 
 /// What changed, in words.
@@ -265,7 +286,13 @@ fn unlike(evidence: &Evidence<'_>, rest: &Best, index: usize, mine: &[f64]) -> O
     let recording = &evidence.recordings[index];
     let object = &evidence.objects[evidence.of[index]];
     let explained = Explained::new(&rest.candidate, object, recording.kept);
-    let [mean, variance] = moments(&object.redrawn(&rest.candidate, recording.kept).iter().map(|touch| explained.log_density(touch)).collect::<Vec<_>>());
+    let [mean, variance] = moments(
+        &object
+            .redrawn(&rest.candidate, recording.kept)
+            .iter()
+            .map(|touch| explained.log_density(touch))
+            .collect::<Vec<_>>(),
+    );
     let [own, _] = moments(mine);
     let errors = (mean - own) / (variance / mine.len() as f64).sqrt();
     (errors > UNLIKE).then(|| Suspect::Unlike { object: recording.name.to_owned(), errors })
