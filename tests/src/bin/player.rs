@@ -42,6 +42,7 @@ fn play(image: &str, address: &str) -> Result<(), Box<dyn Error>> {
     let mut chip = qemu.spawn()?;
     let played = (|| {
         let (mut pins, _) = listener.accept()?;
+        println!("the chip is at {address}");
         let mut hands = Hands { rng: ChaCha8Rng::seed_from_u64(1), now: 150_000 };
         for line in std::io::stdin().lock().lines() {
             let line = line?;

@@ -92,7 +92,8 @@ fn run() -> Option<Infallible> {
     let mut led = pins.gpio25.into_push_pull_output();
 
     let storage = FlashStorage::<_, { record_length(OBJECTS) }>::new(flash::Flash::take()?, LOG).ok()?;
-    let settings = ProbeSettings { scale: Scale::new(MODEL_PROBE, PROBE)?, boot, program: PROGRAM, ..ProbeSettings::default() };
+    let settings =
+        ProbeSettings { scale: Scale::new(MODEL_PROBE, PROBE)?, boot, program: PROGRAM, ..ProbeSettings::default() };
     let mut station = ProbeStation::<OBJECTS, _>::open(MODEL, storage, settings).ok()?;
     let switches = (pins.gpio2.reconfigure(), pins.gpio3.reconfigure(), pins.gpio4.reconfigure());
     let (reader, writer) = uart.split();
