@@ -68,12 +68,11 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
             .clone()
     };
     assert_eq!(evaluate(&[]), evaluate(&arguments!["--probe", &probe]));
-    let true_file = at.join("true.toml");
-    let error = stderr(run(arguments!["evaluate", &ensemble, &touches, "--probe", &true_file]), 1);
+    let error = stderr(run(arguments!["evaluate", &ensemble, &touches, "--probe", &at.join("true.toml")]), 1);
     assert!(error.contains("true.toml and the data set state different probes: [real]: "), "{error}");
     // Another probe's touches are not added to a data set.
-    let other = [&capture[..8], &arguments!["--add", "--probe", &true_file]].concat();
-    let error = stderr(run([&arguments!["capture", "fork"], &other[3..]].concat()), 1);
+    let add = arguments!["capture", "fork", "-o", &touches, "--touches", "2000", "--approaches", "--add", "--probe"];
+    let error = stderr(run([&add[..], &arguments![&at.join("true.toml")]].concat()), 1);
     assert!(error.contains("real is "), "{error}");
 }
 
@@ -106,8 +105,7 @@ fn recorded_touches_are_compared_with_simulated_ones() {
     let (clean, right) = (at.join("clean"), at.join("right"));
     let capture = arguments!["capture", "bowl", "mouse", "--approaches", "--touches", "3000", "-o"];
     stdout(run([&capture[..], &arguments![&clean]].concat()));
-    let true_file = at.join("true.toml");
-    stdout(run([&capture[..], &arguments![&right, "--probe", &true_file]].concat()));
+    stdout(run([&capture[..], &arguments![&right, "--probe", &at.join("true.toml")]].concat()));
     let compare = |simulated: &Path| {
         let words = arguments!["data", "compare", &data, simulated, "--groups", "100", "--json"];
         json(run(words))
