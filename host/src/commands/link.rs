@@ -3,7 +3,7 @@ use crate::chip::{
     ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
 };
 use crate::compile::CompiledModel;
-use crate::error::ChipProblem;
+use crate::error::{ChipProblem, Place};
 use crate::output::{print, print_json};
 use crate::progress::Progress;
 use crate::{Error, Result};
@@ -48,6 +48,11 @@ impl ChipOptions {
     /// Opens a session, and loads the model if there is one to load.
     pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledModel>)> {
         let model = self.load.as_deref().map(CompiledModel::read).transpose()?;
+        if let Some(path) = self.load.as_deref()
+            && model.as_ref().is_some_and(|model| model.model().descriptor().is_none())
+        {
+            return Err(Error::at(Place::file(path), ChipProblem::Rows));
+        }
         let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
         let mut transport = port.open(self.baud, &emulator)?;
         let mut settings = HostSettings::default();
@@ -123,6 +128,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     let (mut connection, loaded) = arguments.chip.open(&arguments.port)?;
     let chip = connection.model()?;
+    if steps.is_some() && chip.info.descriptor().is_none() {
+        return Err(ChipProblem::Rows.into());
+    }
     let mut printer = Printer::new(&chip, arguments.json, arguments.journal.as_deref())?;
     let Some(steps) = steps else { return printer.model(&arguments.port) };
 
