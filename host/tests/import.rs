@@ -68,6 +68,38 @@ fn margins_are_the_librarys_own_on_plain_tied_and_missing_rows() {
     assert!(exact > 20);
 }
 
+#[test]
+fn what_is_saved_as_xgboosts_json_has_the_same_margins_bit_for_bit() {
+    let place = tempfile::tempdir().unwrap();
+    let mut objectives = std::collections::BTreeMap::<String, usize>::new();
+    for path in models() {
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        // Those that are refused.
+        let Ok(ensemble) = Ensemble::load(&path) else { continue };
+        let saved = place.path().join("saved.json");
+        ensemble.save(&saved).unwrap();
+        let again = Ensemble::load(&saved).unwrap();
+        assert_eq!((&again.inputs, &again.objects), (&ensemble.inputs, &ensemble.objects), "{name}");
+        for row in numbers(&directory().join(format!("{name}.rows.csv")), 1, || f32::NAN) {
+            let bits = |ensemble: &Ensemble| ensemble.margins_of_features(&row).into_iter().map(f32::to_bits).collect();
+            let (own, expected): (Vec<u32>, Vec<u32>) = (bits(&again), bits(&ensemble));
+            assert_eq!(own, expected, "{name}: {row:?}");
+        }
+        // What XGBoost itself decides on margins by; `reopen.py` there compares its own.
+        let document: serde_json::Value = serde_json::from_slice(&std::fs::read(&saved).unwrap()).unwrap();
+        let objective = document["learner"]["objective"]["name"].as_str().unwrap();
+        *objectives.entry(objective.to_owned()).or_default() += 1;
+        let expected = match ensemble.objects.len() {
+            1 => objective == "reg:squarederror",
+            2 => objective.starts_with("binary:") || objective == "multi:softprob",
+            _ => objective == "multi:softprob",
+        };
+        assert!(expected, "{name}: {objective}");
+    }
+    println!("{objectives:?}");
+    assert!(objectives.len() == 4 && objectives.values().sum::<usize>() > 40, "{objectives:?}");
+}
+
 /// A generator of numbers: xorshift.
 struct Numbers(u64);
 

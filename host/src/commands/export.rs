@@ -34,7 +34,8 @@ Examples:
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
   palpate export lightgbm.txt -o model.palpate --for speed
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
-  palpate export ensemble.json -o model.palpate --emit c  # also model.h")]
+  palpate export ensemble.json -o model.palpate --emit c  # also model.h
+  palpate export lightgbm.txt -o model.palpate --emit json  # also model.json, which XGBoost opens")]
 pub(crate) struct Arguments {
     /// Ensemble that `palpate train` or another library saved
     ensemble: PathBuf,
@@ -71,9 +72,10 @@ pub(crate) struct Arguments {
     /// The touches after which they give up
     #[arg(long, default_value_t = 200, value_name = "N")]
     max_touches: u32,
-    /// Write the model as source code beside it, too: an array in FILE.h with palpate.h to read it, or in FILE.rs
-    #[arg(long, value_name = "c|rust,…", value_delimiter = ',', value_parser = language)]
-    emit: Vec<Language>,
+    /// Write beside it, too: an array in FILE.h with palpate.h to read it, or in FILE.rs; the trees in FILE.json, as
+    /// XGBoost's JSON
+    #[arg(long, value_name = "c|rust|json,…", value_delimiter = ',', value_parser = emitted)]
+    emit: Vec<Emitted>,
     /// Print what was exported as JSON
     #[arg(long)]
     json: bool,
@@ -83,6 +85,24 @@ pub(crate) struct Arguments {
 
 #[derive(Clone)]
 struct LayoutChoice(Option<Layout>);
+
+/// What is written beside the model.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Emitted {
+    /// The compiled model as source code.
+    Source(Language),
+    /// The ensemble that it was compiled from.
+    Ensemble,
+}
+
+impl Emitted {
+    const fn extension(self) -> &'static str {
+        match self {
+            Self::Source(language) => language.extension(),
+            Self::Ensemble => "json",
+        }
+    }
+}
 
 #[derive(serde::Serialize)]
 struct Exported {
@@ -112,6 +132,9 @@ struct Exported {
     /// Files with source code.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     sources: Vec<PathBuf>,
+    /// The file with the trees as XGBoost's JSON.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ensemble: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
@@ -119,7 +142,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         &arguments.output,
         [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten(),
     )?;
-    let sources = sources(&arguments)?;
+    let emitted = places(&arguments)?;
     let names = arguments.names.as_deref().map(names).transpose()?;
     let ensemble = Ensemble::load_named(&arguments.ensemble, names.as_deref())?;
     let scales = scales(&arguments, &ensemble)?;
@@ -137,7 +160,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         _ => error,
     })?;
     output::write_bytes(&arguments.output, &compiled.bytes)?;
-    write_sources(&sources, &compiled.bytes)?;
+    write_emitted(&emitted, &compiled.bytes, &ensemble)?;
     let imported = ensemble.origin.imported.as_ref();
     let exported = Exported {
         bytes: compiled.bytes.len(),
@@ -157,7 +180,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         imported: imported.map(|imported| imported.kind.clone()),
         notes: imported.map(|imported| imported.notes.clone()).unwrap_or_default(),
         scales: settings.scales.as_ref().map(|scales| scales::effects(&ensemble, scales)).unwrap_or_default(),
-        sources: sources.into_iter().map(|(_, path)| path).collect(),
+        sources: emitted.iter().filter(|(kind, _)| *kind != Emitted::Ensemble).map(|(_, path)| path.clone()).collect(),
+        ensemble: emitted.into_iter().find(|(kind, _)| *kind == Emitted::Ensemble).map(|(_, path)| path),
     };
     if arguments.json {
         return output::print_json_about(&arguments.output, &exported);
@@ -165,11 +189,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     output::print_about(&arguments.output, &text(&arguments.output, &exported))
 }
 
-/// Where source code is to be written: beside the model, under its name.
-fn sources(arguments: &Arguments) -> Result<Vec<(Language, PathBuf)>> {
-    let (output, mut sources) = (&arguments.output, Vec::new());
-    for &language in &arguments.emit {
-        let path = output.with_extension(language.extension());
+/// Where the rest is to be written: beside the model, under its name.
+fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
+    let (output, mut places) = (&arguments.output, Vec::new());
+    for &emitted in &arguments.emit {
+        let path = output.with_extension(emitted.extension());
         let taken = path == *output || path.file_name().is_some_and(|name| name == HEADER);
         if output::is_stdout(output) || taken {
             return Err(Error::setting(
@@ -177,32 +201,40 @@ fn sources(arguments: &Arguments) -> Result<Vec<(Language, PathBuf)>> {
                 output.display(),
                 format!(
                     "a file beside which another one can have the extension .{} (but not {HEADER}), for --emit",
-                    language.extension()
+                    emitted.extension()
                 ),
             ));
         }
         output::refuse_input(&path, [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten())?;
-        sources.push((language, path));
+        places.push((emitted, path));
     }
-    Ok(sources)
+    Ok(places)
 }
 
 /// The header that reads models in C.
 const HEADER: &str = "palpate.h";
 
-fn write_sources(sources: &[(Language, PathBuf)], bytes: &[u8]) -> Result<()> {
-    for (language, path) in sources {
+fn write_emitted(emitted: &[(Emitted, PathBuf)], bytes: &[u8], ensemble: &Ensemble) -> Result<()> {
+    for (emitted, path) in emitted {
+        let Emitted::Source(language) = *emitted else {
+            ensemble.save(path)?;
+            continue;
+        };
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        output::write_bytes(path, compile::emit(&compile::open(bytes)?, &name, *language).as_bytes())?;
-        if *language == Language::C {
+        output::write_bytes(path, compile::emit(&compile::open(bytes)?, &name, language).as_bytes())?;
+        if language == Language::C {
             output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
         }
     }
     Ok(())
 }
 
-fn language(name: &str) -> Result<Language, String> {
-    Language::ALL.into_iter().find(|language| language.name() == name).ok_or_else(|| "use c or rust".to_owned())
+fn emitted(name: &str) -> Result<Emitted, String> {
+    if name == "json" {
+        return Ok(Emitted::Ensemble);
+    }
+    let language = Language::ALL.into_iter().find(|language| language.name() == name);
+    language.map(Emitted::Source).ok_or_else(|| "use c, rust or json".to_owned())
 }
 
 /// Names from the command line: a file's lines, if there is such a file, else what commas separate.
@@ -281,6 +313,9 @@ fn text(path: &Path, exported: &Exported) -> String {
     }
     for source in &exported.sources {
         _ = writeln!(text, "Source code: {}", source.display());
+    }
+    if let Some(path) = &exported.ensemble {
+        _ = writeln!(text, "The trees, as XGBoost's JSON: {}", path.display());
     }
     for note in &exported.notes {
         _ = writeln!(text, "Note: {note}");

@@ -5,7 +5,7 @@ use crate::chip::{
     stream,
 };
 use crate::compile::CompiledModel;
-use crate::error::ChipProblem;
+use crate::error::{ChipProblem, Place};
 use crate::output::{print, print_json};
 use crate::progress::Progress;
 use crate::{Error, Result};
@@ -60,6 +60,11 @@ impl ChipOptions {
     /// Opens a session, and loads the model if there is one to load.
     pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledModel>)> {
         let model = self.load.as_deref().map(CompiledModel::read).transpose()?;
+        if let Some(path) = self.load.as_deref()
+            && model.as_ref().is_some_and(|model| model.model().descriptor().is_none())
+        {
+            return Err(Error::at(Place::file(path), ChipProblem::Rows));
+        }
         let settings = match self.bad_line {
             // A bad line fails often: retry sooner, and more often.
             Some(_) => HostSettings { retry: 50_000, attempts: 200 },
@@ -146,6 +151,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     let (mut connection, loaded) = arguments.chip.open(&arguments.port)?;
     let chip = connection.model()?;
+    if steps.is_some() && chip.info.descriptor().is_none() {
+        return Err(ChipProblem::Rows.into());
+    }
     let mut printer = Printer::new(&chip, arguments.json, arguments.journal.as_deref())?;
     let Some(steps) = steps else { return printer.model(&arguments.port) };
 

@@ -61,6 +61,9 @@ pub enum ChipProblem {
     /// The chip has no model.
     #[error("the chip has no model")]
     NoModel,
+    /// The line to a chip has no message for a row of features.
+    #[error("the model is over rows of features, and the line to a chip carries touches")]
+    Rows,
     /// The chip does not do what it was told to.
     #[error("the chip refuses: {0}")]
     Refused(Refusal),
@@ -159,6 +162,10 @@ impl ChipProblem {
             }
             Self::Forgotten { .. } => "Start again, or use a program on the chip that stores its progress.",
             Self::NoModel | Self::Refused(Refusal::NoModel) => "Load a model into it.",
+            Self::Rows => {
+                "Recognize rows here with `palpate recognize MODEL ROWS.csv --features`; on the chip the program itself \
+                 passes them to push_features, and its verdicts are the same."
+            }
             Self::Refused(Refusal::NoObject) => "Load the model again.",
             Self::Refused(_) | Self::UnexpectedAnswer => {
                 "Flash the chip again: its program speaks another version of the link."

@@ -47,9 +47,6 @@ pub enum EnsembleProblem {
         /// Objects (classes), or the one output of a regression.
         outputs: usize,
     },
-    /// An ensemble over rows has no place in the file's format.
-    #[error("an ensemble over rows of features cannot be saved")]
-    Rows,
     /// A file is not JSON, or not of XGBoost's schema.
     #[error("not an ensemble in XGBoost's JSON format: {detail}")]
     NotJson {
@@ -372,7 +369,6 @@ impl EnsembleProblem {
             Self::FeatureCount { most, .. } => format!("Train on the features that matter, at most {most}."),
             Self::FeatureName { .. } => "Give the feature a shorter name before training.".into(),
             Self::Names { .. } => "Give one name for each class, in the order of the labels.".into(),
-            Self::Rows => "Keep the file that it was read from.".into(),
             Self::NotJson { .. } => {
                 "Give a file that `palpate train` or XGBoost's `save_model(\"….json\")` wrote.".into()
             }

@@ -421,7 +421,14 @@ fn export_emits_sources_beside_the_model_and_refuses_a_name_that_leaves_no_room_
     assert!(read("cup.h").contains(&format!("cup_model[{}]", std::fs::read(&model).unwrap().len())));
     assert!(read("cup.rs").contains("pub static CUP:"));
     assert_eq!(read("palpate.h"), palpate_onboard::C_HEADER);
-    for (output, language) in [("model.h", "c"), ("palpate.palpate", "c"), ("-", "rust"), ("model.palpate", "cobol")] {
+    let exported = json(&["export", &ensemble, "-o", &model, "--emit", "json", "--json"]);
+    assert_eq!(exported["ensemble"].as_str(), Some(&*place.text("cup.json")));
+    assert_eq!(Ensemble::load(place.path("cup.json")).unwrap(), Ensemble::load(&ensemble).unwrap());
+    // The file that it is made of stays.
+    let own = ("ensemble.palpate", "json");
+    for (output, language) in
+        [("model.h", "c"), ("palpate.palpate", "c"), ("-", "rust"), own, ("model.palpate", "cobol")]
+    {
         let output = if output == "-" { output.to_owned() } else { place.text(output) };
         let (code, message) = refusal(&["export", &ensemble, "-o", &output, "--emit", language]);
         assert_eq!(code, 2, "{message}");

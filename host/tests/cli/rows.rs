@@ -142,6 +142,16 @@ fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
 }
 
 #[test]
+fn a_chip_is_sent_no_model_over_rows_since_the_line_carries_touches() {
+    let (_place, path) = place();
+    let model = path("model.palpate");
+    stdout(run(["export", &data("xgboost-3.4-binary.json"), "-o", &model]));
+    let message = stderr(run(["link", "emulator", "--load", &model, &data("xgboost-3.4-binary.rows.csv")]), 1);
+    assert!(message.contains("model.palpate: the model is over rows of features"), "{message}");
+    assert!(message.contains("palpate recognize MODEL ROWS.csv --features"), "{message}");
+}
+
+#[test]
 fn labeled_rows_are_evaluated_one_by_one() {
     let (_directory, path) = place();
     let name = "xgboost-2.1-softprob";

@@ -8,7 +8,7 @@
 //!
 //! | attribute | value |
 //! |---|---|
-//! | `palpate_descriptor` | the descriptor's name |
+//! | `palpate_descriptor` | the descriptor's name; absent for an ensemble over rows |
 //! | `palpate_objects` | a JSON array of the objects' names, in the order of the labels |
 //! | `palpate_probe` | optional: the probe of the training touches, a JSON object of `radius`, `spacing`, `speed`, `tilt` and `length` |
 //! | `palpate_noise` | optional: what was added to the training touches ([`Noise`](crate::touches::noise::Noise)), a JSON object |
@@ -18,6 +18,7 @@
 //! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
 
 mod objective;
+mod outputs;
 mod read;
 mod schema;
 #[cfg(all(test, feature = "train"))]
@@ -25,7 +26,7 @@ mod tests;
 mod trees;
 mod write;
 
-use super::{Ensemble, Inputs};
+use super::Ensemble;
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use crate::output;
 use schema::Document;
@@ -111,23 +112,24 @@ impl Ensemble {
         let path = Path::new("XGBoost's model");
         let mut document: Document =
             serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;
-        document.learner.attributes = write::attributes(descriptor, &objects, &super::Origin::default());
+        document.learner.attributes = write::attributes(&descriptor.into(), &objects, &super::Origin::default());
         document.into_ensemble(None, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
     }
 
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be
     /// [loaded](Self::load) again.
     ///
+    /// XGBoost predicts the same margins with it, bit for bit, for all that it takes (it refuses infinite values). Over
+    /// rows, one output is a regression, and two of which the first one's margin is 0 are `binary:logistic`, or
+    /// `binary:logitraw` where no probability in f32 stands for the base margin.
+    ///
     /// # Errors
     /// [`Error::Io`] naming `path`; [`EnsembleProblem`] for an ensemble that [`check`](Self::check) refuses, which none
-    /// that was trained or loaded is, and for one over rows of features.
+    /// that was trained or loaded is.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
         self.check().map_err(|problem| Error::at(Place::file(path), problem))?;
-        let Inputs::Touches(descriptor) = self.inputs else {
-            return Err(Error::at(Place::file(path), EnsembleProblem::Rows));
-        };
-        let document = Document::new(self, descriptor);
+        let document = Document::new(self);
         output::write_whole(path, |out| {
             serde_json::to_writer(&mut *out, &document)?;
             out.write_all(b"\n")

@@ -75,11 +75,19 @@ pub(super) struct Objective {
     pub(super) name: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) softmax_multiclass_param: Option<SoftmaxParameters>,
+    #[serde(default, skip_deserializing, skip_serializing_if = "Option::is_none")]
+    pub(super) reg_loss_param: Option<LossParameters>,
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct SoftmaxParameters {
     pub(super) num_class: String,
+}
+
+/// Of binary models and regressions.
+#[derive(Serialize)]
+pub(super) struct LossParameters {
+    pub(super) scale_pos_weight: String,
 }
 
 /// A tree as XGBoost stores it: one array per property, indexed by node.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::ensemble::train::{Settings, train};
+use crate::ensemble::{Inputs, Node, Output};
 use crate::touches::synthetic;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
@@ -11,7 +12,7 @@ fn ensemble(multi_output: bool) -> Ensemble {
 }
 
 fn document(multi_output: bool) -> Value {
-    serde_json::to_value(Document::new(&ensemble(multi_output), Descriptor::Curvature)).unwrap()
+    serde_json::to_value(Document::new(&ensemble(multi_output))).unwrap()
 }
 
 fn load(text: &[u8]) -> Result<Ensemble> {
@@ -207,6 +208,40 @@ fn an_ensemble_without_a_descriptor_is_over_rows_and_names_may_be_given() {
     assert_eq!(Ensemble::load_named(file.path(), Some(&names)).unwrap().objects, names);
     let error = Ensemble::load_named(file.path(), Some(&names[..2])).unwrap_err().to_string();
     assert!(error.contains("2 names were given for 3 outputs"), "{error}");
-    let error = read.save(file.path()).unwrap_err().to_string();
-    assert!(error.contains("rows of features cannot be saved"), "{error}");
+}
+
+#[test]
+fn finite_values_take_the_same_way_at_infinite_thresholds() {
+    for (bound, missing) in
+        [(f32::INFINITY, true), (f32::INFINITY, false), (f32::NEG_INFINITY, true), (f32::NEG_INFINITY, false)]
+    {
+        let mut infinite = ensemble(false);
+        infinite.inputs = Inputs::unnamed(2);
+        for tree in &mut infinite.trees {
+            if let Node::Split { threshold, missing_left, .. } = &mut tree.nodes[0] {
+                (*threshold, *missing_left) = (bound, missing);
+            }
+        }
+        let file = tempfile::NamedTempFile::new().unwrap();
+        infinite.save(file.path()).unwrap();
+        let read = Ensemble::load(file.path()).unwrap();
+        for first in [f32::MIN, -3e5, 0.0, 1e5, f32::MAX, f32::NAN] {
+            for row in [[first, 0.0], [first, f32::NAN], [9e4, first]] {
+                assert_eq!(read.margins_of_features(&row), infinite.margins_of_features(&row), "{bound} {row:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn trees_of_one_object_and_of_all_are_written_as_trees_of_all() {
+    let (mut mixed, of_all) = (ensemble(false), ensemble(true));
+    mixed.trees.extend(of_all.trees);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    mixed.save(file.path()).unwrap();
+    let read = Ensemble::load(file.path()).unwrap();
+    assert!(read.trees.iter().all(|tree| tree.output == Output::Each));
+    for row in [[-3e5, 0.0], [f32::NAN, 2e4], [1e5, f32::NAN], [7.0, 9e4]] {
+        assert_eq!(read.margins_of_features(&row), mixed.margins_of_features(&row));
+    }
 }

@@ -1,24 +1,28 @@
 //! From an ensemble to XGBoost's schema.
 
+use super::outputs::Outputs;
 use super::schema::{
     Document, Flag, Forest, ForestParameters, GradientBooster, Learner, LearnerParameters, NO_CONDITION, NO_PARENT,
-    Objective, SoftmaxParameters, TreeColumns, TreeParameters,
+    TreeColumns, TreeParameters,
 };
-use crate::ensemble::{Ensemble, Node, Origin, Output, Tree};
-use palpate_shared::Descriptor;
+use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 impl Document {
     /// The document of an ensemble that [`Ensemble::check`] accepts.
-    pub(super) fn new(ensemble: &Ensemble, descriptor: Descriptor) -> Self {
-        let objects = ensemble.objects.len();
-        let features = descriptor.feature_count();
-        let trees = &ensemble.trees;
-        let num_class = objects.to_string();
+    pub(super) fn new(ensemble: &Ensemble) -> Self {
+        let outputs = Outputs::of(ensemble);
+        let features = ensemble.inputs.count();
+        let trees = trees_of_one_kind(ensemble);
+        let feature_names = match &ensemble.inputs {
+            Inputs::Rows(names) if ensemble.inputs.are_named() => names.clone(),
+            _ => Vec::new(),
+        };
         Self {
             learner: Learner {
-                attributes: attributes(descriptor, &ensemble.objects, &ensemble.origin),
-                feature_names: Vec::new(),
+                attributes: attributes(&ensemble.inputs, &ensemble.objects, &ensemble.origin),
+                feature_names,
                 feature_types: Vec::new(),
                 gradient_booster: GradientBooster {
                     model: Some(Forest {
@@ -26,9 +30,13 @@ impl Document {
                             num_parallel_tree: "1".into(),
                             num_trees: trees.len().to_string(),
                         },
-                        iteration_indptr: rounds(ensemble),
-                        tree_info: trees.iter().map(|tree| group(tree.output)).collect(),
-                        trees: trees.iter().zip(0..).map(|(tree, id)| columns(tree, id, features, objects)).collect(),
+                        iteration_indptr: rounds(&trees, &outputs),
+                        tree_info: trees.iter().map(|tree| outputs.group(tree.output)).collect(),
+                        trees: trees
+                            .iter()
+                            .zip(0..)
+                            .map(|(tree, id)| columns(tree, id, features, outputs.groups))
+                            .collect(),
                         weight_drop: None,
                     }),
                     name: "gbtree".into(),
@@ -36,16 +44,13 @@ impl Document {
                     weight_drop: None,
                 },
                 learner_model_param: LearnerParameters {
-                    base_score: base_score(&ensemble.base_margins),
+                    base_score: outputs.base_score,
                     boost_from_average: "0".into(),
-                    num_class: num_class.clone(),
+                    num_class: outputs.num_class,
                     num_feature: features.to_string(),
                     num_target: "1".into(),
                 },
-                objective: Objective {
-                    name: "multi:softprob".into(),
-                    softmax_multiclass_param: Some(SoftmaxParameters { num_class }),
-                },
+                objective: outputs.objective,
             },
             // The schema that every reader since knows; newer readers take what 2.1 wrote.
             version: [2, 1, 4],
@@ -53,12 +58,12 @@ impl Document {
     }
 }
 
-pub(super) fn attributes(descriptor: Descriptor, objects: &[String], origin: &Origin) -> BTreeMap<String, String> {
+pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -> BTreeMap<String, String> {
     let names = serde_json::Value::from(objects.to_vec()).to_string();
-    let mut attributes = BTreeMap::from([
-        ("palpate_descriptor".to_owned(), descriptor.name().to_owned()),
-        ("palpate_objects".into(), names),
-    ]);
+    let mut attributes = BTreeMap::from([("palpate_objects".to_owned(), names)]);
+    if let Some(descriptor) = inputs.descriptor() {
+        attributes.insert("palpate_descriptor".into(), descriptor.name().into());
+    }
     // Numbers and strings are always JSON.
     if let Some(probe) = origin.probe.and_then(|probe| serde_json::to_string(&probe).ok()) {
         attributes.insert("palpate_probe".into(), probe);
@@ -81,26 +86,35 @@ pub(super) fn attributes(descriptor: Descriptor, objects: &[String], origin: &Or
     attributes
 }
 
-/// Where each boosting round's trees begin and end: one tree for each object in order, or one tree for all.
-fn rounds(ensemble: &Ensemble) -> Vec<u64> {
-    let in_order = |(index, tree): (usize, &Tree)| tree.output == Output::One(index % ensemble.objects.len());
-    let per_round = if ensemble.trees.iter().enumerate().all(in_order) { ensemble.objects.len() } else { 1 };
-    (0..=ensemble.trees.len()).step_by(per_round).filter_map(|tree| u64::try_from(tree).ok()).collect()
+/// The trees, with a value for each object in every leaf if some tree has that: XGBoost has no models of both kinds. What
+/// is added to the other objects then is 0.
+fn trees_of_one_kind(ensemble: &Ensemble) -> Cow<'_, [Tree]> {
+    let of_each = ensemble.trees.iter().filter(|tree| tree.output == Output::Each).count();
+    if of_each == 0 || of_each == ensemble.trees.len() {
+        return Cow::Borrowed(&ensemble.trees);
+    }
+    let widened = |tree: &Tree| {
+        let Output::One(object) = tree.output else { return tree.clone() };
+        let node = |node: &Node| match node {
+            Node::Leaf(values) => {
+                let own = |index: usize| if index == object { values[0] } else { 0.0 };
+                Node::Leaf((0..ensemble.objects.len()).map(own).collect())
+            }
+            split => split.clone(),
+        };
+        Tree { nodes: tree.nodes.iter().map(node).collect(), output: Output::Each }
+    };
+    ensemble.trees.iter().map(widened).collect()
 }
 
-fn group(output: Output) -> u64 {
-    match output {
-        Output::One(object) => u64::try_from(object).unwrap_or(u64::MAX),
-        Output::Each => 0,
-    }
-}
-
-/// One number where all margins start equal (every version reads that), else a list.
-fn base_score(margins: &[f32]) -> String {
-    match margins {
-        [first, rest @ ..] if rest.iter().all(|margin| margin.to_bits() == first.to_bits()) => format!("{first:E}"),
-        _ => format!("[{}]", margins.iter().map(|margin| format!("{margin:E}")).collect::<Vec<_>>().join(",")),
-    }
+/// Where each boosting round's trees begin and end: one tree for each group in order, or one tree for all.
+fn rounds(trees: &[Tree], outputs: &Outputs) -> Vec<u64> {
+    let groups = u64::try_from(outputs.groups).unwrap_or(1);
+    let in_order =
+        |(index, tree): (u64, &Tree)| tree.output != Output::Each && outputs.group(tree.output) == index % groups;
+    let is_in_order = (0..).zip(trees).all(in_order) && trees.len().is_multiple_of(outputs.groups);
+    let per_round = if is_in_order { outputs.groups } else { 1 };
+    (0..=trees.len()).step_by(per_round).filter_map(|tree| u64::try_from(tree).ok()).collect()
 }
 
 fn columns(tree: &Tree, id: u64, features: usize, objects: usize) -> TreeColumns {
@@ -127,14 +141,20 @@ fn columns(tree: &Tree, id: u64, features: usize, objects: usize) -> TreeColumns
     for (position, node) in tree.nodes.iter().enumerate() {
         match node {
             Node::Split { feature, threshold, missing_left, left, right } => {
+                // JSON has no infinity. No finite number is below the least one, so all go right there, and as all are
+                // below infinity, right has to be what was left.
+                let swap = *threshold == f32::INFINITY;
+                let (left, right) = if swap { (right, left) } else { (left, right) };
+                let (missing_left, threshold) =
+                    (*missing_left != swap, if swap { f32::MIN } else { threshold.max(f32::MIN) });
                 for child in [*left, *right] {
                     columns.parents[child] = index(position);
                 }
                 columns.left_children.push(index(*left));
                 columns.right_children.push(index(*right));
                 columns.split_indices.push(u64::try_from(*feature).unwrap_or(u64::MAX));
-                columns.split_conditions.push(*threshold);
-                columns.default_left.push(Flag::Number(u8::from(*missing_left)));
+                columns.split_conditions.push(threshold);
+                columns.default_left.push(Flag::Number(u8::from(missing_left)));
                 columns.base_weights.extend(std::iter::repeat_n(0.0, width));
             }
             Node::Leaf(values) => {

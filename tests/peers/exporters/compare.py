@@ -1,0 +1,146 @@
+"""Exporters of tree ensembles on two emulated chips: bytes, instructions per row, and classes that differ from the library's.
+
+    cargo build --release
+    python3.11 tests/peers/exporters/compare.py target/release/palpate [wine digits synthetic touches forest]
+
+Makes an environment with the packages of requirements.txt beside itself (`venv`, not committed) and runs itself in it. Needs
+gcc-arm-none-eabi with newlib and libstdc++, qemu-system-arm, and Rust's targets thumbv7em-none-eabihf and thumbv6m-none-eabi.
+Prints a table in Markdown: about ten minutes.
+
+*Bytes* are those of the whole image less one whose peer_class is empty: model, code, and what it calls of newlib and of the
+compiler's routines, all for size (-Os). *Instructions* are of a row: class and all, f32 values in. *Wrong* are classes that
+differ from the library's own among 200 plain rows, 200 whose values equal thresholds, 200 with missing values.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[2]
+CHIPS = [
+    ("M4F", "thumbv7em-none-eabihf", "mps2-an386", ["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]),
+    ("M0+", "thumbv6m-none-eabi", "mps2-an385", ["-mcpu=cortex-m0plus"]),
+]
+
+
+def enter_environment():
+    python = HERE / "venv/bin/python"
+    if Path(sys.prefix) == HERE / "venv":
+        return
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", HERE / "venv"], check=True)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "-r", HERE / "requirements.txt"], check=True)
+    sys.exit(subprocess.run([python, *sys.argv]).returncode)
+
+
+def image(chip, directory, source):
+    """The program; its bytes in flash."""
+    _, target, _, flags = chip
+    common = ["-mthumb", *flags, "-Os", "-ffunction-sections", "-fdata-sections", "-DNDEBUG", "-w", *source.flags]
+    common += ["-I", directory, "-I", ROOT / "onboard/c"]
+    objects = []
+    for path in [*source.files, HERE / "harness.c"]:
+        objects.append(directory / f"{target}-{path.name}.o")
+        is_cpp = path.suffix == ".cc"
+        compiler = ["arm-none-eabi-g++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics"]
+        compiler = compiler if is_cpp else ["arm-none-eabi-gcc", "-std=gnu99", "-I", ROOT / "tests/c"]
+        subprocess.run([*compiler, *common, "-c", path, "-o", objects[-1]], check=True)
+    if source.library:
+        objects.append(source.library(target))
+    program = directory / f"{target}.elf"
+    link = ["arm-none-eabi-gcc", "-mthumb", *flags, "-nostdlib", "-static", "-T", ROOT / "tests/c/mps2.ld"]
+    link += ["-Wl,--gc-sections", "-Wl,--no-warn-rwx-segments", "-Wl,-z,noexecstack", *objects, "-lm", "-lc", "-lgcc", "-o", program]
+    subprocess.run(link, check=True)
+    size = subprocess.run(["arm-none-eabi-size", program], check=True, capture_output=True, text=True).stdout
+    text, data = size.splitlines()[1].split()[:2]
+    return program, int(text) + int(data)
+
+
+def run(chip, program):
+    """Instructions of a plain row, and the class of every row."""
+    command = ["qemu-system-arm", "-machine", chip[2], "-nographic", "-icount", "shift=0"]
+    command += ["-semihosting-config", "enable=on,target=native", "-kernel", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900, stdin=subprocess.DEVNULL)
+    numbers = [int(number) for number in (done.stdout + done.stderr).split()]
+    return numbers[0], numbers[1:]
+
+
+def rows_header(directory, ensemble):
+    values = ",".join("0.0f/0.0f" if value != value else f"{float(value)!r}f" for value in ensemble.rows.ravel())
+    count, features = ensemble.rows.shape
+    (directory / "rows.h").write_text(
+        f"enum {{ ROWS = {count}, FEATURES = {features}, PLAIN = {len(ensemble.kinds[0][1])} }};\n"
+        f"static const float rows[] = {{{values}}};\n"
+    )
+
+
+def measure(ensemble, name, exporter, scratch):
+    from exporters import Refused, Source
+
+    directory = scratch / ensemble.name / "".join(part for part in name if part.isalnum())
+    directory.mkdir(parents=True)
+    rows_header(directory, ensemble)
+    try:
+        source = exporter(ensemble, directory)
+    except Refused as refused:
+        return None if str(refused) == "see touches" else f"refused: {refused}"
+    except Exception as error:  # whatever an exporter fails with is a result
+        return f"fails: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+    nothing = directory / "nothing.c"
+    nothing.write_text("int peer_start(void) { return 0; }\nint peer_class(const float *row) { return row[0] > 0; }\n")
+    cells = []
+    for chip in CHIPS:
+        empty = image(chip, directory, Source([nothing]))[1]
+        try:
+            program, size = image(chip, directory, source)
+        except subprocess.CalledProcessError:
+            return "its code does not compile"
+        instructions, classes = run(chip, program)
+        expected = ensemble.classes if source.expected is None else source.expected
+        wrong, at = [], 0
+        for _, rows in ensemble.kinds:
+            part = range(at, at + len(rows))
+            wrong.append(str(sum(classes[row] != expected[row] for row in part)))
+            at += len(rows)
+        cells += [f"{size - empty:,}", f"{instructions:,}"]
+    return " | ".join([*cells, " / ".join(wrong)])
+
+
+def main():
+    import exporters
+    from functools import partial
+    from models import all_of
+
+    palpate = Path(sys.argv[1]).resolve()
+    wanted = sys.argv[2:]
+    ours = {
+        f"ours {leaf}, for {goal} ({language})": partial(function, palpate=palpate, leaf=leaf, goal=goal)
+        for leaf, goal in [("i16", "speed"), ("i16", "size"), ("i8", "balanced"), ("f32", "balanced")]
+        for language, function in [("Rust", exporters.ours_rust), ("C", exporters.ours_c)]
+    }
+    peers = {
+        "TL2cgen": partial(exporters.tl2cgen, quantize=False),
+        "TL2cgen, quantized": partial(exporters.tl2cgen, quantize=True),
+        "m2cgen": exporters.m2cgen,
+        "micromlgen": exporters.micromlgen,
+        "Timber": exporters.timber,
+        "emlearn": exporters.emlearn,
+        "YDF (its own model)": exporters.ydf,
+        "irithyll-core": exporters.irithyll,
+    }
+    print("| ensemble | exporter | bytes M4F | instructions | bytes M0+ | instructions | wrong: plain / tied / missing |")
+    print("|---|---|---|---|---|---|---|", flush=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = Path(scratch)
+        for ensemble in all_of(palpate, scratch, wanted):
+            for name, exporter in {**ours, **peers}.items():
+                row = measure(ensemble, name, exporter, scratch)
+                if row is not None:
+                    cells = row if " | " in row else f"{row} | | | |"
+                    print(f"| {ensemble.name} | {name} | {cells} |", flush=True)
+
+
+enter_environment()
+main()
