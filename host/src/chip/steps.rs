@@ -20,7 +20,7 @@ pub enum Steps {
     /// A data set: a sequence of touches of each object in turn, again and again.
     Sequences {
         /// The touches.
-        dataset: Dataset,
+        dataset: Box<Dataset>,
         /// Touches of an object before the next one comes.
         length: usize,
         /// Touches still to come.
@@ -43,7 +43,7 @@ impl Steps {
     /// `count` touches of a data set: `length` of the first object, `length` of the second, and so on, then `length` more
     /// of the first. An object's touches begin again when they are used up.
     pub fn sequences(dataset: Dataset, length: usize, count: u64) -> Self {
-        Self::Sequences { dataset, length: length.max(1), left: count, at: (0, 0) }
+        Self::Sequences { dataset: dataset.into(), length: length.max(1), left: count, at: (0, 0) }
     }
 
     /// Lines as in a data set's files, until they end.

@@ -137,7 +137,7 @@ mod tests {
             assert_eq!(unpack(bytes), None);
         }
         // Of one triangle and no vertex; of counts that no bytes follow.
-        let mut one = vec![0; 20];
+        let mut one = [0; 20];
         one[4] = 1;
         for bytes in [&one[..], &[1, 0, 0, 0, 0, 0, 0, 0], &[0xff; 8], &[0xff; 9], &[1]] {
             assert_eq!(unpack(&compress(bytes)), None);

@@ -97,7 +97,7 @@ impl Table {
             deviation: Deviation { least, largest },
             timer,
             debounce,
-            missed,
+            missed: [missed; 3],
             bent: [first, middle, last],
             speed,
             speed_error,

@@ -75,7 +75,7 @@ fn recorded(objects: &[Object], count: usize, seed: u64, probe: &Crooked) -> Dat
 fn plate(count: usize, probe: &Crooked) -> Vec<Touch> {
     let mut numbers = Numbers(7);
     let press = |index: usize| {
-        let slope = if index % 2 == 0 { 2.5 } else { -2.5 };
+        let slope = if index.is_multiple_of(2) { 2.5 } else { -2.5 };
         record([Some(10.0 - slope), Some(10.0), Some(10.0 + slope)], probe, &mut numbers)
     };
     (0..count).map(press).collect()
