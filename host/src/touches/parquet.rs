@@ -319,6 +319,7 @@ fn write_error(path: &Path, error: ParquetError) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_shared::ContactTime;
 
     fn round_trip(touches: &[Touch]) -> Result<Vec<Touch>> {
         let directory = tempfile::tempdir().unwrap();
