@@ -67,7 +67,9 @@
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
 //! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
+//! | `teach` | objects that are learned from recorded touches | `teach::teach` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
+//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate play` | [`play::Game`] |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
 //!
@@ -80,7 +82,7 @@
 //! | feature | default | what it adds |
 //! |---|---|---|
 //! | none | | simulator, compiler, evaluator |
-//! | `train` | yes | `ensemble::train` and `tune`; the trainer is hessboost |
+//! | `train` | yes | `ensemble::train`, `teach` and `tune`; the trainer is hessboost |
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `serial` | yes | chips at serial ports |
@@ -110,10 +112,14 @@ pub mod evaluate;
 pub mod calibrate;
 
 #[cfg(feature = "train")]
+pub mod teach;
+#[cfg(feature = "train")]
 pub mod tune;
 
 #[cfg(feature = "train")]
 pub mod strangers;
+
+pub mod play;
 
 pub mod chip;
 

@@ -1,7 +1,7 @@
 //! Files that appear whole or not at all.
 
 use crate::error::{Error, Result};
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,22 @@ pub fn remove_leftovers(directory: &Path) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Locks a directory for one writer, by the file `.lock` in it; none if another has it. The operating system takes the
+/// lock back when the file is closed, even from a process that is killed.
+///
+/// # Errors
+/// [`Error::Io`] naming the file.
+pub(crate) fn lock(directory: &Path) -> Result<Option<File>> {
+    let path = directory.join(".lock");
+    let io = |error| Error::io(&path, "lock the directory", error);
+    let file = File::options().write(true).create(true).truncate(false).open(&path).map_err(io)?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Ok(None),
+        Err(TryLockError::Error(error)) => Err(io(error)),
+    }
 }
 
 /// Where writing to a path leads.

@@ -8,7 +8,7 @@ use rand::rngs::ChaCha8Rng;
 /// What random numbers are for. Each purpose has its own streams, so that drawing more for one changes no other, and
 /// what is drawn for two of them at the same seed is independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "some purposes are the report's"))]
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "some purposes are the report's, one is the trainer's"))]
 pub(crate) enum Purpose {
     /// Which touches train and which test.
     Folds,
@@ -36,6 +36,12 @@ pub(crate) enum Purpose {
     Switch,
     /// The order in which touches are used to calibrate a test of fit.
     Fit,
+    /// What a real probe adds to the touches of a capture.
+    Capture,
+    /// Touches as a fitted probe would make them.
+    Fitted,
+    /// Which recorded touches are held out together, and groups of them.
+    Teach,
     /// Made-up touches for tests.
     #[cfg(test)]
     Synthetic,
@@ -59,6 +65,9 @@ impl Purpose {
             Self::Active => Some(16),
             Self::Switch => Some(17),
             Self::Fit => Some(11),
+            Self::Capture => Some(28),
+            Self::Fitted => Some(29),
+            Self::Teach => Some(18),
             #[cfg(test)]
             Self::Synthetic => Some(6),
         }
@@ -109,6 +118,9 @@ mod tests {
             Active,
             Switch,
             Fit,
+            Capture,
+            Fitted,
+            Teach,
             Synthetic,
         ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();

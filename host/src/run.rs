@@ -1,20 +1,22 @@
 //! The main job: capture, train, compile, recognize, report.
 
+mod shown;
+
+pub use shown::text;
+
 use crate::calibrate::{self, Calibrated};
 use crate::capture;
-use crate::compile::{self, Compiled};
+use crate::compile::{self, Compiled, CompiledModel};
 use crate::ensemble::{StatedProbe, train};
 use crate::error::{Problem, ReportProblem, Result};
 use crate::evaluate::parity::{self, Parity};
-use crate::evaluate::{self, Approaches, Candidate, Curve, Evaluation, Margins, SequentialSettings};
+use crate::evaluate::{self, Candidate, Curve, Evaluation, Margins, SequentialSettings};
 use crate::mesh::Object;
 use crate::output;
-use crate::page::document::Picture;
-use crate::page::render;
-use crate::page::table::{Cell, Records};
 use crate::progress::{self, Progress};
+use crate::report::play::{self, Contender, Expected};
 use crate::report::results;
-use crate::report::run_page::{RunMethod, RunResults, run_page};
+use crate::report::run_page::{RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use crate::touches::folds::{self, Split};
 use crate::touches::noise::Noise;
@@ -23,7 +25,6 @@ use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::format::Counted;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -41,8 +42,11 @@ const PARITY_SEQUENCES: usize = 10_000;
 const PICTURE: u32 = 160;
 
 /// Files in the output directory besides `data/`, `approaches/` and `summary.json`.
-const FILES: [&str; 7] =
-    ["paper.json", "paper.palpate", "full.json", "full.palpate", "ensemble.json", "model.palpate", "report.html"];
+const FILES: [&str; 8] =
+    ["paper.json", "paper.palpate", "full.json", "full.palpate", "ensemble.json", "model.palpate", "report.html", PLAY];
+
+/// The page on which the objects can be touched, of [`FILES`].
+const PLAY: &str = "play.html";
 
 /// How to run.
 #[derive(Clone, Debug)]
@@ -116,8 +120,40 @@ pub struct Summary {
     pub ours: Method,
     /// One sequence of test approaches per object, as the model to use recognizes it.
     pub recognized: Vec<Recognition>,
+    /// What each stage took, in order: captures, then of each method training, compiling, its promise (with the capture
+    /// that it rests on), testing, and the comparison with the full model.
+    pub stages: Vec<Stage>,
     /// The whole run.
     pub seconds: f64,
+}
+
+/// What a stage of a run took.
+#[derive(Clone, Debug, Serialize)]
+pub struct Stage {
+    /// What was done.
+    pub name: String,
+    /// Wall-clock time.
+    pub seconds: f64,
+}
+
+/// Times stages: each ends where the next is noted.
+struct Stages {
+    last: Instant,
+    stages: Vec<Stage>,
+}
+
+impl Stages {
+    fn new() -> Self {
+        Self { last: Instant::now(), stages: Vec::new() }
+    }
+
+    /// What was done since the last stage ended; its time in seconds.
+    fn end(&mut self, name: impl Into<String>) -> f64 {
+        let seconds = self.last.elapsed().as_secs_f64();
+        self.last = Instant::now();
+        self.stages.push(Stage { name: name.into(), seconds });
+        seconds
+    }
 }
 
 /// How many touches were used for what.
@@ -187,6 +223,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     if !settings.replace {
         results::refuse_others(out, &made_from, &FILES, "data/dataset.json")?;
     }
+    let mut stages = Stages::new();
     let data = out.join("data");
     // A run replaces what an earlier run on the same objects left, finished or not, and no other touches.
     let names: BTreeSet<&str> = objects.iter().map(|object| object.name.as_str()).collect();
@@ -195,6 +232,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let captured =
         capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
     let seed = settings.capture.origin.seed;
+    stages.end("capture of full touches");
     let mut split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
     // Of another seed, so that no test approach is one of the full touches that the others were trained on.
     let origin = &settings.capture.origin;
@@ -204,13 +242,15 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let force = settings.capture.force || settings.replace || Listing::read(&directory)?.as_ref().is_some_and(is_same);
     let approach_settings = capture::Settings { origin, force, ..settings.capture.clone() };
     let approached = capture::capture(objects, &approach_settings, &directory, progress)?;
+    stages.end("capture of approaches");
     let mut approaches = folds::split(&Dataset::read(&directory)?, settings.test_share, seed)?;
     // Another seed than that of the training.
     let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
     evaluate::add_noise(&mut approaches.test, &settings.noise, seed.wrapping_add(1))?;
     let probe = Some(StatedProbe::from(&settings.capture.origin));
     let job = Job { settings, objects, approaches: &approaches.test, robots, out, progress };
-    let method = |name, files, preset, split| Trial::new(name, files, preset, split, job);
+    stages.end("reading and dividing touches");
+    let mut method = |name, files, preset, split| Trial::new(name, files, preset, split, job, &mut stages);
     let compact = train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() };
     let full = train::Settings { counted: Some(Counted::Full), ..compact.clone() };
     let contacts = train::Settings { counted: Some(Counted::Contacts), ..compact };
@@ -219,6 +259,8 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let full = method("ours on full touches", "full", full, &split)?;
     let ours = method("ours on every contact", "ensemble", contacts, &approaches)?;
     let model = compile::open(&ours.compiled.bytes)?;
+    progress.begin("writing the page to play on", None);
+    output::write_bytes(&out.join(PLAY), play_page(objects, [&paper, &full, &ours], settings)?.as_bytes())?;
     let summary = Summary {
         made_from,
         tool_version: env!("CARGO_PKG_VERSION"),
@@ -238,19 +280,21 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         paper: paper.method.clone(),
         full: full.method.clone(),
         ours: ours.method.clone(),
+        stages: stages.stages,
         seconds: began.elapsed().as_secs_f64(),
     };
     let page = run_page(&RunResults {
         command: settings.command.clone(),
-        pictures: pictures(objects, &summary.capture),
+        play: PLAY.into(),
+        pictures: shown::pictures(objects, &summary.capture),
         methods: vec![
-            shown("paper", &paper),
-            shown("ours on full touches", &full),
-            shown("ours on every contact", &ours),
+            shown::shown("paper", &paper),
+            shown::shown("ours on full touches", &full),
+            shown::shown("ours on every contact", &ours),
         ],
-        table: table(&summary),
-        note: note(&summary),
-        facts: facts(&summary),
+        table: shown::table(&summary),
+        note: shown::note(&summary),
+        facts: shown::facts(&summary),
     })?;
     page.write(&out.join("report.html"))?;
     output::write_json(&out.join("summary.json"), &summary)?;
@@ -295,19 +339,27 @@ struct Trial {
 }
 
 impl Trial {
-    fn new(name: &str, stem: &str, preset: train::Settings, split: &Split, job: Job<'_>) -> Result<Self> {
+    fn new(
+        name: &str,
+        stem: &str,
+        preset: train::Settings,
+        split: &Split,
+        job: Job<'_>,
+        stages: &mut Stages,
+    ) -> Result<Self> {
         let Job { settings, approaches, robots, out, progress, .. } = job;
-        let began = Instant::now();
         let ensemble = train::train(&split.train, &preset, progress)?;
-        let train_seconds = began.elapsed().as_secs_f64();
+        let train_seconds = stages.end(format!("{name}: training"));
         progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
         let compile = compile::Settings { error_rate: settings.error_rate, ..compile::Settings::default() };
         let mut compiled = compile::compile(&ensemble, &compile)?;
+        stages.end(format!("{name}: compiling"));
         let calibration = calibrated(&compiled.bytes, split, &job)?;
         if let Ok(calibrated) = &calibration {
             compiled.bytes.clone_from(&calibrated.model);
         }
+        stages.end(format!("{name}: promise"));
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
         let model = compile::open(&compiled.bytes)?;
@@ -332,7 +384,9 @@ impl Trial {
         let stopping = SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed };
         evaluation.approaches = Some(approached.approaches(&at, &stopping)?);
         let curve = margins.curve(MOST.min(largest_group(fewest)), settings.groups, seed)?;
+        stages.end(format!("{name}: testing"));
         let parity = parity::parity(&ensemble, &model, &split.test, PARITY_SEQUENCES, seed, progress)?;
+        stages.end(format!("{name}: comparison with the full model"));
         let method = Method {
             trees: ensemble.trees.len(),
             train_seconds,
@@ -393,234 +447,20 @@ fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]
     Ok(Recognition { touched: touched.into(), recognized, touches: recognizer.touches(), approaches, posterior })
 }
 
-fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<Picture> {
-    let captured_as = |name: &str| captured.objects.iter().find(|object| object.name == name);
-    let picture = |object: &Object| Picture {
-        name: object.name.clone(),
-        png: render::thumbnail(object.mesh(), PICTURE),
-        line: captured_as(&object.name).map_or_else(String::new, |c| {
-            format!("{:.1} % of approaches are full touches", 100.0 * c.touches as f64 / c.approaches.max(1) as f64)
-        }),
+/// The page on which the objects can be touched, with all models.
+fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Result<String> {
+    let contender = |trial: &Trial| {
+        let measured = trial.method.evaluation.approaches.as_ref();
+        let expected = measured.map(|approaches| Expected::from(&approaches.sequential));
+        Contender::new(CompiledModel::from_bytes(trial.compiled.bytes.clone())?, expected)
     };
-    objects.iter().map(picture).collect()
-}
-
-fn shown(name: &str, Trial { curve, method, fewest, .. }: &Trial) -> RunMethod {
-    let touches: Vec<usize> = [1, 2, 3, 5, 7, 10, 14, 20, 30, 42, 60, 85, 120]
-        .into_iter()
-        .filter(|&n| n <= curve.most() && distinct_groups(*fewest, n) >= LEAST_GROUPS)
-        .collect();
-    let objects = method.evaluation.per_object.keys().enumerate();
-    RunMethod {
-        name: name.into(),
-        curve: touches
-            .iter()
-            .map(|&n| {
-                let accuracy = curve.accuracy(n);
-                (n, accuracy.value, accuracy.standard_error)
-            })
-            .collect(),
-        per_object: objects
-            .map(|(position, name)| {
-                (name.clone(), touches.iter().map(|&n| (n, curve.object_accuracy(position, n).value)).collect())
-            })
-            .collect(),
-    }
-}
-
-/// The table that the program prints and the page shows: the paper's method, ours where it waits for full touches, and
-/// ours where every contact is evidence, side by side.
-fn table(summary: &Summary) -> Records {
-    let mut table = Records::new(["measure", "paper, full touches", "ours, full touches", "ours, every contact"]);
-    let both = |cell: &dyn Fn(&Method) -> Cell| [&summary.paper, &summary.full, &summary.ours].map(cell);
-    let mut row = |name: String, [paper, full, ours]: [Cell; 3]| table.push([Cell::Text(name), paper, full, ours]);
-    let rate = 100.0 * summary.ours.evaluation.sequential.error_rate;
-    let approaches = |cell: &dyn Fn(&Approaches) -> Cell| {
-        both(&|method| method.evaluation.approaches.as_ref().map_or(Cell::Missing, cell))
-    };
-    row(
-        format!("approaches to a {rate} % error rate, stopping when sure"),
-        approaches(&|of| Cell::Spread(of.sequential.mean_approaches, of.sequential.mean_approaches_standard_error, 1)),
-    );
-    let promised = |rate: Option<f64>| rate.map_or(Cell::Missing, |rate| Cell::Percent(rate, 2));
-    row("  promised".into(), approaches(&|of| promised(of.sequential.promised)));
-    row("  wrong verdicts".into(), approaches(&|of| Cell::Percent(of.sequential.error, 2)));
-    row("  undecided when touches ran out".into(), approaches(&|of| Cell::Percent(of.sequential.undecided, 2)));
-    for at in AT_APPROACHES {
-        let cell = |of: &Approaches| match (of.accuracy.get(&at), of.accuracy_standard_error.get(&at)) {
-            (Some(&accuracy), Some(&error)) => Cell::PercentSpread(accuracy, error, 1),
-            _ => Cell::Missing,
-        };
-        row(format!("accuracy after {at} approaches"), approaches(&cell));
-    }
-    row("share of approaches that are evidence".into(), approaches(&|of| Cell::Percent(of.used, 1)));
-    for at in TABLE_AT {
-        let cell = |method: &Method| {
-            let evaluation = &method.evaluation;
-            match (evaluation.accuracy.get(&at), evaluation.accuracy_standard_error.get(&at)) {
-                (Some(&accuracy), Some(&error)) => Cell::PercentSpread(accuracy, error, 1),
-                _ => Cell::Missing,
-            }
-        };
-        row(format!("accuracy after {at} touches"), both(&cell));
-    }
-    row(
-        format!("touches to a {rate} % error rate, stopping when sure"),
-        both(&|m| {
-            let sequential = &m.evaluation.sequential;
-            Cell::Spread(sequential.mean_touches, sequential.mean_touches_standard_error, 1)
-        }),
-    );
-    row("  promised".into(), both(&|m| promised(m.evaluation.sequential.promised)));
-    row("  wrong verdicts".into(), both(&|m| Cell::Percent(m.evaluation.sequential.error, 2)));
-    row("  undecided when touches ran out".into(), both(&|m| Cell::Percent(m.evaluation.sequential.undecided, 2)));
-    row(
-        format!("touches to a {rate} % error rate, a fixed number"),
-        both(&|m| {
-            m.fixed_touches.map_or_else(
-                || if m.followed_to == 0 { Cell::Missing } else { Cell::Text(format!("over {}", m.followed_to)) },
-                Cell::count,
-            )
-        }),
-    );
-    row("model bytes".into(), both(&|m| Cell::count(m.model_bytes)));
-    row("trees".into(), both(&|m| Cell::count(m.trees)));
-    row("training, seconds".into(), both(&|m| Cell::Number(m.train_seconds, 1)));
-    let captures = [&summary.capture, &summary.capture, &summary.approach_capture];
-    row("capture, seconds".into(), captures.map(|capture| Cell::Number(capture.seconds, 1)));
-    row(
-        "approaches captured per second".into(),
-        captures.map(|capture| Cell::Number(capture.approaches() as f64 / capture.seconds.max(1e-9), 0)),
-    );
-    row("largest margin error, nats".into(), both(&|m| Cell::Number(m.parity.max_margin_error, 5)));
-    row("  bound that the model states".into(), both(&|m| Cell::Number(m.parity.stated_bound, 5)));
-    row("verdicts that differ from the full model's".into(), both(&|m| Cell::count(m.parity.verdict_differs)));
-    table
-}
-
-/// What the test touches had, and what a missing accuracy means, if one is missing.
-fn note(summary: &Summary) -> String {
-    let noise = &summary.noise;
-    let noise = match noise.is_none() {
-        true => "No noise was added to touches.".to_owned(),
-        false => format!("Ours was trained, and all are tested, with {noise}; the paper's method is trained without."),
-    };
-    [noise, calibration(summary), missing(summary)]
-        .into_iter()
-        .filter(|part| !part.is_empty())
-        .collect::<Vec<_>>()
-        .join(" ")
-}
-
-/// What the promises rest on, or why there are none.
-fn calibration(summary: &Summary) -> String {
-    let ours = &summary.ours;
-    let promise = match (&ours.calibration, &ours.uncalibrated) {
-        (Some(calibrated), _) => format!(
-            "The model keeps its promise with a probability of {} %; its thresholds were found on {} sequences of {} \
-             captured for that.",
-            100.0 * calibrated.confidence,
-            calibrated.sequences,
-            calibrated.counted
-        ),
-        (None, why) => format!("The model promises nothing: {}.", why.as_deref().unwrap_or("it was not calibrated")),
-    };
-    let others = [("paper", &summary.paper), ("full touches", &summary.full)];
-    let why = |(name, method): (&str, &Method)| method.uncalibrated.as_ref().map(|why| format!(" {name}: {why}."));
-    promise + &others.into_iter().filter_map(why).collect::<String>()
-}
-
-/// What a missing accuracy means, if one is missing.
-fn missing(summary: &Summary) -> String {
-    let missing = |method: &Method| TABLE_AT.iter().any(|at| !method.evaluation.accuracy.contains_key(at));
-    if ![&summary.paper, &summary.full, &summary.ours].into_iter().any(missing) {
-        return String::new();
-    }
-    format!(
-        "– stands for an accuracy that would rest on fewer than {LEAST_GROUPS} distinct groups of test touches; capture \
-         more touches to measure it."
+    let contenders = trials.into_iter().map(contender).collect::<Result<Vec<_>>>()?;
+    let origin = settings.capture.origin.clone();
+    play::page(
+        objects,
+        &contenders,
+        &play::Settings { origin, noise: settings.noise, command: settings.command.clone() },
     )
-}
-
-fn facts(summary: &Summary) -> Vec<(String, String)> {
-    let touches = summary.touches;
-    [
-        ("command", summary.command.clone()),
-        ("version", summary.tool_version.into()),
-        ("seed", summary.seed.to_string()),
-        ("touches trained on", touches.train.to_string()),
-        ("touches tested on", touches.test.to_string()),
-        ("seconds in all", format!("{:.1}", summary.seconds)),
-    ]
-    .map(|(name, value)| (name.to_string(), value))
-    .to_vec()
-}
-
-/// The summary as the program prints it.
-pub fn text(summary: &Summary, out: &Path) -> String {
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    let capture = &summary.capture;
-    _ = writeln!(
-        text,
-        "Touched {} objects {} times with all three fingers, in {} approaches, and approached them {} times more, keeping \
-         every approach. Tested on a tenth of each that training never saw.\n",
-        capture.objects.len(),
-        capture.touches(),
-        capture.approaches(),
-        summary.approach_capture.approaches(),
-    );
-    let width = summary.recognized.iter().map(|r| r.touched.chars().count()).max().unwrap_or(0);
-    for recognition in &summary.recognized {
-        let Recognition { touched, recognized, touches: _, approaches, posterior } = recognition;
-        _ = match recognized {
-            Some(name) if name == touched => {
-                writeln!(
-                    text,
-                    "  {touched:width$}  recognized after {approaches:>3} approaches, posterior {posterior:.4}"
-                )
-            }
-            Some(name) => {
-                writeln!(
-                    text,
-                    "  {touched:width$}  mistaken for {name} after {approaches} approaches, posterior {posterior:.4}"
-                )
-            }
-            None => writeln!(text, "  {touched:width$}  undecided after {approaches} approaches"),
-        };
-    }
-    let table = table(summary);
-    let rows: Vec<Vec<String>> = std::iter::once(table.columns.clone())
-        .chain(table.rows.iter().map(|row| row.iter().map(Cell::shown).collect()))
-        .collect();
-    let widths: Vec<usize> =
-        (0..4).map(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)).collect();
-    _ = writeln!(text);
-    for row in &rows {
-        _ = writeln!(
-            text,
-            "{:w0$}  {:>w1$}  {:>w2$}  {:>w3$}",
-            row[0],
-            row[1],
-            row[2],
-            row[3],
-            w0 = widths[0],
-            w1 = widths[1],
-            w2 = widths[2],
-            w3 = widths[3]
-        );
-    }
-    let note = note(summary);
-    if !note.is_empty() {
-        _ = writeln!(text, "\n{note}");
-    }
-    _ = writeln!(
-        text,
-        "\n± is a standard error. {:.1} s in all. The page: {}",
-        summary.seconds,
-        out.join("report.html").display()
-    );
-    text
 }
 
 #[cfg(test)]
@@ -687,6 +527,10 @@ mod tests {
             serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
         assert_eq!(written["full"]["sequential"]["undecided"], serde_json::json!(evaluation.sequential.undecided));
         assert_eq!(written["full"]["approaches"]["sequential"]["undecided"], serde_json::json!(undecided));
+        // Every stage is timed, and what is not in one is next to nothing.
+        let stages = written["stages"].as_array().unwrap();
+        assert_eq!(stages.len(), 3 + 3 * 5, "{stages:#?}");
+        assert!(stages.iter().all(|stage| stage["seconds"].as_f64().unwrap() >= 0.0));
         for file in FILES {
             assert!(out.join(file).is_file(), "{file}");
         }

@@ -3,7 +3,7 @@
 //! A touch and its mirror image (fingers counted from the other end) are the same touch, so every descriptor but the
 //! paper's own [`Descriptor::Times`] gives the same features for both.
 
-use crate::touch::{ContactTime, Touch};
+use crate::touch::{ContactTime, Pose, Touch};
 
 /// The most features that a built-in descriptor has.
 pub const MAX_FEATURES: usize = 10;
@@ -211,57 +211,68 @@ impl Descriptor {
     /// Cost: about 60 instructions on a Cortex-M without a pose. Cannot fail.
     pub fn features(self, touch: &Touch) -> Features {
         const NONE: i32 = MISSING_FEATURE;
-        let [first, middle, last] = touch.times().map(within_limit);
+        let [first, middle, last] = touch.times();
+        // One by one: as an array they would go through memory.
+        let (first, middle, last) = (within_limit(first), within_limit(middle), within_limit(last));
         let (mut curvature, mut slope, mut pair) = (NONE, NONE, NONE);
         if first != NONE && last != NONE {
-            slope = (last - first).abs();
+            slope = (last - first).abs().min(FEATURE_LIMIT);
             if middle != NONE {
-                curvature = first - 2 * middle + last;
+                curvature = clamp(first - 2 * middle + last);
             }
         } else if middle != NONE {
             // The one outer finger that touched, if one did: the other is missing, which is the least number.
             let outer = first.max(last);
             if outer != NONE {
-                pair = middle - outer;
+                pair = clamp(middle - outer);
             }
         }
         let contacts = self.uses_partial_touches();
-        // What the pose gives comes after these; without a pattern, already where the last two are.
-        let (head, start) = if self == Self::Times {
-            ([first, middle, last, NONE], 4)
+        let [a, b, c, d] = if self == Self::Times {
+            // A missing time is the least number, and stays.
+            [first.min(FEATURE_LIMIT), middle.min(FEATURE_LIMIT), last.min(FEATURE_LIMIT), NONE]
         } else if contacts {
-            ([touch.pattern().code().into(), curvature, slope, pair], 4)
+            [touch.pattern().code().into(), curvature, slope, pair]
         } else {
-            ([curvature, slope, NONE, NONE], 2)
+            [curvature, slope, NONE, NONE]
         };
-        let [a, b, c, d] = head.map(clamp);
         let mut values = [a, b, c, d, NONE, NONE, NONE, NONE, NONE, NONE];
-        if let Some(pose) = touch.pose()
-            && let Some(tail) = values.get_mut(start..).and_then(<[i32]>::first_chunk_mut)
+        if self.needs_pose()
+            && let Some(pose) = touch.pose()
         {
-            let [x, y, z] = pose.direction.map(i32::from);
-            let [u, v, w] = oriented(pose.alignment, [first, last], contacts).map(i32::from);
-            match self.frame() {
-                Frame::Nothing => {}
-                Frame::Vertical => *tail = [z, w, NONE, NONE, NONE, NONE],
-                Frame::Object => *tail = [x, y, z, u, v, w],
-            }
+            self.put_pose(&pose, [first, last], &mut values);
         }
         Features { values, len: self.length() }
+    }
+
+    /// Adds what the pose gives: after the first four features; without a pattern, already where the last two of them are.
+    fn put_pose(self, pose: &Pose, ends: [i32; 2], values: &mut [i32; MAX_FEATURES]) {
+        const NONE: i32 = MISSING_FEATURE;
+        let contacts = self.uses_partial_touches();
+        let Some(tail) = values.get_mut(if contacts { 4 } else { 2 }..).and_then(<[i32]>::first_chunk_mut) else {
+            return;
+        };
+        let [x, y, z] = pose.direction.map(i32::from);
+        let [u, v, w] = oriented(pose.alignment, ends, contacts).map(i32::from);
+        match self.frame() {
+            Frame::Nothing => {}
+            Frame::Vertical => *tail = [z, w, NONE, NONE, NONE, NONE],
+            Frame::Object => *tail = [x, y, z, u, v, w],
+        }
     }
 }
 
 /// A contact time in microseconds; what is later than 2^28 (268 s) counts as that, so that sums of times fit an i32; a
 /// missing one is [`MISSING_FEATURE`].
+#[inline(always)]
 fn within_limit(time: ContactTime) -> i32 {
     const LIMIT: u32 = 1 << 28;
     time.micros().map_or(MISSING_FEATURE, |micros| micros.min(LIMIT).cast_signed())
 }
 
-/// A feature within its limits; a missing one stays missing.
-#[inline(never)]
+/// A feature within its limits.
 fn clamp(value: i32) -> i32 {
-    if value == MISSING_FEATURE { value } else { value.clamp(-FEATURE_LIMIT, FEATURE_LIMIT) }
+    value.clamp(-FEATURE_LIMIT, FEATURE_LIMIT)
 }
 
 /// The alignment from the outer finger that touched first to the other one; a missing contact counts as later than any
@@ -287,7 +298,7 @@ fn oriented(alignment: [i16; 3], ends: [i32; 2], contacts: bool) -> [i16; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ContactPattern, Pose};
+    use crate::ContactPattern;
     use std::vec::Vec;
 
     fn touch() -> Touch {

@@ -28,10 +28,12 @@ impl ContactPattern {
     ///
     /// Cost: about ten instructions. Cannot fail.
     pub const fn of([first, middle, last]: [bool; 3]) -> Self {
-        match 2 * (first as u8 + last as u8) + middle as u8 {
+        // Four bits for each: with no finger, the middle one, an outer one, that and the middle one, both outer ones, all.
+        const CODES: u32 = 0x0054_3120;
+        match CODES >> (8 * (first as u32 + last as u32) + 4 * middle as u32) & 7 {
             0 => Self::None,
-            1 => Self::Middle,
-            2 => Self::Outer,
+            1 => Self::Outer,
+            2 => Self::Middle,
             3 => Self::OuterAndMiddle,
             4 => Self::BothOuter,
             _ => Self::All,

@@ -86,8 +86,10 @@ impl Touch {
     }
 
     /// Which fingers touched.
+    #[inline(never)]
     pub fn pattern(&self) -> ContactPattern {
-        ContactPattern::of(self.times.map(|time| !time.is_missing()))
+        let [first, middle, last] = self.times;
+        ContactPattern::of([!first.is_missing(), !middle.is_missing(), !last.is_missing()])
     }
 
     /// Microseconds between the first and the last contact; 0 with fewer than two contacts.

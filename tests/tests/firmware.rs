@@ -12,6 +12,7 @@ use palpate_shared::link::{
     Decision, Decoder, Detail, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Descriptor, Patterns, Touch};
+use palpate_tests::pins::{APPROACH, Edges, edges};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
 use rand::rngs::ChaCha8Rng;
@@ -168,30 +169,6 @@ fn soak_the_emulated_chip_neither_drifts_nor_loses_a_frame() {
     assert_eq!((summary.chip_repeated, summary.garbled, summary.chip_garbled, events), (0, 0, 0, 0), "{summary:?}");
 }
 
-/// Edges as a host plays them: finger, level, time.
-#[derive(Default)]
-struct Recording {
-    bytes: Vec<u8>,
-}
-
-impl Recording {
-    fn edge(&mut self, finger: u8, closed: bool, at: u32) {
-        self.bytes.extend([finger, u8::from(closed)]);
-        self.bytes.extend(at.to_le_bytes());
-    }
-
-    /// Time passes.
-    fn wait(&mut self, at: u32) {
-        self.edge(3, false, at);
-    }
-
-    /// The power goes, and comes back.
-    fn cut(&mut self, at: u32) {
-        self.wait(at);
-        self.edge(4, false, at);
-    }
-}
-
 /// Contacts of one, two or three fingers, up to a second apart; none is left out later.
 fn approach(rng: &mut ChaCha8Rng) -> Touch {
     let first = rng.random_range(0..3);
@@ -205,37 +182,6 @@ fn approach(rng: &mut ChaCha8Rng) -> Touch {
     Touch::new(times)
 }
 
-/// From the beginning of one approach to that of the next.
-const APPROACH: u32 = 1_450_000;
-
-/// The edges that three switches make of an approach and of their release: time, finger, closed. Switches bounce; one in
-/// ten loses contact for a while and touches again, and a third finger may come as late as the model allows.
-fn edges(touch: &Touch, rng: &mut ChaCha8Rng) -> Vec<(u32, u8, bool)> {
-    let mut edges = Vec::new();
-    let again = rng.random_range(0..10);
-    for (finger, time) in (0..3).zip(touch.times()) {
-        let Some(time) = time.micros() else { continue };
-        let mut at = time;
-        edges.push((at, finger, true));
-        for _ in 0..rng.random_range(0..4) {
-            for closed in [false, true] {
-                at += rng.random_range(1..1_000);
-                edges.push((at, finger, closed));
-            }
-        }
-        if finger == again {
-            // Another contact in the same approach: the first one counts.
-            at += rng.random_range(10_000..40_000);
-            edges.push((at, finger, false));
-            at += rng.random_range(10_000..90_000);
-            edges.push((at, finger, true));
-        }
-        edges.push((1_300_000 + rng.random_range(0..1_000), finger, false));
-    }
-    edges.sort_unstable();
-    edges
-}
-
 /// What is played until the power goes, or all is over, and the touches up to there.
 struct Segment {
     bytes: Vec<u8>,
@@ -244,35 +190,35 @@ struct Segment {
 
 /// Plays touches one after the other; in one of fifty the power goes, at any moment. Ends with a finger that stays closed.
 fn segments(touches: &[Touch], rng: &mut ChaCha8Rng) -> Vec<Segment> {
-    let (mut segments, mut recording) = (Vec::new(), Recording::default());
+    let (mut segments, mut played) = (Vec::new(), Edges::default());
     // The clock wraps after twenty touches.
     let mut now = 0_u32.wrapping_sub(20 * APPROACH);
     // From power-up at 0 to there in steps that the driver can follow: less than half a turn of the clock.
-    [now / 3, now / 3 * 2, now].into_iter().for_each(|at| recording.wait(at));
+    [now / 3, now / 3 * 2, now].into_iter().for_each(|at| played.wait(at));
     now = now.wrapping_add(150_000);
     for (index, touch) in touches.iter().enumerate() {
         let edges = edges(touch, rng);
         let cut = rng.random_ratio(1, 50).then(|| rng.random_range(0..1_340_000));
         for &(at, finger, closed) in edges.iter().filter(|(at, ..)| cut.is_none_or(|cut| *at < cut)) {
-            recording.edge(finger, closed, now.wrapping_add(at));
+            played.edge(finger, closed, now.wrapping_add(at));
         }
         if let Some(cut) = cut {
-            recording.cut(now.wrapping_add(cut));
-            segments.push(Segment { bytes: std::mem::take(&mut recording.bytes), touches: index + 1 });
+            played.cut(now.wrapping_add(cut));
+            segments.push(Segment { bytes: std::mem::take(&mut played.bytes), touches: index + 1 });
             // The approach goes on, and the clock starts again.
             now = 0_u32.wrapping_sub(cut);
             for &(at, finger, closed) in edges.iter().filter(|(at, ..)| *at >= cut) {
-                recording.edge(finger, closed, now.wrapping_add(at));
+                played.edge(finger, closed, now.wrapping_add(at));
             }
         }
         now = now.wrapping_add(APPROACH);
-        recording.wait(now);
+        played.wait(now);
     }
     // A finger that stays closed is a touch with two missing contacts, and stuck.
-    recording.edge(2, true, now);
-    recording.wait(now.wrapping_add(1_200_000));
-    recording.wait(now.wrapping_add(6_000_000));
-    segments.push(Segment { bytes: recording.bytes, touches: touches.len() + 1 });
+    played.edge(2, true, now);
+    played.wait(now.wrapping_add(1_200_000));
+    played.wait(now.wrapping_add(6_000_000));
+    segments.push(Segment { bytes: played.bytes, touches: touches.len() + 1 });
     segments
 }
 

@@ -13,7 +13,7 @@ use crate::progress::Progress;
 use crate::touches::Dataset;
 use crate::touches::noise::Noise;
 use palpate_onboard::{Model, Refused, Stopping};
-use palpate_shared::format::{OddsByObject, Promise, PromisedNoise, SECTION_HEADER_LENGTH, Tag, Temperature};
+use palpate_shared::format::{OddsByObject, Promise, SECTION_HEADER_LENGTH, Tag, Temperature};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -239,8 +239,7 @@ fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
 
 /// Bytes that a calibration to an average error rate adds to a model that states neither promise nor temperature.
 pub fn added_bytes(noise: &Noise) -> usize {
-    let is_short = PromisedNoise { touch: noise.promised().touch, ..PromisedNoise::default() } == noise.promised();
-    let promise = if is_short { Promise::LENGTH } else { Promise::FULL_LENGTH };
+    let promise = Promise::length(&noise.promised());
     2 * SECTION_HEADER_LENGTH + promise + Temperature::LENGTH
 }
 
@@ -267,7 +266,7 @@ fn finished(
         wrong: count(chosen.wrong),
         mean_thousandths: (1e3 * mean).round() as u32,
         max_touches,
-        noise: settings.noise.promised(),
+        noise: dataset.real().and(&settings.noise).promised(),
     };
     let by_object = match &chosen.odds {
         Odds::All(_) => None,

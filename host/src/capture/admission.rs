@@ -30,6 +30,10 @@ pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) ->
         }
         return Ok(Admission { replaced: None, listing: wanted });
     };
+    if found.is_recorded() {
+        let touches = touches(&found.objects);
+        return refuse(CaptureProblem::HoldsRecorded { touches, objects: found.names() });
+    }
     if settings.force {
         return Ok(Admission { replaced: Some(found), listing: wanted });
     }
@@ -96,7 +100,7 @@ fn merged(found: Listing, wanted: &Listing) -> Listing {
     }
     objects.sort_by(|a, b| a.name.cmp(&b.name));
     let complete = false;
-    Listing { palpate: wanted.palpate.clone(), complete, origin: found.origin, objects }
+    Listing { palpate: wanted.palpate.clone(), complete, origin: found.origin, objects, recorded: Vec::new() }
 }
 
 /// Which settings differ, and how: "touches is 20 there and 30 here". Empty if none does.
@@ -132,8 +136,16 @@ fn settings(there: &Origin, here: &Origin) -> Vec<String> {
         _ => serde_json::Map::new(),
     };
     let (there, here) = (fields(there), fields(here));
-    let different = there.iter().filter(|(name, value)| here.get(*name) != Some(value));
-    let said = different.map(|(name, value)| format!("{name} is {value} there and {} here", here[name]));
+    // Settings that are the default may be left out on either side.
+    let mut names: Vec<&String> = there.keys().chain(here.keys().filter(|name| !there.contains_key(*name))).collect();
+    names.retain(|name| there.get(*name) != here.get(*name));
+    let value = |fields: &serde_json::Map<_, _>, name: &String| match fields.get(name) {
+        Some(value) => serde_json::Value::to_string(value),
+        None => "the default".to_owned(),
+    };
+    let said = names
+        .into_iter()
+        .map(|name| format!("{name} is {} there and {} here", value(&there, name), value(&here, name)));
     said.collect()
 }
 

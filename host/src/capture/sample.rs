@@ -6,6 +6,7 @@
 use crate::error::{CaptureProblem, Result};
 use crate::probe::approach::Approach;
 use crate::probe::scene::Scene;
+use crate::random::{self, Purpose};
 use crate::touches::Origin;
 use palpate_shared::Touch;
 use rand::SeedableRng;
@@ -55,17 +56,35 @@ impl<'a> Sampler<'a> {
         let turn = index % self.scenes.len().max(1) as u64;
         let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn)).ok_or_else(untouchable)?;
         let (bounds, clearance) = (scene.bounds(), self.origin.clearance(scene.bounds()));
+        // What the real probe adds has a stream of its own, so that the approaches stay the same with it and without.
+        let mut added = (!self.origin.real.is_none())
+            .then(|| random::generator(self.origin.seed, Purpose::Capture, self.name, index));
+        let mut real = |touch: Touch| match &mut added {
+            Some(random) => self.origin.real.add_to(&touch, random),
+            None => touch,
+        };
         for attempts in 1..=MOST_ATTEMPTS {
             let target = self.origin.aim.target(scene);
             let approach = Approach::draw_at(&mut rng, bounds, target, probe.tilt, clearance);
             if self.origin.approaches {
-                return Ok((approach.touch(approach.distances(scene, probe), probe), attempts));
+                return Ok((real(approach.touch(approach.distances(scene, probe), probe)), attempts));
             }
             if let Some(distances) = approach.full_distances(scene, probe) {
-                return Ok((approach.touch(distances.map(Some), probe), attempts));
+                let touch = real(approach.touch(distances.map(Some), probe));
+                if touch.is_full() {
+                    return Ok((touch, attempts));
+                }
             }
         }
         Err(untouchable().into())
+    }
+
+    /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is
+    /// kept.
+    pub fn approach(&self, scene: &Scene, index: u64) -> Approach {
+        let (bounds, origin) = (scene.bounds(), self.origin);
+        let target = origin.aim.target(scene);
+        Approach::draw_at(&mut self.rng(index), bounds, target, origin.probe.tilt, origin.clearance(bounds))
     }
 
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {

@@ -12,7 +12,7 @@ use super::admission::{Admission, admit};
 use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::output;
 use crate::touches::{Entry, Format, Listing, checksum};
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -37,7 +37,8 @@ impl Store {
     /// Opens the directory for a capture of objects with these names, alone.
     pub(super) fn open(directory: &Path, settings: &Settings, objects: &[Entry]) -> Result<Self> {
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
-        let lock = lock(directory)?;
+        let busy = || Error::at(Place::file(directory), CaptureProblem::Busy);
+        let lock = output::lock(directory)?.ok_or_else(busy)?;
         let Admission { replaced, listing } = admit(directory, settings, objects)?;
         output::remove_leftovers(directory)?;
         if let Some(replaced) = replaced {
@@ -199,15 +200,4 @@ fn remove(path: &Path) -> Result<()> {
 fn stopped(path: &Path, error: &std::io::Error) -> Error {
     let problem = CaptureProblem::NotWritten { kind: error.kind(), message: error.to_string() };
     Error::at(Place::file(path), problem)
-}
-
-fn lock(directory: &Path) -> Result<File> {
-    let path = directory.join(".lock");
-    let io = |error| Error::io(&path, "lock the directory", error);
-    let file = File::options().write(true).create(true).truncate(false).open(&path).map_err(io)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(Error::at(Place::file(directory), CaptureProblem::Busy)),
-        Err(TryLockError::Error(error)) => Err(io(error)),
-    }
 }

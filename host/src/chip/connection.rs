@@ -27,6 +27,7 @@ enum Reply {
     Statistics(Statistics),
     Posteriors(Vec<u64>),
     NextApproach(ApproachMessage),
+    Program(String),
     Refused(Refusal),
     Other,
 }
@@ -64,14 +65,29 @@ impl Connection {
             reply: None,
             open: false,
         };
-        let now = connection.now();
-        let mut sent = Ok(());
-        connection.end.connect(session(), now, |bytes| sent = connection.transport.send(bytes));
-        sent?;
-        while !connection.open {
-            connection.exchange(Duration::from_millis(20))?;
-        }
+        connection.connect()?;
         Ok(connection)
+    }
+
+    /// Goes on over another transport, after the line broke: a new session with the same chip, or another. What the chip
+    /// reports by itself is counted on from before, so that no event is taken twice and those in between are missed ones.
+    ///
+    /// # Errors
+    /// When the chip does not answer.
+    pub fn reopen(&mut self, transport: Transport) -> Result<()> {
+        (self.transport, self.reply, self.open) = (transport, None, false);
+        self.connect()
+    }
+
+    fn connect(&mut self) -> Result<()> {
+        let now = self.now();
+        let mut sent = Ok(());
+        self.end.connect(session(), now, |bytes| sent = self.transport.send(bytes));
+        sent?;
+        while !self.open {
+            self.exchange(Duration::from_millis(20))?;
+        }
+        Ok(())
     }
 
     fn now(&self) -> u64 {
@@ -143,6 +159,14 @@ impl Connection {
     }
 
     fn ask(&mut self, query: Query) -> Result<Reply> {
+        match self.ask_until(query, None)? {
+            Some(reply) => Ok(reply),
+            None => Err(self.wrong(ChipProblem::UnexpectedAnswer)),
+        }
+    }
+
+    /// The answer; none if it has not come by `until`.
+    fn ask_until(&mut self, query: Query, until: Option<Instant>) -> Result<Option<Reply>> {
         let mut asked = false;
         self.reply = None;
         loop {
@@ -153,7 +177,11 @@ impl Connection {
                 sent?;
             }
             if let Some(reply) = self.reply.take() {
-                return Ok(reply);
+                return Ok(Some(reply));
+            }
+            if until.is_some_and(|until| Instant::now() > until) {
+                self.end.withdraw();
+                return Ok(None);
             }
             self.exchange(Duration::from_millis(20))?;
         }
@@ -189,6 +217,20 @@ impl Connection {
             }
         }
         Ok(ChipModel { info, names })
+    }
+
+    /// Name and version of the chip's program; none if it does not say, as programs before version 0.3, for which this
+    /// waits ten seconds.
+    ///
+    /// # Errors
+    /// When the line broke or the chip is silent.
+    pub fn program(&mut self) -> Result<Option<String>> {
+        let until = Instant::now() + Duration::from_secs(10);
+        match self.ask_until(Query::Program, Some(until))? {
+            Some(Reply::Program(program)) => Ok(Some(program).filter(|program| !program.is_empty())),
+            Some(reply) => self.unexpected(&reply),
+            None => Ok(None),
+        }
     }
 
     /// What the chip's end has seen.
@@ -278,6 +320,7 @@ fn keep(answer: Answer<'_>) -> Reply {
             Reply::Posteriors(bytes.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
         }
         Answer::NextApproach(approach) => Reply::NextApproach(approach),
+        Answer::Program(program) => Reply::Program(program.into()),
         Answer::Refused(refusal) => Reply::Refused(refusal),
         _ => Reply::Other,
     }

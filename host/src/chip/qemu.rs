@@ -19,6 +19,7 @@ pub(super) struct Qemu {
     /// Reads standard error until it ends.
     messages: Option<JoinHandle<String>>,
     /// The folder of the monitor's socket.
+    #[cfg_attr(not(unix), allow(dead_code, reason = "there it only has to be removed in the end"))]
     directory: tempfile::TempDir,
 }
 

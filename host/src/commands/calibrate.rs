@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         confidence: arguments.confidence,
         sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
         max_touches: arguments.max_touches,
-        noise: arguments.noise.over(file.map_or_else(Noise::default, |file| file.real)),
+        noise: arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?),
         active: arguments.active,
         seed: arguments.seed,
     };

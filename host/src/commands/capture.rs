@@ -19,18 +19,21 @@ capture that would replace others is refused.
 
 Examples:
   palpate capture builtin -o data                 21,000 touches per object
-  palpate capture cup.obj bowls/ builtin -o data  your own meshes beside them
+  palpate capture cup.stl bowls/ builtin -o data  your own meshes beside them
   palpate capture jug.obj -o data --add           one more object, touched alike
   palpate capture meshes/ -o data --pose          with the probe's direction
   palpate capture meshes/ -o data --approaches    every approach, also misses
   palpate capture meshes/ -o data --true-size --unit mm --probe probe.toml
                                                   as large as they are
+  palpate capture meshes/ -o data --probe probe.toml
+                                                  as your probe would: the file's
+                                                  [real] is added to each touch
   palpate capture meshes/ -o data --instances     a directory for each object
   palpate capture builtin -o data --instances 20  twenty forks are a fork
   palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts
   palpate capture meshes/ -o data --resume        continue an interrupted one")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin` or a built-in object's name, an OBJ file, or a directory that is searched for OBJ files
+    /// What to touch: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory that is searched for meshes
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// The directory for the touches
@@ -104,9 +107,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
     for object in &objects {
         for instance in object.instances() {
-            if let Some(complaint) = Facts::of(&instance.mesh).complaint() {
+            let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
+            if !complaints.is_empty() {
                 let name = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
-                eprintln!("{}{name}: {complaint}", object.name);
+                eprintln!("{}{name}: {}", object.name, complaints.join(" "));
             }
         }
     }
@@ -140,6 +144,7 @@ impl Arguments {
             approaches: self.approaches || base.approaches,
             format: self.format.unwrap_or(base.format),
             shard: self.shard.unwrap_or(base.shard),
+            real: self.size.probe.read()?.map_or(base.real, |file| file.real),
         })
     }
 }

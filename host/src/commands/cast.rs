@@ -1,6 +1,6 @@
 use crate::Error;
 use crate::Result;
-use crate::mesh::obj;
+use crate::mesh::file;
 use crate::output;
 use crate::probe::cast::{self, Agreement};
 use crate::probe::scene::Scene;
@@ -18,8 +18,8 @@ Examples:
   palpate cast cup.obj casts.csv -o ours.csv  write them, compare the times
   palpate cast cup.obj casts.csv --as-is      the mesh is in units of the probe")]
 pub(crate) struct Arguments {
-    /// The mesh, as an OBJ file
-    #[arg(value_name = "MESH.obj")]
+    /// The mesh: OBJ, STL, PLY, glTF, GLB or COLLADA
+    #[arg(value_name = "MESH")]
     mesh: PathBuf,
     /// The casts
     #[arg(value_name = "CASTS.csv")]
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             return Err(Error::setting(name, value, "a number greater than 0"));
         }
     }
-    let mesh = obj::read(&arguments.mesh)?;
+    let mesh = file::read(&arguments.mesh)?.mesh;
     let scene = if arguments.as_is { Scene::as_is(&mesh) } else { Scene::new(&mesh, arguments.length) }?;
     let lines = cast::read(&arguments.casts)?;
     let times = cast::times(&scene, &lines, f64::from(arguments.radius));

@@ -1,4 +1,4 @@
-//! `palpate probe design`.
+//! `palpate probe`, and `palpate probe design`.
 
 use super::numbers::share;
 use super::probe::UnitArguments;
@@ -27,6 +27,8 @@ pub(crate) struct Arguments {
 enum Command {
     /// Find the probe that needs the fewest approaches to recognize your objects
     Design(DesignArguments),
+    /// Find out what is crooked about your probe from touches that it made of objects whose meshes you have
+    Fit(super::fit::FitArguments),
 }
 
 #[derive(clap::Args)]
@@ -40,7 +42,7 @@ Examples:
   palpate probe design meshes/ -o design --aim box --noise 5ms
   palpate probe design meshes/ -o design --error-rate 0.1% --approaches 20000")]
 struct DesignArguments {
-    /// What to touch: `builtin` or a built-in object's name, an OBJ file, or a directory that is searched for OBJ files
+    /// What to touch: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory that is searched for meshes
     #[arg(value_name = "MESHES", required = true)]
     sources: Vec<String>,
     /// Directory for probe.toml and design.html, such as design; created if it is missing
@@ -90,7 +92,13 @@ struct DesignArguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Command::Design(arguments) = arguments.command;
+    match arguments.command {
+        Command::Design(arguments) => run_design(&arguments),
+        Command::Fit(arguments) => super::fit::run(&arguments),
+    }
+}
+
+fn run_design(arguments: &DesignArguments) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
     let objects = arguments.units.objects(&arguments.sources, arguments.seed)?;
     let settings = arguments.settings(&objects)?;

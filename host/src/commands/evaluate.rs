@@ -113,7 +113,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     let probe = arguments.probe.read()?;
     arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
-    let noise = arguments.noise.over(probe.map_or_else(Noise::default, |file| file.real));
+    let noise = arguments.noise.over(arguments.probe.noise(probe.as_ref(), &dataset, Noise::default())?);
+    // What the touches have in the end.
+    let stated = dataset.real().and(&noise);
     let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
@@ -140,7 +142,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             error_rate: arguments.error_rate,
             max_touches: arguments.max_touches,
             seed: arguments.seed,
-            noise,
+            noise: stated,
         };
         let confusion = arguments.confusion.map(|touches| -> Result<_> {
             Ok(Confusion {

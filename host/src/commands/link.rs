@@ -1,6 +1,8 @@
 use super::progress::Bar;
+use super::record::LinkArguments;
 use crate::chip::{
-    ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Update, probability, stream,
+    ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Transport, Update, probability,
+    stream,
 };
 use crate::compile::CompiledModel;
 use crate::error::ChipProblem;
@@ -23,7 +25,7 @@ pub(crate) struct ChipOptions {
     /// Touches of one object before the next object begins
     #[arg(long, value_name = "N", default_value_t = 60)]
     sequence: usize,
-    /// Touches in all, from a data set [default: all that it holds]
+    /// Touches in all, from a data set or to record [default: all that it holds; until Ctrl-C]
     #[arg(long, value_name = "N")]
     touches: Option<u64>,
     /// Ask the chip after each touch for the approach that helps most; its model needs a plan (see `palpate plan`)
@@ -45,18 +47,25 @@ pub(crate) struct ChipOptions {
 }
 
 impl ChipOptions {
+    /// Opens the line.
+    fn transport(&self, port: &Port) -> Result<Transport> {
+        let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
+        let transport = port.open(self.baud, &emulator)?;
+        Ok(match self.bad_line {
+            Some(faults) => transport.with_faults(faults, self.seed),
+            None => transport,
+        })
+    }
+
     /// Opens a session, and loads the model if there is one to load.
     pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledModel>)> {
         let model = self.load.as_deref().map(CompiledModel::read).transpose()?;
-        let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
-        let mut transport = port.open(self.baud, &emulator)?;
-        let mut settings = HostSettings::default();
-        if let Some(faults) = self.bad_line {
-            transport = transport.with_faults(faults, self.seed);
+        let settings = match self.bad_line {
             // A bad line fails often: retry sooner, and more often.
-            settings = HostSettings { retry: 50_000, attempts: 200 };
-        }
-        let mut connection = Connection::open(transport, settings)?;
+            Some(_) => HostSettings { retry: 50_000, attempts: 200 },
+            None => HostSettings::default(),
+        };
+        let mut connection = Connection::open(self.transport(port)?, settings)?;
         if let Some(file) = &model {
             connection.load(file.bytes(), &Bar::new())?;
         }
@@ -86,6 +95,8 @@ Examples:
   palpate link /dev/ttyACM0 touches/                  recognize a data set
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
   palpate link /dev/ttyACM0 - --active                where to touch next
+  palpate link /dev/ttyACM0 --record recorded --object bowl
+                                                      keep what its fingers touch
   palpate link emulator --load model.palpate --parity touches/ --touches 10000
   palpate link emulator --load model.palpate --parity touches/ \\
       --bad-line 0.001,0.001,0.01,5
@@ -93,7 +104,11 @@ Examples:
 The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station.
 
 A touch is one line of three contact times in seconds (- for a missing contact), as in a data set. An empty line begins \
-another object. Every touch is counted exactly once, however bad the line.")]
+another object. Every touch is counted exactly once, however bad the line.
+
+With --record, what the chip's own fingers touch goes to DIR/NAME.txt, each touch as soon as the chip reports it, and \
+dataset.json says when, with which probe and by which firmware. A model on the chip is not needed. If the cable is \
+pulled, this waits for it; recording the same object again adds to it. See docs/real-probe.md.")]
 pub(crate) struct Arguments {
     /// A serial port, tcp://HOST:PORT, or emulator
     port: Port,
@@ -112,10 +127,18 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    record: LinkArguments,
+    #[command(flatten)]
     chip: ChipOptions,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    if let Some(recording) = arguments.record.open(&arguments.port.to_string())? {
+        let (port, chip) = (&arguments.port, &arguments.chip);
+        let (connection, _) = chip.open(port)?;
+        let reopen = || chip.transport(port);
+        return arguments.record.run(connection, reopen, recording, chip.touches, arguments.json);
+    }
     let named = arguments.model.as_deref().map(CompiledModel::read).transpose()?;
     let steps = match arguments.parity.as_ref().or(arguments.source.as_ref()) {
         Some(source) => Some(arguments.chip.steps(source)?),

@@ -5,11 +5,13 @@ mod capture;
 mod cast;
 mod chips;
 mod completions;
+mod data;
 mod design;
 mod evaluate;
 mod expected;
 mod export;
 mod figures;
+mod fit;
 mod inspect;
 mod link;
 mod noise;
@@ -17,15 +19,18 @@ mod numbers;
 mod objects;
 mod parity;
 mod plan;
+mod play;
 mod probe;
 mod progress;
 mod recognize;
 mod recognize_rows;
+mod record;
 mod report;
 mod run;
 mod shell;
 mod stated;
 mod strangers;
+mod teach;
 mod train;
 mod tune;
 mod verify;
@@ -64,10 +69,14 @@ commands! {
     Objects => objects,
     /// Make a page that shows an object and some touches, to look at in a browser
     View => view,
+    /// Make a page on which objects can be touched, with the recognizer inside
+    Play => play,
     /// Touch objects with the virtual probe
     Capture => capture,
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     Cast => cast,
+    /// Look after data sets of touches: record, check, compare
+    Data => data,
     /// Train an ensemble on captured touches
     Train => train,
     /// Compile an ensemble to the bytes that the chip reads
@@ -84,7 +93,7 @@ commands! {
     Calibrate => calibrate,
     /// Find the best model that fits a chip
     Tune => tune,
-    /// Find out which probe to build for your objects
+    /// Find out which probe to build for your objects, and what is crooked about the one you have
     Probe => design,
     /// Compare a compiled model with its ensemble
     Parity => parity,
@@ -112,7 +121,7 @@ commands! {
     after_help = "\
 Examples:
   palpate run                 capture, train and recognize built-in objects
-  palpate run meshes/ -o out  the same for your own OBJ files
+  palpate run meshes/ -o out  the same for your own meshes
   palpate help capture        what a command does, with examples"
 )]
 pub(crate) struct Cli {

@@ -4,6 +4,7 @@ use crate::ensemble::StatedProbe;
 use crate::error::ProbeProblem;
 use crate::mesh::{BACKGROUND, Object, builtin, source};
 use crate::probe::file::ProbeFile;
+use crate::touches::noise::Noise;
 use crate::touches::{Dataset, Origin};
 use crate::{Error, Result};
 use palpate_shared::format::Length;
@@ -43,6 +44,27 @@ impl ProbeArguments {
         }
         Ok(own.or(Some(given)))
     }
+
+    /// What is to be added to the touches of a data set: what the file says under `[real]`, without a file `usual`, and
+    /// nothing where the touches were captured with such a file and have it already.
+    ///
+    /// # Errors
+    /// If the data set was captured with another `[real]`.
+    pub(crate) fn noise(&self, file: Option<&ProbeFile>, dataset: &Dataset, usual: Noise) -> Result<Noise> {
+        let there = dataset.real();
+        let asked = file.map(|file| file.real).filter(|real| !real.is_none());
+        match asked {
+            None if there.is_none() => Ok(usual),
+            Some(real) if there.is_none() => Ok(real),
+            Some(real) if real != there => Err(ProbeProblem::Differs {
+                first: self.probe.as_ref().map_or_else(String::new, |path| path.display().to_string()),
+                second: "the data set".into(),
+                differences: format!("[real]: {real}; and {there}"),
+            }
+            .into()),
+            _ => Ok(Noise::default()),
+        }
+    }
 }
 
 /// The probe file, and whether objects keep their true sizes.
@@ -57,10 +79,10 @@ pub(crate) struct SizeArguments {
 /// Whether objects keep their true sizes, and whether they have instances.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct UnitArguments {
-    /// Touch objects at their true size, with a probe in millimeters; built-in objects have one, for others say --unit
+    /// Touch objects at their true size, with a probe in millimeters; built-in objects, glTF and COLLADA state their unit, for others say --unit
     #[arg(long)]
     true_size: bool,
-    /// The unit of the meshes: mm, cm, m or in; for one object NAME=cm; may be given several times
+    /// The unit of the meshes that do not state one: mm, cm, m or in; for one object, whatever its file states, NAME=cm; may be given several times
     #[arg(long, value_name = "[NAME=]mm|cm|m|in", value_parser = mesh_unit, requires = "true_size")]
     unit: Vec<(Option<String>, f64)>,
     /// Objects with several meshes: of a directory inside a directory each mesh is an instance; with a number N, each built-in object has N varied instances
@@ -75,6 +97,7 @@ impl UnitArguments {
             None => source::objects(sources)?,
             Some(count) => self.of_instances(sources, count, seed)?,
         };
+        tell(&objects);
         self.add_units(&mut objects)?;
         Ok(objects)
     }
@@ -116,6 +139,7 @@ impl UnitArguments {
     /// One object, with its true size as far as it is known.
     pub(crate) fn object(&self, source: &str) -> Result<Object> {
         let mut object = [source::object(source)?];
+        tell(&object);
         self.add_units(&mut object)?;
         let [object] = object;
         Ok(object)
@@ -210,6 +234,13 @@ pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
     match size.lacks_probe() {
         true => Err(Error::setting("probe", "not given", "a file with unit = \"mm\": the published probe is in units")),
         false => Ok(()),
+    }
+}
+
+/// Tells on stderr how objects were found and read, where that may surprise.
+fn tell(objects: &[Object]) {
+    for object in objects {
+        object.notes.iter().for_each(|note| eprintln!("{}: {note}", object.name));
     }
 }
 

@@ -14,13 +14,15 @@ use std::path::PathBuf;
 Examples:
   palpate report                    the built-in objects, in about ten minutes
   palpate report --quick -o quick   fewer touches, in half a minute
-  palpate report meshes/ -o report  your own OBJ files
+  palpate report meshes/ -o report  your own meshes
   palpate report meshes/ --true-size --unit mm --probe probe.toml
                                     objects as large as they are, and your probe
   palpate report --noise 0..10ms    with our robust model trained for this noise
+  palpate report meshes/ --recorded recorded --probe probe.toml
+                                    is the simulation of your probe right?
   palpate report --resume           continue an interrupted report")]
 pub(crate) struct Arguments {
-    /// Where objects come from: `builtin` or a built-in object's name, an OBJ file, or a directory of OBJ files
+    /// Where objects come from: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory of meshes
     #[arg(default_value = "builtin", value_name = "SOURCE")]
     sources: Vec<String>,
     /// Where the page, its figures and tables go
@@ -35,6 +37,9 @@ pub(crate) struct Arguments {
     /// Measure growth and generalization too, which use built-in objects; the default for `builtin` alone
     #[arg(long)]
     growth: bool,
+    /// Recorded touches of the objects, to compare simulated ones with: by the probe of --probe, as it really is
+    #[arg(long, value_name = "DIR")]
+    recorded: Option<PathBuf>,
     /// Continue an interrupted report of the same program with the same settings and objects
     #[arg(long)]
     resume: bool,
@@ -51,9 +56,11 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { sources, output, seed, quick, growth, resume, force, json, size, noise } = arguments;
+    let Arguments { sources, output, seed, quick, growth, recorded, resume, force, json, size, noise } = arguments;
     refuse_stdout(&output)?;
-    let command = command(&sources, seed, quick, growth, &[size.words(), noise.words()].concat());
+    let compared = recorded.iter().flat_map(|path| ["--recorded".to_owned(), path.to_string_lossy().into_owned()]);
+    let compared: Vec<String> = compared.collect();
+    let command = command(&sources, seed, quick, growth, &[compared, size.words(), noise.words()].concat());
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
     let growth = settings.growth || growth;
     refuse_unstated(&size)?;
@@ -65,7 +72,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         None => settings.noise,
     };
     noise.check()?;
-    let settings = Settings { command, growth, noise, capture, ..settings };
+    let real = real.unwrap_or_default();
+    let settings = Settings { command, growth, noise, real, recorded, capture, ..settings };
     let objects = || size.objects(&settings.sources, seed);
     let existing = Existing { resume, replace: force };
     let written = report::report_on(&objects, &settings, &output, existing, &Bar::new())?;

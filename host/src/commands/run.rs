@@ -13,7 +13,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate run                  ten built-in objects; results in out/
-  palpate run meshes/ -o mine  your own OBJ files
+  palpate run meshes/ -o mine  your own meshes
   palpate run --touches 2000   a quick look
   palpate run --noise 0..5ms --timer 1ms
                                trained for a real switch, and tested with one
@@ -27,9 +27,9 @@ Three methods are trained and compared: the published one, on the times of full 
 
 The models promise an error rate of 1 %: their thresholds are found on touches that are captured for that and nothing else (see `palpate help calibrate`).
 
-Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html.")]
+Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html, and play.html, on which the objects can be touched (see `palpate help play`).")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin` or built-in objects' names, OBJ files, directories of them
+    /// What to touch: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// Directory for the results

@@ -1,13 +1,16 @@
 use super::noise::NoiseArguments;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
-use crate::Result;
+use super::teach::TeachArguments;
+use crate::ensemble::Ensemble;
 use crate::ensemble::train::{self, Engine, Settings};
 use crate::evaluate::{self, CostOfNoise};
+use crate::mesh::BACKGROUND;
 use crate::output;
-use crate::probe::file::ProbeFile;
-use crate::touches::Dataset;
+use crate::teach::{self, Taught};
 use crate::touches::noise::Noise;
+use crate::touches::{Dataset, ObjectTouches};
+use crate::{Error, Result};
 use palpate_onboard::Refused;
 use palpate_shared::format::Counted;
 use palpate_shared::{Descriptor, Touch};
@@ -25,7 +28,9 @@ A data set of approaches also holds touches with one or two contacts, and approa
 
 The ensemble states the probe that the data set was captured with; models exported from it do as well. With --probe, \
 the data set must have been captured with the probe of the file, and what the file says under [real] is added to the \
-touches.
+touches, unless they were captured with it and have it already.
+
+With --teach, objects are learned from recorded touches, which are not disturbed further. The trees are those of the simulated objects, or of the ensemble that --extend names; every leaf gets a value more. How much the touches are smoothed is found by cross-validation, and so is a constant that is added with every touch, so that the object is missed as often as others are taken for it. What is printed comes from recorded touches that were held out; of the simulated ones, trees have seen all.
 
 Examples:
   palpate train data -o ensemble.json
@@ -39,10 +44,17 @@ Examples:
   palpate train data -o table.json --bins 64,16  for a small, very fast table
   palpate train data -o robust.json --noise 0..10ms --timer 1ms
   palpate train data -o real.json --probe probe.toml
+  palpate train approaches -o taught.json --teach pot.txt
+  palpate train approaches -o taught.json --teach pot.txt --page pot.html
+  palpate train approaches -o more.json --extend taught.json --teach real
+  palpate train --teach real -o own.json  no simulation at all
   palpate train data -o turned.json --descriptor oriented --pose-noise 5deg")]
 pub(crate) struct Arguments {
     /// Directory that `palpate capture` filled
-    directory: PathBuf,
+    #[arg(required_unless_present = "teach")]
+    directory: Option<PathBuf>,
+    #[command(flatten)]
+    teach: TeachArguments,
     /// Where to save the ensemble
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -137,30 +149,38 @@ struct Trained {
     seconds: f64,
     /// What [`SWITCH`] would cost; null where the training had noise, or too few touches.
     cost_of_noise: Option<CostOfNoise>,
+    /// What was learned from recorded touches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    taught: Option<Taught>,
 }
 
 /// The noise whose cost is given, in microseconds: what a good switch and a timer add.
 const SWITCH: f64 = 1_000.0;
 
+/// An ensemble, the touches that it was trained on, and what it was taught.
+struct Made {
+    ensemble: Ensemble,
+    dataset: Dataset,
+    taught: Option<Taught>,
+    /// Whether it was trained here, on simulated touches without noise.
+    is_clean: bool,
+    settings: Settings,
+}
+
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
-    let dataset = super::dataset(&arguments.directory)?;
-    let file = arguments.probe.read()?;
-    let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let settings = Settings { probe, ..arguments.settings(file.as_ref()) };
-    let is_clean = settings.noise.is_none();
+    let read = arguments.directory.iter().flat_map(|directory| super::files_of(directory));
+    let read: Vec<PathBuf> = read.chain(arguments.teach.files()).collect();
+    output::refuse_input(&arguments.output, &read)?;
+    arguments.teach.page.iter().try_for_each(|page| output::refuse_input(page, &read))?;
     let start = Instant::now();
-    let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
-    let trained = match &background {
-        None => train::train(&dataset, &settings, &Bar::new()),
-        Some(background) => train::train_with_background(&dataset, background, &settings, &Bar::new()),
+    let recorded = arguments.teach.read()?;
+    let Made { ensemble, dataset, taught, is_clean, settings } = match (&arguments.directory, recorded) {
+        (Some(directory), recorded) => simulated(&arguments, directory, recorded.as_ref())?,
+        (None, recorded) => alone(&arguments, recorded.unwrap_or_default())?,
     };
-    let ensemble = trained.map_err(|error| match error.exit_code() {
-        1 => error.in_file(&arguments.directory),
-        _ => error,
-    })?;
     let seconds = start.elapsed().as_secs_f64();
     ensemble.save(&arguments.output)?;
+    arguments.teach.write_page(taught.as_ref())?;
     let evidence = ensemble.trained_touches();
     let is_used = |touch: &&Touch| Refused::check(&evidence, touch).is_ok();
     let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
@@ -177,6 +197,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         splits,
         leaves: nodes - splits,
         seconds,
+        taught,
         cost_of_noise: match is_clean {
             true => evaluate::cost_of_noise(&dataset, &settings, &Noise::gaussian(SWITCH))?,
             false => None,
@@ -194,7 +215,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         trained.used,
         trained.touches,
         if dataset.holds_approaches() { "approaches" } else { "touches" },
-        trained.objects,
+        dataset.objects.len(),
         match evidence.counted {
             Counted::Full => "full touches",
             Counted::Contacts => "those with a contact",
@@ -202,8 +223,69 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         },
         trained.seconds
     );
-    let text = text + &cost(&trained, is_clean);
+    let text = text + &cost(&trained, is_clean) + &trained.taught.as_ref().map_or_else(String::new, super::teach::text);
     output::print_about(&arguments.output, &text)
+}
+
+/// Trains on simulated touches, or takes the ensemble that was, and teaches it the recorded ones, if there are any.
+fn simulated(arguments: &Arguments, directory: &PathBuf, recorded: Option<&Dataset>) -> Result<Made> {
+    let dataset = super::dataset(directory)?;
+    let file = arguments.probe.read()?;
+    let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
+    let mut settings = Settings { probe, ..arguments.settings() };
+    settings.noise = arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, settings.noise)?);
+    let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
+    let in_directory = |error: Error| match error.exit_code() {
+        1 => error.in_file(directory),
+        _ => error,
+    };
+    let ensemble = match (&arguments.teach.extend, &background) {
+        (Some(path), _) => Ensemble::load(path)?,
+        (None, None) => train::train(&dataset, &settings, &Bar::new()).map_err(in_directory)?,
+        (None, Some(background)) => {
+            train::train_with_background(&dataset, background, &settings, &Bar::new()).map_err(in_directory)?
+        }
+    };
+    let is_clean = recorded.is_none() && dataset.real().and(&settings.noise).is_none();
+    let Some(recorded) = recorded else {
+        return Ok(Made { ensemble, dataset, taught: None, is_clean, settings });
+    };
+    let mut known = dataset.clone();
+    if let Some(background) = background {
+        let touches = background.objects.into_iter().flat_map(|object| object.touches).collect();
+        known.objects.push(ObjectTouches { name: BACKGROUND.into(), touches });
+    }
+    // An ensemble that is there states what it was trained for.
+    let noise = arguments.teach.extend.is_none().then_some(settings.noise);
+    let how = teach::Settings { noise, ..teaching(&settings) };
+    let (ensemble, taught) = teach::teach(&ensemble, &known, recorded, &how, &Bar::new())?;
+    Ok(Made { ensemble, dataset, taught: Some(taught), is_clean, settings })
+}
+
+/// Trains on recorded touches alone.
+fn alone(arguments: &Arguments, recorded: Dataset) -> Result<Made> {
+    if arguments.noise.is_given() {
+        return Err(Error::setting(
+            "noise",
+            "given",
+            "it with simulated touches: recorded ones have noise of their own",
+        ));
+    }
+    if let Some(background) = &arguments.background {
+        let allowed = "it with simulated touches: recorded ones are trained on alone";
+        return Err(Error::setting("background", background.display(), allowed));
+    }
+    let file = arguments.probe.read()?;
+    let probe = arguments.probe.of_dataset(file.as_ref(), &recorded)?;
+    let settings = Settings { probe, noise: Noise::default(), ..arguments.settings() };
+    let (ensemble, taught) = teach::alone(&recorded, &settings, &teaching(&settings), &Bar::new())?;
+    Ok(Made { ensemble, dataset: recorded, taught: Some(taught), is_clean: false, settings })
+}
+
+/// How objects are taught to an ensemble of such a training.
+fn teaching(settings: &Settings) -> teach::Settings {
+    let Settings { seed, threads, leaf_bits, .. } = *settings;
+    teach::Settings { seed, threads, leaf_bits, ..teach::Settings::default() }
 }
 
 /// What noise would cost, as a line; nothing where the training had noise.
@@ -226,7 +308,8 @@ fn cost(trained: &Trained, is_clean: bool) -> String {
 }
 
 impl Arguments {
-    fn settings(&self, probe: Option<&ProbeFile>) -> Settings {
+    /// All but the noise and the probe.
+    fn settings(&self) -> Settings {
         let preset = match self.preset {
             Preset::Compact => Settings::compact(),
             Preset::Paper => Settings::paper(),
@@ -247,7 +330,7 @@ impl Arguments {
             bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
             feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
             leaf_bits: self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-            noise: self.noise.over(probe.map_or(preset.noise, |file| file.real)),
+            noise: preset.noise,
             seed: self.seed,
             threads: self.threads,
             probe: None,

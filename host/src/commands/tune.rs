@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             max_instructions: arguments.max_instructions,
             core: arguments.chip,
             probe: arguments.probe.of_dataset(file.as_ref(), &dataset)?,
-            noise: arguments.noise.over(file.map_or_else(Noise::default, |file| file.real)),
+            noise: arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?),
             error_rate: arguments.error_rate,
             groups: arguments.groups,
             seed: arguments.seed,

@@ -1,6 +1,7 @@
 use super::probe::{SizeArguments, refuse_unstated};
 use crate::Result;
 use crate::error::CaptureProblem;
+use crate::mesh::facts::Facts;
 use crate::output;
 use crate::probe::approach::Probe;
 use crate::report::view;
@@ -12,7 +13,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate view bowl -o bowl.html                  a built-in object
-  palpate view cup.obj -o cup.html                your own mesh: right side out?
+  palpate view cup.stl -o cup.html                your own mesh: what is wrong with it?
   palpate view fork -o fork.html --touches 60     more touches
   palpate view cup.obj -o cup.html --radius 0.05  with thinner fingers
   palpate view cup.obj -o cup.html --true-size --unit mm --probe probe.toml
@@ -21,7 +22,7 @@ Examples:
 The page works in any browser, without a network. The inside of the surface is orange: a mesh that shows orange from
 outside is inside out, or has holes.")]
 pub(crate) struct Arguments {
-    /// An OBJ file, or the name of a built-in object if there is no such file
+    /// A mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or the name of a built-in object if there is no such file
     #[arg(value_name = "OBJECT")]
     object: String,
     /// The page to write
@@ -68,5 +69,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         &view::Settings { touches: *touches, misses: *misses, seed: *seed, length, clearance, probe },
     )?;
     output::write_bytes(&arguments.output, page.as_bytes())?;
-    output::print_about(&arguments.output, &format!("{}: open it in a browser\n", arguments.output.display()))
+    let mut text = format!("{}: open it in a browser\n", arguments.output.display());
+    let complaints = Facts::of(object.mesh()).complaints(object.millimeters);
+    match complaints.is_empty() {
+        true => text += &format!("{}: nothing is wrong with the mesh\n", object.name),
+        false => complaints.iter().for_each(|complaint| text += &format!("{}: {complaint}\n", object.name)),
+    }
+    output::print_about(&arguments.output, &text)
 }

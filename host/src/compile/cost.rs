@@ -180,7 +180,7 @@ const M4F: Costs = Costs {
     leaf: Leaf { ten_i8: 29, five_i16: 19, five_f32: 30, alone: 11 },
     preorder: (25.0, 57, 5),
     step: (17.0, 28.0),
-    grid: (545, 5),
+    grid: (442, 5),
 };
 
 const M0_PLUS: Costs = Costs {
@@ -193,7 +193,7 @@ const M0_PLUS: Costs = Costs {
     leaf: Leaf { ten_i8: 57, five_i16: 31, five_f32: 0, alone: 14 },
     preorder: (35.0, 80, 7),
     step: (24.0, 39.0),
-    grid: (695, 7),
+    grid: (506, 7),
 };
 
 impl Costs {
@@ -310,7 +310,7 @@ mod tests {
             }
         }
         let grid = Shape { layout: Layout::Grid, leaf: LeafType::I8, objects: 10, axes: 2, groups: &[], nodes: &[] };
-        assert_eq!(Instructions::new(&grid), Instructions { m4f: 595, m0_plus: Some(765) });
+        assert_eq!(Instructions::new(&grid), Instructions { m4f: 492, m0_plus: Some(576) });
     }
 
     #[test]

@@ -118,7 +118,7 @@ fn check_features(names: &[String], ensemble: &Ensemble) -> Result<(), EnsembleP
 }
 
 /// Whether these names can be an ensemble's objects.
-pub(super) fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
+pub(crate) fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
     if !(2..=MAX_OBJECTS).contains(&names.len()) {
         return Err(EnsembleProblem::ObjectCount { count: names.len() });
     }

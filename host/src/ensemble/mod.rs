@@ -14,7 +14,7 @@ mod origin;
 pub mod train;
 mod xgboost;
 
-pub(crate) use check::{MAX_FEATURES, MAX_OBJECTS, check_leaf};
+pub(crate) use check::{MAX_FEATURES, MAX_OBJECTS, check_leaf, check_names};
 pub use inputs::Inputs;
 pub use origin::{Imported, Origin, StatedProbe, Trained};
 
@@ -91,17 +91,18 @@ impl Tree {
     /// # Panics
     /// If a child's or a feature's index is out of range, which [`Ensemble::check`] rules out.
     pub fn leaf(&self, features: &[f32]) -> &[f32] {
+        self.nodes[self.leaf_node(features)].leaf().unwrap_or_default()
+    }
+
+    /// The index of that leaf among the nodes.
+    pub(crate) fn leaf_node(&self, features: &[f32]) -> usize {
         let mut index = 0;
-        loop {
-            match &self.nodes[index] {
-                Node::Leaf(values) => return values,
-                Node::Split { feature, threshold, missing_left, left, right } => {
-                    let value = features[*feature];
-                    let goes_left = if value.is_nan() { *missing_left } else { value < *threshold };
-                    index = if goes_left { *left } else { *right };
-                }
-            }
+        while let Node::Split { feature, threshold, missing_left, left, right } = &self.nodes[index] {
+            let value = features[*feature];
+            let goes_left = if value.is_nan() { *missing_left } else { value < *threshold };
+            index = if goes_left { *left } else { *right };
         }
+        index
     }
 }
 

@@ -54,6 +54,14 @@ pub enum CaptureProblem {
         /// The files' names.
         files: Vec<String>,
     },
+    /// The directory holds recorded touches, which no capture could make again.
+    #[error("holds {touches} recorded touches of {}", list(objects))]
+    HoldsRecorded {
+        /// The objects.
+        objects: Vec<String>,
+        /// How many touches there are of them.
+        touches: u64,
+    },
     /// The directory holds an unfinished capture.
     #[error("holds an unfinished capture of {}, with {touches} touches so far", list(objects))]
     HoldsUnfinished {
@@ -133,6 +141,7 @@ impl CaptureProblem {
             Self::Busy => "Wait until it is done, or give another directory.",
             Self::HoldsOtherObjects { .. } => "Give another directory, add to these touches, or replace them.",
             Self::HoldsOtherSettings { .. } => "Give another directory, or replace these touches.",
+            Self::HoldsRecorded { .. } => "Give another directory: recorded and simulated touches are not mixed.",
             Self::HoldsFiles { .. } => "Give another directory, or move the files away.",
             Self::HoldsUnfinished { .. } => "Resume that capture, replace it, or give another directory.",
             Self::AlreadyThere { .. } => "Leave them out, or give another directory.",

@@ -100,6 +100,12 @@ pub enum EvaluateProblem {
     /// There is one object only.
     #[error("the data set has one object: there is nothing to exchange it for")]
     NothingToSwitch,
+    /// Recorded and simulated touches cannot be compared.
+    #[error("the touches cannot be compared: {detail}")]
+    Incomparable {
+        /// Why not.
+        detail: String,
+    },
     /// A line is not a touch.
     #[error("{detail}")]
     Touch {
@@ -150,6 +156,7 @@ impl EvaluateProblem {
             }
             Self::NotCompiled => "Export the ensemble first.",
             Self::NothingToSwitch => "Capture another object.",
+            Self::Incomparable { .. } => "Give recorded and simulated touches of the same objects, and simulate every approach (--approaches).",
             Self::Touch { .. } => "Correct the line.",
             Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
         }

@@ -13,7 +13,7 @@ pub enum MeshProblem {
         builtin: Vec<&'static str>,
     },
     /// A directory holds no mesh.
-    #[error("no OBJ file here")]
+    #[error("no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb or .dae")]
     NoMeshes,
     /// Several objects where one is asked for.
     #[error("{count} objects, where one is needed")]
@@ -73,6 +73,39 @@ pub enum MeshProblem {
         /// How many vertices the file has.
         vertices: u64,
     },
+    /// A face's index is negative, or larger than the number of vertices.
+    #[error("vertex {index} of a face is missing: there are {vertices} vertices, counted from 0")]
+    NoSuchVertex {
+        /// The index as it stands in the file, counted from 0.
+        index: i64,
+        /// How many vertices there are.
+        vertices: u64,
+    },
+    /// A file is not what a file of its kind must be.
+    #[error("the {format} file is damaged: {what}")]
+    Damaged {
+        /// The kind of file: `STL`.
+        format: &'static str,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A file uses what is not read and would change the surface.
+    #[error("{what} is not read")]
+    Unsupported {
+        /// What it is, by name.
+        what: String,
+        /// What to do instead, as a sentence without its full stop.
+        instead: &'static str,
+    },
+    /// The meshes of a file, placed as often as it says, are too large for a file of its length; or a pipe does not end.
+    #[error("the mesh would take more than {limit} bytes")]
+    TooLarge {
+        /// How many bytes it may take.
+        limit: u64,
+    },
+    /// More vertices than an index can tell apart.
+    #[error("the mesh has more than 4294967295 vertices")]
+    TooManyVertices,
     /// The parser refuses the file for another reason.
     #[error("cannot be read as a mesh ({reason})")]
     Unreadable {
@@ -120,8 +153,8 @@ impl MeshProblem {
             Self::NoSuchSource { builtin } => {
                 format!("Check the path, or give one of the built-in objects: {}.", builtin.join(", "))
             }
-            Self::NoMeshes => "Give a directory that holds .obj files.".into(),
-            Self::SeveralObjects { .. } => "Give one OBJ file, or the name of one built-in object.".into(),
+            Self::NoMeshes => "Give a directory that holds such files.".into(),
+            Self::SeveralObjects { .. } => "Give one mesh file, or the name of one built-in object.".into(),
             Self::SameName { .. } => "Rename one of the files, or leave one out.".into(),
             Self::MissingCoordinate { .. }
             | Self::NotANumber { .. }
@@ -129,8 +162,13 @@ impl MeshProblem {
             | Self::NotAnIndex { .. }
             | Self::IndexBeforeFirst { .. }
             | Self::IndexAfterLast { .. } => "Correct the line, or export the mesh again.".into(),
+            Self::NoSuchVertex { .. } | Self::Damaged { .. } => {
+                "Export the mesh again, or convert it to another of OBJ, STL, PLY, GLB and COLLADA.".into()
+            }
+            Self::Unsupported { instead, .. } => format!("{instead}."),
+            Self::TooLarge { .. } | Self::TooManyVertices => "Simplify the mesh, or export it in parts.".into(),
             Self::Unreadable { .. } | Self::NoFaces | Self::NoExtent => {
-                "Export the mesh as a Wavefront OBJ file with faces.".into()
+                "Export the mesh as a file with faces: OBJ, STL, PLY, GLB or COLLADA.".into()
             }
             Self::MissingVertex { .. } | Self::VertexNotFinite { .. } => {
                 "Give a mesh whose faces have finite vertices.".into()

@@ -11,6 +11,7 @@ mod page;
 mod probe;
 mod report;
 mod rows;
+mod teach;
 mod touches;
 mod tune;
 
@@ -25,6 +26,7 @@ pub use page::PageProblem;
 pub use probe::ProbeProblem;
 pub use report::ReportProblem;
 pub use rows::RowsProblem;
+pub use teach::TeachProblem;
 pub use touches::TouchesProblem;
 pub use tune::TuneProblem;
 
@@ -120,6 +122,9 @@ pub enum Problem {
     /// With rows of features, and models over them.
     #[error(transparent)]
     Rows(#[from] RowsProblem),
+    /// With teaching objects from recorded touches.
+    #[error(transparent)]
+    Teach(#[from] TeachProblem),
     /// With searching for a model.
     #[error(transparent)]
     Tune(#[from] TuneProblem),
@@ -148,6 +153,7 @@ impl Problem {
             Self::Evaluate(problem) => problem.fix(),
             Self::Calibrate(problem) => problem.fix(),
             Self::Rows(problem) => problem.fix(),
+            Self::Teach(problem) => problem.fix(),
             Self::Tune(problem) => problem.fix(),
             Self::Chip(problem) => problem.fix(),
             Self::Page(problem) => problem.fix(),
@@ -209,6 +215,7 @@ problems!(
     EvaluateProblem,
     CalibrateProblem,
     RowsProblem,
+    TeachProblem,
     TuneProblem,
     ChipProblem,
     PageProblem,

@@ -152,6 +152,42 @@ pub enum TouchesProblem {
     /// A Parquet file is not the one that was captured.
     #[error("damaged or changed: its checksum is not the one in dataset.json")]
     OtherChecksum,
+    /// Another program has locked the directory.
+    #[error("another program is writing into this directory")]
+    Busy,
+    /// Touches are to be recorded into a directory that holds simulated ones.
+    #[error("holds {touches} simulated touches of {objects}")]
+    HoldsSimulated {
+        /// The objects.
+        objects: String,
+        /// How many touches there are of them.
+        touches: u64,
+    },
+    /// Touches are to be recorded into a directory with files of touches that no listing names.
+    #[error("holds {files}, which dataset.json does not list")]
+    Unlisted {
+        /// The files' names.
+        files: String,
+    },
+    /// Recorded touches are to be added to others that were made in another way.
+    #[error("cannot add to these recorded touches: {differences}")]
+    OtherRecording {
+        /// What differs, and how.
+        differences: String,
+    },
+    /// The same lines were recorded before.
+    #[error("the same {touches} touches of {object} were recorded before, on {began}")]
+    RecordedBefore {
+        /// The object.
+        object: String,
+        /// How many touches they are.
+        touches: u64,
+        /// When they were recorded.
+        began: String,
+    },
+    /// A touch has no pose, and is to be recorded with one.
+    #[error("no pose, and it is to be recorded with one")]
+    NoPose,
     /// A text names no shard.
     #[error("{text:?} is no shard")]
     BadShard {
@@ -171,6 +207,21 @@ pub enum TouchesProblem {
         text: String,
         /// What to write, with an example.
         example: &'static str,
+    },
+    /// A file whose name does not say what it holds.
+    #[error("not a file of touches by its name")]
+    NoFormat,
+    /// An object was recorded in two places.
+    #[error("the object {name} was given twice")]
+    RecordedTwice {
+        /// The object.
+        name: String,
+    },
+    /// A check of a data set found what would make training wrong.
+    #[error("training on these touches would be wrong, for {count} reason{}", if *count == 1 { "" } else { "s" })]
+    WouldTrainWrong {
+        /// How many reasons there are.
+        count: usize,
     },
     /// An object has too few touches to be divided.
     #[error("{name} has only {touches} touches, too few to split")]
@@ -216,12 +267,21 @@ impl TouchesProblem {
                 "Remove the file if the touches are from elsewhere, else capture them again."
             }
             Self::Missing { .. } | Self::OtherCount { .. } => {
-                "Capture the objects again, or remove dataset.json if this is meant."
+                "Restore the file or capture the objects again, or remove dataset.json if this is meant."
             }
+            Self::Busy => "Wait until it is done, or give another directory.",
+            Self::HoldsSimulated { .. } => "Give another directory: recorded and simulated touches are not mixed.",
+            Self::Unlisted { .. } => "Give another directory, or move the files away.",
+            Self::OtherRecording { .. } => "Record as these touches were, or into another directory.",
+            Self::RecordedBefore { .. } => "Give other lines.",
+            Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
             Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
+            Self::NoFormat => "Call it like the object, with the ending .txt or .parquet.",
+            Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
             Self::BadQuantity { example, .. } => return format!("Give {example}."),
+            Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }
         .into()

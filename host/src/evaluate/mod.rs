@@ -35,6 +35,8 @@
 mod active;
 mod approaches;
 #[cfg(feature = "train")]
+pub mod compare;
+#[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
 mod draws;
@@ -64,6 +66,8 @@ pub use approaches::{ApproachSequential, Approaches};
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
+#[cfg(feature = "train")]
+pub(crate) use margins::best;
 pub(crate) use margins::least_common_multiple;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};

@@ -52,13 +52,24 @@ pub fn parity(
         return Err(EvaluateProblem::NoTouches.into());
     }
     let touches: Vec<&Touch> = dataset.objects.iter().flat_map(|object| &object.touches).collect();
-    let Difference { max_margin_error, best_differs } = difference(ensemble, model, &touches, progress)?;
+    check(ensemble, model)?;
+    let full = FullMargins::new(ensemble, &touches, progress)?;
+    let margins = touches.par_iter().enumerate().map(|(index, touch)| compare_margins(full.of(index), model, touch));
+    let Difference { max_margin_error, best_differs } = margins.reduce(Difference::default, Difference::worse);
+    let firsts: Vec<usize> = dataset
+        .objects
+        .iter()
+        .scan(0, |next, object| Some(std::mem::replace(next, *next + object.touches.len())))
+        .collect();
     progress.begin("verdicts", Some(sequences as u64));
     let runs = (0..sequences).into_par_iter().map(|index| -> Result<_> {
         progress::advance(progress, 1)?;
         let mut rng = random::generator(seed, Purpose::Sequences, "", index as u64);
-        let object = &dataset.objects[rng.random_range(0..dataset.objects.len())];
-        let draw = std::iter::repeat_with(|| object.touches[rng.random_range(0..object.touches.len())]);
+        let object = rng.random_range(0..dataset.objects.len());
+        let draw = std::iter::repeat_with(|| {
+            let index = firsts[object] + rng.random_range(0..dataset.objects[object].touches.len());
+            (touches[index], full.of(index))
+        });
         compare_verdicts::<CAPACITY>(ensemble, model, draw)
     });
     let (verdict_differs, touches_differ) = runs.try_reduce(|| (0, 0), |a, b| Ok((a.0 + b.0, a.1 + b.1)))?;
@@ -82,6 +93,40 @@ pub struct Difference {
     pub best_differs: usize,
 }
 
+impl Difference {
+    fn worse(self, other: Self) -> Self {
+        Self {
+            max_margin_error: self.max_margin_error.max(other.max_margin_error),
+            best_differs: self.best_differs + other.best_differs,
+        }
+    }
+}
+
+/// The full model's margins of every touch of a data set. Sequences draw the same touches again and again.
+struct FullMargins {
+    objects: usize,
+    /// Row by row, one row per touch.
+    values: Vec<f32>,
+}
+
+impl FullMargins {
+    fn new(ensemble: &Ensemble, touches: &[&Touch], progress: &dyn Progress) -> Result<Self> {
+        progress.begin("margins", Some(touches.len() as u64));
+        let objects = ensemble.objects.len();
+        let mut values = vec![0.0; objects * touches.len()];
+        values.par_chunks_mut(objects).zip(touches).try_for_each(|(row, touch)| -> Result<()> {
+            progress::advance(progress, 1)?;
+            row.copy_from_slice(&ensemble.margins(touch));
+            Ok(())
+        })?;
+        Ok(Self { objects, values })
+    }
+
+    fn of(&self, touch: usize) -> &[f32] {
+        &self.values[touch * self.objects..(touch + 1) * self.objects]
+    }
+}
+
 /// Compares a compiled model's margins with its ensemble's, touch by touch, on all threads.
 ///
 /// # Errors
@@ -94,6 +139,16 @@ pub fn difference(
     touches: &[&Touch],
     progress: &dyn Progress,
 ) -> Result<Difference> {
+    check(ensemble, model)?;
+    progress.begin("margins", Some(touches.len() as u64));
+    let compared = touches.par_iter().map(|touch| -> Result<_> {
+        progress::advance(progress, 1)?;
+        Ok(compare_margins(&ensemble.margins(touch), model, touch))
+    });
+    compared.try_reduce(Difference::default, |a, b| Ok(a.worse(b)))
+}
+
+fn check(ensemble: &Ensemble, model: &Model<'_>) -> Result<()> {
     if ensemble.descriptor().is_none() {
         return Err(EvaluateProblem::RawFeatures.into());
     }
@@ -101,38 +156,28 @@ pub fn difference(
     if model.descriptor() != ensemble.descriptor() || !names.eq(ensemble.objects.iter().map(String::as_str)) {
         return Err(EvaluateProblem::OtherModel.into());
     }
-    progress.begin("margins", Some(touches.len() as u64));
-    let compared = touches.par_iter().map(|touch| -> Result<_> {
-        progress::advance(progress, 1)?;
-        Ok(compare_margins(ensemble, model, touch))
-    });
-    compared.try_reduce(Difference::default, |a, b| {
-        Ok(Difference {
-            max_margin_error: f64::max(a.max_margin_error, b.max_margin_error),
-            best_differs: a.best_differs + b.best_differs,
-        })
-    })
+    Ok(())
 }
 
-fn compare_margins(ensemble: &Ensemble, model: &Model<'_>, touch: &Touch) -> Difference {
-    let full = ensemble.margins(touch);
+fn compare_margins(full: &[f32], model: &Model<'_>, touch: &Touch) -> Difference {
     let mut margins = [0; CAPACITY];
     model.margins(touch, &mut margins);
     let compiled = &margins[..full.len()];
     let unit = f64::from(model.unit());
     let errors = full.iter().zip(compiled).map(|(full, &int)| (f64::from(*full) - f64::from(int) * unit).abs());
-    let best_differs = usize::from(best(&full) != best(compiled));
+    let best_differs = usize::from(best(full) != best(compiled));
     Difference { max_margin_error: errors.fold(0.0, f64::max), best_differs }
 }
 
-/// Whether the verdicts differ (1, 0), or only the numbers of touches (0, 1).
+/// Whether the verdicts differ (1, 0), or only the numbers of touches (0, 1). `draw` gives touches, each with the full
+/// model's margins.
 ///
 /// # Errors
 /// [`EvaluateProblem::TooManyObjects`] if the model has more than `N` objects.
-fn compare_verdicts<const N: usize>(
+fn compare_verdicts<'t, const N: usize>(
     ensemble: &Ensemble,
     model: &Model<'_>,
-    mut draw: impl Iterator<Item = Touch>,
+    mut draw: impl Iterator<Item = (&'t Touch, &'t [f32])>,
 ) -> Result<(usize, usize)> {
     let stopping = Stopping::from_model(model);
     let mut compiled = Recognizer::<N>::new(model, stopping)
@@ -143,15 +188,15 @@ fn compare_verdicts<const N: usize>(
     // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict. Where hardly
     // any touch is one that the model was trained for, there may never be a verdict.
     let mut draws = 100 * u64::from(stopping.max_touches());
-    while let Some(touch) = draw.next()
+    while let Some((touch, margins)) = draw.next()
         && draws > 0
         && (compiled.verdict() == Verdict::Undecided || full.verdict() == Verdict::Undecided)
     {
         draws -= 1;
         // What the model was not trained for is not counted by either.
-        let accepted = compiled.push(&touch).is_ok();
+        let accepted = compiled.push(touch).is_ok();
         if accepted && full.verdict() == Verdict::Undecided {
-            full.push(&ensemble.margins(&touch));
+            full.push(margins);
         }
     }
     Ok(match (compiled.verdict(), full.verdict()) {
@@ -189,7 +234,9 @@ mod tests {
         let ensemble = ensemble();
         let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
         let model = compile::open(&bytes).unwrap();
-        let touches = || std::iter::repeat(Touch::from_micros([0, 0, 9]));
+        let touch = Touch::from_micros([0, 0, 9]);
+        let margins = ensemble.margins(&touch);
+        let touches = || std::iter::repeat((&touch, &margins[..]));
         let error = problem(compare_verdicts::<2>(&ensemble, &model, touches()));
         assert_eq!(error, EvaluateProblem::TooManyObjects { objects: 3, capacity: 2 });
         assert_eq!(compare_verdicts::<3>(&ensemble, &model, touches()).unwrap(), (0, 0));

@@ -1,7 +1,8 @@
 //! Triangle meshes: from files, or built in.
 //!
-//! - [`source`] finds objects by what a user names: `builtin`, a built-in object, an OBJ file, a directory of them.
-//! - [`obj`] reads and writes one file; [`builtin`] makes the ten objects that need no file.
+//! - [`source`] finds objects by what a user names: `builtin`, a built-in object, a mesh file, a directory of them.
+//! - [`file`] reads one file: OBJ, STL, PLY, glTF or COLLADA, whichever its content says it is. [`obj`] writes one;
+//!   [`builtin`] makes the ten objects that need no file.
 //! - [`Mesh`] is what comes out: vertices and triangles, in the file's own units. [`Object`] gives it a name.
 //! - [`facts`] says whether a mesh is closed and right side out, how large it is and what volume it encloses.
 //!
@@ -36,10 +37,20 @@ pub mod builtin;
 #[cfg(not(feature = "objects"))]
 #[path = "no_builtin.rs"]
 mod builtin;
+mod collada;
 pub mod facts;
+pub mod file;
+mod gltf;
 pub mod obj;
+mod placed;
+mod ply;
+mod polygon;
+#[cfg(test)]
+mod samples;
 pub mod source;
+mod stl;
 mod triangles;
+mod words;
 
 pub use triangles::Mesh;
 
@@ -54,6 +65,8 @@ pub struct Object {
     pub name: String,
     /// How many millimeters a unit of its meshes is, where that is known: what touching it at its true size needs.
     pub millimeters: Option<f64>,
+    /// What a user should know of how it was found and read: other files of its name that were passed over.
+    pub notes: Vec<String>,
     first: Instance,
     others: Vec<Instance>,
 }
@@ -72,14 +85,14 @@ impl Object {
     pub fn new(name: impl Into<String>, mesh: Mesh) -> Self {
         let name = name.into();
         let first = Instance { name: name.clone(), mesh };
-        Self { name, millimeters: None, first, others: Vec::new() }
+        Self { name, millimeters: None, notes: Vec::new(), first, others: Vec::new() }
     }
 
     /// An object with several meshes of unknown units; none if there is no instance.
     pub fn of_instances(name: impl Into<String>, instances: Vec<Instance>) -> Option<Self> {
         let mut instances = instances.into_iter();
         let first = instances.next()?;
-        Some(Self { name: name.into(), millimeters: None, first, others: instances.collect() })
+        Some(Self { name: name.into(), millimeters: None, notes: Vec::new(), first, others: instances.collect() })
     }
 
     /// Its mesh, or that of its first instance.

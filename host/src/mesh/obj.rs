@@ -2,13 +2,18 @@
 //!
 //! `tobj` parses and indexes. In front of it, `FacesOnly` lets through only vertices and faces, and checks them: so an
 //! error names its line, and what does not shape the surface (normals, materials, groups, lines) cannot break a mesh.
-//! Polygons become triangles here, concave ones too.
 
 use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::Mesh;
+use crate::mesh::polygon::Cutter;
+use crate::mesh::words::{coordinate, number, shown};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
+
+/// The words that lines of OBJ files begin with, as far as they may be the first of a file.
+pub(super) const KEYWORDS: [&[u8]; 11] =
+    [b"v", b"vn", b"vt", b"vp", b"f", b"o", b"g", b"s", b"l", b"mtllib", b"usemtl"];
 
 /// Reads the mesh of an OBJ file: all its objects and groups together, polygons cut into triangles, without faces that
 /// are a single point. Coordinates stay in the units of the file.
@@ -41,18 +46,7 @@ pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
     for model in models {
         append(&mut mesh, model.mesh);
     }
-    if mesh.triangles.is_empty() {
-        return Err(unusable(MeshProblem::NoFaces));
-    }
-    // A face whose corners are one point is no surface. Left in, it could still be touched where it floats, and would
-    // stretch the bounding box.
-    let Mesh { vertices, triangles } = &mut mesh;
-    let vertex = |index: u32| vertices[index as usize];
-    triangles.retain(|&[a, b, c]| vertex(a) != vertex(b) || vertex(b) != vertex(c));
-    if mesh.triangles.is_empty() {
-        return Err(unusable(MeshProblem::NoExtent));
-    }
-    Ok(mesh)
+    mesh.usable().map_err(unusable)
 }
 
 fn append(mesh: &mut Mesh, part: tobj::Mesh) {
@@ -70,51 +64,9 @@ fn append(mesh: &mut Mesh, part: tobj::Mesh) {
         let (face, others) = rest.split_at_mut(arity as usize);
         rest = others;
         face.iter_mut().for_each(|index| *index += base);
-        cutter.cut(face, mesh);
+        let Mesh { vertices, triangles } = &mut *mesh;
+        cutter.cut(face, |index| vertices[index as usize].map(f64::from), triangles);
     }
-}
-
-/// Cuts polygons into triangles.
-#[derive(Default)]
-struct Cutter {
-    earcut: Option<earcut::Earcut<f64>>,
-    corners: Vec<[f64; 3]>,
-    flat: Vec<[f64; 2]>,
-    cut: Vec<u32>,
-}
-
-impl Cutter {
-    fn cut(&mut self, face: &[u32], mesh: &mut Mesh) {
-        self.corners.clear();
-        self.corners.extend(face.iter().map(|&index| mesh.vertices[index as usize].map(f64::from)));
-        if !is_convex(&self.corners) && self.cut_ears() {
-            mesh.triangles.extend(self.cut.as_chunks().0.iter().map(|cut: &[u32; 3]| cut.map(|i| face[i as usize])));
-            return;
-        }
-        for pair in face[1..].windows(2) {
-            mesh.triangles.push([face[0], pair[0], pair[1]]);
-        }
-    }
-
-    /// Cuts `corners` into `cut`. False when the polygon is too degenerate to be flattened: then a fan serves as well.
-    fn cut_ears(&mut self) -> bool {
-        let size = self.corners.iter().flatten().fold(0.0, |size: f64, c| size.max(c.abs()));
-        self.corners.iter_mut().flatten().for_each(|c| *c /= size);
-        self.cut.clear();
-        if size > 0.0 && earcut::utils3d::project3d_to_2d(&self.corners, self.corners.len(), &mut self.flat) {
-            let earcut = self.earcut.get_or_insert_with(earcut::Earcut::new);
-            earcut.earcut(self.flat.iter().copied(), &[] as &[u32], &mut self.cut);
-        }
-        !self.cut.is_empty()
-    }
-}
-
-/// Whether the polygon turns the same way at every corner.
-fn is_convex(corners: &[[f64; 3]]) -> bool {
-    let corner = |index: usize| glam::DVec3::from(corners[index % corners.len()]);
-    let turn = |i: usize| (corner(i + 1) - corner(i)).cross(corner(i + 2) - corner(i + 1));
-    let normal: glam::DVec3 = (0..corners.len()).map(|i| corner(i).cross(corner(i + 1))).sum();
-    corners.len() <= 3 || (0..corners.len()).all(|i| turn(i).dot(normal) >= 0.0)
 }
 
 /// The vertices and faces of an OBJ text, checked, as clean lines for `tobj`. Faces keep only their vertex indices, all
@@ -178,10 +130,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
                 clean.push(b'v');
                 for axis in ['x', 'y', 'z'] {
                     let word = words.next().ok_or(MeshProblem::MissingCoordinate { axis })?;
-                    let value: f32 = number(word).ok_or_else(|| MeshProblem::NotANumber { text: shown(word) })?;
-                    if !value.is_finite() {
-                        return Err(MeshProblem::NotFinite { axis, text: shown(word) });
-                    }
+                    coordinate(word, axis)?;
                     clean.push(b' ');
                     clean.extend_from_slice(word);
                 }
@@ -224,15 +173,6 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         }
         Ok(())
     }
-}
-
-fn number<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
-    std::str::from_utf8(word).ok()?.parse().ok()
-}
-
-/// A word of the file for an error message: its first 40 bytes.
-fn shown(word: &[u8]) -> String {
-    String::from_utf8_lossy(&word[..word.len().min(40)]).into_owned()
 }
 
 impl<R: BufRead> BufRead for FacesOnly<'_, R> {

@@ -1,5 +1,6 @@
 //! The triangle mesh itself.
 
+use crate::error::MeshProblem;
 use glam::Vec3;
 use std::collections::HashMap;
 
@@ -44,6 +45,21 @@ impl Mesh {
         let triangles = self.triangles.iter().map(|triangle| triangle.map(|i| merged[i as usize]));
         let triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
         Self { vertices, triangles }
+    }
+
+    /// The mesh without the triangles whose corners are one point: they are no surface. Left in, they could still be
+    /// touched where they float, and would stretch the bounding box.
+    ///
+    /// # Errors
+    /// [`MeshProblem::NoFaces`] without triangles, [`MeshProblem::NoExtent`] if none is left.
+    pub(super) fn usable(mut self) -> Result<Self, MeshProblem> {
+        if self.triangles.is_empty() {
+            return Err(MeshProblem::NoFaces);
+        }
+        let Self { vertices, triangles } = &mut self;
+        let vertex = |index: u32| vertices[index as usize];
+        triangles.retain(|&[a, b, c]| vertex(a) != vertex(b) || vertex(b) != vertex(c));
+        if triangles.is_empty() { Err(MeshProblem::NoExtent) } else { Ok(self) }
     }
 
     /// A globe with hills, for tests and benchmarks that need a mesh of a certain size: closed, right side out, about 2

@@ -58,6 +58,8 @@ pub(crate) enum Block {
     Figure(Figure),
     /// A table.
     Table(Table),
+    /// A paragraph that is a link to a file beside the page: the file's name, and what the link says.
+    Link(String, String),
     /// Small pictures, each with a name and a line below it.
     Pictures(Vec<Picture>),
 }
@@ -196,6 +198,7 @@ impl Page {
     fn block(&self, block: &Block) -> Markup {
         match block {
             Block::Text(text) => html! { p { (text) } },
+            Block::Link(file, text) => html! { p { a href=(file) { (text) } } },
             Block::Figure(figure) => html! {
                 figure id=(figure.id) {
                     h3 { (figure.title) }

@@ -2,8 +2,22 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+/// Scripts that stand in the file.
+const SCRIPTS: &str = "script-src 'unsafe-inline'";
+/// The same, which may also compile WebAssembly that stands in the file.
+const SCRIPTS_AND_WASM: &str = "script-src 'unsafe-inline' 'wasm-unsafe-eval'";
+
 /// A whole HTML file. It holds everything itself: the `styles` are put into its head one after the other.
 pub(crate) fn file(title: &str, styles: &[&str], body: &Markup) -> String {
+    whole(title, styles, SCRIPTS, body)
+}
+
+/// The same for a page that computes in WebAssembly.
+pub(crate) fn file_with_wasm(title: &str, styles: &[&str], body: &Markup) -> String {
+    whole(title, styles, SCRIPTS_AND_WASM, body)
+}
+
+fn whole(title: &str, styles: &[&str], scripts: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -12,7 +26,7 @@ pub(crate) fn file(title: &str, styles: &[&str], body: &Markup) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 meta http-equiv="Content-Security-Policy"
-                    content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+                    content={ "default-src 'none'; img-src data:; style-src 'unsafe-inline'; " (scripts) };
                 // No icon, so that a browser does not ask for one.
                 link rel="icon" href="data:,";
                 title { (title) }

@@ -179,10 +179,12 @@ impl Approach {
         let micros =
             |distance: f64| ContactTime::from_micros(((distance - earliest) / probe.speed * 1e6).round() as u32);
         let times = distances.map(|distance| distance.map_or(ContactTime::MISSING, micros));
-        Touch::new(times).with_pose(Pose {
-            direction: self.direction.to_array().map(to_q15),
-            alignment: self.alignment.to_array().map(to_q15),
-        })
+        Touch::new(times).with_pose(self.pose())
+    }
+
+    /// The pose that its touch has.
+    pub fn pose(&self) -> Pose {
+        Pose { direction: self.direction.to_array().map(to_q15), alignment: self.alignment.to_array().map(to_q15) }
     }
 }
 

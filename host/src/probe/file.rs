@@ -13,7 +13,7 @@
 //! offsets = [0.0, 0.3, 0.0]       # how far each finger stands out, toward the object
 //! noise = "0..5ms"                # Gaussian, on every contact time
 //! debounce = "2ms"
-//! missed = "2%"                   # of the contacts
+//! missed = "2%"                   # of the contacts; or of each finger's: ["1%", "2%", "0%"]
 //! speed_error = "5%"              # off per touch
 //! speed_bias = "1%"               # off per robot
 //! pose_noise = "2deg"
@@ -21,7 +21,7 @@
 //! ```
 //!
 //! Radius, spacing, speed and unit are what a data set and a model state and what is compared. What the real probe adds
-//! is not: it is added to touches in training and testing.
+//! is not compared: it is added to touches by a capture with this file or else in training and testing, and never twice.
 
 use crate::error::{Error, Place, ProbeProblem, Result, TouchesProblem};
 use crate::probe::approach::{FINGERS, Probe};
@@ -69,8 +69,8 @@ struct Real {
     timer: Option<f64>,
     #[serde(deserialize_with = "duration")]
     debounce: Option<f64>,
-    #[serde(deserialize_with = "share")]
-    missed: Option<f64>,
+    #[serde(deserialize_with = "shares")]
+    missed: [f64; FINGERS],
     #[serde(deserialize_with = "share")]
     speed_error: Option<f64>,
     #[serde(deserialize_with = "share")]
@@ -123,7 +123,7 @@ impl ProbeFile {
             deviation: real.noise.unwrap_or_default(),
             timer: real.timer.or(timer).unwrap_or_default(),
             debounce: real.debounce.unwrap_or_default(),
-            missed: real.missed.unwrap_or_default(),
+            missed: real.missed,
             // A finger that stands out by a length touches earlier by the time that the probe takes for it.
             bent: real.offsets.map(|offset| offset / speed * 1e6),
             speed: real.speed_factor.unwrap_or(1.0),
@@ -161,6 +161,28 @@ fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::E
     read(deserializer, quantity::share)
 }
 
+/// A share of all fingers' contacts, or one of each finger's.
+fn shares<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Shares {
+        One(String),
+        Each([String; FINGERS]),
+    }
+    let given = Shares::deserialize(deserializer).map_err(|_| {
+        D::Error::custom("missed is a share such as \"2%\", or one of each finger: [\"1%\", \"2%\", \"0%\"]")
+    })?;
+    let texts = match given {
+        Shares::One(text) => std::array::from_fn(|_| text.clone()),
+        Shares::Each(texts) => texts,
+    };
+    let mut shares = [0.0; FINGERS];
+    for (share, text) in shares.iter_mut().zip(texts) {
+        *share = quantity::share(&text).map_err(|problem| D::Error::custom(format!("{problem}. {}", problem.fix())))?;
+    }
+    Ok(shares)
+}
+
 fn angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
     read(deserializer, quantity::angle)
 }
@@ -194,7 +216,7 @@ mod tests {
             deviation: Deviation { least: 0.0, largest: 5_000.0 },
             timer: 1_000.0,
             debounce: 2_000.0,
-            missed: 0.02,
+            missed: [0.02; 3],
             bent: [0.0, 3_000.0, -1_000.0],
             speed: 0.98,
             speed_error: 0.05,
@@ -203,6 +225,8 @@ mod tests {
             pose_bias: 1.0,
         };
         assert_eq!(file.real, real);
+        let each = parse(&text.replace("\"2%\"", "[\"1%\", \"0.02\", \"0%\"]")).unwrap();
+        assert_eq!(each.real, Noise { missed: [0.01, 0.02, 0.0], ..real });
     }
 
     #[test]
@@ -212,6 +236,8 @@ mod tests {
             (format!("{MEASURES}[real]\nnoise = 5\n"), 5, "string"),
             (format!("{MEASURES}[real]\nnoise = \"5\"\n"), 5, "0..10ms"),
             (format!("{MEASURES}[real]\njitter = \"5ms\"\n"), 5, "jitter"),
+            (format!("{MEASURES}[real]\nmissed = [\"1%\", \"2%\"]\n"), 5, "of each finger"),
+            (format!("{MEASURES}[real]\nmissed = [\"1%\", \"2\", \"few\"]\n"), 5, "few"),
             (format!("unit = \"inch\"\n{MEASURES}"), 1, "mm"),
             (format!("{MEASURES}tilt = \"much\"\n"), 4, "much"),
             (format!("{MEASURES}spacing 3\n"), 4, ""),

@@ -1,7 +1,8 @@
 //! The evaluation: what is measured and shown, one section per module, written as one page with the files behind it.
 //!
 //! [`report`] measures every stage, or takes it from an interrupted report, and writes the page. [`view`] makes the page
-//! that shows an object and its touches. The page of [`crate::run`] is also drawn here.
+//! that shows an object and its touches, [`play`] the one on which objects can be touched. The page of [`crate::run`] is
+//! also drawn here.
 
 mod approaches;
 mod cache;
@@ -19,8 +20,10 @@ mod limit;
 mod noise;
 mod objects;
 mod plan;
+pub mod play;
 mod promises;
 mod published;
+mod recorded;
 pub(crate) mod results;
 pub(crate) mod run_page;
 mod sequential;
@@ -29,6 +32,7 @@ mod simulator;
 mod stages;
 pub(crate) mod statistics;
 mod strangers;
+pub(crate) mod teach;
 pub mod view;
 
 pub use settings::Settings;

@@ -42,7 +42,7 @@ fn kinds() -> [Noise; 9] {
         none,
         Noise { timer, ..none },
         Noise { debounce: 2_000.0, ..none },
-        Noise { missed: 0.02, ..none },
+        Noise { missed: [0.02; 3], ..none },
         Noise { bent: [3_000.0, 0.0, 0.0], ..none },
         Noise { speed_error: 0.05, ..none },
         Noise { speed_bias: 0.01, ..none },

@@ -12,6 +12,8 @@ use crate::page::table::{Cell, Records, Table};
 pub(crate) struct RunResults {
     /// The command that remakes it.
     pub(crate) command: String,
+    /// The file of the page on which the objects can be touched.
+    pub(crate) play: String,
     /// One picture per object, with a line about its capture. May be empty.
     pub(crate) pictures: Vec<Picture>,
     /// The methods compared, the paper's first.
@@ -41,11 +43,10 @@ pub(crate) struct RunMethod {
 /// If a chart cannot be drawn.
 pub(crate) fn run_page(results: &RunResults) -> Result<Page> {
     let mut sections = Vec::new();
-    if !results.pictures.is_empty() {
-        let mut section = Section::new("objects", "The objects");
-        section.blocks.push(Block::Pictures(results.pictures.clone()));
-        sections.push(section);
-    }
+    let mut section = Section::new("objects", "The objects");
+    section.blocks.push(Block::Link(results.play.clone(), "Touch them yourself".into()));
+    section.blocks.push(Block::Pictures(results.pictures.clone()));
+    sections.push(section);
     let mut section = Section::new("result", "The result");
     section.table(Table {
         id: "summary".into(),
@@ -171,6 +172,7 @@ mod tests {
         table.push(["accuracy at 10".into(), Cell::Percent(0.65, 1), Cell::Percent(0.75, 1)]);
         RunResults {
             command: "palpate run builtin --seed 1".into(),
+            play: "play.html".into(),
             pictures: vec![Picture { name: "fork".into(), png: vec![1, 2, 3], line: "5.6 % of approaches".into() }],
             methods: vec![method("paper", 0.5), method("ours", 0.57)],
             table,
@@ -190,6 +192,7 @@ mod tests {
             "65.0\u{a0}%",
             "75.0\u{a0}%",
             "palpate run builtin --seed 1",
+            "href=\"play.html\"",
             "5.6 % of approaches",
         ] {
             assert!(html.contains(part), "{part}");

@@ -3,6 +3,7 @@
 use crate::touches::Origin;
 use crate::touches::noise::Noise;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// What a report is made with. A change of any of these but the command starts it from the beginning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,6 +19,12 @@ pub struct Settings {
     /// How objects are touched: the probe, and the unit of its lengths. How many touches and from which seed say the
     /// settings beside it. Growth and generalization use the published probe.
     pub capture: Origin,
+    /// What a real probe adds to simulated touches where they are compared with recorded ones.
+    #[serde(default)]
+    pub real: Noise,
+    /// A data set of recorded touches of these objects, to compare simulated ones with.
+    #[serde(default)]
+    pub recorded: Option<PathBuf>,
     /// Full touches captured of each object.
     pub touches: usize,
     /// Folds that the touches are divided into.
@@ -71,6 +78,8 @@ impl Settings {
             seed,
             quick: false,
             capture: Origin::default(),
+            real: Noise::default(),
+            recorded: None,
             touches: 21_000,
             folds: 10,
             folds_used: 10,

@@ -5,7 +5,7 @@ use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
     approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
-    published, results, sequential, simulator, strangers,
+    published, recorded, results, sequential, simulator, strangers,
 };
 use crate::capture;
 use crate::compile;
@@ -103,7 +103,8 @@ pub fn report_on(
         capture::Settings::default(),
         compile::Settings::default()
     );
-    let cache = Cache::open(directory, &(&made_from, presets), &objects, existing.resume)?;
+    let recorded = settings.recorded.as_deref().map(recorded::fingerprint).transpose()?;
+    let cache = Cache::open(directory, &(&made_from, presets, recorded), &objects, existing.resume)?;
     let context = Context::new(settings, &objects, &cache, progress)?;
     let mut stages = Stages { cache: &cache, progress, seconds: Vec::new() };
 
@@ -121,6 +122,10 @@ pub fn report_on(
     let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
     let plans = stages.stage("plan", || plan::measure(&context))?;
     let unknown = stages.stage("strangers", || strangers::measure(&context))?;
+    let compared = match settings.recorded {
+        Some(_) => stages.stage("recorded", || recorded::measure(&context))?,
+        None => None,
+    };
     let engines = stages.stage("simulator", || simulator::measure(&context))?;
     let grown = if settings.growth {
         let growth = stages.stage("growth", || growth::measure(&context))?;
@@ -151,6 +156,7 @@ pub fn report_on(
         strangers::section(&context, &unknown)?,
         costs,
     ];
+    sections.extend(recorded::section(&context, compared.as_ref())?);
     sections.extend(grown);
     let sentence = published::sentence(&summary);
     let page = Page {

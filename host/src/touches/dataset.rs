@@ -1,7 +1,8 @@
 //! A data set: a directory with one file per object.
 
 use super::checksum::checksum;
-use super::{Entry, Format, Listing, Origin};
+use super::noise::Noise;
+use super::{Entry, Format, Listing, Origin, Recorded, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
 use palpate_shared::Touch;
@@ -18,6 +19,8 @@ pub struct Dataset {
     /// How many instances the objects have that have several, by name: touch i is of instance i modulo their number.
     /// Empty after a split, which shuffles touches.
     pub instances: BTreeMap<String, usize>,
+    /// The recordings that the touches are from; empty for simulated touches, and where that is not known.
+    pub recorded: Vec<Recorded>,
     /// What looked wrong when the data set was read, and may be meant.
     pub warnings: Vec<Warning>,
 }
@@ -41,9 +44,20 @@ pub enum Warning {
         /// The file.
         path: PathBuf,
     },
+    /// The last line of a recorded file is not whole.
+    #[error("{}: its last line is not whole and was not read: a recording was interrupted", path.display())]
+    HalfLine {
+        /// The file.
+        path: PathBuf,
+    },
 }
 
 impl Dataset {
+    /// Whether a real probe made the touches, as far as the data set states it.
+    pub fn is_recorded(&self) -> bool {
+        !self.recorded.is_empty()
+    }
+
     /// Touches that nothing is known about: no origin, no warnings. The objects are to be sorted by name.
     pub fn new(objects: Vec<ObjectTouches>) -> Self {
         Self { objects, ..Self::default() }
@@ -51,7 +65,7 @@ impl Dataset {
 
     /// Other touches of the same origin, such as a part of these.
     pub fn with(&self, objects: Vec<ObjectTouches>) -> Self {
-        Self { objects, origin: self.origin.clone(), ..Self::default() }
+        Self { objects, origin: self.origin.clone(), recorded: self.recorded.clone(), ..Self::default() }
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
@@ -86,6 +100,21 @@ impl Dataset {
         }
     }
 
+    /// The touches of one file, as an object that is called like it.
+    ///
+    /// # Errors
+    /// [`TouchesProblem::NoFormat`] if the file's name says neither what it holds nor of which object; when the file
+    /// cannot be read, holds no touch, or has a wrong line.
+    pub fn read_file(path: &Path) -> Result<ObjectTouches> {
+        let extension = path.extension().unwrap_or_default();
+        let format = Format::ALL.into_iter().find(|format| extension == format.extension());
+        let name = path.file_stem().and_then(|stem| stem.to_str());
+        let Some((format, name)) = format.zip(name) else {
+            return Err(Error::at(Place::file(path), TouchesProblem::NoFormat));
+        };
+        Ok(ObjectTouches { name: name.into(), touches: format.read(path)? })
+    }
+
     /// What a listing names.
     fn listed(directory: &Path, listing: Listing) -> Result<Self> {
         if !listing.complete {
@@ -93,16 +122,24 @@ impl Dataset {
         }
         let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
         let mut instances = BTreeMap::new();
+        let is_recorded = listing.is_recorded();
         for entry in listing.objects {
             let path = entry.file(directory, listing.origin.format);
-            let touches = read_listed(&entry, listing.origin.format, &path, &mut warnings)?;
+            let touches = match is_recorded {
+                true => recording::read(&entry, &path, &mut warnings)?,
+                false => read_listed(&entry, listing.origin.format, &path, &mut warnings)?,
+            };
+            // Of an object whose recording was interrupted before its first touch.
+            if is_recorded && touches.is_empty() {
+                continue;
+            }
             if entry.instances.len() > 1 {
                 instances.insert(entry.name.clone(), entry.instances.len());
             }
             objects.push(ObjectTouches { name: entry.name, touches });
         }
         objects.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(Self { objects, origin: Some(listing.origin), instances, warnings })
+        Ok(Self { objects, origin: Some(listing.origin), instances, recorded: listing.recorded, warnings })
     }
 
     /// Every file of touches that there is.
@@ -130,6 +167,11 @@ impl Dataset {
     pub fn holds_approaches(&self) -> bool {
         let any_partial = || self.objects.iter().flat_map(|object| &object.touches).any(|touch| !touch.is_full());
         self.origin.as_ref().map_or_else(any_partial, |origin| origin.approaches)
+    }
+
+    /// What a real probe added to the touches, as far as the data set states it: noise that they have already.
+    pub fn real(&self) -> Noise {
+        self.origin.as_ref().map_or_else(Noise::default, |origin| origin.real)
     }
 
     /// The share of each contact pattern among all touches, in the order of the patterns' codes, each object weighted

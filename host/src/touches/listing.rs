@@ -1,11 +1,12 @@
 //! `dataset.json`: what a data set holds, how it was made, and whether it is complete.
 
-use super::{Format, Origin};
+use super::{Format, Origin, Recorded};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use std::path::{Component, Path, PathBuf};
 
-/// What a data set's directory holds. The same capture writes the same bytes: no times of day, no durations.
+/// What a data set's directory holds. The same capture writes the same bytes: no times of day, no durations. A recording
+/// says when it was made.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Listing {
     /// The version of the program that made it.
@@ -17,6 +18,9 @@ pub struct Listing {
     pub origin: Origin,
     /// The objects, sorted by name.
     pub objects: Vec<Entry>,
+    /// The recordings that the touches are from, in their order; empty for simulated touches.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recorded: Vec<Recorded>,
 }
 
 /// What there is of one object.
@@ -52,7 +56,14 @@ impl Listing {
             complete: false,
             origin: origin.clone(),
             objects: names.into_iter().map(|name| Entry { name, ..Entry::default() }).collect(),
+            recorded: Vec::new(),
         }
+    }
+
+    /// Whether a real probe made the touches. Such a data set may grow at any time: what its files hold beyond what is
+    /// listed counts, up to the last whole line.
+    pub fn is_recorded(&self) -> bool {
+        !self.recorded.is_empty()
     }
 
     /// Where the listing of a directory is.
@@ -115,7 +126,7 @@ impl Entry {
 }
 
 /// Whether files of the directory itself can be called this.
-fn is_file_name(name: &str) -> bool {
+pub(super) fn is_file_name(name: &str) -> bool {
     let mut components = Path::new(name).components();
     !name.is_empty()
         && !name.contains(['/', '\\', '\0'])

@@ -5,7 +5,11 @@
 //! [`Listing`]: which objects there are, how many touches of each, their files' checksums, and how the touches were made
 //! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe.
 //!
-//! [`noise`] adds what a real sensor, timer and robot add; [`folds`] divides touches into some to train on and others to test on.
+//! [`Recording`] adds the touches of a real probe to such a directory, one by one as they come; its listing says when, from
+//! where and by which firmware ([`Recorded`]).
+//!
+//! [`check`] says what is wrong with a data set, line by line; [`noise`] adds what a real sensor, timer and robot add;
+//! [`folds`] divides touches into some to train on and others to test on.
 //!
 //! ```
 //! use palpate::touches::{Dataset, folds};
@@ -26,6 +30,7 @@
 //! # }
 //! ```
 
+pub mod check;
 mod checksum;
 mod dataset;
 pub mod folds;
@@ -35,6 +40,7 @@ pub mod noise;
 mod origin;
 #[cfg(feature = "parquet")]
 pub mod parquet;
+mod recording;
 mod save;
 mod seconds;
 mod shard;
@@ -49,6 +55,7 @@ pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use origin::Origin;
 pub(crate) use origin::{tenth, unit};
+pub use recording::{Recorded, Recording};
 pub use seconds::touch_of_seconds;
 pub use shard::Shard;
 pub use text::{parse_touch, write_touch};

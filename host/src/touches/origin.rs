@@ -1,5 +1,6 @@
 //! How touches were made.
 
+use super::noise::Noise;
 use super::{Format, Shard};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
@@ -36,6 +37,9 @@ pub struct Origin {
     pub format: Format,
     /// Which part of the samples this data set holds.
     pub shard: Shard,
+    /// What the real probe added to each touch, as far as the touches were made as a real probe would make them.
+    #[serde(default, skip_serializing_if = "Noise::is_none")]
+    pub real: Noise,
 }
 
 impl Default for Origin {
@@ -51,11 +55,17 @@ impl Default for Origin {
             approaches: false,
             format: Format::Text,
             shard: Shard::WHOLE,
+            real: Noise::default(),
         }
     }
 }
 
 impl Origin {
+    /// How recorded touches are made: every touch with a contact is kept, nothing is drawn.
+    pub fn recorded(probe: Probe, unit: Length, pose: bool) -> Self {
+        Self { touches: 0, seed: 0, probe, unit, pose, approaches: true, ..Self::default() }
+    }
+
     /// Refuses what no touches can be made by.
     ///
     /// # Errors
@@ -67,6 +77,7 @@ impl Origin {
         if !self.format.is_built_in() {
             return Err(Error::setting("format", self.format.name(), "text, or build with the feature parquet"));
         }
+        self.real.check()?;
         match self.unit {
             Length::Tenth => self.probe.check(self.length),
             // Each object is checked when its size is known.

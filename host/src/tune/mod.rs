@@ -1,4 +1,5 @@
-//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]).
+//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]), and the
+//! one that recorded touches came from ([`fit`]).
 //!
 //! A family of ensembles is trained (trees, depth, eta; for the table layout bins of each feature), each compiled with
 //! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Kept is the model
@@ -20,6 +21,7 @@
 //! ```
 
 mod family;
+pub mod fit;
 pub mod probe;
 #[cfg(test)]
 mod tests;

@@ -174,9 +174,12 @@ fn forgetting_finds_an_exchanged_object_sooner() {
     assert_eq!(figures["switch"]["nats"], 3.0);
     let after = |rule| of(rule, "switched", "mean_approaches");
     assert!(after("on") < after("off"), "{figures:#}");
-    assert!(of("on", "switched", "error") < of("off", "switched", "error"));
-    // Where nothing is exchanged it costs something.
-    assert!(of("on", "still", "mean_approaches") >= of("off", "still", "mean_approaches"));
+    // Nearly all errors of the exchanged are decisions before the exchange, which no rule can mend.
+    let beyond = |case| of("on", case, "error") - of("off", case, "error");
+    assert!(beyond("switched") <= 2.0 * of("off", "switched", "error_standard_error"), "{figures:#}");
+    assert!(beyond("still") < 0.01, "{figures:#}");
+    let old = figures["switch"]["on"]["old"].as_f64().unwrap();
+    assert!(of("on", "switched", "error") - old < 0.02, "{figures:#}");
     let text = place.ok(&["evaluate", "model.palpate", "unseen", "--switch"]);
     assert!(text.contains("at 5 nats"), "{text}");
 }

@@ -19,7 +19,9 @@ fn run_goes_from_meshes_to_models_and_a_page() {
     let text = stdout(command.current_dir(&directory).output().unwrap());
     assert!(text.contains("report.html"), "{text}");
     let out = directory.path().join("out");
-    for name in ["ensemble.json", "model.palpate", "paper.json", "paper.palpate", "report.html", "summary.json"] {
+    for name in
+        ["ensemble.json", "model.palpate", "paper.json", "paper.palpate", "play.html", "report.html", "summary.json"]
+    {
         assert!(listing(&out).iter().any(|file| file == name), "{name}: {:?}", listing(&out));
     }
     let summary: Value = serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();

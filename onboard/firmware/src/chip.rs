@@ -3,6 +3,7 @@
 
 use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use palpate_onboard::station::Memory;
 
 // Symbols that cortex-m-rt's linker script defines; only their addresses mean anything.
 unsafe extern "C" {
@@ -90,6 +91,19 @@ pub fn take_retained() -> &'static mut [u8] {
     // SAFETY: memory.x sets this region aside, so nothing else lies in it, and it is handed out once. It is RAM, so
     // any content is valid bytes.
     unsafe { core::slice::from_raw_parts_mut(addr_of_mut!(_retained_start), length) }
+}
+
+/// The memory that keeps its content through a reset, once, with places for two models and two records of these bytes.
+///
+/// # Panics
+/// As [`take_retained`].
+pub fn take_memory(record: usize) -> Memory<'static> {
+    // Aligned, as models are read fastest.
+    let record = record.next_multiple_of(4);
+    let (first_record, rest) = take_retained().split_at_mut(record);
+    let (second_record, rest) = rest.split_at_mut(record);
+    let (first_model, second_model) = rest.split_at_mut(rest.len() / 8 * 4);
+    Memory { models: [first_model, second_model], records: [first_record, second_record] }
 }
 
 /// The levels of three switches, a bit each. They outlast a reset, as switches do: nothing initializes them.

@@ -1,9 +1,8 @@
 //! An ensemble over two features as a table of margins over their thresholds.
 
 use super::leaves::BIAS;
-use super::ranks::{Cuts, at_or_missing, rank_in};
+use super::ranks::Cuts;
 use super::{Sections, built_in};
-use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Axis, LeafType};
 
 /// The number of cells of a grid: for each of its two axes, one between any two thresholds, one at either end, and one
@@ -23,11 +22,10 @@ pub(crate) fn look_up(model: &Sections<'_>, features: &[i32], margins: &mut [i32
     let (axes, cuts) = model.axes_and_cuts();
     let mut cuts = Cuts(cuts);
     let mut cell = 0;
-    for &[feature, _, width, count] in axes {
-        let cuts = cuts.next(width, count);
-        let value = at_or_missing(features, feature);
+    for axis in axes {
+        let &[.., count] = axis;
         let count = usize::from(count);
-        let place = if value == MISSING_FEATURE { count + 1 } else { rank_in(cuts, width, value).into() };
+        let place = cuts.rank(axis, features).map_or(count + 1, usize::from);
         cell = cell * (count + 2) + place;
     }
     read(model, cell, margins);

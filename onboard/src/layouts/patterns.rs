@@ -6,7 +6,7 @@
 
 use super::Sections;
 use super::grid::read;
-use super::ranks::{Cuts, at_or_missing, rank_in};
+use super::ranks::{Cuts, at_or_missing};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Axis;
 
@@ -41,8 +41,9 @@ pub(crate) fn look_up(model: &Sections<'_>, features: &[i32], margins: &mut [i32
     let (axes, cuts) = model.axes_and_cuts();
     let mut cuts = Cuts(cuts);
     let (mut sides, mut places) = ([1; 3], [0; 3]);
-    for ((&[feature, _, width, count], side), place) in axes.iter().zip(&mut sides).zip(&mut places) {
-        *place = usize::from(rank_in(cuts.next(width, count), width, at_or_missing(features, feature)));
+    for ((axis, side), place) in axes.iter().zip(&mut sides).zip(&mut places) {
+        let &[feature, .., count] = axis;
+        *place = usize::from(cuts.rank_of(axis, at_or_missing(features, feature)));
         *side = usize::from(count) + 1;
     }
     let [curvature, slope, pair] = places;

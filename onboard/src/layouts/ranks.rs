@@ -41,20 +41,15 @@ pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
     };
     let (axes, cuts) = model.axes_and_cuts();
     let mut cuts = Cuts(cuts);
-    for &[feature, axis_columns, width, count] in axes {
-        let cuts = cuts.next(width, count);
-        let value = at_or_missing(features, feature);
+    for axis in axes {
+        let rank = cuts.rank(axis, features);
         // The bits of `Columns`: where a missing value goes left, and right.
-        let (mut left, mut right) = (0, u8::MAX);
-        if value != MISSING_FEATURE {
-            left = rank_in(cuts, width, value);
-            right = left;
+        let &[_, columns, ..] = axis;
+        if columns & 1 != 0 {
+            put(rank.unwrap_or(0));
         }
-        if axis_columns & 1 != 0 {
-            put(left);
-        }
-        if axis_columns & 2 != 0 {
-            put(right);
+        if columns & 2 != 0 {
+            put(rank.unwrap_or(u8::MAX));
         }
     }
 }
@@ -68,9 +63,23 @@ pub(crate) fn at_or_missing(features: &[i32], feature: u8) -> i32 {
 pub(crate) struct Cuts<'m>(pub(crate) &'m [u8]);
 
 impl<'m> Cuts<'m> {
+    /// The rank of a row's feature among the thresholds of the next axis; `None` if the feature is missing.
+    #[inline(always)]
+    pub(crate) fn rank(&mut self, axis: &[u8; Axis::LENGTH], features: &[i32]) -> Option<u8> {
+        let value = at_or_missing(features, axis[0]);
+        let rank = self.rank_of(axis, value);
+        (value != MISSING_FEATURE).then_some(rank)
+    }
+
+    /// The rank of a value among the thresholds of the next axis; a missing one is the least number.
+    #[inline(never)]
+    pub(crate) fn rank_of(&mut self, &[_, _, width, count]: &[u8; Axis::LENGTH], value: i32) -> u8 {
+        rank_in(self.next(width, count), width, value)
+    }
+
     /// The thresholds of the next axis, which has `count` of them of `width` bytes.
     #[inline(always)]
-    pub(crate) fn next(&mut self, width: u8, count: u8) -> &'m [u8] {
+    fn next(&mut self, width: u8, count: u8) -> &'m [u8] {
         let length = usize::from(width) * usize::from(count);
         let Some((cuts, rest)) = self.0.split_at_checked(length) else { return &[] };
         self.0 = rest;
@@ -81,23 +90,24 @@ impl<'m> Cuts<'m> {
 /// How many of an axis's thresholds, of `width` bytes each, are at or below `value`.
 ///
 /// Those of two or four bytes are loaded at once where they are aligned, which the exporter ensures if the model is aligned.
-#[inline(never)]
-pub(crate) fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
+#[inline(always)]
+fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
     if width == 2
         && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
     {
-        search(cuts, value, |cut| i16::from_le(cut).into())
+        search(cuts, value, |cut: i16| i16::from_le(cut).into())
     } else if width == 4
         && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
     {
-        search(cuts, value, i32::from_le)
+        search(cuts, value, |cut: i32| i32::from_le(cut))
     } else {
         search_bytes(cuts, width.into(), value)
     }
 }
 
 /// A binary search.
-#[inline(always)]
+// By itself, so that all that it needs is in registers on a Cortex-M0+.
+#[inline(never)]
 fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32) -> u8 {
     let mut step = 128;
     while step > cuts.len() {
@@ -117,6 +127,7 @@ fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32) -> u8 {
 }
 
 /// The same for thresholds of any width that stand anywhere.
+#[inline(never)]
 fn search_bytes(cuts: &[u8], width: usize, value: i32) -> u8 {
     let (mut rank, mut step) = (0_u8, 128_u8);
     while step > 0 {

@@ -4,8 +4,8 @@ use super::{Model, fixed};
 use crate::bytes::AlignedTo8;
 use crate::layouts::leaves::{BLOCK, Sum};
 use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
+use palpate_shared::Touch;
 use palpate_shared::format::{Group, Layout};
-use palpate_shared::{Features, Touch};
 
 impl Model<'_> {
     /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
@@ -14,8 +14,10 @@ impl Model<'_> {
     /// Cost: the ensemble's; see the layouts. Cannot fail otherwise; a model over rows of features takes every feature
     /// of a touch as missing.
     pub fn margins(&self, touch: &Touch, margins: &mut [i32]) -> bool {
-        let features = self.descriptor().map(|descriptor| descriptor.features(touch));
-        self.margins_of(features.as_ref().map_or(&[], Features::as_slice), margins)
+        match self.descriptor() {
+            Some(descriptor) => self.margins_of(descriptor.features(touch).as_slice(), margins),
+            None => self.margins_of(&[], margins),
+        }
     }
 
     /// The margins of a row of features (see [`Model::margins`]): whole numbers or
@@ -23,14 +25,17 @@ impl Model<'_> {
     /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where one is missing, as it is for all features beyond the end of a short row.
     pub fn margins_of(&self, features: &[i32], margins: &mut [i32]) -> bool {
         let Some(margins) = margins.get_mut(..self.object_count()) else { return false };
-        margins.fill(0);
+        if self.has_trees() {
+            margins.fill(0);
+        }
         self.margins_in_zeros(features, margins)
     }
 
-    /// [`Model::margins`] where zeros are already.
+    /// [`Model::margins`] where zeros are already, of a model over touches.
     pub(crate) fn touch_in_zeros(&self, touch: &Touch, zeros: &mut [i32]) {
-        let features = self.descriptor().map(|descriptor| descriptor.features(touch));
-        self.margins_in_zeros(features.as_ref().map_or(&[], Features::as_slice), zeros);
+        if let Some(descriptor) = self.descriptor() {
+            self.margins_in_zeros(descriptor.features(touch).as_slice(), zeros);
+        }
     }
 
     fn margins_in_zeros(&self, features: &[i32], zeros: &mut [i32]) -> bool {
@@ -41,6 +46,11 @@ impl Model<'_> {
             }
         }
         true
+    }
+
+    /// Whether margins are added up; those of a table are set.
+    fn has_trees(&self) -> bool {
+        built_in::TREES && !matches!(self.layout(), Layout::Grid | Layout::Patterns)
     }
 
     /// The margins of a row of features as the trainer's own f32 values, bit for bit; `false`, and nothing written,
@@ -58,7 +68,7 @@ impl Model<'_> {
         true
     }
 
-    /// Adds up all trees, in what has to be zeros: in units, or in f32 values' bits.
+    /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits.
     fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
         if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
@@ -67,6 +77,9 @@ impl Model<'_> {
         }
         if built_in::layout(Layout::Patterns) && self.layout() == Layout::Patterns {
             patterns::look_up(&self.sections, features, margins);
+            return Some(margins);
+        }
+        if !built_in::TREES {
             return Some(margins);
         }
         let (base, _) = self.sections.base_and_priors();

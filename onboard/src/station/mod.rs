@@ -39,5 +39,5 @@ pub use memory::Memory;
 pub use probe::{Board, Happened, ProbeSettings, ProbeStation};
 pub use record::record_length;
 pub use serve::{ServeError, serve};
-pub use session::{RecordsTooShort, Station};
+pub use session::{PROGRAM, RecordsTooShort, Station};
 pub use storage::{NoStorage, Place, Storage};

@@ -1,6 +1,6 @@
 //! A probe of three switches that recognizes, at the end of a link: the whole program of a board but the board.
 
-use super::session::{RecordsTooShort, Station};
+use super::session::{PROGRAM, RecordsTooShort, Station};
 use super::storage::{NoStorage, Storage};
 use crate::Model;
 use crate::effector::{Effector, Fault, Scale, Sensed, Settings, State, drain};
@@ -49,13 +49,15 @@ pub struct ProbeSettings {
     /// Another number after each start, counted or random: see [`DeviceEnd::new`]. A station that keeps records counts by
     /// itself and may be given 0.
     pub boot: u32,
+    /// What the program is called on the link: name and version.
+    pub program: &'static str,
 }
 
 impl Default for ProbeSettings {
     /// The model's own probe; poses last two seconds.
     fn default() -> Self {
         let effector = Settings::default();
-        Self { effector, scale: Scale::IDENTITY, pose_lasts: 2_000_000, detail: true, boot: 0 }
+        Self { effector, scale: Scale::IDENTITY, pose_lasts: 2_000_000, detail: true, boot: 0, program: PROGRAM }
     }
 }
 
@@ -115,7 +117,8 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
     /// # Errors
     /// [`RecordsTooShort`].
     pub fn open(built_in: &'m [u8], storage: S, settings: ProbeSettings) -> Result<Self, RecordsTooShort> {
-        let (station, progress, starts) = Station::open(built_in, storage)?;
+        let (mut station, progress, starts) = Station::open(built_in, storage)?;
+        station.set_program(settings.program);
         let end = DeviceEnd::new(progress, settings.boot.wrapping_add(starts));
         let effector = Effector::new(settings.effector);
         let mut probe = Self { effector, station, end, settings, model: 0, started: false };

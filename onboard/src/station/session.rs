@@ -16,6 +16,9 @@ use palpate_shared::link::{
 /// object alone would take.
 type SnapshotBuffer<const N: usize> = [[u8; SNAPSHOT_LENGTH + 10]; N];
 
+/// What programs are called on the link that say nothing else: this crate and its version.
+pub const PROGRAM: &str = concat!("palpate-onboard ", env!("CARGO_PKG_VERSION"));
+
 /// A storage whose records are too short for what a station has to keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordsTooShort {
@@ -48,6 +51,8 @@ pub struct Station<'m, const N: usize, S = NoStorage> {
     staged: Option<Staged>,
     /// Touches that were not counted.
     refused: u32,
+    /// What it is called on the link.
+    program: &'static str,
 }
 
 impl<'m, const N: usize> Station<'m, N> {
@@ -62,7 +67,7 @@ impl<'m, const N: usize> Station<'m, N> {
 impl<'m, const N: usize, S> Station<'m, N, S> {
     const fn empty(built_in: &'m [u8], storage: S) -> Self {
         let (source, kept) = (Source::BuiltIn, Source::BuiltIn);
-        Self { built_in, storage, opened: None, state: None, source, kept, staged: None, refused: 0 }
+        Self { built_in, storage, opened: None, state: None, source, kept, staged: None, refused: 0, program: PROGRAM }
     }
 }
 
@@ -129,6 +134,11 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
             let recognizer = Recognizer::new(&model, Stopping::from_model(&model)).ok()?;
             Some(recognizer.into_state())
         });
+    }
+
+    /// Says what the chip's program is called on the link: name and version. [`PROGRAM`] if this is not said.
+    pub const fn set_program(&mut self, program: &'static str) {
+        self.program = program;
     }
 
     /// The model in use.
@@ -332,6 +342,10 @@ impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
             Some(ApproachMessage::new(proposal.pose, proposal.score, &poses.pose(proposal.pose)?))
         })?;
         proposal.ok_or(Refusal::NoPlan)
+    }
+
+    fn program(&self) -> &str {
+        self.program
     }
 
     fn refused(&self) -> u32 {

@@ -71,8 +71,8 @@ pub struct PromisedNoise {
     pub debounce: u32,
     /// How much earlier each finger touches than it should, in microseconds.
     pub bent: [i32; 3],
-    /// The probability that a contact is missed, in parts of a billion.
-    pub missed: u32,
+    /// The probability that a contact of each finger is missed, in parts of a billion.
+    pub missed: [u32; 3],
     /// How far the speed of a touch may be off, in parts of a billion.
     pub speed_error: u32,
     /// The same for a robot, through all of its touches.
@@ -88,6 +88,13 @@ impl PromisedNoise {
     fn is_short(&self) -> bool {
         *self == Self { touch: self.touch, ..Self::default() }
     }
+
+    /// How much more often the middle and the third finger miss a contact than the first.
+    fn missed_more(&self) -> [i32; 2] {
+        let [first, middle, third] = self.missed;
+        // Shares of at most a billion: their differences fit.
+        [middle, third].map(|share| share.cast_signed().wrapping_sub(first.cast_signed()))
+    }
 }
 
 impl Promise {
@@ -95,6 +102,17 @@ impl Promise {
     pub const LENGTH: usize = 48;
     /// Bytes of the section with all noise.
     pub const FULL_LENGTH: usize = 84;
+    /// Bytes of the section with all noise, of which every finger misses another share of its contacts.
+    pub const FINGERS_LENGTH: usize = 92;
+
+    /// Bytes of the section with this noise: one of the three lengths.
+    pub fn length(noise: &PromisedNoise) -> usize {
+        match (noise.is_short(), noise.missed_more()) {
+            (true, _) => Self::LENGTH,
+            (false, [0, 0]) => Self::FULL_LENGTH,
+            (false, _) => Self::FINGERS_LENGTH,
+        }
+    }
 
     /// Hands the section's content to `put`.
     pub fn write<T>(&self, put: impl FnOnce(&[u8]) -> T) -> T {
@@ -104,20 +122,21 @@ impl Promise {
         let TrainedNoise { least, largest, timer, pose } = noise.touch;
         let [first, second, third] = noise.bent.map(i32::cast_unsigned);
         let head = [billionths(self.rate), billionths(self.confidence), codes, sequences, given, wrong];
-        let words: [[u32; 3]; 7] = [
+        let [middle, last] = noise.missed_more().map(i32::cast_unsigned);
+        let words: [[u32; 3]; 8] = [
             [head[0], head[1], head[2]],
             [head[3], head[4], head[5]],
             [mean_thousandths, max_touches, least],
             [largest, timer, pose],
             [noise.debounce, first, second],
-            [third, noise.missed, noise.speed_error],
+            [third, noise.missed[0], noise.speed_error],
             [noise.speed_bias, noise.speed.cast_unsigned(), noise.pose_bias],
+            [middle, last, 0],
         ];
-        let mut bytes = [0; Self::FULL_LENGTH];
+        let mut bytes = [0; Self::FINGERS_LENGTH];
         let numbers = words.into_iter().flatten().flat_map(u32::to_le_bytes);
         bytes.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
-        let length = if noise.is_short() { Self::LENGTH } else { Self::FULL_LENGTH };
-        put(bytes.get(..length).unwrap_or(&bytes))
+        put(bytes.get(..Self::length(&noise)).unwrap_or(&bytes))
     }
 
     /// Reads a section; `None` if it is too short, promises nothing (a rate or a confidence that is not between 0 and 1,
@@ -130,6 +149,8 @@ impl Promise {
         let [rate, confidence, _, sequences, given, wrong, mean, touches, least, largest, timer, pose] =
             head.map(u32::from_le_bytes);
         let more = rest.first_chunk::<9>().map_or([0; 9], |more| more.map(u32::from_le_bytes));
+        let fingers = rest.get(9..).and_then(<[[u8; 4]]>::first_chunk::<2>);
+        let [middle, last] = fingers.map_or([0; 2], |fingers| fingers.map(i32::from_le_bytes));
         let [debounce, first, second, third, missed, speed_error, speed_bias, speed, pose_bias] = more;
         let share = |billionths: u32| {
             let share = f64::from(billionths) / BILLION;
@@ -153,7 +174,7 @@ impl Promise {
                 touch: TrainedNoise { least, largest, timer, pose },
                 debounce,
                 bent: [first, second, third].map(u32::cast_signed),
-                missed,
+                missed: [0, middle, last].map(|more| missed.saturating_add_signed(more)),
                 speed_error,
                 speed_bias,
                 speed: speed.cast_signed(),
@@ -228,7 +249,7 @@ mod tests {
             touch: TrainedNoise { least: 0, largest: 5_000, timer: 1_000, pose: 2_000 },
             debounce: 0,
             bent: [0; 3],
-            missed: 0,
+            missed: [0; 3],
             speed_error: 0,
             speed_bias: 0,
             speed: 0,
@@ -243,7 +264,15 @@ mod tests {
     #[test]
     fn promises_are_read_back_as_written_in_as_few_bytes_as_they_need() {
         let noise = PromisedNoise { bent: [1, -3_000, 2], speed: -20_000_000, pose_bias: 5_000, ..PROMISE.noise };
-        for (promise, length) in [(PROMISE, Promise::LENGTH), (Promise { noise, ..PROMISE }, Promise::FULL_LENGTH)] {
+        let alike = PromisedNoise { missed: [20_000_000; 3], ..noise };
+        let fingers = PromisedNoise { missed: [20_000_000, 0, 1_000_000_000], ..noise };
+        for (promise, length) in [
+            (PROMISE, Promise::LENGTH),
+            (Promise { noise, ..PROMISE }, Promise::FULL_LENGTH),
+            (Promise { noise: alike, ..PROMISE }, Promise::FULL_LENGTH),
+            (Promise { noise: fingers, ..PROMISE }, Promise::FINGERS_LENGTH),
+        ] {
+            assert_eq!(Promise::length(&promise.noise), length);
             let bytes = bytes(&promise);
             assert_eq!(bytes.len(), length);
             assert_eq!(Promise::from_bytes(&bytes), Some(promise));

@@ -50,6 +50,11 @@ pub trait Device {
         Err(Refusal::Unsupported)
     }
 
+    /// Name and version of the chip's program, for [`Query::Program`]: at most [`CHUNK`] bytes of it are sent.
+    fn program(&self) -> &str {
+        ""
+    }
+
     /// How many touches were not counted because the model was not trained for them, since power-up.
     fn refused(&self) -> u32 {
         0
@@ -293,10 +298,10 @@ fn answer<'b>(
         Query::Hello | Query::Open { .. } => Answer::Session { next: progress.next, boot },
         Query::Model => device.model().map_or(Answer::Refused(Refusal::NoModel), Answer::Model),
         Query::Name { object } => match device.name(object) {
-            // A name longer than a chunk would make too long a frame.
-            Some(name) => Answer::Name(name.get(..name.floor_char_boundary(CHUNK)).unwrap_or_default()),
+            Some(name) => Answer::Name(short(name)),
             None => Answer::Refused(Refusal::NoObject),
         },
+        Query::Program => Answer::Program(short(device.program())),
         Query::Statistics => Answer::Statistics(Statistics { refused: device.refused(), ..*statistics }),
         Query::Posteriors { first } => {
             let objects = (first..=u8::MAX).take(POSTERIORS);
@@ -317,4 +322,9 @@ fn answer<'b>(
             Err(refusal) => Answer::Refused(refusal),
         },
     }
+}
+
+/// As much of a text as fits into a frame.
+fn short(text: &str) -> &str {
+    text.get(..text.floor_char_boundary(CHUNK)).unwrap_or_default()
 }

@@ -273,6 +273,14 @@ impl HostEnd {
         can
     }
 
+    /// Gives up the question that was asked last, if it has no answer yet: another can be asked. For questions that chips
+    /// with older programs do not answer.
+    pub fn withdraw(&mut self) {
+        if self.phase == Phase::Open {
+            self.question = None;
+        }
+    }
+
     fn put_question(&mut self, query: Query, now: u64, send: &mut impl FnMut(&[u8])) {
         self.tag = self.tag.wrapping_add(1);
         let session = self.session;

@@ -95,6 +95,8 @@ pub enum Query {
         /// Poses that the robot cannot reach: pose n is bit n % 8 of byte n / 8. Zeros: it can reach all.
         without: [u8; POSE_BYTES],
     },
+    /// Which program does the chip run? A chip whose program is older than this question does not answer it.
+    Program,
 }
 
 /// The answer to a [`Query`].
@@ -127,6 +129,8 @@ pub enum Answer<'a> {
     Refused(Refusal),
     /// To [`Query::NextApproach`].
     NextApproach(ApproachMessage),
+    /// To [`Query::Program`]: name and version; empty if it does not say.
+    Program(&'a str),
 }
 
 /// Something to do, exactly once.

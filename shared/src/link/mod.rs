@@ -15,7 +15,7 @@
 //! |---|---|---|
 //! | host | [`Command`]: touch, reset, load | numbered, executed exactly once and in order |
 //! | chip | [`Outcome`]: verdict, done, refused | repeated on demand for the last [`WINDOW`] commands |
-//! | host | [`Query`]: model, names, posteriors, statistics, snapshot, next approach | changes nothing, repeated until answered |
+//! | host | [`Query`]: model, names, posteriors, statistics, snapshot, next approach, program | changes nothing, repeated until answered |
 //! | chip | [`Answer`] | |
 //! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host knows how many it missed |
 //!

@@ -75,6 +75,10 @@ impl Device for Notebook {
         ["bowl", "wristwatch"].get(usize::from(object)).copied()
     }
 
+    fn program(&self) -> &str {
+        "notebook 1.0"
+    }
+
     fn posterior(&self, object: u8) -> Option<u64> {
         (object < 20).then_some(u64::from(object) << 50)
     }
@@ -327,6 +331,43 @@ fn questions_are_answered_between_commands() {
 }
 
 #[test]
+fn a_chip_says_which_program_it_runs_and_a_question_that_an_older_one_does_not_answer_is_given_up() {
+    let mut rig = Rig::new(CLEAN, 1);
+    assert_eq!(rig.ask(Query::Program), "Program(\"notebook 1.0\")");
+    // Nothing arrives: as with a chip that does not know the question.
+    rig.host.ask(Query::Program, rig.now, |_| ());
+    assert!(!rig.host.can_ask());
+    rig.host.withdraw();
+    assert_eq!(rig.ask(Query::Name { object: 0 }), "Name(\"bowl\")");
+    // Its answer is late: it is not taken for that to another question.
+    rig.host.ask(Query::Program, rig.now, |frame| rig.down.send(frame, rig.now));
+    rig.host.withdraw();
+    assert_eq!(rig.ask(Query::Name { object: 1 }), "Name(\"wristwatch\")");
+    assert!(rig.answers.is_empty());
+}
+
+#[test]
+fn events_while_the_cable_was_out_are_missed_and_those_before_are_not_taken_twice() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let event = |index: u32| Event::Fault { kind: FaultKind::Stuck, finger: index as u8 };
+    let mut frames = Vec::new();
+    (0..4).for_each(|index| rig.chip.tell(event(index), |frame| frames.push(frame.to_vec())));
+    rig.up.send(&frames[0], rig.now);
+    rig.until(|rig| rig.events.len() == 1);
+    // Out, with half of a frame, and in again: a session of the same end, so that it knows what it has heard.
+    rig.up.send(&frames[1][..frames[1].len() / 2], rig.now);
+    (0..5).for_each(|_| rig.step().unwrap());
+    rig.opened = false;
+    rig.host.connect(2, rig.now, |frame| rig.down.send(frame, rig.now));
+    rig.up.send(&frames[0], rig.now);
+    rig.until(|rig| rig.opened);
+    rig.up.send(&frames[3], rig.now);
+    rig.until(|rig| rig.events.len() == 2);
+    assert_eq!(rig.events, [(event(0), 0), (event(3), 2)]);
+    assert_eq!(rig.host.statistics().missed_events, 2);
+}
+
+#[test]
 fn a_chip_that_stored_its_progress_goes_on_after_power_cuts_with_nothing_lost_or_doubled() {
     let faults = Faults { frame_lost: 0.02, frame_doubled: 0.02, byte_changed: 0.001, delay: 4_000, ..CLEAN };
     let mut rig = Rig::new(faults, 11);
@@ -565,7 +606,7 @@ fn golden_frames_pin_the_format() {
     // Written out by hand but for the checksums: version, session, message, CRC-32, in COBS.
     let (mut without, down) = ([0; POSE_BYTES], Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] });
     (without[0], without[12]) = (255, 1);
-    let frames: [(Message<'_>, &[u8]); 6] = [
+    let frames: [(Message<'_>, &[u8]); 8] = [
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
             &[
@@ -596,6 +637,11 @@ fn golden_frames_pin_the_format() {
             Message::Answer { asker: 2, tag: 5, answer: Answer::NextApproach(ApproachMessage::new(48, -5, &down)) },
             &[0, 3, 3, 2, 1, 1, 7, 1, 2, 5, 7, 48, 9, 1, 1, 1, 5, 1, 128, 255, 127, 1, 1, 1, 5, 49, 88, 154, 7, 0],
         ),
+        (Message::Query { tag: 5, query: Query::Program }, &[0, 3, 3, 2, 1, 1, 1, 7, 5, 8, 212, 181, 158, 15, 0]),
+        (
+            Message::Answer { asker: 2, tag: 5, answer: Answer::Program("gpio 1") },
+            &[0, 3, 3, 2, 1, 1, 16, 1, 2, 5, 8, 6, 103, 112, 105, 111, 32, 49, 42, 229, 240, 127, 0],
+        ),
     ];
     for (message, golden) in frames {
         assert_eq!(encode(&Frame { session: 2, message }, &mut [0; FRAME_MAX]), golden);
@@ -611,6 +657,7 @@ fn decode(bytes: &[u8]) -> Vec<Result<(), FrameError>> {
 
 #[test]
 fn the_longest_messages_fit_into_a_frame() {
+    let text = core::str::from_utf8(&[b'x'; CHUNK]).unwrap();
     let longest = [
         Message::Command { sequence: u32::MAX, command: Command::Chunk { offset: u32::MAX, bytes: &[0; CHUNK] } },
         Message::Answer {
@@ -619,6 +666,7 @@ fn the_longest_messages_fit_into_a_frame() {
             answer: Answer::Snapshot { length: u32::MAX, bytes: &[255; CHUNK] },
         },
         Message::Answer { asker: u32::MAX, tag: 255, answer: Answer::Posteriors(&[7; CHUNK]) },
+        Message::Answer { asker: u32::MAX, tag: 255, answer: Answer::Program(text) },
     ];
     for message in longest {
         let mut out = [0; FRAME_MAX];

@@ -71,7 +71,8 @@ pub struct Settings {
     /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
     /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
     pub leaf_bits: Option<u32>,
-    /// What is added to the touches before training, every touch made by a robot of its own.
+    /// What is added to the touches before training, every touch made by a robot of its own; on top of what the data set
+    /// states that they have already ([`Dataset::real`]).
     pub noise: Noise,
     /// Seed of the noise.
     pub seed: u64,
@@ -164,7 +165,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
         round_leaves(&mut ensemble, bits);
     }
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
-    let noise = (!settings.noise.is_none()).then_some(settings.noise);
+    let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
     ensemble.origin = Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) };
     Ok(ensemble)
 }
@@ -205,7 +206,7 @@ pub fn train_with_background(
     Ok(ensemble)
 }
 
-/// Rounds every leaf to a whole multiple of a power of two (the unit, at most 2⁻¹ and at least 2⁻¹⁵ nats), the smallest
+/// Rounds every leaf, and what margins start from, to a whole multiple of a power of two (the unit, at most 2⁻¹ and at least 2⁻¹⁵ nats), the smallest
 /// with which the largest leaf still fits `bits` bits, its sign included.
 ///
 /// A 16-bit unit is about 10⁻⁴ nats, far below what a finite number of touches can teach a leaf. In exchange, f32 sums
@@ -217,10 +218,12 @@ pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     let most = 2.0_f32.powi(i32::try_from(bits).unwrap_or(32) - 1) - 1.0;
     let fits = |digits: &i32| (largest * 2.0_f32.powi(*digits)).round() <= most;
     let unit = 2.0_f32.powi(-(1..=15).rev().find(fits).unwrap_or(1));
+    // Multiplying and dividing by a power of two is exact.
+    let rounded = |value: &mut f32| *value = (*value / unit).round() * unit;
+    ensemble.base_margins.iter_mut().for_each(rounded);
     for node in ensemble.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
         if let Node::Leaf(values) = node {
-            // Multiplying and dividing by a power of two is exact.
-            values.iter_mut().for_each(|value| *value = (*value / unit).round() * unit);
+            values.iter_mut().for_each(rounded);
         }
     }
 }

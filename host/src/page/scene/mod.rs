@@ -1,9 +1,9 @@
 //! A scene in three dimensions, for a page: a mesh that can be turned, its bounding box, and straight lines, some with a
 //! ball at their end.
 //!
-//! [three.js](https://threejs.org) draws it, from inside the page. `scene.js` offers the page's own script one function,
-//! `drawScene(data, { hover, choose })`: it draws what [`Scene::json`] wrote, calls back with the group of the line under
-//! the pointer, and returns `show`, which takes what is visible.
+//! [three.js](https://threejs.org) draws it, from inside the page. `stage.js` sets it up, for any page; `scene.js` offers
+//! the page's own script one function, `drawScene(data, { hover, choose })`: it draws what [`Scene::json`] wrote, calls
+//! back with the group of the line under the pointer, and returns `show`, which takes what is visible.
 
 mod simplified;
 
@@ -92,11 +92,19 @@ pub(crate) fn figure(caption: &str) -> Markup {
     }
 }
 
+/// The scripts that set a stage up, for the page's script to draw on.
+pub(crate) fn stage() -> Markup {
+    html! {
+        (html::script(LIBRARY))
+        (html::script(include_str!("stage.js")))
+    }
+}
+
 /// The scripts that draw `json`, which [`Scene::json`] wrote, and then the page's `own` script.
 pub(crate) fn scripts(json: &str, own: &str) -> Markup {
     html! {
         script id="data" type="application/json" { (maud::PreEscaped(json)) }
-        (html::script(LIBRARY))
+        (stage())
         (html::script(include_str!("scene.js")))
         (html::script(own))
     }

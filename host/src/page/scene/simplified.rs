@@ -19,9 +19,14 @@ pub(crate) struct SimplifiedMesh {
 
 impl SimplifiedMesh {
     /// The mesh, scaled so that its longest side is `length` and its box is centered on the origin, with at most
-    /// [`MOST_TRIANGLES`] triangles: in a larger mesh, the vertices in each cell of a grid become one, on the finest grid
-    /// that is coarse enough.
+    /// [`MOST_TRIANGLES`] triangles.
     pub(crate) fn new(mesh: &Mesh, length: f64) -> Self {
+        Self::with_at_most(mesh, length, MOST_TRIANGLES)
+    }
+
+    /// The same with at most this many triangles: in a larger mesh, the vertices in each cell of a grid become one, on the
+    /// finest grid that is coarse enough.
+    pub(crate) fn with_at_most(mesh: &Mesh, length: f64, most: usize) -> Self {
         let [low, high] = mesh.bounds();
         let longest = f64::from((high - low).max_element());
         let origin = -(high - low).as_dvec3() / 2.0 * (length / longest);
@@ -33,16 +38,16 @@ impl SimplifiedMesh {
         };
         let Mesh { vertices, triangles } = mesh.welded();
         let mut shown = Self { points: vertices.into_iter().map(place).collect(), triangles, step, origin };
-        if shown.triangles.len() > MOST_TRIANGLES {
+        if shown.triangles.len() > most {
             let full = shown;
             let mut cells = 800.0;
             loop {
                 shown = full.clustered(cells);
-                if shown.triangles.len() <= MOST_TRIANGLES {
+                if shown.triangles.len() <= most || cells < 2.0 {
                     break;
                 }
                 // The number of triangles grows about as the square of the number of cells.
-                let ratio = MOST_TRIANGLES as f64 / shown.triangles.len() as f64;
+                let ratio = most as f64 / shown.triangles.len() as f64;
                 cells *= ratio.sqrt().clamp(0.5, 0.95);
             }
         }

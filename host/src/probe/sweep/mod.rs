@@ -28,6 +28,8 @@ pub struct Surface {
     /// How many of the mesh's units are one unit in the frame of the casts, where the box's longest side is between 1 and
     /// 2. A power of two, so that scaling is exact; it keeps meshes of any size in the range of f32.
     unit: f64,
+    /// One over it, which is exact, too.
+    per_unit: f64,
     /// Half the box's sides, in the frame of the casts.
     half: DVec3,
     /// In the frame of the casts, in the order of the tree.
@@ -49,12 +51,13 @@ impl Surface {
         }
         let center = (low + high) / 2.0;
         let longest = (high - low).max_element();
-        let unit = if longest > 0.0 { libm::ldexp(1.0, libm::ilogb(longest)) } else { 1.0 };
+        // Not so small that one over it is out of range.
+        let unit = if longest > 0.0 { libm::ldexp(1.0, libm::ilogb(longest).max(-1000)) } else { 1.0 };
         for corner in triangles.iter_mut().flatten() {
             *corner = (*corner - center) / unit;
         }
         let (triangles, tree) = Tree::new(without_repeats(triangles));
-        Self { center, unit, half: (high - low) / (2.0 * unit), triangles, tree }
+        Self { center, unit, per_unit: 1.0 / unit, half: (high - low) / (2.0 * unit), triangles, tree }
     }
 
     /// The triangles, in the order of the tree; repeated ones only once.
@@ -82,9 +85,9 @@ impl Surface {
         let length = direction.length();
         let moves = length > 0.0 && length.is_finite();
         let motion = Motion {
-            origin: (origin - self.center) / self.unit,
+            origin: (origin - self.center) * self.per_unit,
             direction: if moves { direction / length } else { DVec3::ZERO },
-            radius: radius / self.unit,
+            radius: radius * self.per_unit,
         };
         let skipped = self.entry(&motion)?;
         let motion = Motion { origin: motion.origin + motion.direction * skipped, ..motion };
@@ -93,7 +96,8 @@ impl Surface {
 
     /// Whether the sphere's path meets the mesh's box: a cheap necessary condition for a contact.
     pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
-        let motion = Motion { origin: (origin - self.center) / self.unit, direction, radius: radius / self.unit };
+        let motion =
+            Motion { origin: (origin - self.center) * self.per_unit, direction, radius: radius * self.per_unit };
         self.entry(&motion).is_some()
     }
 

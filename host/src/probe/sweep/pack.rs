@@ -41,15 +41,63 @@ impl Pack {
 
     /// For each triangle, a distance before which the sphere does not touch it; infinite if it does not before `limit`.
     #[inline]
-    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> [f32; LANES] {
-        let mut earliest = [f32::INFINITY; LANES];
-        let used = self.count as usize;
-        for (half, places) in self.halves.iter().zip(earliest.chunks_exact_mut(WIDTH)).take(used.div_ceil(WIDTH)) {
-            places.copy_from_slice(&half_earliest(half, ray, limit).to_array());
-        }
-        earliest[used..].fill(f32::INFINITY);
-        earliest
+    pub(super) fn earliest(&self, ray: &Ray, limit: f32) -> Earliest {
+        let first = half_earliest(&self.halves[0], ray, limit);
+        let is_half = self.count as usize <= WIDTH;
+        let second = if is_half { Vec4::INFINITY } else { half_earliest(&self.halves[1], ray, limit) };
+        Earliest::new([first, second], self.count)
     }
+}
+
+/// Distances before which the triangles of a pack are not touched.
+pub(super) struct Earliest {
+    places: [f32; LANES],
+    /// A bit for each triangle that is left.
+    left: u32,
+}
+
+impl Earliest {
+    /// Of the first `count` triangles.
+    #[inline]
+    fn new(halves: [Vec4; 2], count: u32) -> Self {
+        let [low, high] = halves.map(|half| half.cmplt(Vec4::INFINITY).bitmask());
+        let mut places = [0.0; LANES];
+        for (places, half) in places.chunks_exact_mut(WIDTH).zip(halves) {
+            places.copy_from_slice(&half.to_array());
+        }
+        Self { places, left: (low | high << WIDTH) & all(count) }
+    }
+
+    /// Distances that exclude none of this many triangles.
+    #[cfg(feature = "experiments")]
+    pub(super) fn at_once(count: u32) -> Self {
+        Self { places: [0.0; LANES], left: all(count) }
+    }
+
+    /// The triangle with the least distance, if that is at most `limit`. Each is returned only once.
+    #[inline]
+    pub(super) fn pop(&mut self, limit: f32) -> Option<usize> {
+        if self.left == 0 {
+            return None;
+        }
+        let mut least = self.left.trailing_zeros() as usize;
+        let mut others = self.left & (self.left - 1);
+        while others != 0 {
+            let lane = others.trailing_zeros() as usize;
+            others &= others - 1;
+            if self.places[lane % LANES] < self.places[least % LANES] {
+                least = lane;
+            }
+        }
+        self.left &= !(1 << least);
+        (self.places[least % LANES] <= limit).then_some(least)
+    }
+}
+
+/// A bit for each of this many lanes.
+#[inline]
+fn all(count: u32) -> u32 {
+    (1 << count) - 1
 }
 
 #[inline]
@@ -87,8 +135,11 @@ fn half_earliest(corners: &[[Vec4; 3]; 3], ray: &Ray, limit: f32) -> Vec4 {
 /// A motion as the f32 tests need it.
 pub(super) struct Ray {
     pub(super) origin: Vec3,
-    /// One over the direction, with tiny components in place of zeros.
-    pub(super) inverse: Vec3,
+    /// The same, and one over the direction with tiny components in place of zeros, and its absolute value: axis by axis, for
+    /// four boxes at once.
+    pub(super) origins: [Vec4; 3],
+    pub(super) inverse: [Vec4; 3],
+    pub(super) spread: [Vec4; 3],
     /// Two directions perpendicular to the motion, and the direction of the motion.
     axes: [Vec3; 3],
     /// The origin along each of them.
@@ -106,9 +157,13 @@ impl Ray {
         let margin = motion.radius + BOX * (1.0 + motion.radius + motion.origin.abs().max_element());
         let component = |c: f64| if c.abs() < 1e-12 { 1e12_f64.copysign(c) } else { 1.0 / c };
         let across = |axis: DVec3| axis.dot(motion.origin) as f32;
+        let origin = motion.origin.as_vec3();
+        let inverse = direction.to_array().map(|along| Vec4::splat(component(along) as f32));
         Self {
-            origin: motion.origin.as_vec3(),
-            inverse: DVec3::from(direction.to_array().map(component)).as_vec3(),
+            origin,
+            origins: origin.to_array().map(Vec4::splat),
+            inverse,
+            spread: inverse.map(Vec4::abs),
             axes: [u.as_vec3(), v.as_vec3(), direction.as_vec3()],
             offsets: [across(u), across(v), across(direction)],
             margin: margin as f32,

@@ -5,8 +5,8 @@
 
 use super::Surface;
 use super::narrow::{self, Motion, Triangle};
-use super::pack::{LANES, Pack, Ray};
-use super::tree::{self, Tree};
+use super::pack::{Earliest, Ray};
+use super::tree::{self, Tree, scale};
 use glam::DVec3;
 
 /// A way to decide which triangle of a pack the sphere touches first.
@@ -63,6 +63,9 @@ mod single {
         pub const FLAT: Real = 1e-4;
         pub const PARALLEL: Real = 1e-6;
         pub const PLANE: Real = 1e-5;
+        pub const NARROW: Real = 1e-3;
+        pub const STEEP: Real = 1e-3;
+        pub const CLEAR: Real = 1.0 + 1e-5;
     }
 
     #[path = "narrow.rs"]
@@ -74,16 +77,16 @@ pub fn first_contact<P: Precision>(surface: &Surface, origin: DVec3, direction: 
     let start = surface.start(origin, direction, radius)?;
     let (tree, triangles, motion) = (&surface.tree, &surface.triangles, &start.motion);
     let ray = Ray::new(motion);
-    let distance = if tree.is_fine_for(&ray) {
-        search::<P, true>(tree, triangles, motion, &ray)?
-    } else {
-        search::<P, false>(tree, triangles, motion, &ray)?
-    };
+    let distance = match tree.scale_for(&ray) {
+        scale::COARSE => search::<P, { scale::COARSE }>(tree, triangles, motion, &ray),
+        scale::MIDDLE => search::<P, { scale::MIDDLE }>(tree, triangles, motion, &ray),
+        _ => search::<P, { scale::FINE }>(tree, triangles, motion, &ray),
+    }?;
     Some((start.skipped + distance) * surface.unit / start.length)
 }
 
 /// The production search, with the contacts decided by `P`.
-fn search<P: Precision, const IS_FINE: bool>(
+fn search<P: Precision, const SCALE: u8>(
     tree: &Tree,
     triangles: &[Triangle],
     motion: &Motion,
@@ -91,11 +94,11 @@ fn search<P: Precision, const IS_FINE: bool>(
 ) -> Option<f64> {
     let mut first = tree::farthest(motion);
     let mut limit = first as f32;
-    let mut stack = tree.candidates::<IS_FINE>(ray, limit);
+    let mut stack = tree.candidates::<SCALE>(ray, limit);
     while let Some(candidate) = stack.pop() {
-        let Some(pack) = tree.resolve::<IS_FINE>(&candidate, ray, limit, &mut stack) else { continue };
-        let mut earliest = if P::REJECT { pack.earliest(ray, limit) } else { at_once(pack) };
-        while let Some(lane) = tree::pop_least(&mut earliest, limit) {
+        let Some(pack) = tree.resolve::<SCALE>(&candidate, ray, limit, &mut stack) else { continue };
+        let mut earliest = if P::REJECT { pack.earliest(ray, limit) } else { Earliest::at_once(pack.count) };
+        while let Some(lane) = earliest.pop(limit) {
             let triangle = &triangles[pack.first as usize + lane];
             if let Some(distance) = P::first_contact(motion, triangle, first) {
                 first = distance;
@@ -104,12 +107,6 @@ fn search<P: Precision, const IS_FINE: bool>(
         }
     }
     (first < tree::farthest(motion)).then_some(first)
-}
-
-/// Earliest distances that reject nothing.
-#[inline]
-fn at_once(pack: &Pack) -> [f32; LANES] {
-    std::array::from_fn(|lane| if lane < pack.count as usize { 0.0 } else { f32::INFINITY })
 }
 
 #[cfg(test)]

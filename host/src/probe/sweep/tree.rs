@@ -29,8 +29,9 @@ pub(super) struct Candidate {
     near: f32,
     /// When it is likely to be touched: the candidate where this is least is searched first.
     expected: f32,
-    node: u32,
-    child: u32,
+    link: u32,
+    /// Four times its node's index, plus its own place among the node's children.
+    place: u32,
 }
 
 /// A tree over the triangles of a surface.
@@ -44,8 +45,21 @@ pub(super) struct Tree {
     grain: f32,
 }
 
-/// Where the sphere is this many times as large as the packs, it touches many boxes without touching the surface inside.
-const FINE: f32 = 2.0;
+/// How large the sphere is compared with the packs, and so what is worth looking at before a box is opened.
+pub(super) mod scale {
+    /// The sphere is small: it hardly touches a box without touching what is inside, so boxes alone do.
+    pub(in super::super) const COARSE: u8 = 0;
+    /// The sphere is about as large as the packs: the corners of boxes that it is too round to touch are left out.
+    pub(in super::super) const MIDDLE: u8 = 1;
+    /// The sphere is larger than the packs and touches many boxes without touching the surface inside: discs are tried.
+    pub(in super::super) const FINE: u8 = 2;
+}
+
+/// The sphere's radius, as a multiple of the packs' size, from which on a mesh is not coarse.
+const MIDDLE_FROM: f32 = 0.6;
+
+/// The same from which on it is fine.
+const FINE_FROM: f32 = 2.0;
 
 struct Bounds(Aabb);
 
@@ -72,30 +86,36 @@ impl Tree {
         (flattened.ordered, flattened.tree)
     }
 
-    /// Whether the mesh is so fine compared with the sphere that discs are worth looking at.
-    pub(super) fn is_fine_for(&self, ray: &Ray) -> bool {
-        ray.margin > FINE * self.grain
+    /// How fine the mesh is for the sphere: one of [`scale`].
+    #[inline]
+    pub(super) fn scale_for(&self, ray: &Ray) -> u8 {
+        if ray.margin > FINE_FROM * self.grain {
+            scale::FINE
+        } else if ray.margin > MIDDLE_FROM * self.grain {
+            scale::MIDDLE
+        } else {
+            scale::COARSE
+        }
     }
 
     /// The distance that the sphere travels until it touches one of the triangles.
     pub(super) fn first_contact(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
         let ray = Ray::new(motion);
-        if self.is_fine_for(&ray) {
-            self.search::<true>(triangles, motion, &ray)
-        } else {
-            self.search::<false>(triangles, motion, &ray)
+        match self.scale_for(&ray) {
+            scale::COARSE => self.search::<{ scale::COARSE }>(triangles, motion, &ray),
+            scale::MIDDLE => self.search::<{ scale::MIDDLE }>(triangles, motion, &ray),
+            _ => self.search::<{ scale::FINE }>(triangles, motion, &ray),
         }
     }
 
-    /// `IS_FINE`: whether to look at the discs.
-    fn search<const IS_FINE: bool>(&self, triangles: &[Triangle], motion: &Motion, ray: &Ray) -> Option<f64> {
+    fn search<const SCALE: u8>(&self, triangles: &[Triangle], motion: &Motion, ray: &Ray) -> Option<f64> {
         let mut first = farthest(motion);
         let mut limit = first as f32;
-        let mut stack = self.candidates::<IS_FINE>(ray, limit);
+        let mut stack = self.candidates::<SCALE>(ray, limit);
         while let Some(candidate) = stack.pop() {
-            let Some(pack) = self.resolve::<IS_FINE>(&candidate, ray, limit, &mut stack) else { continue };
+            let Some(pack) = self.resolve::<SCALE>(&candidate, ray, limit, &mut stack) else { continue };
             let mut earliest = pack.earliest(ray, limit);
-            while let Some(lane) = pop_least(&mut earliest, limit) {
+            while let Some(lane) = earliest.pop(limit) {
                 let triangle = &triangles[pack.first as usize + lane];
                 if let Some(distance) = narrow::first_contact(motion, triangle, first) {
                     first = distance;
@@ -108,30 +128,30 @@ impl Tree {
 
     /// The children of the root that the sphere may touch before `limit`.
     #[inline]
-    pub(super) fn candidates<const IS_FINE: bool>(&self, ray: &Ray, limit: f32) -> Vec<Candidate> {
-        // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this.
-        let mut stack = Vec::with_capacity(96);
-        self.visit::<IS_FINE>(0, ray, limit, &mut stack);
+    pub(super) fn candidates<const SCALE: u8>(&self, ray: &Ray, limit: f32) -> Vec<Candidate> {
+        // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this. A
+        // kilobyte is also what allocators have at hand.
+        let mut stack = Vec::with_capacity(1024 / size_of::<Candidate>());
+        self.visit::<SCALE>(0, ray, limit, &mut stack);
         stack
     }
 
     /// The candidate, if it is a pack that the sphere may touch before `limit`; if it is a node, its children go on the
     /// stack.
     #[inline]
-    pub(super) fn resolve<const IS_FINE: bool>(
+    pub(super) fn resolve<const SCALE: u8>(
         &self,
-        &Candidate { near, node, child, .. }: &Candidate,
+        &Candidate { near, link, place, .. }: &Candidate,
         ray: &Ray,
         limit: f32,
         stack: &mut Vec<Candidate>,
     ) -> Option<&Pack> {
         // The limit may have become lower since the child was put there.
-        if near > limit || self.passed::<IS_FINE>(node, ray, limit).test(child as usize) {
+        if near > limit || self.passed::<SCALE>(place / WIDTH as u32, ray, limit) >> (place % WIDTH as u32) & 1 == 1 {
             return None;
         }
-        let link = self.nodes[node as usize].children[child as usize];
         if link & PACK == 0 {
-            self.visit::<IS_FINE>(link, ray, limit, stack);
+            self.visit::<SCALE>(link, ray, limit, stack);
             return None;
         }
         Some(&self.packs[(link & !PACK) as usize])
@@ -140,41 +160,50 @@ impl Tree {
     /// Puts the node's children that the sphere may touch before `limit` on the stack; the one that is expected to be
     /// touched first comes on top.
     #[inline]
-    fn visit<const IS_FINE: bool>(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Candidate>) {
+    fn visit<const SCALE: u8>(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Candidate>) {
         let node = &self.nodes[index as usize];
-        let (mut near, mut met) = node.met(ray, limit);
+        let (mut near, mut met) = node.met::<SCALE>(ray, limit);
         let mut expected = near;
-        if IS_FINE {
+        if SCALE == scale::FINE {
             let bounds = self.discs[index as usize].contact_bounds(&node.center, ray, near);
             (near, expected) = (bounds.near, bounds.expected);
             met &= near.cmple(Vec4::splat(limit));
         }
-        if limit < f32::INFINITY {
-            met &= !self.passed::<IS_FINE>(index, ray, limit);
-        }
-        let (mut met, near, expected) = (met.bitmask(), near.to_array(), expected.to_array());
+        let mut met = met.bitmask() & !self.passed::<SCALE>(index, ray, limit);
+        let (near, expected) = (near.to_array(), expected.to_array());
+        // In a coarse mesh the nearest child nearly always has the first contact: its siblings wait below it. In others
+        // the most promising of all candidates is next.
+        let bottom = if SCALE == scale::COARSE { stack.len() } else { 0 };
         while met != 0 {
-            let child = met.trailing_zeros();
+            let child = met.trailing_zeros() as usize;
             met &= met - 1;
-            let (near, expected) = (near[child as usize], expected[child as usize]);
-            let mut place = stack.len();
-            stack.push(Candidate { near, expected, node: index, child });
-            while place > 0 && stack[place - 1].expected < expected {
-                stack.swap(place - 1, place);
-                place -= 1;
+            let (near, expected) = (near[child], expected[child]);
+            let mut above = stack.len();
+            stack.push(Candidate {
+                near,
+                expected,
+                link: node.children[child],
+                place: index * WIDTH as u32 + child as u32,
+            });
+            while above > bottom && stack[above - 1].expected < expected {
+                stack.swap(above - 1, above);
+                above -= 1;
             }
         }
     }
 
-    /// Which children the sphere has not reached when it has traveled as far as `limit`.
+    /// Which children the sphere has not reached when it has traveled as far as `limit`: a bit for each.
     #[inline]
-    fn passed<const IS_FINE: bool>(&self, index: u32, ray: &Ray, limit: f32) -> BVec4A {
+    fn passed<const SCALE: u8>(&self, index: u32, ray: &Ray, limit: f32) -> u32 {
+        if SCALE == scale::COARSE || limit == f32::INFINITY {
+            return 0;
+        }
         let node = &self.nodes[index as usize];
         let mut passed = node.passed(ray, limit);
-        if IS_FINE {
+        if SCALE == scale::FINE {
             passed |= self.discs[index as usize].passed(&node.center, ray, limit);
         }
-        passed
+        passed.bitmask()
     }
 }
 
@@ -183,13 +212,16 @@ impl Node {
 
     /// For each child, a distance before which the sphere does not touch its box, and whether it may before `limit`.
     #[inline]
-    fn met(&self, ray: &Ray, limit: f32) -> (Vec4, BVec4A) {
+    fn met<const SCALE: u8>(&self, ray: &Ray, limit: f32) -> (Vec4, BVec4A) {
         let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(limit));
         for axis in 0..3 {
-            let middle = (self.center[axis] - ray.origin[axis]) * ray.inverse[axis];
-            let half = (self.half[axis] + ray.margin) * ray.inverse[axis].abs();
+            let middle = (self.center[axis] - ray.origins[axis]) * ray.inverse[axis];
+            let half = (self.half[axis] + ray.margin) * ray.spread[axis];
             near = near.max(middle - half);
             far = far.min(middle + half);
+        }
+        if SCALE == scale::COARSE {
+            return (near, near.cmple(far));
         }
         // A box that is inflated like that has corners where the sphere is round. Seen along the motion, a box at a
         // distance from the path is met later than its depth says, or never: in fine meshes this limits the search to the
@@ -228,19 +260,6 @@ pub(super) fn farthest(motion: &Motion) -> f64 {
 #[inline]
 pub(super) fn limit_after(first: f64, motion: &Motion, ray: &Ray) -> f32 {
     first as f32 + 2.0 * (ray.margin - motion.radius as f32)
-}
-
-/// The lane with the least value, if that is at most `limit`. Each lane is returned only once.
-#[inline]
-pub(super) fn pop_least(values: &mut [f32; LANES], limit: f32) -> Option<usize> {
-    let (mut least, mut lane) = (f32::INFINITY, 0);
-    for (index, &value) in values.iter().enumerate() {
-        if value < least {
-            (least, lane) = (value, index);
-        }
-    }
-    values[lane] = f32::INFINITY;
-    (least <= limit && least < f32::INFINITY).then_some(lane)
 }
 
 /// As the fast preset of obvhs, but with fewer, fuller packs.

@@ -163,6 +163,7 @@ fn html(
                     } }
                     div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
                     div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
+                    @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (grouped(facts.parts.len())) } } }
                     div { dt { "Size in the file" } dd {
                         (three_digits(side.x.into())) " × " (three_digits(side.y.into())) " × " (three_digits(side.z.into()))
                     } }
@@ -172,6 +173,7 @@ fn html(
                     } }
                     div { dt { "Full touches" } dd { (format!("{share:.1} % of {} approaches", grouped(drawn.tried as usize))) } }
                 }
+                @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
                 fieldset {
                     legend { "Show" }
                     @for (id, label, on) in [

@@ -43,8 +43,9 @@ pub struct Noise {
     pub timer: f64,
     /// What a bouncing switch adds to every contact time: uniform from 0 to this.
     pub debounce: f64,
-    /// The probability that a contact is missed.
-    pub missed: f64,
+    /// The probability that a contact of each finger is missed. In files one number, if it is the same for all fingers.
+    #[serde(with = "missed_shares")]
+    pub missed: [f64; FINGERS],
     /// How much earlier each finger touches than it should: a bent finger.
     pub bent: [f64; FINGERS],
     /// The probe's speed over the nominal one.
@@ -65,7 +66,7 @@ impl Default for Noise {
             deviation: Deviation::default(),
             timer: 0.0,
             debounce: 0.0,
-            missed: 0.0,
+            missed: [0.0; FINGERS],
             bent: [0.0; FINGERS],
             speed: 1.0,
             speed_error: 0.0,
@@ -130,7 +131,14 @@ impl fmt::Display for Noise {
         let mut say = |is_there: bool, text: String| parts.extend(is_there.then_some(text));
         say(self.timer > 0.0, format!("a timer of {} ms", ms(self.timer)));
         say(self.debounce > 0.0, format!("bouncing of up to {} ms", ms(self.debounce)));
-        say(self.missed > 0.0, format!("{} % of contacts missed", percent(self.missed)));
+        let [missed, others @ ..] = self.missed;
+        if others.iter().all(|other| *other == missed) {
+            say(missed > 0.0, format!("{} % of contacts missed", percent(missed)));
+        } else {
+            for (finger, missed) in (1..).zip(self.missed) {
+                say(missed > 0.0, format!("{} % of finger {finger}'s contacts missed", percent(missed)));
+            }
+        }
         for (finger, early) in (1..).zip(self.bent) {
             say(early != 0.0, format!("finger {finger} early by {} ms", ms(early)));
         }
@@ -168,7 +176,7 @@ impl Noise {
 
     /// Whether it can turn a contact into a missing one.
     pub fn misses(&self) -> bool {
-        self.missed > 0.0
+        self.missed.iter().any(|share| *share > 0.0)
     }
 
     /// What a compiled model states about it. A robot's bias counts as noise of the pose: in training, every touch is
@@ -191,7 +199,7 @@ impl Noise {
             touch: Self { pose_bias: 0.0, ..*self }.trained(),
             debounce: whole(self.debounce),
             bent: self.bent.map(|early| early.round() as i32),
-            missed: billionths(self.missed),
+            missed: self.missed.map(billionths),
             speed_error: billionths(self.speed_error),
             speed_bias: billionths(self.speed_bias),
             speed: (1e9 * (self.speed - 1.0)).round() as i32,
@@ -207,7 +215,7 @@ impl Noise {
             deviation: Deviation { least: least.into(), largest: largest.into() },
             timer: timer.into(),
             debounce: promised.debounce.into(),
-            missed: share(promised.missed),
+            missed: promised.missed.map(share),
             bent: promised.bent.map(f64::from),
             speed: 1.0 + f64::from(promised.speed) / 1e9,
             speed_error: share(promised.speed_error),
@@ -235,8 +243,8 @@ impl Noise {
         if let Some(bent) = self.bent.iter().find(|bent| !bent.is_finite()) {
             return Err(Error::setting("bent", bent, "a duration"));
         }
-        if !(0.0..=1.0).contains(&self.missed) {
-            return Err(Error::setting("missed", self.missed, "a share from 0 to 1"));
+        if let Some(missed) = self.missed.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+            return Err(Error::setting("missed", missed, "a share from 0 to 1"));
         }
         if !(self.speed > 0.0 && self.speed.is_finite()) {
             return Err(Error::setting("speed", self.speed, "a number greater than 0"));
@@ -271,6 +279,38 @@ impl Noise {
         self.by(name, touches, seed, |index| index % robots.max(1) as u64)
     }
 
+    /// A touch with this noise, whose random numbers come from `random`; made by a robot of its own. For touches that are
+    /// made one at a time, such as those of a capture.
+    pub(crate) fn add_to(&self, touch: &Touch, random: &mut ChaCha8Rng) -> Touch {
+        let normal = std::array::from_fn(|_| StandardNormal.sample(random));
+        let [own, robot] = [Draw::new(random), Draw::new(random)];
+        self.one(touch, normal, &own, &robot)
+    }
+
+    /// This noise and `more` added after it, as far as one noise can say it: variances and shares of missed contacts add
+    /// up, times of fingers add up, speeds are multiplied; of two timers the coarser one counts.
+    #[must_use]
+    pub fn and(&self, more: &Self) -> Self {
+        let Deviation { least, largest } = self.deviation;
+        let deviation =
+            Deviation { least: least.hypot(more.deviation.least), largest: largest.hypot(more.deviation.largest) };
+        Self {
+            deviation,
+            timer: self.timer.max(more.timer),
+            debounce: self.debounce + more.debounce,
+            missed: std::array::from_fn(|finger| {
+                let [one, other] = [self.missed[finger], more.missed[finger]];
+                one + other - one * other
+            }),
+            bent: std::array::from_fn(|finger| self.bent[finger] / more.speed + more.bent[finger]),
+            speed: self.speed * more.speed,
+            speed_error: (self.speed_error + more.speed_error).min(0.9),
+            speed_bias: (self.speed_bias + more.speed_bias).min(0.9),
+            pose: self.pose.hypot(more.pose),
+            pose_bias: self.pose_bias.hypot(more.pose_bias),
+        }
+    }
+
     fn by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
         // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
         // version 0.1.0, and no other setting changes it.
@@ -293,7 +333,8 @@ impl Noise {
         let Deviation { least, largest } = self.deviation;
         let deviation = least + (largest - least) * own.level * own.level.sqrt();
         let speed = self.speed * (1.0 + self.speed_error * own.speed) * (1.0 + self.speed_bias * robot.speed);
-        let noisy = missed(touch, own.missed.map(|chance| chance < self.missed));
+        let missing = std::array::from_fn(|finger| own.missed[finger] < self.missed[finger]);
+        let noisy = missed(touch, missing);
         let noisy = timed(&noisy, |finger, time| {
             let sensed =
                 time / speed - self.bent[finger] + deviation * normal[finger] + self.debounce * own.debounce[finger];
@@ -310,6 +351,35 @@ impl Noise {
             }
             _ => noisy,
         }
+    }
+}
+
+/// Shares of the fingers: one number in files, if it is the same for all of them.
+mod missed_shares {
+    use super::FINGERS;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Shares {
+        One(f64),
+        Each([f64; FINGERS]),
+    }
+
+    pub(super) fn serialize<S: Serializer>(shares: &[f64; FINGERS], serializer: S) -> Result<S::Ok, S::Error> {
+        let [first, others @ ..] = shares;
+        if others.iter().all(|other| other == first) {
+            first.serialize(serializer)
+        } else {
+            shares.serialize(serializer)
+        }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], D::Error> {
+        Ok(match Shares::deserialize(deserializer)? {
+            Shares::One(share) => [share; FINGERS],
+            Shares::Each(shares) => shares,
+        })
     }
 }
 

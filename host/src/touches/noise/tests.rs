@@ -88,11 +88,11 @@ fn a_timer_rounds_down_from_a_phase_of_every_touch() {
 
 #[test]
 fn missed_contacts_are_as_many_as_asked_for_and_the_others_start_at_zero() {
-    let noisy = Noise { missed: 0.25, ..Noise::default() }.add("fork", &touches(10_000), 1);
+    let noisy = Noise { missed: [0.25; 3], ..Noise::default() }.add("fork", &touches(10_000), 1);
     let missing = noisy.iter().flat_map(|touch| touch.times()).filter(|time| time.is_missing()).count();
     assert!((7_200..7_800).contains(&missing), "{missing}");
     assert!(noisy.iter().all(|touch| touch.is_empty() || touch.times().contains(&ContactTime::FIRST)));
-    let none = Noise { missed: 1.0, ..Noise::default() }.add("fork", &touches(10), 1);
+    let none = Noise { missed: [1.0; 3], ..Noise::default() }.add("fork", &touches(10), 1);
     assert_eq!(none, vec![Touch::new([ContactTime::MISSING; 3]); 10]);
 }
 
@@ -157,7 +157,7 @@ fn noise_of_a_touch_depends_on_its_position_and_on_no_other_touch() {
         deviation: Deviation { least: 0.0, largest: 10_000.0 },
         timer: 1_000.0,
         debounce: 2_000.0,
-        missed: 0.1,
+        missed: [0.1; 3],
         speed_error: 0.05,
         ..Noise::default()
     };
@@ -179,7 +179,7 @@ fn noise_that_cannot_be_is_refused_by_the_name_of_its_setting() {
         (Noise { deviation: Deviation { least: 2.0, largest: 1.0 }, ..base }, "noise"),
         (Noise { timer: f64::NAN, ..base }, "timer"),
         (Noise { debounce: -1.0, ..base }, "debounce"),
-        (Noise { missed: 1.5, ..base }, "missed"),
+        (Noise { missed: [0.0, 1.5, 0.0], ..base }, "missed"),
         (Noise { bent: [f64::NAN, 0.0, 0.0], ..base }, "bent"),
         (Noise { speed: 0.0, ..base }, "speed"),
         (Noise { speed_error: 1.0, ..base }, "speed_error"),
@@ -208,7 +208,7 @@ fn a_model_states_the_noise_that_it_was_trained_with() {
 fn noise_is_said_in_words() {
     assert_eq!(Noise::default().to_string(), "no noise");
     assert_eq!(Noise::gaussian(5_000.0).to_string(), "noise of 5 ms");
-    let noise = Noise { deviation: "0..10ms".parse().unwrap(), timer: 500.0, missed: 0.02, ..Noise::default() };
+    let noise = Noise { deviation: "0..10ms".parse().unwrap(), timer: 500.0, missed: [0.02; 3], ..Noise::default() };
     assert_eq!(noise.to_string(), "noise of 0 to 10 ms, a timer of 0.5 ms, 2 % of contacts missed");
     let noise = Noise { bent: [0.0, 3_000.0, 0.0], speed_bias: 0.05, pose: 5.0, ..Noise::default() };
     assert_eq!(

@@ -1,7 +1,8 @@
 //! Recognizes from three switches on three pins, and reports every touch and fault to a host over the UART
 //! (`palpate watch`). A verdict ends an object; the next touch begins another. What was touched is kept through resets.
 //!
-//! The model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`.
+//! A model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`, or over the
+//! link: `palpate link PORT --load model.palpate`.
 #![no_std]
 #![no_main]
 
@@ -12,10 +13,12 @@ use palpate_firmware::chip::{self, Interrupt};
 use palpate_firmware::pins;
 use palpate_firmware::uart::{Port, Uart};
 use palpate_onboard::effector::Sensed;
-use palpate_onboard::station::{Board, Memory, ProbeSettings, ProbeStation, record_length};
+use palpate_onboard::station::{Board, ProbeSettings, ProbeStation, record_length};
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
-/// Objects that the model may have.
+/// What it is called on the link.
+const PROGRAM: &str = concat!("palpate-firmware gpio ", env!("CARGO_PKG_VERSION"));
+/// Objects that a model may have.
 const OBJECTS: usize = 16;
 
 /// The link; the pins are the interrupt's.
@@ -40,10 +43,8 @@ impl Board for Chip {
 #[entry]
 fn main() -> ! {
     let mut chip = Chip(Uart::take(Port::Link));
-    let (first, rest) = chip::take_retained().split_at_mut(record_length(OBJECTS));
-    let (second, _) = rest.split_at_mut(record_length(OBJECTS));
-    let memory = Memory { models: [&mut [], &mut []], records: [first, second] };
-    let settings = ProbeSettings::default();
+    let memory = chip::take_memory(record_length(OBJECTS));
+    let settings = ProbeSettings { program: PROGRAM, ..ProbeSettings::default() };
     let Ok(mut station) = ProbeStation::<OBJECTS, _>::open(MODEL, memory, settings) else { palpate_firmware::fail() };
     if station.model().is_none() {
         palpate_firmware::println!("no model is built in: build with PALPATE_MODEL=/path/to/model.palpate");

@@ -8,7 +8,7 @@
 use cortex_m_rt::{entry, exception};
 use palpate_firmware::chip::{self, Interrupt};
 use palpate_firmware::uart::{Port, Uart};
-use palpate_onboard::station::{Memory, record_length, serve};
+use palpate_onboard::station::{record_length, serve};
 
 /// Objects that a model may have.
 const OBJECTS: usize = 16;
@@ -16,13 +16,7 @@ const OBJECTS: usize = 16;
 #[entry]
 fn main() -> ! {
     let mut uart = Uart::take(Port::Link);
-    let retained = chip::take_retained();
-    // Aligned, as models are read fastest.
-    let record = record_length(OBJECTS).next_multiple_of(4);
-    let (first_record, rest) = retained.split_at_mut(record);
-    let (second_record, rest) = rest.split_at_mut(record);
-    let (first_model, second_model) = rest.split_at_mut(rest.len() / 8 * 4);
-    let memory = Memory { models: [first_model, second_model], records: [first_record, second_record] };
+    let memory = chip::take_memory(record_length(OBJECTS));
     match serve::<OBJECTS, _, _>(&[], memory, 0, &mut uart) {
         // The UART has no end.
         Ok(()) | Err(_) => palpate_firmware::fail(),

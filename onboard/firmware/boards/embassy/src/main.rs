@@ -15,6 +15,8 @@ use palpate_onboard::station::{Board, NoStorage, ProbeSettings, ProbeStation};
 use panic_halt as _;
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
+/// What it is called on the link.
+const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 /// Objects that the model may have.
 const OBJECTS: usize = 16;
 
@@ -100,7 +102,7 @@ async fn main(_spawner: Spawner) {
     let last = Input::new(chip.PIN_4, Pull::Up);
     let watcher = Watcher::start(Fingers::new(first, middle, last, Active::Low), &Micros);
     let mut pico = Pico { watcher, uart, received: [0; 32], count: 0 };
-    let settings = ProbeSettings { boot: RoscRng.next_u32(), ..ProbeSettings::default() };
+    let settings = ProbeSettings { boot: RoscRng.next_u32(), program: PROGRAM, ..ProbeSettings::default() };
     let Ok(mut station) = ProbeStation::<OBJECTS>::open(MODEL, NoStorage, settings) else { return };
     loop {
         match station.step(&mut pico) {

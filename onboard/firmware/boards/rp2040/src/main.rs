@@ -24,6 +24,8 @@ use panic_halt as _;
 use rp2040_hal as hal;
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
+/// What it is called on the link.
+const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 /// Objects that the model may have.
 const OBJECTS: usize = 16;
 /// Bytes of flash for records: more wear longer.
@@ -90,7 +92,8 @@ fn run() -> Option<Infallible> {
     let mut led = pins.gpio25.into_push_pull_output();
 
     let storage = FlashStorage::<_, { record_length(OBJECTS) }>::new(flash::Flash::take()?, LOG).ok()?;
-    let settings = ProbeSettings { scale: Scale::new(MODEL_PROBE, PROBE)?, boot, ..ProbeSettings::default() };
+    let settings =
+        ProbeSettings { scale: Scale::new(MODEL_PROBE, PROBE)?, boot, program: PROGRAM, ..ProbeSettings::default() };
     let mut station = ProbeStation::<OBJECTS, _>::open(MODEL, storage, settings).ok()?;
     let switches = (pins.gpio2.reconfigure(), pins.gpio3.reconfigure(), pins.gpio4.reconfigure());
     let (reader, writer) = uart.split();

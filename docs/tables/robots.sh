@@ -1,0 +1,56 @@
+#!/bin/sh
+# Accuracy on touches of real robots (or such as stand for them), for models trained clean, on a mixture, and for fitted
+# probes.
+#
+#   docs/tables/robots.sh MESHES ROBOT DIR
+#
+# ROBOT has known/ (recorded touches to fit from), plate.txt and test/ (touches to test on), DIR is filled. The program is
+# $PALPATE, or target/release/palpate; $TOUCHES and $APPROACHES are those of each object to train on.
+set -eu
+meshes=$1
+robot=$2
+out=$3
+palpate=${PALPATE:-target/release/palpate}
+touches=${TOUCHES:-21000}
+approaches=${APPROACHES:-60000}
+
+mkdir -p "$out/test"
+quiet() { "$palpate" "$@" >/dev/null 2>>"$out/log"; }
+known=""
+for file in "$robot"/known/*.txt; do known="$known $meshes/$(basename "$file" .txt).obj"; done
+# Only objects that have a mesh.
+for mesh in "$meshes"/*.obj; do cp "$robot/test/$(basename "$mesh" .obj).txt" "$out/test/"; done
+
+row() { # name, full touches, approaches, more options of train
+    name=$1 full=$2 all=$3
+    shift 3
+    quiet train "$full" -o "$out/full.json" "$@"
+    quiet train "$all" -o "$out/contacts.json" "$@"
+    echo "== $name"
+    "$palpate" evaluate "$out/full.json" "$out/test" --at 10,20,30,60 | grep -A 3 '^touches' | sed 's/^/full touches   /'
+    "$palpate" evaluate "$out/contacts.json" "$out/test" --at 10,20,30,60 | grep -A 3 '^approaches' | sed 's/^/every contact  /'
+}
+
+if [ ! -e "$out/../clean-all/dataset.json" ]; then
+    quiet capture "$meshes" -o "$out/../clean" --touches "$touches" --force
+    quiet capture "$meshes" -o "$out/../clean-all" --approaches --touches "$approaches" --force
+fi
+row "trained clean" "$out/../clean" "$out/../clean-all"
+row "mixture" "$out/../clean" "$out/../clean-all" --noise 0..6ms --timer 1ms --speed-error 15% --missed 2%
+
+fitted() { # name, recorded touches, more options of fit
+    name=$1 recorded=$2
+    shift 2
+    echo "== $name"
+    # shellcheck disable=SC2086
+    "$palpate" probe fit "$recorded" $known -o "$out/probe.toml" "$@"
+    quiet capture "$meshes" -o "$out/fitted" --touches "$touches" --probe "$out/probe.toml" --force
+    quiet capture "$meshes" -o "$out/fitted-all" --approaches --touches "$approaches" --probe "$out/probe.toml" --force
+    row "$name" "$out/fitted" "$out/fitted-all"
+}
+
+mkdir -p "$out/part"
+for file in "$robot"/known/*.txt; do head -n 75 "$file" >"$out/part/$(basename "$file")"; done
+fitted "fitted from 300 approaches" "$out/part"
+fitted "fitted from all approaches" "$robot/known"
+fitted "fitted from all approaches and the plate" "$robot/known" --plate "$robot/plate.txt"

@@ -1,0 +1,220 @@
+//! What a chip's own fingers report, into a data set.
+
+use super::{ChipModel, Connection, Received, Transport};
+use crate::error::{ChipProblem, Error, Problem, Result};
+use crate::touches::Recording;
+use palpate_shared::Touch;
+use palpate_shared::link::{Event, FaultKind, Refusal, VerdictMessage};
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// How long to wait before the line is tried again.
+const RETRY: Duration = Duration::from_millis(500);
+
+/// Something new while touches are recorded.
+#[derive(Debug)]
+pub enum Heard<'a> {
+    /// The chip answers, for the first time or after the line broke.
+    Connected {
+        /// Its program, where it says so.
+        program: Option<&'a str>,
+        /// Its model, if it has one.
+        model: Option<&'a ChipModel>,
+        /// Another program made the newest touches of the data set: this one.
+        other: Option<&'a str>,
+    },
+    /// The line broke; it is tried again and again.
+    Lost(&'a Error),
+    /// A touch was recorded.
+    Touch {
+        /// The touch.
+        touch: Touch,
+        /// How many touches of the object there are now.
+        number: u64,
+        /// What the chip made of it: that it does not count it does not matter here.
+        verdict: Result<VerdictMessage, Refusal>,
+    },
+    /// A touch was not recorded, because it lacks the pose.
+    NoPose(Touch),
+    /// A finger is faulty.
+    Fault {
+        /// What is wrong.
+        kind: FaultKind,
+        /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
+        finger: u8,
+    },
+    /// The chip reported so many things that were lost on the way.
+    Missed(u32),
+    /// Nothing has happened for a while.
+    Idle,
+}
+
+/// How a recording went.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RecordSummary {
+    /// The object.
+    pub object: String,
+    /// Touches that were recorded.
+    pub touches: u64,
+    /// Touches of the object that the data set holds now.
+    pub all_touches: u64,
+    /// How many of the recorded touches have one, two and three contacts.
+    pub contacts: [u64; 3],
+    /// Touches that were not recorded because they lack the pose.
+    pub without_pose: u64,
+    /// Reports of the chip that were lost on the way, touches or others.
+    pub missed: u64,
+    /// Faults of fingers that the chip reported.
+    pub faults: u64,
+    /// Times that the line broke.
+    pub lost: u64,
+    /// Name and version of the chip's program, where it says so.
+    pub firmware: Option<String>,
+}
+
+/// Records what the chip reports until there are `count` touches or `each` breaks, and passes everything to `each`, in
+/// order. When `each` hears of a touch, it is on the disk.
+///
+/// Where the line breaks, `reopen` is called until it succeeds. Touches that the chip reports meanwhile are lost: they are
+/// counted as missed, unless the chip was without power too. No touch is recorded twice.
+///
+/// # Errors
+/// When the data set cannot be written, an emulated chip ends, or `each` fails. The data set is whole in any case.
+pub fn record(
+    connection: &mut Connection,
+    mut reopen: impl FnMut() -> Result<Transport>,
+    recording: &mut Recording,
+    count: Option<u64>,
+    mut each: impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+) -> Result<RecordSummary> {
+    let mut summary = RecordSummary { object: recording.object().into(), ..RecordSummary::default() };
+    let mut connected = false;
+    let recorded = loop {
+        let step = match connected {
+            true => listen(connection, recording, count, &mut summary, &mut each),
+            false => greet(connection, recording, &mut summary, &mut each),
+        };
+        connected = true;
+        match step {
+            Ok(ControlFlow::Continue(())) => {}
+            Ok(ControlFlow::Break(())) => break Ok(()),
+            Err(error) if is_lost(&error) => {
+                summary.lost += 1;
+                connected = false;
+                recording.checkpoint()?;
+                match wait(connection, &error, &mut reopen, &mut each) {
+                    Ok(ControlFlow::Continue(())) => {}
+                    Ok(ControlFlow::Break(())) => break Ok(()),
+                    Err(error) => break Err(error),
+                }
+            }
+            Err(error) => break Err(error),
+        }
+    };
+    recording.checkpoint()?;
+    recorded?;
+    summary.all_touches = recording.all_touches();
+    Ok(summary)
+}
+
+/// Asks the chip what it is.
+fn greet(
+    connection: &mut Connection,
+    recording: &mut Recording,
+    summary: &mut RecordSummary,
+    each: &mut impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+) -> Result<ControlFlow<()>> {
+    let program = connection.program()?;
+    let model = match connection.model() {
+        Ok(model) => Some(model),
+        Err(error) if is(&error, |problem| *problem == ChipProblem::NoModel) => None,
+        Err(error) => return Err(error),
+    };
+    let other = recording.made_by(program.clone(), model.as_ref().map(|model| model.info.checksum))?;
+    let heard = Heard::Connected { program: program.as_deref(), model: model.as_ref(), other: other.as_deref() };
+    let flow = each(&heard);
+    summary.firmware = program;
+    flow
+}
+
+/// Takes the next thing that the chip reports.
+fn listen(
+    connection: &mut Connection,
+    recording: &mut Recording,
+    count: Option<u64>,
+    summary: &mut RecordSummary,
+    each: &mut impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+) -> Result<ControlFlow<()>> {
+    if count.is_some_and(|count| summary.touches >= count) {
+        return Ok(ControlFlow::Break(()));
+    }
+    let Some(Received::Event(event, missed)) = connection.hear(Duration::from_millis(50))? else {
+        return each(&Heard::Idle);
+    };
+    if missed > 0 {
+        summary.missed += u64::from(missed);
+        if each(&Heard::Missed(missed))?.is_break() {
+            return Ok(ControlFlow::Break(()));
+        }
+    }
+    let (touch, verdict) = match event {
+        Event::Touch { touch, verdict, .. } => (Touch::from(&touch), Ok(verdict)),
+        Event::Refused { touch, refusal } => (Touch::from(&touch), Err(refusal)),
+        Event::Fault { kind, finger } => {
+            summary.faults += 1;
+            return each(&Heard::Fault { kind, finger });
+        }
+        _ => return Ok(ControlFlow::Continue(())),
+    };
+    if recording.lacks_pose(&touch) {
+        summary.without_pose += 1;
+        return each(&Heard::NoPose(touch));
+    }
+    recording.add(&touch)?;
+    summary.touches += 1;
+    let contacts = touch.times().iter().filter(|time| !time.is_missing()).count();
+    if let Some(counted) = contacts.checked_sub(1).and_then(|place| summary.contacts.get_mut(place)) {
+        *counted += 1;
+    }
+    each(&Heard::Touch { touch, number: recording.all_touches(), verdict })
+}
+
+/// Waits until the line is there again.
+fn wait(
+    connection: &mut Connection,
+    error: &Error,
+    reopen: &mut impl FnMut() -> Result<Transport>,
+    each: &mut impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+) -> Result<ControlFlow<()>> {
+    if each(&Heard::Lost(error))?.is_break() {
+        return Ok(ControlFlow::Break(()));
+    }
+    loop {
+        match reopen().and_then(|transport| connection.reopen(transport)) {
+            Ok(()) => return Ok(ControlFlow::Continue(())),
+            Err(error) if !is_lost(&error) && !is(&error, is_closed) => return Err(error),
+            Err(_) => std::thread::sleep(RETRY),
+        }
+        if each(&Heard::Idle)?.is_break() {
+            return Ok(ControlFlow::Break(()));
+        }
+    }
+}
+
+/// Whether the line broke, or the chip does not know the session any more: it may come back.
+fn is_lost(error: &Error) -> bool {
+    let lost = |problem: &ChipProblem| {
+        matches!(problem, ChipProblem::Lost { .. } | ChipProblem::Silent { .. } | ChipProblem::Forgotten { .. })
+    };
+    is(error, lost)
+}
+
+/// Whether nothing is there yet.
+fn is_closed(problem: &ChipProblem) -> bool {
+    matches!(problem, ChipProblem::CannotOpen { .. } | ChipProblem::CannotConnect { .. })
+}
+
+fn is(error: &Error, which: impl FnOnce(&ChipProblem) -> bool) -> bool {
+    matches!(error.problem(), Some(Problem::Chip(problem)) if which(problem))
+}

@@ -1,0 +1,73 @@
+//! `palpate data record`.
+
+use crate::commands::record::{RecordArguments, summary};
+use crate::touches::text;
+use crate::{Error, Result, output};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and if you like \
+the probe's direction and alignment (six numbers). Lines like these come from any robot that can print. Lines `- - -` for \
+approaches that missed are welcome: they say how often each object is missed.
+
+DIR gets NAME.txt and dataset.json, which says when, from where and with which probe the touches were recorded. All \
+lines are added, or none if one of them is wrong. Touches of an object that is there already are added to it.
+
+Examples:
+  palpate data record monday.txt -o recorded --object bowl
+  palpate data record monday.txt -o recorded --object bowl --probe probe.toml
+  robot --print | palpate data record - -o recorded --object bowl --pose")]
+pub(crate) struct Arguments {
+    /// A file of lines, or - for standard input
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// The data set's directory, such as recorded; created if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// The name of the object that was touched, such as bowl
+    #[arg(long, value_name = "NAME")]
+    object: String,
+    #[command(flatten)]
+    record: RecordArguments,
+    /// Print the summary as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let Arguments { file, output: directory, object, record, json } = arguments;
+    output::refuse_stdout(directory)?;
+    let (source, lines): (_, Box<dyn Read>) = match file.as_os_str() == "-" {
+        true => ("standard input".into(), Box::new(std::io::stdin())),
+        false => {
+            let opened = File::open(file).map_err(|error| Error::io(file, "read the touches", error))?;
+            (file.display().to_string(), Box::new(opened))
+        }
+    };
+    let touches = read(BufReader::new(lines), Path::new(&source))?;
+    let mut recording = record.open(directory, object, &source, SystemTime::now())?;
+    recording.add_all(&touches).map_err(|error| error.in_file(&source))?;
+    let mut counts = [0; 4];
+    for touch in &touches {
+        counts[touch.times().iter().filter(|time| !time.is_missing()).count()] += 1;
+    }
+    if *json {
+        let all = recording.all_touches();
+        return output::print_json(&serde_json::json!({
+            "object": object, "touches": touches.len(), "all_touches": all, "contacts": counts,
+        }));
+    }
+    output::print(&summary(&recording, directory, counts))
+}
+
+fn read(lines: impl BufRead, source: &Path) -> Result<Vec<palpate_shared::Touch>> {
+    let touches = text::touches(lines, source).collect::<Result<Vec<_>>>()?;
+    match touches.is_empty() {
+        true => Err(Error::at(crate::error::Place::file(source), crate::error::TouchesProblem::NoTouches)),
+        false => Ok(touches),
+    }
+}

@@ -1,0 +1,475 @@
+//! How far recorded and simulated touches are apart, feature by feature and as a whole.
+//!
+//! The one figure is how often a classifier tells a recorded touch of an object from a simulated one: trees are trained to
+//! do just that, and tested on touches that they were not trained on (cross-validation). Half of the time is guessing. It
+//! is a test of two samples by a classifier: Lopez-Paz and Oquab, Revisiting Classifier Two-Sample Tests, 1610.06545. Each
+//! feature is compared by itself too, by the largest difference of its two distributions (Kolmogorov and Smirnov).
+//!
+//! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
+//! recorded ones, and how many more approaches it takes there to be right as often as on simulated ones.
+
+use super::estimate::Estimate;
+use super::{Candidate, Margins, SequentialSettings};
+use crate::ensemble::{feature_row, train};
+use crate::error::{Error, EvaluateProblem, Result};
+use crate::progress::{self, Progress};
+use crate::touches::{Dataset, ObjectTouches, folds};
+use palpate_shared::format::Counted;
+use palpate_shared::{ContactPattern, Descriptor, Touch};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// How data sets are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The features that touches are compared by, and that the model is trained on.
+    pub descriptor: Descriptor,
+    /// Folds of the cross-validation.
+    pub folds: usize,
+    /// Groups of approaches drawn for each object.
+    pub groups: usize,
+    /// Seed of the folds and of the drawing.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { descriptor: Descriptor::Curvature, folds: 5, groups: 1_000, seed: 1 }
+    }
+}
+
+/// Numbers of approaches after which accuracy is given.
+const AT: [usize; 5] = [5, 10, 20, 30, 60];
+/// Approaches whose accuracy on simulated touches is asked for on recorded ones.
+const COST_AT: usize = 20;
+/// The most simulated touches for each recorded one: more say no more.
+const MOST: usize = 5;
+/// The fewest recorded touches of an object that are compared.
+pub const LEAST: usize = 30;
+/// Standard errors to either side of an interval of 95 %.
+const QUANTILE: f64 = 1.96;
+/// Kolmogorov's distribution at 95 %.
+const KOLMOGOROV: f64 = 1.358;
+
+/// A share, and between what it is with a probability of 95 %.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Share {
+    /// The share.
+    pub value: f64,
+    /// The lower end of the interval.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+}
+
+impl Share {
+    fn of(estimate: Estimate) -> Self {
+        let Estimate { value, standard_error } = estimate;
+        let end = |sign: f64| (value + sign * QUANTILE * standard_error).clamp(0.0, 1.0);
+        Self { value, low: end(-1.0), high: end(1.0) }
+    }
+}
+
+/// How recorded and simulated touches compare.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// The features that they were compared by.
+    pub descriptor: String,
+    /// How often a classifier tells recorded from simulated touches of the same object: 0.5 is guessing. Each object
+    /// weighted equally.
+    pub told_apart: Share,
+    /// The objects that both data sets hold, by name.
+    pub objects: Vec<ObjectComparison>,
+    /// What it costs; none for fewer than two objects.
+    pub cost: Option<Cost>,
+}
+
+/// How recorded and simulated touches of an object compare.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectComparison {
+    /// The object's name.
+    pub name: String,
+    /// Recorded touches, and the simulated ones that they are compared with.
+    pub touches: [usize; 2],
+    /// How often a classifier tells them apart: 0.5 is guessing.
+    pub told_apart: Share,
+    /// The share of each contact pattern among recorded and among simulated touches.
+    pub patterns: BTreeMap<String, [f64; 2]>,
+    /// Every other feature.
+    pub features: Vec<FeatureComparison>,
+}
+
+/// How a feature of recorded and simulated touches compares.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureComparison {
+    /// The feature's name.
+    pub feature: String,
+    /// Its 5th, 25th, 50th, 75th and 95th percentiles among recorded touches: microseconds for times, Q15 for cosines.
+    pub recorded: [f64; 5],
+    /// The same among simulated touches.
+    pub simulated: [f64; 5],
+    /// The largest difference between the shares of touches below a value: 0 to 1.
+    pub apart: f64,
+    /// What [`FeatureComparison::apart`] would be by chance in one of 20 comparisons.
+    pub by_chance: f64,
+}
+
+impl FeatureComparison {
+    /// In words: "alike", "9 % apart: smaller, wider".
+    pub fn words(&self) -> String {
+        if self.apart <= self.by_chance {
+            return "alike".into();
+        }
+        let [_, low, middle, high, _] = self.recorded;
+        let [_, own_low, own_middle, own_high, _] = self.simulated;
+        let (width, own_width) = (high - low, own_high - own_low);
+        let mut how = Vec::new();
+        if (middle - own_middle).abs() > 0.1 * own_width.max(1.0) {
+            how.push(if middle > own_middle { "larger" } else { "smaller" });
+        }
+        if width > 1.1 * own_width {
+            how.push("wider");
+        } else if 1.1 * width < own_width {
+            how.push("narrower");
+        }
+        let how = if how.is_empty() { "another shape".to_owned() } else { how.join(", ") };
+        format!("{:.0} % apart: {how}", 100.0 * self.apart)
+    }
+}
+
+/// What it costs a model that recorded touches are not as simulated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Objects that the model knows; all of the simulated ones.
+    pub known: usize,
+    /// Accuracy after a number of approaches, on simulated touches that the model was not trained on.
+    pub simulated: BTreeMap<usize, Share>,
+    /// The same on recorded touches of the same objects.
+    pub recorded: BTreeMap<usize, Share>,
+    /// How many approaches the accuracy on simulated touches is of.
+    pub after: usize,
+    /// After how many approaches the model is right as often on recorded touches; none if it never is.
+    pub needed: Option<f64>,
+}
+
+impl Comparison {
+    /// What the figure means, in a sentence.
+    pub fn verdict(&self) -> &'static str {
+        match self.told_apart {
+            Share { low, .. } if low <= 0.5 => "Nothing shows that the simulation is not right.",
+            Share { value, .. } if value < 0.55 => "They differ a little: the simulation is nearly right.",
+            Share { value, .. } if value < 0.65 => {
+                "They differ: fit the probe to recorded touches, or record more of them."
+            }
+            _ => "They differ much: the probe, a mesh or its size is not what is simulated.",
+        }
+    }
+}
+
+impl Cost {
+    /// What it costs, in a sentence.
+    pub fn sentence(&self) -> String {
+        let Self { after, needed, .. } = self;
+        match needed {
+            Some(needed) if needed - *after as f64 > 0.5 => format!(
+                "To be right as often as on simulated touches after {after} approaches takes {needed:.0} on recorded ones: {:.0} more.",
+                (needed - *after as f64).max(1.0)
+            ),
+            Some(_) => format!("It is right as often on recorded touches: after {after} approaches nothing is lost."),
+            None => {
+                format!("On recorded touches it is never right as often as on simulated ones after {after} approaches.")
+            }
+        }
+    }
+}
+
+/// Compares recorded touches with simulated ones of the same objects. Where approaches that touched nothing were not
+/// recorded, simulated ones are left out, and where only full touches were, partial ones.
+///
+/// The same touches and settings give the same comparison on any number of threads.
+///
+/// # Errors
+/// [`EvaluateProblem::Incomparable`] if the data sets share no object, if one holds approaches and the other full touches
+/// only, or if an object has fewer than [`LEAST`] touches; as [`train::train`]; [`Error::Cancelled`].
+pub fn compare(
+    recorded: &Dataset,
+    simulated: &Dataset,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Comparison> {
+    let refuse = |detail: String| Err(Error::from(EvaluateProblem::Incomparable { detail }));
+    if settings.folds < 2 {
+        return Err(Error::setting("folds", settings.folds, "2 or more"));
+    }
+    let any = |dataset: &Dataset, is: fn(&Touch) -> bool| dataset.objects.iter().flat_map(|own| &own.touches).any(is);
+    if any(recorded, |touch| !touch.is_full()) && !any(simulated, |touch| !touch.is_full()) {
+        return refuse("the recorded touches are of approaches, the simulated ones full touches only".into());
+    }
+    let empties = any(recorded, Touch::is_empty);
+    let partial = any(recorded, |touch| !touch.is_full());
+    let alike = |touch: &&Touch| touch.is_full() || partial && (empties || !touch.is_empty());
+    let simulated = simulated.with(
+        (simulated.objects.iter())
+            .map(|own| ObjectTouches {
+                name: own.name.clone(),
+                touches: own.touches.iter().filter(alike).copied().collect(),
+            })
+            .collect(),
+    );
+    let find = |name: &str| simulated.objects.iter().find(|own| own.name == name);
+    let pairs: Vec<(&ObjectTouches, &ObjectTouches)> =
+        recorded.objects.iter().filter_map(|own| Some((own, find(&own.name)?))).collect();
+    if pairs.is_empty() {
+        return refuse("no object is in both".into());
+    }
+    for (own, other) in &pairs {
+        let fewest = own.touches.len().min(other.touches.len());
+        if fewest < LEAST {
+            return refuse(format!("{} has {fewest} touches to compare, of at least {LEAST}", own.name));
+        }
+    }
+    let counted = if partial { Counted::All } else { Counted::Full };
+    let descriptor = match counted {
+        Counted::Full => settings.descriptor.for_full_touches(),
+        _ => settings.descriptor.for_contacts().unwrap_or(settings.descriptor),
+    };
+    progress.begin("telling apart", Some(pairs.len() as u64));
+    let one = |(own, other): &(&ObjectTouches, &ObjectTouches)| {
+        let compared = object(own, other, descriptor, counted, settings)?;
+        progress::advance(progress, 1)?;
+        Ok(compared)
+    };
+    let compared: Vec<(ObjectComparison, Estimate)> = pairs.par_iter().map(one).collect::<Result<_>>()?;
+    let told_apart = Share::of(Estimate::mean_of(compared.iter().map(|(_, told)| *told)));
+    let recorded = recorded.with(pairs.iter().map(|(own, _)| (*own).clone()).collect());
+    Ok(Comparison {
+        descriptor: descriptor.name().into(),
+        told_apart,
+        objects: compared.into_iter().map(|(object, _)| object).collect(),
+        cost: cost(&recorded, &simulated, settings, progress)?,
+    })
+}
+
+fn object(
+    recorded: &ObjectTouches,
+    simulated: &ObjectTouches,
+    descriptor: Descriptor,
+    counted: Counted,
+    settings: &Settings,
+) -> Result<(ObjectComparison, Estimate)> {
+    let most = (MOST * recorded.touches.len()).max(1_000).min(simulated.touches.len());
+    let both = [&recorded.touches[..], &simulated.touches[..most]];
+    let told = told_apart(both, counted, settings)?;
+    let share = |pattern: ContactPattern| {
+        both.map(|touches| {
+            touches.iter().filter(|touch| touch.pattern() == pattern).count() as f64 / touches.len() as f64
+        })
+    };
+    let patterns = ContactPattern::ALL.iter().map(|pattern| (pattern.name().to_owned(), share(*pattern))).collect();
+    let rows =
+        both.map(|touches| -> Vec<Vec<f32>> { touches.iter().map(|touch| feature_row(descriptor, touch)).collect() });
+    let features = (descriptor.feature_names().iter().enumerate())
+        .filter(|(_, name)| **name != "pattern")
+        .filter_map(|(column, name)| feature(name, rows.each_ref().map(|rows| values(rows, column))));
+    let comparison = ObjectComparison {
+        name: recorded.name.clone(),
+        touches: both.map(<[Touch]>::len),
+        told_apart: Share::of(told),
+        patterns,
+        features: features.collect(),
+    };
+    Ok((comparison, told))
+}
+
+/// The values of a feature where it is not missing, in order.
+fn values(rows: &[Vec<f32>], column: usize) -> Vec<f64> {
+    let there = rows.iter().filter_map(|row| row.get(column)).filter(|value| value.is_finite());
+    let mut values: Vec<f64> = there.map(|value| f64::from(*value)).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// Compares two samples in order; none if one is empty.
+fn feature(name: &str, [recorded, simulated]: [Vec<f64>; 2]) -> Option<FeatureComparison> {
+    let percentiles = |values: &[f64]| {
+        let at = |percent: usize| values.get(percent * (values.len() - 1) / 100).copied().unwrap_or_default();
+        [5, 25, 50, 75, 95].map(at)
+    };
+    if recorded.is_empty() || simulated.is_empty() {
+        return None;
+    }
+    let [n, m] = [recorded.len() as f64, simulated.len() as f64];
+    let below = |values: &[f64], at: f64| values.partition_point(|value| *value <= at) as f64;
+    let at = recorded.iter().chain(&simulated);
+    let apart = at.map(|&at| (below(&recorded, at) / n - below(&simulated, at) / m).abs()).fold(0.0, f64::max);
+    Some(FeatureComparison {
+        feature: name.into(),
+        recorded: percentiles(&recorded),
+        simulated: percentiles(&simulated),
+        apart,
+        by_chance: KOLMOGOROV * ((n + m) / (n * m)).sqrt(),
+    })
+}
+
+/// How often trees tell touches of two samples apart that they were not trained on; the two samples weigh equally.
+fn told_apart([recorded, simulated]: [&[Touch]; 2], counted: Counted, settings: &Settings) -> Result<Estimate> {
+    let samples = [("recorded", recorded), ("simulated", simulated)]
+        .map(|(name, touches)| ObjectTouches { name: name.into(), touches: touches.to_vec() });
+    let both = Dataset::new(samples.into());
+    let recipe = train::Settings {
+        descriptor: settings.descriptor,
+        counted: Some(counted),
+        rounds: 40,
+        depth: 3,
+        eta: 0.1,
+        min_child_weight: 4.0,
+        bins: 64,
+        leaf_bits: None,
+        threads: Some(1),
+        ..train::Settings::compact()
+    };
+    let mut right = [0; 2];
+    for fold in 0..settings.folds {
+        let split = folds::fold(&both, fold, settings.folds, settings.seed)?;
+        let trees = train::train(&split.train, &recipe, &())?;
+        for (class, object) in split.test.objects.iter().enumerate() {
+            let is_right = |touch: &&Touch| {
+                let margins = trees.margins(touch);
+                margins[class] > margins[1 - class]
+            };
+            right[class] += object.touches.iter().filter(is_right).count();
+        }
+    }
+    let counts = [recorded.len(), simulated.len()];
+    Ok(Estimate::mean_of([0, 1].map(|class: usize| Estimate::share(right[class], counts[class])).into_iter()))
+}
+
+/// What a model that is trained on simulated touches makes of recorded ones; none for fewer than two recorded objects.
+fn cost(recorded: &Dataset, simulated: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Option<Cost>> {
+    if recorded.objects.len() < 2 {
+        return Ok(None);
+    }
+    let split = folds::split(simulated, 0.25, settings.seed)?;
+    let recipe = train::Settings { descriptor: settings.descriptor, ..train::Settings::compact() };
+    let model = train::train(&split.train, &recipe, progress)?;
+    let names = recorded.names();
+    let tested = split.test.objects.into_iter().filter(|own| names.contains(&own.name)).collect();
+    let tested = simulated.with(tested);
+    progress.begin("measuring", None);
+    let accuracy = |dataset: &Dataset, at: &[usize]| -> Result<BTreeMap<usize, Estimate>> {
+        let margins = Margins::new(Candidate::Full(&model), dataset)?;
+        let at: Vec<usize> = at.iter().copied().filter(|at| *at <= margins.fewest_approaches()).collect();
+        let sequences =
+            SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed: settings.seed };
+        let measured = margins.approaches(&at, &sequences)?;
+        let both = measured.accuracy.iter().zip(measured.accuracy_standard_error.values());
+        Ok(both.map(|((at, value), error)| (*at, Estimate { value: *value, standard_error: *error })).collect())
+    };
+    let all: Vec<usize> = (1..=*AT.last().unwrap_or(&1)).collect();
+    let [own, other] = [&tested, recorded].map(|dataset| accuracy(dataset, &all));
+    let (own, other) = (own?, other?);
+    let shown = |of: &BTreeMap<usize, Estimate>| -> BTreeMap<usize, Share> {
+        AT.iter().filter_map(|at| Some((*at, Share::of(*of.get(at)?)))).collect()
+    };
+    let after = COST_AT.min(own.len()).min(other.len()).max(1);
+    let wanted = own.get(&after).map_or(1.0, |estimate| estimate.value);
+    Ok(Some(Cost {
+        known: model.known_count(),
+        simulated: shown(&own),
+        recorded: shown(&other),
+        after,
+        needed: needed(&other, wanted),
+    }))
+}
+
+/// The number of approaches after which this accuracy is reached, in between two of them by a straight line.
+fn needed(accuracy: &BTreeMap<usize, Estimate>, wanted: f64) -> Option<f64> {
+    let (mut before, mut least) = (0.0, 0.0);
+    for (&at, estimate) in accuracy {
+        if estimate.value >= wanted {
+            let share = (wanted - least) / (estimate.value - least).max(1e-12);
+            return Some(before + share.clamp(0.0, 1.0) * (at as f64 - before));
+        }
+        (before, least) = (at as f64, estimate.value);
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Problem;
+    use crate::touches::noise::{Noise, noisy};
+    use crate::touches::synthetic;
+
+    fn shifted(dataset: &Dataset, noise: &Noise) -> Dataset {
+        let one = |own: &ObjectTouches| ObjectTouches {
+            name: own.name.clone(),
+            touches: noise.add(&own.name, &own.touches, 3),
+        };
+        dataset.with(dataset.objects.iter().map(one).collect())
+    }
+
+    fn quick() -> Settings {
+        Settings { groups: 100, ..Settings::default() }
+    }
+
+    #[test]
+    fn touches_of_one_simulator_are_told_apart_no_better_than_by_guessing() {
+        let [one, other] = [1, 2].map(|seed| synthetic::dataset(&[300, 300, 300], seed));
+        let compared = compare(&one, &other, &quick(), &()).unwrap();
+        assert!(compared.told_apart.low < 0.5 + 0.02 && compared.told_apart.high > 0.48, "{:?}", compared.told_apart);
+        assert!(compared.told_apart.value < 0.55, "{:?}", compared.told_apart);
+        let alike = compared.objects.iter().flat_map(|own| &own.features).filter(|own| own.words() == "alike").count();
+        assert!(alike >= 4, "{compared:?}");
+        let cost = compared.cost.unwrap();
+        let needed = cost.needed.unwrap();
+        assert!(needed < 1.8 * cost.after as f64, "{cost:?}");
+        assert_eq!(compare(&one, &other, &quick(), &()).unwrap().told_apart, compared.told_apart);
+    }
+
+    #[test]
+    fn a_bent_finger_is_told_apart_and_costs_approaches() {
+        let [one, other] = [1, 2].map(|seed| synthetic::dataset(&[300, 300, 300], seed));
+        let bent = shifted(&one, &Noise { bent: [0.0, 40_000.0, 0.0], ..Noise::default() });
+        let compared = compare(&bent, &other, &quick(), &()).unwrap();
+        assert!(compared.told_apart.low > 0.6, "{:?}", compared.told_apart);
+        let worst = |own: &ObjectComparison| own.features.iter().any(|own| own.words().contains("larger"));
+        assert!(compared.objects.iter().any(worst), "{compared:?}");
+        let cost = compared.cost.unwrap();
+        assert!(cost.recorded[&20].value < cost.simulated[&20].value - 0.05, "{cost:?}");
+        assert!(cost.needed.is_none_or(|needed| needed > 1.2 * cost.after as f64), "{cost:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_refused_with_the_reason() {
+        let dataset = synthetic::dataset(&[300, 300], 1);
+        let refused = |one: &Dataset, other: &Dataset| match compare(one, other, &quick(), &()).unwrap_err().problem() {
+            Some(Problem::Evaluate(EvaluateProblem::Incomparable { detail })) => detail.clone(),
+            other => panic!("{other:?}"),
+        };
+        let mut other = dataset.clone();
+        other.objects.iter_mut().for_each(|own| own.name += "-other");
+        assert!(refused(&dataset, &other).contains("no object"));
+        let mut few = dataset.clone();
+        few.objects[0].touches.truncate(LEAST - 1);
+        assert!(refused(&few, &dataset).contains("29 touches"));
+        let mut full = dataset.clone();
+        full.objects.iter_mut().for_each(|own| own.touches.retain(Touch::is_full));
+        assert!(refused(&dataset, &full).contains("full touches only"));
+        let compared = compare(&full, &dataset, &quick(), &()).unwrap();
+        assert_eq!(compared.objects[0].patterns["all"], [1.0, 1.0], "partial ones are left out");
+    }
+
+    #[test]
+    fn one_object_is_compared_without_a_cost() {
+        let dataset = synthetic::dataset(&[300, 300], 1);
+        let one = dataset.with(dataset.objects[..1].to_vec());
+        let noisy = dataset.with(vec![ObjectTouches {
+            name: dataset.objects[0].name.clone(),
+            touches: noisy("x", &dataset.objects[0].touches, 1_000.0, 1),
+        }]);
+        assert_eq!(compare(&one, &noisy, &quick(), &()).unwrap().cost, None);
+    }
+}

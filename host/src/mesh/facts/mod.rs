@@ -1,0 +1,228 @@
+//! Facts about a mesh: is it closed, is it right side out, do its parts hang together, how large is it.
+//!
+//! The simulator touches any mesh, from both sides. But through a hole, a finger gets where no real one could, an
+//! inside-out mesh is often a sign of a broken export, and a speck that floats beside an object makes its box larger:
+//! whoever captures from such a mesh should know.
+
+mod parts;
+mod stray;
+
+pub use parts::Part;
+pub use stray::Piece;
+
+use crate::mesh::Mesh;
+use glam::Vec3;
+
+/// What can be said about a mesh, in the units of its file. Vertices at the same place count as one.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Facts {
+    /// How many triangles it has.
+    pub triangles: usize,
+    /// The lowest corner of its bounding box.
+    pub low: Vec3,
+    /// The highest corner of its bounding box.
+    pub high: Vec3,
+    /// Open edges: those that belong to one triangle only.
+    pub open_edges: usize,
+    /// Edges whose two triangles face opposite sides.
+    pub contrary_edges: usize,
+    /// Edges that three or more triangles share.
+    pub branching_edges: usize,
+    /// The volume that it encloses, in cubic units of its file: negative if it is inside out, meaningless if it is open.
+    pub volume: f64,
+    /// Its parts, the one with most triangles first.
+    pub parts: Vec<Part>,
+    /// The pieces that float apart from the rest, which is not among them; the largest first.
+    pub stray: Vec<Piece>,
+}
+
+/// The sizes in millimeters that an object for a finger may have: a grain of rice to a car.
+const SIZES: std::ops::RangeInclusive<f64> = 1.0..=10_000.0;
+
+impl Facts {
+    /// The facts about `mesh`: two seconds or so for a million triangles.
+    ///
+    /// # Panics
+    /// If a triangle names a vertex that the mesh does not have. Meshes that were read or built in never do.
+    pub fn of(mesh: &Mesh) -> Self {
+        let welded = mesh.welded();
+        let [low, high] = mesh.bounds();
+        let (parts, branching_edges) = parts::parts(&welded);
+        Self {
+            triangles: mesh.triangles.len(),
+            low,
+            high,
+            open_edges: parts.iter().map(|part| part.open_edges).sum(),
+            contrary_edges: parts.iter().map(|part| part.contrary_edges).sum(),
+            branching_edges,
+            volume: parts.iter().map(|part| part.volume).sum(),
+            parts,
+            stray: stray::pieces(&welded),
+        }
+    }
+
+    /// Whether each edge belongs to exactly two triangles.
+    pub fn is_closed(&self) -> bool {
+        self.open_edges == 0 && self.branching_edges == 0
+    }
+
+    /// Whether it is closed and each triangle is anticlockwise when seen from outside, in every part.
+    pub fn is_right_side_out(&self) -> bool {
+        self.is_closed() && self.contrary_edges == 0 && self.volume > 0.0 && self.inside_out().next().is_none()
+    }
+
+    /// The parts that are inside out.
+    pub fn inside_out(&self) -> impl Iterator<Item = &Part> {
+        self.parts.iter().filter(|part| part.is_inside_out)
+    }
+
+    /// Whether the mesh is closed, in words: "yes", or what is not.
+    pub fn closed(&self) -> String {
+        match (self.open_edges, self.branching_edges) {
+            (0, 0) => "yes".into(),
+            (0, branching) => format!("yes, but more than two triangles meet at {}", edges(branching)),
+            (open, 0) => format!("no: {}", counted(open, "open edge")),
+            (open, branching) => {
+                format!("no: {}, and more than two triangles at {branching}", counted(open, "open edge"))
+            }
+        }
+    }
+
+    /// Whether the mesh is right side out, in words: "yes", or what is not.
+    pub fn side(&self) -> String {
+        let turned = self.inside_out().count();
+        if turned > 0 && turned == self.parts.len() {
+            "no: inside out".into()
+        } else if turned > 0 {
+            format!("no: {turned} of {} are inside out", counted(self.parts.len(), "part"))
+        } else if self.contrary_edges > 0 {
+            format!("no: at {} the two triangles face opposite sides", edges(self.contrary_edges))
+        } else if !self.is_closed() {
+            "unknown for an open surface: look for orange".into()
+        } else if self.volume > 0.0 {
+            "yes".into()
+        } else {
+            "unknown: it encloses nothing".into()
+        }
+    }
+
+    /// What a user should know before touching the mesh, as sentences: that it is open, inside out in all or some of its
+    /// parts, not a manifold, in pieces, or of a size that cannot be. `millimeters` is how many its unit is, if that is
+    /// known. None if nothing is wrong.
+    pub fn complaints(&self, millimeters: Option<f64>) -> Vec<String> {
+        let sentences =
+            [self.open(), self.turned(), self.contrary(), self.branching(), self.apart(), self.size(millimeters)];
+        sentences.into_iter().flatten().collect()
+    }
+
+    fn open(&self) -> Option<String> {
+        let belong = match self.open_edges {
+            0 => return None,
+            1 => "1 edge belongs".to_owned(),
+            open => format!("{open} edges belong"),
+        };
+        let open: Vec<&Part> = self.parts.iter().filter(|part| part.open_edges > 0).collect();
+        let of = self.among(&open);
+        Some(format!("The mesh is open: {belong} to one triangle only{of}, so fingers may reach through the gaps."))
+    }
+
+    fn turned(&self) -> Option<String> {
+        let turned: Vec<&Part> = self.inside_out().collect();
+        if turned.is_empty() {
+            return None;
+        }
+        if turned.len() == self.parts.len() {
+            return Some("The mesh is inside out: reverse the order of the vertices in its faces.".into());
+        }
+        let are = if turned.len() == 1 { "is" } else { "are" };
+        let (count, all) = (turned.len(), self.parts.len());
+        let places = places(turned.iter().map(|part| part.place()), count);
+        Some(format!(
+            "The mesh is partly inside out: {count} of {all} parts {are} ({places}). Reverse the vertices of those faces."
+        ))
+    }
+
+    fn contrary(&self) -> Option<String> {
+        let contrary: Vec<&Part> = self.parts.iter().filter(|part| part.contrary_edges > 0).collect();
+        let of = self.among(&contrary);
+        let edges = edges(self.contrary_edges);
+        (self.contrary_edges > 0)
+            .then(|| format!("The mesh is partly inside out: at {edges}{of}, the two triangles face opposite sides."))
+    }
+
+    fn branching(&self) -> Option<String> {
+        let edges = edges(self.branching_edges);
+        (self.branching_edges > 0)
+            .then(|| format!("The mesh is not a manifold: more than two triangles meet at {edges}."))
+    }
+
+    fn apart(&self) -> Option<String> {
+        let count = self.stray.len();
+        let floats = if count == 1 { "piece floats" } else { "pieces float" };
+        let places = places(self.stray.iter().map(Piece::place), count);
+        (count > 0).then(|| {
+            format!(
+                "The mesh has stray parts: {count} {floats} apart from the rest ({places}), and make its box larger."
+            )
+        })
+    }
+
+    fn size(&self, millimeters: Option<f64>) -> Option<String> {
+        let length = f64::from((self.high - self.low).max_element());
+        let shown = short(length);
+        match millimeters {
+            Some(unit) if SIZES.contains(&(length * unit)) => None,
+            Some(unit) => Some(format!(
+                "The mesh has a size that cannot be: its longest side is {} mm, by the unit that it states.",
+                short(length * unit)
+            )),
+            None if SIZES.contains(&length) || SIZES.contains(&(length * 1_000.0)) => None,
+            None => Some(format!(
+                "The mesh has a size that can be neither meters nor millimeters: its longest side is {shown}."
+            )),
+        }
+    }
+
+    /// Which of the parts, in words, where there are several; nothing where there is one, or where it is all of them.
+    fn among(&self, some: &[&Part]) -> String {
+        if self.parts.len() < 2 || some.len() == self.parts.len() {
+            return String::new();
+        }
+        let places = places(some.iter().map(|part| part.place()), some.len());
+        format!(", in {} of {} parts ({places})", some.len(), self.parts.len())
+    }
+}
+
+/// The first three of `count` places, and that there are more.
+fn places(places: impl Iterator<Item = String>, count: usize) -> String {
+    const SHOWN: usize = 3;
+    let mut text = places.take(SHOWN).collect::<Vec<_>>().join("; ");
+    if count > SHOWN {
+        text += &format!("; and {} more", count - SHOWN);
+    }
+    text
+}
+
+fn edges(count: usize) -> String {
+    counted(count, "edge")
+}
+
+fn counted(count: usize, name: &str) -> String {
+    if count == 1 { format!("1 {name}") } else { format!("{count} {name}s") }
+}
+
+/// A number with about three significant digits.
+fn short(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".into(),
+        1e-3..1e6 => {
+            let digits = (2.0 - libm::floor(libm::log10(value.abs()))).max(0.0) as usize;
+            format!("{value:.digits$}")
+        }
+        _ => format!("{value:.2e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests;

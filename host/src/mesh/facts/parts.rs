@@ -1,0 +1,212 @@
+//! The parts of a mesh: which of its triangles hang together, and what can be said of each.
+
+use crate::mesh::Mesh;
+use glam::{DVec3, Vec3};
+
+/// Triangles that hang together by edges that exactly two of them share.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Part {
+    /// How many triangles it has.
+    pub triangles: usize,
+    /// The lowest corner of its bounding box, in the units of the file.
+    pub low: Vec3,
+    /// The highest corner of its bounding box.
+    pub high: Vec3,
+    /// Edges that belong to one triangle only, in the whole mesh.
+    pub open_edges: usize,
+    /// Edges whose two triangles face opposite sides.
+    pub contrary_edges: usize,
+    /// Whether each edge belongs to an even number of its triangles.
+    pub is_closed: bool,
+    /// The volume that it encloses, negative if its triangles face inward; meaningless if it is open.
+    pub volume: f64,
+    /// Whether it is closed and its triangles face inward, although it is no cavity of another part.
+    pub is_inside_out: bool,
+}
+
+impl Part {
+    /// Where it is, in words.
+    pub(super) fn place(&self) -> String {
+        Self::place_of(self.triangles, self.low, self.high)
+    }
+
+    /// Where so many triangles in a box are, in words: "96 triangles around (1.20, 0, -3.00)".
+    pub(super) fn place_of(triangles: usize, low: Vec3, high: Vec3) -> String {
+        let plural = if triangles == 1 { "" } else { "s" };
+        let [x, y, z] = ((low.as_dvec3() + high.as_dvec3()) / 2.0).to_array().map(super::short);
+        format!("{triangles} triangle{plural} around ({x}, {y}, {z})")
+    }
+
+    /// Whether it encloses something, its triangles all facing one side.
+    fn is_solid(&self) -> bool {
+        // Less is a sheet with two sides, or the rounding of one.
+        let size = f64::from((self.high - self.low).max_element());
+        self.is_closed && self.contrary_edges == 0 && self.volume.abs() > 1e-12 * size * size * size
+    }
+}
+
+/// How many rays against triangles are tried at most to tell cavities from parts that are inside out: a second or so. A
+/// mesh with so many parts that this does not suffice is said to be right side out where the boxes of parts allow it.
+const MOST_TRIES: usize = 100_000_000;
+
+/// How many vertices of a part must be inside another part for it to be a cavity.
+const SAMPLES: usize = 64;
+
+/// The parts of a welded mesh, the largest first, and how many edges three or more of its triangles share.
+pub(super) fn parts(mesh: &Mesh) -> (Vec<Part>, usize) {
+    let Mesh { vertices, triangles } = mesh;
+    // Each edge of each triangle: its ends, the lower one first, the triangle, whether it runs from the lower one.
+    let mut edges: Vec<(u32, u32, u32, bool)> = (0..)
+        .zip(triangles)
+        .flat_map(|(index, &[a, b, c])| [(a, b), (b, c), (c, a)].map(|(a, b)| (a.min(b), a.max(b), index, a < b)))
+        .collect();
+    edges.sort_unstable();
+    let mut sets = Sets::new(triangles.len());
+    for uses in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        if let [one, other] = uses {
+            sets.join(one.2, other.2);
+        }
+    }
+    let (numbers, count) = sets.numbers();
+    let empty = Part {
+        triangles: 0,
+        low: Vec3::INFINITY,
+        high: Vec3::NEG_INFINITY,
+        open_edges: 0,
+        contrary_edges: 0,
+        is_closed: true,
+        volume: 0.0,
+        is_inside_out: false,
+    };
+    let mut parts = vec![empty; count];
+    // From a corner of the box, so that a mesh far from its origin loses no digits.
+    let [low, _] = mesh.bounds();
+    let corner = |i: u32| -> DVec3 { (Vec3::from(vertices[i as usize]) - low).as_dvec3() };
+    for (triangle, &number) in triangles.iter().zip(&numbers) {
+        let part = &mut parts[number];
+        part.triangles += 1;
+        for vertex in triangle.map(|i| Vec3::from(vertices[i as usize])) {
+            (part.low, part.high) = (part.low.min(vertex), part.high.max(vertex));
+        }
+        let [a, b, c] = triangle.map(corner);
+        part.volume += a.dot(b.cross(c)) / 6.0;
+    }
+    let mut branching_edges = 0;
+    for uses in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        match uses {
+            [one] => {
+                let part = &mut parts[numbers[one.2 as usize]];
+                part.open_edges += 1;
+                part.is_closed = false;
+            }
+            [one, other] if one.3 == other.3 => parts[numbers[one.2 as usize]].contrary_edges += 1,
+            [_, _] => {}
+            uses => {
+                branching_edges += 1;
+                let of = |number: usize| uses.iter().filter(|other| numbers[other.2 as usize] == number).count();
+                // Three to a few: a part goes on across the edge if it has two of its triangles there.
+                for number in uses.iter().take(16).map(|one| numbers[one.2 as usize]) {
+                    parts[number].is_closed &= of(number) % 2 == 0;
+                }
+            }
+        }
+    }
+    find_inside_out(&mut parts, &numbers, mesh);
+    parts.sort_by_key(|part| std::cmp::Reverse(part.triangles));
+    (parts, branching_edges)
+}
+
+/// Marks the parts that are inside out. A part that faces inward inside of another is a cavity of it, as it should be.
+fn find_inside_out(parts: &mut [Part], numbers: &[usize], mesh: &Mesh) {
+    let solid = |sign: f64| -> Vec<usize> {
+        (0..parts.len()).filter(|&number| parts[number].is_solid() && sign * parts[number].volume > 0.0).collect()
+    };
+    let (inward, outward) = (solid(-1.0), solid(1.0));
+    let mut tries = MOST_TRIES;
+    for number in inward {
+        let Some(left) = tries.checked_sub(outward.len()) else { return };
+        tries = left;
+        let own = &parts[number];
+        let around = |other: &Part| other.low.cmple(own.low).all() && own.high.cmple(other.high).all();
+        let candidates: Vec<usize> = outward.iter().copied().filter(|&other| around(&parts[other])).collect();
+        let samples = if candidates.is_empty() { Vec::new() } else { samples(number, numbers, mesh) };
+        let is_cavity = candidates.into_iter().any(|other| {
+            let cost = samples.len() * mesh.triangles.len();
+            if cost > tries {
+                // Too many to look at: the box decides.
+                return true;
+            }
+            tries -= cost;
+            samples.iter().all(|&sample| is_inside(sample, other, numbers, mesh))
+        });
+        parts[number].is_inside_out = !is_cavity;
+    }
+}
+
+/// Some vertices of a part, evenly spread over its triangles.
+fn samples(number: usize, numbers: &[usize], mesh: &Mesh) -> Vec<DVec3> {
+    let own: Vec<&[u32; 3]> =
+        mesh.triangles.iter().zip(numbers).filter(|(_, own)| **own == number).map(|(triangle, _)| triangle).collect();
+    let step = own.len().div_ceil(SAMPLES).max(1);
+    own.into_iter().step_by(step).map(|&[a, ..]| Vec3::from(mesh.vertices[a as usize]).as_dvec3()).collect()
+}
+
+/// Whether a point is inside a closed part: a ray leaves it more often than it enters it.
+fn is_inside(point: DVec3, part: usize, numbers: &[usize], mesh: &Mesh) -> bool {
+    // A direction in which no one models.
+    let direction = DVec3::new(0.836_516_303_737_8, 0.482_962_913_144_5, 0.258_819_045_102_5);
+    let mut crossings = 0;
+    for (triangle, _) in mesh.triangles.iter().zip(numbers).filter(|(_, own)| **own == part) {
+        let [a, b, c] = triangle.map(|i| Vec3::from(mesh.vertices[i as usize]).as_dvec3() - point);
+        // The ray passes the triangle if it has all edges on one side.
+        let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|normal| normal.dot(direction));
+        let volume = a.dot(b.cross(c));
+        if sides.iter().all(|&side| side > 0.0) && volume > 0.0 {
+            crossings += 1;
+        } else if sides.iter().all(|&side| side < 0.0) && volume < 0.0 {
+            crossings -= 1;
+        }
+    }
+    crossings > 0
+}
+
+/// Sets of triangles that hang together.
+struct Sets(Vec<u32>);
+
+impl Sets {
+    fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    fn first(&mut self, mut of: u32) -> u32 {
+        while self.0[of as usize] != of {
+            let above = self.0[of as usize];
+            self.0[of as usize] = self.0[above as usize];
+            of = above;
+        }
+        of
+    }
+
+    fn join(&mut self, one: u32, other: u32) {
+        let (one, other) = (self.first(one), self.first(other));
+        // To the lower one, so that numbers follow the order of the triangles.
+        self.0[one.max(other) as usize] = one.min(other);
+    }
+
+    /// The number of each one's set, and how many sets there are.
+    fn numbers(mut self) -> (Vec<usize>, usize) {
+        let mut numbers = vec![0; self.0.len()];
+        let mut count = 0;
+        for index in 0..numbers.len() {
+            let first = self.first(index as u32) as usize;
+            if first == index {
+                numbers[index] = count;
+                count += 1;
+            } else {
+                numbers[index] = numbers[first];
+            }
+        }
+        (numbers, count)
+    }
+}

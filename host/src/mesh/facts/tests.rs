@@ -1,0 +1,143 @@
+use super::*;
+
+fn cube() -> Mesh {
+    let vertices = (0..8_u8).map(|i| [i & 1, i >> 1 & 1, i >> 2].map(f32::from)).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    Mesh { vertices, triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
+}
+
+#[test]
+fn a_cube_is_closed_and_right_side_out_until_it_is_turned_over_or_opened() {
+    let words = |mesh: &Mesh| {
+        let facts = Facts::of(mesh);
+        (facts.closed(), facts.side())
+    };
+    let complaint = |mesh: &Mesh| Facts::of(mesh).complaints(None).into_iter().next();
+    let mut mesh = cube();
+    assert_eq!(words(&mesh), ("yes".into(), "yes".into()));
+    assert_eq!(complaint(&mesh), None);
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(0, 1));
+    assert_eq!(words(&mesh), ("yes".into(), "no: inside out".into()));
+    assert!(complaint(&mesh).unwrap().starts_with("The mesh is inside out"));
+    mesh.triangles[0].swap(0, 1);
+    assert_eq!(words(&mesh), ("yes".into(), "no: at 3 edges the two triangles face opposite sides".into()));
+    assert!(complaint(&mesh).unwrap().contains("partly inside out: at 3 edges"));
+    mesh.triangles.remove(0);
+    assert_eq!(words(&mesh).0, "no: 3 open edges");
+    assert!(words(&mesh).1.contains("open surface"));
+    assert!(complaint(&mesh).unwrap().starts_with("The mesh is open: 3 edges belong to one triangle only"));
+}
+
+#[test]
+fn a_mesh_far_from_its_origin_keeps_its_size_and_volume() {
+    let mut mesh = cube();
+    mesh.vertices.iter_mut().flatten().for_each(|x| *x += 1000.0);
+    let facts = Facts::of(&mesh);
+    assert_eq!((facts.low, facts.high, facts.triangles), (Vec3::splat(1000.0), Vec3::splat(1001.0), 12));
+    assert!((facts.volume - 1.0).abs() < 1e-9, "{}", facts.volume);
+}
+
+#[test]
+fn vertices_at_the_same_place_are_one() {
+    let whole = cube();
+    let vertices = whole.triangles.iter().flatten().map(|&i| whole.vertices[i as usize]).collect();
+    let apart = Mesh { vertices, triangles: (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect() };
+    assert!(Facts::of(&apart).is_right_side_out());
+}
+
+#[test]
+fn an_edge_of_four_triangles_is_not_that_of_a_manifold() {
+    // Two tetrahedra that share an edge.
+    let mut mesh = crate::mesh::obj::parse(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n".as_bytes(),
+        "two.obj".as_ref(),
+    )
+    .unwrap();
+    mesh.vertices.extend([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]);
+    mesh.triangles.extend([[0, 1, 4], [0, 5, 1], [1, 5, 4], [4, 5, 0]]);
+    let facts = Facts::of(&mesh);
+    assert_eq!((facts.open_edges, facts.branching_edges, facts.parts.len()), (0, 1, 2));
+    let said = facts.complaints(None);
+    assert_eq!(said, ["The mesh is not a manifold: more than two triangles meet at 1 edge."]);
+    assert!(!facts.is_closed());
+}
+
+/// Globes and the like beside or inside each other: where, how large, and whether inside out.
+fn globes(all: &[([f32; 3], f32, bool)]) -> Mesh {
+    let mut mesh = Mesh::default();
+    for &(place, size, turned) in all {
+        let globe = Mesh::globe(8);
+        let base = mesh.vertices.len() as u32;
+        let moved = |vertex: [f32; 3]| [0, 1, 2].map(|axis| place[axis] + size * vertex[axis]);
+        mesh.vertices.extend(globe.vertices.into_iter().map(moved));
+        let turn = |[a, b, c]: [u32; 3]| if turned { [a, c, b] } else { [a, b, c] }.map(|index| base + index);
+        mesh.triangles.extend(globe.triangles.into_iter().map(turn));
+    }
+    mesh
+}
+
+/// A pot whose handle and spout stick out of it, inside out or not.
+fn pot(handle: bool, spout: bool) -> Mesh {
+    globes(&[([0.0; 3], 1.0, false), ([1.0, 0.0, 0.2], 0.4, handle), ([-0.9, 0.3, 0.1], 0.3, spout)])
+}
+
+#[test]
+fn a_pot_of_which_handle_and_spout_alone_are_inside_out_is_not_right_side_out() {
+    let good = Facts::of(&pot(false, false));
+    assert!(good.is_right_side_out() && good.complaints(None).is_empty());
+    let facts = Facts::of(&pot(true, true));
+    assert!(facts.volume > 0.0 && facts.is_closed() && facts.contrary_edges == 0);
+    assert!(!facts.is_right_side_out());
+    assert_eq!(facts.side(), "no: 2 of 3 parts are inside out");
+    let said = facts.complaints(None);
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].starts_with("The mesh is partly inside out: 2 of 3 parts are (224 triangles around ("), "{said:?}");
+    assert!(Facts::of(&pot(true, false)).side() == "no: 1 of 3 parts are inside out");
+}
+
+#[test]
+fn a_cavity_faces_inward_and_a_solid_inside_another_may_face_outward() {
+    let hollow = |inner| Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.1; 3], 0.5, inner)]));
+    assert!(hollow(true).is_right_side_out() && hollow(false).is_right_side_out());
+    // In the box of the larger one, but not in it.
+    let beside = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.85; 3], 0.1, true)]));
+    assert_eq!(beside.inside_out().count(), 1);
+    let turned = Facts::of(&globes(&[([0.0; 3], 1.0, true), ([0.1; 3], 0.5, true)]));
+    assert_eq!((turned.side().as_str(), turned.inside_out().count()), ("no: inside out", 2));
+}
+
+#[test]
+fn an_open_part_is_named_among_the_others() {
+    let mut mesh = pot(false, false);
+    mesh.triangles.pop();
+    let said = Facts::of(&mesh).complaints(None);
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(
+        said[0].contains("3 edges belong to one triangle only, in 1 of 3 parts (223 triangles around ("),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn a_speck_beside_an_object_is_a_stray_part_and_what_touches_it_is_not() {
+    let facts = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([3.0, 0.0, 0.0], 0.05, false)]));
+    assert_eq!((facts.stray.len(), facts.stray[0].triangles), (1, 224));
+    let said = facts.complaints(None);
+    assert!(
+        said[0].starts_with("The mesh has stray parts: 1 piece floats apart from the rest (224 triangles around (")
+    );
+    assert!(Facts::of(&pot(false, true)).stray.is_empty());
+    assert!(Facts::of(&cube().stretched([1.0, 100.0, 0.001])).stray.is_empty());
+}
+
+#[test]
+fn a_size_that_is_neither_one_in_meters_nor_in_millimeters_is_said() {
+    let said = |size: f32, millimeters| Facts::of(&cube().stretched([size; 3])).complaints(millimeters);
+    for (size, millimeters) in [(0.001, None), (1.0, None), (9_999.0, None), (0.2, Some(1_000.0)), (50.0, Some(10.0))] {
+        assert_eq!(said(size, millimeters), [""; 0], "{size} {millimeters:?}");
+    }
+    for (size, millimeters) in [(0.000_9, None), (20_000.0, None), (200.0, Some(1_000.0)), (0.2, Some(1.0))] {
+        let said = said(size, millimeters);
+        assert!(said.len() == 1 && said[0].contains("a size that can"), "{size} {millimeters:?}: {said:?}");
+    }
+}

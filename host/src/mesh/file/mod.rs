@@ -1,0 +1,130 @@
+//! Mesh files of every kind: which kind a file is, by its content, and its mesh.
+
+use super::{Mesh, collada, gltf, obj, ply, stl};
+use crate::error::{Error, MeshProblem, Place, Result};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// The kinds of mesh files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Format {
+    /// Wavefront OBJ.
+    Obj,
+    /// STL, binary or text.
+    Stl,
+    /// PLY: text, or binary in either byte order.
+    Ply,
+    /// glTF 2.0, as JSON or as GLB.
+    Gltf,
+    /// COLLADA.
+    Collada,
+}
+
+/// The extensions of mesh files, in the order in which they are preferred where a folder holds one name with several.
+pub const EXTENSIONS: [&str; 6] = ["obj", "stl", "ply", "gltf", "glb", "dae"];
+
+impl Format {
+    /// The kind of file that starts with `head` (a few hundred bytes or more, or all of it) and has `length` bytes. Its
+    /// content decides; `extension` only where the content says nothing, so that errors speak of what the user meant.
+    pub fn of(head: &[u8], length: u64, extension: Option<&str>) -> Self {
+        if stl::is_binary(head, length) {
+            return Self::Stl;
+        }
+        let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+        let first = text.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        let rest = text.get(first.len()..).unwrap_or_default();
+        if head.starts_with(b"glTF") || text.first() == Some(&b'{') {
+            Self::Gltf
+        } else if first == b"ply" {
+            Self::Ply
+        } else if text.first() == Some(&b'<') {
+            Self::Collada
+        } else if first.eq_ignore_ascii_case(b"solid") {
+            Self::Stl
+        } else if !rest.is_empty() && (obj::KEYWORDS.contains(&first) || first.starts_with(b"#")) {
+            Self::Obj
+        } else {
+            match extension.map(str::to_ascii_lowercase).as_deref() {
+                Some("stl") => Self::Stl,
+                Some("ply") => Self::Ply,
+                Some("gltf" | "glb") => Self::Gltf,
+                Some("dae") => Self::Collada,
+                _ => Self::Obj,
+            }
+        }
+    }
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Contents {
+    /// Its mesh, in the units of the file. A COLLADA file that states its upward axis is turned so that z is up.
+    pub mesh: Mesh,
+    /// How many millimeters its unit is, where the file says: COLLADA with a unit, glTF (meters, by its standard).
+    pub millimeters: Option<f64>,
+    /// Which kind of file it was.
+    pub format: Format,
+}
+
+/// The most bytes that are taken from what is no regular file, such as a pipe: 1 GiB.
+const MOST_OF_A_PIPE: u64 = 1 << 30;
+
+/// Reads a mesh file of any kind: all its meshes together, polygons cut into triangles, without faces that are a single
+/// point.
+///
+/// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB.
+///
+/// # Errors
+/// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses
+/// what is not read, and with the file when there is no face or each is a single point.
+pub fn read(path: &Path) -> Result<Contents> {
+    let io = |source| Error::io(path, "read the mesh", source);
+    let file = File::open(path).map_err(io)?;
+    let metadata = file.metadata().map_err(io)?;
+    if metadata.is_file() {
+        return parse_buffered(BufReader::with_capacity(1 << 18, file), metadata.len(), path, path.parent());
+    }
+    let mut bytes = Vec::new();
+    file.take(MOST_OF_A_PIPE + 1).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.len() as u64 > MOST_OF_A_PIPE {
+        return Err(Error::at(Place::file(path), MeshProblem::TooLarge { limit: MOST_OF_A_PIPE }));
+    }
+    parse_buffered(bytes.as_slice(), bytes.len() as u64, path, path.parent())
+}
+
+/// Reads the bytes of a mesh file of any kind; errors name `path`, and its extension serves where the bytes do not say
+/// what they are.
+///
+/// # Errors
+/// As [`read`]; and where a glTF file needs other files, which it cannot have.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Contents> {
+    parse_buffered(bytes, bytes.len() as u64, path, None)
+}
+
+/// Reads a mesh of `length` bytes. Files that it names are looked for in `folder`.
+fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
+    let io = |source| Error::io(path, "read the mesh", source);
+    let head = reader.fill_buf().map_err(io)?;
+    let format = Format::of(head, length, path.extension().and_then(|extension| extension.to_str()));
+    let (mesh, millimeters) = match format {
+        Format::Obj => (obj::parse(reader, path)?, None),
+        Format::Stl => (stl::parse(reader, length, path)?, None),
+        Format::Ply => (ply::parse(reader, path)?, None),
+        Format::Gltf | Format::Collada => {
+            let mut bytes = Vec::new();
+            // A file that grows while it is read is cut: its end is missing, as its parser says.
+            reader.take(length).read_to_end(&mut bytes).map_err(io)?;
+            match format {
+                Format::Gltf => (gltf::parse(&bytes, path, folder)?, Some(1_000.0)),
+                _ => collada::parse(&bytes, path)?,
+            }
+        }
+    };
+    Ok(Contents { mesh, millimeters, format })
+}
+
+#[cfg(test)]
+mod tests;

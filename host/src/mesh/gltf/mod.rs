@@ -1,0 +1,293 @@
+//! glTF 2.0, as JSON or as GLB: the meshes of its scene, placed by their nodes.
+//!
+//! `serde_json` reads the document; every accessor is checked and read here. Coordinates are taken as they stand: glTF
+//! says that y is up, but files disagree. What would change the surface and is not read (Draco, meshopt, quantization,
+//! skins, morphs) is refused by name; materials, textures, cameras and animations are skipped.
+
+mod accessor;
+mod container;
+mod document;
+mod extension;
+
+use super::Mesh;
+use super::placed::Placed;
+use crate::error::{Error, MeshProblem, Place, Result};
+use accessor::Data;
+use document::{Document, Node, Primitive};
+use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Reads the mesh of a glTF file; errors name `path`. Files that it names are looked for in `folder`.
+///
+/// # Errors
+/// Where the JSON is none, a number that it states is impossible, a file beside it cannot be read, it uses what is not
+/// read, or no face is left.
+pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<Mesh> {
+    let parts = container::parts(bytes, path)?;
+    let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
+        let mut reason = error.to_string();
+        reason.truncate(reason.rfind(" at line ").unwrap_or(reason.len()));
+        let place = match parts.start {
+            start @ 4.. => Place::byte(path, start + offset(parts.json, error.line(), error.column())),
+            _ => Place::line(path, error.line().max(1) as u64),
+        };
+        Error::at(place, MeshProblem::Damaged { format: "glTF", what: reason.chars().take(200).collect() })
+    })?;
+    let here = |problem| Error::at(Place::file(path), problem);
+    check(&document).map_err(here)?;
+    let buffers = container::buffers(&document, &parts, path, folder)?;
+    let length = bytes.len() as u64 + buffers.iter().flatten().map(|buffer| buffer.len() as u64).sum::<u64>();
+    let scene = Scene {
+        data: Data { document: &document, buffers, most_zeros: length },
+        document: &document,
+        placed: Placed::new(length),
+    };
+    scene.mesh().map_err(here)
+}
+
+/// Something is wrong with a file as a whole.
+fn damaged(path: &Path, what: String) -> Error {
+    Error::at(Place::file(path), accessor::damaged(what))
+}
+
+/// Where a line and a column (both from 1) are in a text.
+fn offset(text: &[u8], line: usize, column: usize) -> u64 {
+    let before: usize = text.split_inclusive(|&byte| byte == b'\n').take(line.saturating_sub(1)).map(<[u8]>::len).sum();
+    (before + column.saturating_sub(1)).min(text.len()) as u64
+}
+
+fn check(document: &Document) -> Result<(), MeshProblem> {
+    // A file of a later 2.x says in `minVersion` what a reader must know; 2.0 is what is known here.
+    let version = document.asset.min_version.as_ref().unwrap_or(&document.asset.version);
+    let is_known = match document.asset.min_version {
+        Some(_) => version == "2.0",
+        None => version.split('.').next() == Some("2"),
+    };
+    if !is_known {
+        let what = format!("glTF of version {}", version.chars().take(20).collect::<String>());
+        return Err(MeshProblem::Unsupported { what, instead: "Export it as glTF 2.0" });
+    }
+    extension::check_required(&document.extensions_required)
+}
+
+struct Scene<'a> {
+    data: Data<'a>,
+    document: &'a Document,
+    placed: Placed,
+}
+
+impl Scene<'_> {
+    fn mesh(mut self) -> Result<Mesh, MeshProblem> {
+        let nodes = &self.document.nodes;
+        let mut waiting: Vec<(u32, DAffine3)> = Vec::new();
+        let add = |nodes: &[u32], transform: &DAffine3, waiting: &mut Vec<_>| {
+            waiting.extend(nodes.iter().rev().map(|&node| (node, *transform)));
+        };
+        match (self.document.scene, self.document.scenes.first()) {
+            (Some(index), _) => {
+                let scene = self.document.scenes.get(index as usize);
+                let scene = scene.ok_or_else(|| accessor::damaged(format!("scenes[{index}] is missing")))?;
+                add(&scene.nodes, &DAffine3::IDENTITY, &mut waiting);
+            }
+            (None, Some(scene)) => add(&scene.nodes, &DAffine3::IDENTITY, &mut waiting),
+            // Without scenes, all nodes that are no one's child; without nodes, all meshes.
+            (None, None) => {
+                let mut is_root = vec![true; nodes.len()];
+                for &child in nodes.iter().flat_map(|node| &node.children) {
+                    if let Some(is_root) = is_root.get_mut(child as usize) {
+                        *is_root = false;
+                    }
+                }
+                let roots: Vec<u32> =
+                    (0..).zip(is_root).filter(|(_, is_root)| *is_root).map(|(node, _)| node).collect();
+                add(&roots, &DAffine3::IDENTITY, &mut waiting);
+            }
+        }
+        if nodes.is_empty() {
+            for mesh in 0..self.document.meshes.len() {
+                self.place(mesh as u32, &DAffine3::IDENTITY)?;
+            }
+        }
+        // Nodes are a forest: each is met once at most, so this ends.
+        let mut met = vec![false; nodes.len()];
+        while let Some((index, parent)) = waiting.pop() {
+            let node = nodes.get(index as usize);
+            let node = node.ok_or_else(|| accessor::damaged(format!("nodes[{index}] is missing")))?;
+            match met.get_mut(index as usize) {
+                Some(met) if !*met => *met = true,
+                _ => return Err(accessor::damaged(format!("nodes[{index}] has two parents, or is above itself"))),
+            }
+            let transform = parent * transform(node, index)?;
+            if let Some(mesh) = node.mesh {
+                self.check_node(node)?;
+                self.place(mesh, &transform)?;
+            }
+            add(&node.children, &transform, &mut waiting);
+        }
+        self.placed.into_mesh()
+    }
+
+    /// Refuses what would place or bend a node's mesh in another way than its transform.
+    fn check_node(&self, node: &Node) -> Result<(), MeshProblem> {
+        let instancing = "EXT_mesh_gpu_instancing";
+        if node.extensions.as_ref().is_some_and(|extensions| extensions.contains_key(instancing)) {
+            return Err(extension::unsupported(instancing));
+        }
+        if node.skin.is_some() {
+            let what = "a skin, which bends the mesh,".into();
+            return Err(MeshProblem::Unsupported { what, instead: "Apply the skin to the mesh, then export it" });
+        }
+        is_still(&node.weights)
+    }
+
+    /// Places the mesh of this number.
+    fn place(&mut self, index: u32, transform: &DAffine3) -> Result<(), MeshProblem> {
+        let mesh = self.document.meshes.get(index as usize);
+        let mesh = mesh.ok_or_else(|| accessor::damaged(format!("meshes[{index}] is missing")))?;
+        is_still(&mesh.weights)?;
+        // Primitives that share their positions share vertices.
+        let mut parts: Vec<Part> = Vec::new();
+        let mut known: HashMap<u32, usize> = HashMap::new();
+        // How many vertices and triangles wait in `parts`.
+        let mut pending = (0, 0);
+        for primitive in &mesh.primitives {
+            let Some(faces) = Faces::of(primitive.mode)? else { continue };
+            let Some(positions) = primitive.attributes.position else {
+                return Err(without_positions(index, primitive));
+            };
+            let part = match known.get(&positions) {
+                Some(&part) => part,
+                None => {
+                    let vertices = self.data.positions(positions, &primitive.extensions)?;
+                    pending.0 += vertices.len();
+                    parts.push((vertices, Vec::new()));
+                    known.insert(positions, parts.len() - 1);
+                    parts.len() - 1
+                }
+            };
+            let Some((vertices, triangles)) = parts.get_mut(part) else { continue };
+            let count = vertices.len() as u64;
+            let indices = match primitive.indices {
+                Some(accessor) => self.data.indices(accessor, &primitive.extensions)?,
+                None => (0..u32::try_from(count).map_err(|_| MeshProblem::TooManyVertices)?).collect(),
+            };
+            if let Some(&wrong) = indices.iter().find(|&&index| u64::from(index) >= count) {
+                return Err(MeshProblem::NoSuchVertex { index: wrong.into(), vertices: count });
+            }
+            pending.1 += faces.count(indices.len());
+            self.placed.check(pending.0, pending.1)?;
+            faces.append(&indices, triangles).ok_or_else(|| {
+                accessor::damaged(format!(
+                    "meshes[{index}] has {} corners, which is not a multiple of 3",
+                    indices.len()
+                ))
+            })?;
+        }
+        parts.into_iter().try_for_each(|(vertices, triangles)| {
+            let places = vertices.into_iter().map(|vertex| Vec3::from(vertex).as_dvec3());
+            self.placed.place(places, &triangles, transform)
+        })
+    }
+}
+
+/// Vertices and the triangles among them.
+type Part = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
+/// A primitive without positions has them in an extension, or is damaged.
+fn without_positions(mesh: u32, primitive: &Primitive) -> MeshProblem {
+    let mut extensions = primitive.extensions.iter().flat_map(|extensions| extensions.keys());
+    match extensions.find(|name| extension::COMPRESSED.contains(&name.as_str())) {
+        Some(name) => extension::unsupported(name),
+        None => accessor::damaged(format!("meshes[{mesh}] has a primitive without positions")),
+    }
+}
+
+/// Refuses morphs that are not at rest.
+fn is_still(weights: &Option<Vec<f64>>) -> Result<(), MeshProblem> {
+    if weights.iter().flatten().all(|&weight| weight == 0.0) {
+        return Ok(());
+    }
+    let what = "a morph with weights, which bends the mesh,".into();
+    Err(MeshProblem::Unsupported { what, instead: "Apply the morph to the mesh, then export it" })
+}
+
+/// How indices make triangles.
+enum Faces {
+    Each,
+    Strip,
+    Fan,
+}
+
+impl Faces {
+    /// That of a primitive's mode; none for points and lines, which are no surface.
+    fn of(mode: Option<u32>) -> Result<Option<Self>, MeshProblem> {
+        match mode {
+            None | Some(4) => Ok(Some(Self::Each)),
+            Some(5) => Ok(Some(Self::Strip)),
+            Some(6) => Ok(Some(Self::Fan)),
+            Some(0..4) => Ok(None),
+            Some(other) => Err(accessor::damaged(format!("{other} is no mode of a primitive"))),
+        }
+    }
+
+    /// How many triangles so many indices make.
+    fn count(&self, indices: usize) -> usize {
+        match self {
+            Self::Each => indices / 3,
+            Self::Strip | Self::Fan => indices.saturating_sub(2),
+        }
+    }
+
+    /// Appends the triangles; none if their corners are not whole.
+    fn append(&self, indices: &[u32], triangles: &mut Vec<[u32; 3]>) -> Option<()> {
+        match self {
+            Self::Each => {
+                let (whole, rest) = indices.as_chunks();
+                triangles.reserve_exact(whole.len());
+                triangles.extend_from_slice(whole);
+                return rest.is_empty().then_some(());
+            }
+            Self::Strip => triangles.extend(
+                indices.array_windows().enumerate().map(
+                    |(number, &[a, b, c])| {
+                        if number % 2 == 1 { [b, a, c] } else { [a, b, c] }
+                    },
+                ),
+            ),
+            Self::Fan => {
+                let others = indices.get(1..).unwrap_or_default();
+                triangles.extend(others.array_windows().filter_map(|&[b, c]| Some([*indices.first()?, b, c])));
+            }
+        }
+        Some(())
+    }
+}
+
+/// Where a node places its mesh, within its parent.
+fn transform(node: &Node, index: u32) -> Result<DAffine3, MeshProblem> {
+    if let Some(matrix) = &node.matrix {
+        let matrix = DMat4::from_cols_array(matrix);
+        if matrix.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
+            return Err(accessor::damaged(format!("nodes[{index}] has a matrix whose last row is not 0 0 0 1")));
+        }
+        return Ok(DAffine3::from_mat4(matrix));
+    }
+    let translation = node.translation.as_deref().map_or(DVec3::ZERO, |&vector| vector.into());
+    let scale = node.scale.as_deref().map_or(DVec3::ONE, |&vector| vector.into());
+    let rotation = match node.rotation.as_deref() {
+        None => DQuat::IDENTITY,
+        Some(&rotation) => {
+            let rotation = DQuat::from_array(rotation);
+            // Exporters round; but what is no rotation at all would scale the mesh.
+            if !(0.9..1.1).contains(&rotation.length()) {
+                return Err(accessor::damaged(format!("nodes[{index}] has a rotation of a length other than 1")));
+            }
+            if rotation == DQuat::IDENTITY { rotation } else { rotation.normalize() }
+        }
+    };
+    Ok(DAffine3::from_scale_rotation_translation(scale, rotation, translation))
+}
+
+#[cfg(test)]
+mod tests;

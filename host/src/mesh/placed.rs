@@ -1,0 +1,68 @@
+//! Meshes that a file places by transforms, some of them several times: what the readers of scenes share.
+
+use super::Mesh;
+use crate::error::MeshProblem;
+use glam::{DAffine3, DVec3};
+
+/// The mesh of a scene, grown instance by instance, never beyond a bound that the length of the file sets: a file of a few
+/// kilobytes could place meshes a trillion times.
+#[derive(Debug)]
+pub(super) struct Placed {
+    mesh: Mesh,
+    /// The most bytes that vertices and triangles may take.
+    limit: u64,
+}
+
+impl Placed {
+    /// An empty scene of a file of `length` bytes. With the growth of vectors, its mesh, and one that is to be placed, take
+    /// less than 192 bytes for each byte of the file and 768 KB.
+    pub(super) fn new(length: u64) -> Self {
+        Self { mesh: Mesh::default(), limit: (3 << 16) + 48 * length }
+    }
+
+    /// Refuses a mesh of so many vertices and triangles that the scene would become too large.
+    pub(super) fn check(&self, vertices: usize, triangles: usize) -> Result<(), MeshProblem> {
+        let Mesh { vertices: own, triangles: all } = &self.mesh;
+        let bytes = 12 * (own.len() as u64 + all.len() as u64 + vertices as u64 + triangles as u64);
+        if bytes > self.limit { Err(MeshProblem::TooLarge { limit: self.limit }) } else { Ok(()) }
+    }
+
+    /// Appends a mesh, placed by `transform`: `vertices`, and triangles among them. A transform that mirrors turns the
+    /// triangles, so that outside stays outside.
+    ///
+    /// # Errors
+    /// If the scene becomes too large, or a vertex is not finite. The triangles' indices must be in range.
+    pub(super) fn place(
+        &mut self,
+        vertices: impl ExactSizeIterator<Item = DVec3>,
+        triangles: &[[u32; 3]],
+        transform: &DAffine3,
+    ) -> Result<(), MeshProblem> {
+        self.check(vertices.len(), triangles.len())?;
+        let Mesh { vertices: own, triangles: all } = &mut self.mesh;
+        let base = u32::try_from(own.len()).map_err(|_| MeshProblem::TooManyVertices)?;
+        u32::try_from(own.len() + vertices.len()).map_err(|_| MeshProblem::TooManyVertices)?;
+        for vertex in vertices {
+            // As it stands where nothing moves it, every bit.
+            let place =
+                if *transform == DAffine3::IDENTITY { vertex } else { transform.transform_point3(vertex) }.as_vec3();
+            for (axis, value) in ['x', 'y', 'z'].into_iter().zip(place.to_array()) {
+                if !value.is_finite() {
+                    return Err(MeshProblem::NotFinite { axis, text: value.to_string() });
+                }
+            }
+            own.push(place.to_array());
+        }
+        let mirrors = transform.matrix3.determinant() < 0.0;
+        all.extend(triangles.iter().map(|&[a, b, c]| if mirrors { [a, c, b] } else { [a, b, c] }.map(|i| base + i)));
+        Ok(())
+    }
+
+    /// The mesh of the whole scene.
+    ///
+    /// # Errors
+    /// As [`Mesh::usable`].
+    pub(super) fn into_mesh(self) -> Result<Mesh, MeshProblem> {
+        self.mesh.usable()
+    }
+}

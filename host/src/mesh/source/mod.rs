@@ -1,0 +1,254 @@
+//! Where objects come from: built in, a mesh file, a directory of mesh files.
+
+mod layout;
+mod search;
+
+use crate::error::{Error, MeshProblem, Place, Result};
+use crate::mesh::file;
+use crate::mesh::{BACKGROUND, builtin};
+use crate::mesh::{Instance, Object};
+use rayon::prelude::*;
+use search::{Found, LEVELS, lossy, search};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The objects of all `sources`, sorted by name. A source is one of
+///
+/// - `builtin`: the ten built-in objects;
+/// - `background`: one object of many different shapes, for a model's background column;
+/// - a mesh file of any of the kinds that [`file`] reads, or a directory, which is searched for files with one of the
+///   extensions of [`file::EXTENSIONS`], subdirectories included; where a folder holds a name with several extensions, the
+///   first of them is taken, and the object's notes say so;
+/// - the name of a built-in object, if there is no file of that name.
+///
+/// An object is named after its file, except in the layouts of
+///
+/// - ShapeNet (`<category>/<id>/models/model_normalized.obj`, or `<category>/<id>/model.obj`): after the category, or after
+///   category and id where the sources hold several of a category;
+/// - YCB (`NNN_name/google_16k/textured.obj`): after the first folder; of its meshes one is taken, google_16k before
+///   others;
+/// - Google Scanned Objects (`Name/meshes/model.obj`): after the first folder.
+///
+/// # Errors
+/// When a source does not exist, holds no mesh file, or a file is not a usable mesh, and when two objects have the same
+/// name.
+pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
+    let read: Vec<Result<Object>> = files(sources)?.into_par_iter().map(Source::read).collect();
+    read.into_iter().collect()
+}
+
+/// The only object of `source`, found as [`objects`](fn@objects) finds it.
+///
+/// # Errors
+/// As [`objects`](fn@objects), and [`MeshProblem::SeveralObjects`].
+pub fn object(source: &str) -> Result<Object> {
+    let mut found = files(&[source.to_owned()])?;
+    match (found.pop(), found.len()) {
+        (Some(only), 0) => only.read(),
+        (_, others) => Err(Error::at(Place::file(source), MeshProblem::SeveralObjects { count: others + 1 })),
+    }
+}
+
+/// An object that is found, but not yet made or read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// The built-in object of this name.
+    BuiltIn(&'static str),
+    /// The shapes of [`builtin::background`].
+    Background,
+    /// An object in a file.
+    File {
+        /// The object's name.
+        name: String,
+        /// Its mesh file.
+        path: PathBuf,
+        /// Which other files were passed over for it.
+        notes: Vec<String>,
+    },
+    /// An object with a file for each instance.
+    Instances {
+        /// The object's name.
+        name: String,
+        /// The instances' names and mesh files.
+        files: Vec<(String, PathBuf)>,
+        /// Which other files were passed over for them.
+        notes: Vec<String>,
+    },
+}
+
+impl Source {
+    /// The object's name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::BuiltIn(name) => name,
+            Self::Background => BACKGROUND,
+            Self::File { name, .. } | Self::Instances { name, .. } => name,
+        }
+    }
+
+    /// The object itself.
+    ///
+    /// # Errors
+    /// As [`file::read`] and [`builtin::one`].
+    pub fn read(self) -> Result<Object> {
+        match self {
+            Self::BuiltIn(name) => builtin::one(name),
+            Self::Background => builtin::background(builtin::BACKGROUND_SHAPES, 1),
+            Self::File { name, path, notes } => {
+                let contents = file::read(&path)?;
+                let object = Object::new(name, contents.mesh);
+                Ok(Object { millimeters: contents.millimeters, notes, ..object })
+            }
+            Self::Instances { name, files, notes } => {
+                let read = |(name, path): (String, PathBuf)| {
+                    let file::Contents { mesh, millimeters, .. } = file::read(&path)?;
+                    Ok((Instance { name, mesh }, millimeters))
+                };
+                let read = files.into_par_iter().map(read).collect::<Result<Vec<_>>>()?;
+                let (mut instances, units): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+                let (millimeters, note) = one_unit(&mut instances, &units);
+                let object = Object::of_instances(name, instances).ok_or(MeshProblem::NoMeshes)?;
+                Ok(Object { millimeters, notes: notes.into_iter().chain(note).collect(), ..object })
+            }
+        }
+    }
+}
+
+/// The unit of an object's instances in millimeters, of which each may state its own: those that differ are scaled to the
+/// first. Where only some state one, there is none, and a note that says so.
+fn one_unit(instances: &mut [Instance], units: &[Option<f64>]) -> (Option<f64>, Option<String>) {
+    let Some(&Some(first)) = units.iter().find(|unit| unit.is_some()) else { return (None, None) };
+    if units.contains(&None) {
+        let note = "some of its meshes state their unit and others do not, so its size is unknown";
+        return (None, Some(note.into()));
+    }
+    for (instance, unit) in instances.iter_mut().zip(units.iter().flatten()) {
+        if *unit != first {
+            let scaled = |x: &mut f32| *x = (f64::from(*x) * unit / first) as f32;
+            instance.mesh.vertices.iter_mut().flatten().for_each(scaled);
+        }
+    }
+    (Some(first), None)
+}
+
+/// The objects of all `sources`, sorted by name, where a directory inside a directory is one object: the mesh files that
+/// are found in it, subdirectories included, are its instances, named after their paths in it. Everything else is found
+/// as [`objects`](fn@objects) finds it.
+///
+/// # Errors
+/// As [`objects`](fn@objects).
+pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
+    found(sources, true)?.into_par_iter().map(Source::read).collect::<Vec<_>>().into_iter().collect()
+}
+
+/// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.
+///
+/// # Errors
+/// As [`objects`](fn@objects), except for what is wrong inside a file.
+pub fn files(sources: &[String]) -> Result<Vec<Source>> {
+    found(sources, false)
+}
+
+fn found(sources: &[String], instances: bool) -> Result<Vec<Source>> {
+    let mut paths = Vec::new();
+    let mut found = BTreeMap::new();
+    for source in sources {
+        if source == "builtin" {
+            if builtin::names().is_empty() {
+                return builtin::one(source).map(|_| Vec::new());
+            }
+            for name in builtin::names() {
+                insert(&mut found, name.into(), Source::BuiltIn(name))?;
+            }
+        } else if source == BACKGROUND && !Path::new(source).exists() {
+            insert(&mut found, BACKGROUND.into(), Source::Background)?;
+        } else if let Some(name) = builtin::names().into_iter().find(|name| name == source)
+            && !Path::new(source).exists()
+        {
+            insert(&mut found, name.into(), Source::BuiltIn(name))?;
+        } else {
+            let path = Path::new(source);
+            let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
+                std::io::ErrorKind::NotFound => {
+                    Error::at(Place::file(path), MeshProblem::NoSuchSource { builtin: builtin::names().into() })
+                }
+                _ => Error::io(path, "read the mesh", error),
+            })?;
+            if metadata.is_dir() {
+                let before = paths.len() + found.len();
+                if instances {
+                    search(path, 0, &mut paths)?;
+                    for object in directories(path)? {
+                        insert(&mut found, object.name().into(), object)?;
+                    }
+                } else {
+                    search(path, LEVELS, &mut paths)?;
+                }
+                if paths.len() + found.len() == before {
+                    return Err(Error::at(Place::file(path), MeshProblem::NoMeshes));
+                }
+            } else {
+                paths.push(Found { path: path.to_owned(), passed: Vec::new() });
+            }
+        }
+    }
+    layout::choose(&mut paths);
+    let mut in_category = BTreeMap::new();
+    for (category, _) in paths.iter().filter_map(|found| layout::shapenet(&found.path)) {
+        *in_category.entry(category).or_insert(0) += 1;
+    }
+    for one in paths {
+        let name = match (layout::shapenet(&one.path), layout::folder(&one.path)) {
+            (Some((category, id)), _) if in_category[&category] > 1 => format!("{category}-{id}"),
+            (Some((category, _)), _) => category,
+            (None, Some(folder)) => folder,
+            (None, None) => lossy(one.path.file_stem()),
+        };
+        let notes = one.note().into_iter().collect();
+        insert(&mut found, name.clone(), Source::File { name, path: one.path, notes })?;
+    }
+    Ok(found.into_values().collect())
+}
+
+fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) -> Result<()> {
+    let place = |source: &Source| match source {
+        Source::BuiltIn(_) => "builtin".into(),
+        Source::Background => BACKGROUND.into(),
+        Source::File { path, .. } => path.clone(),
+        Source::Instances { files, .. } => files.first().map(|(_, path)| path.clone()).unwrap_or_default(),
+    };
+    if let Some(other) = found.get(&name) {
+        return Err(MeshProblem::SameName { first: place(other), second: place(&source), name }.into());
+    }
+    found.insert(name, source);
+    Ok(())
+}
+
+/// The objects that the directories in `directory` stand for, one each.
+fn directories(directory: &Path) -> Result<Vec<Source>> {
+    let io = |error| Error::io(directory, "read the directory", error);
+    let mut objects = Vec::new();
+    for entry in std::fs::read_dir(directory).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        if !path.is_dir() {
+            continue;
+        }
+        let mut paths = Vec::new();
+        search(&path, LEVELS - 1, &mut paths)?;
+        if paths.is_empty() {
+            continue;
+        }
+        layout::choose(&mut paths);
+        let name = |file: &Path| {
+            let inside = file.strip_prefix(&path).unwrap_or(file).with_extension("");
+            inside.to_string_lossy().replace('\\', "/")
+        };
+        let notes = paths.iter().filter_map(Found::note).collect();
+        let files = paths.into_iter().map(|found| (name(&found.path), found.path)).collect();
+        objects.push(Source::Instances { name: lossy(path.file_name()), files, notes });
+    }
+    Ok(objects)
+}
+
+#[cfg(test)]
+mod tests;

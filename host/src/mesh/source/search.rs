@@ -1,0 +1,65 @@
+//! Mesh files in directories.
+
+use crate::error::{Error, Result};
+use crate::mesh::file::EXTENSIONS;
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// A mesh file that was found.
+pub(super) struct Found {
+    pub(super) path: PathBuf,
+    /// Files that are passed over, since this one stands for the same.
+    pub(super) passed: Vec<PathBuf>,
+}
+
+impl Found {
+    /// Says which files were passed over for this one.
+    pub(super) fn note(&self) -> Option<String> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let named = |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).display().to_string();
+        let passed: Vec<String> = self.passed.iter().map(named).collect();
+        let are = if passed.len() == 1 { "is" } else { "are" };
+        let passed = (!passed.is_empty()).then(|| passed.join(", "))?;
+        Some(format!("{} is used; {passed} {are} passed over, of the same object", self.path.display()))
+    }
+}
+
+/// How many levels of subdirectories are searched.
+pub(super) const LEVELS: usize = 8;
+
+/// How early a file's extension stands among those of meshes; none if it is no mesh's.
+pub(super) fn rank(path: &Path) -> Option<usize> {
+    let extension = path.extension()?;
+    EXTENSIONS.iter().position(|known| extension.eq_ignore_ascii_case(known))
+}
+
+/// Appends the mesh files in a directory and in its subdirectories: of one name, the one with the first extension.
+pub(super) fn search(directory: &Path, levels: usize, found: &mut Vec<Found>) -> Result<()> {
+    let io = |error| Error::io(directory, "read the directory", error);
+    let mut entries = std::fs::read_dir(directory).map_err(io)?.collect::<std::io::Result<Vec<_>>>().map_err(io)?;
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    let paths: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).collect();
+    let mut names: BTreeMap<&OsStr, Vec<(usize, &PathBuf)>> = BTreeMap::new();
+    let files = paths.iter().filter(|path| !path.is_dir()).filter_map(|path| Some((rank(path)?, path)));
+    for (rank, path) in files {
+        names.entry(path.file_stem().unwrap_or_default()).or_default().push((rank, path));
+    }
+    names.values_mut().for_each(|files| files.sort());
+    for path in &paths {
+        if let Some([(_, first), others @ ..]) = names.get(path.file_stem().unwrap_or_default()).map(Vec::as_slice)
+            && *first == path
+        {
+            found
+                .push(Found { path: path.clone(), passed: others.iter().map(|(_, other)| (*other).clone()).collect() });
+        } else if path.is_dir() && levels > 0 {
+            search(path, levels - 1, found)?;
+        }
+    }
+    Ok(())
+}
+
+/// The name of a file or directory as text.
+pub(super) fn lossy(name: Option<&OsStr>) -> String {
+    name.unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,170 @@
+use super::*;
+use crate::error::Problem;
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+fn place(directory: &Path, files: &[&str]) -> String {
+    for file in files {
+        let path = directory.join(file);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, TRIANGLE).unwrap();
+    }
+    directory.to_str().unwrap().to_owned()
+}
+
+fn names(sources: &[String]) -> Vec<String> {
+    objects(sources).unwrap().into_iter().map(|object| object.name).collect()
+}
+
+#[test]
+fn files_and_directories_together_are_sorted_by_name() {
+    let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let one = place(one.path(), &["spoon.OBJ", "deep/er/fork.obj", "notes.txt"]);
+    let two = place(two.path(), &["a cup.obj"]) + "/a cup.obj";
+    assert_eq!(names(&[one, two]), ["a cup", "fork", "spoon"]);
+}
+
+#[cfg(feature = "objects")]
+#[test]
+fn a_built_in_object_is_found_by_its_name_unless_a_file_has_it() {
+    assert_eq!(names(&["mouse".into(), "bowl".into()]), ["bowl", "mouse"]);
+    let error = objects(&["builtin".into(), "mouse".into()]).unwrap_err().to_string();
+    assert!(error.contains("two objects are called mouse"), "{error}");
+}
+
+#[test]
+fn shapenet_objects_are_named_after_category_and_id() {
+    let directory = tempfile::tempdir().unwrap();
+    let files = ["mug/1a/models/model_normalized.obj", "bowl/2b/models/model_normalized.obj"];
+    let source = place(directory.path(), &files);
+    assert_eq!(names(&[format!("{source}/mug/1a/models/model_normalized.obj")]), ["mug"]);
+    assert_eq!(names(&[source]), ["bowl", "mug"]);
+    let source = place(directory.path(), &["mug/3c/models/model_normalized.obj"]);
+    assert_eq!(names(&[source]), ["bowl", "mug-1a", "mug-3c"]);
+}
+
+#[test]
+fn a_directory_inside_a_directory_is_one_object_with_instances() {
+    let directory = tempfile::tempdir().unwrap();
+    let files = ["cup/red.obj", "cup/blue.obj", "cup/far/green.obj", "fork/one.obj", "spoon.obj", "empty/notes.txt"];
+    let source = place(directory.path(), &files);
+    let objects = objects_of_instances(std::slice::from_ref(&source)).unwrap();
+    let found: Vec<(&str, Vec<&str>)> = objects
+        .iter()
+        .map(|object| (object.name.as_str(), object.instances().map(|one| one.name.as_str()).collect()))
+        .collect();
+    let cup = vec!["blue", "far/green", "red"];
+    assert_eq!(found, [("cup", cup), ("fork", vec!["one"]), ("spoon", vec!["spoon"])]);
+    // Without instances, each file is an object.
+    assert_eq!(names(std::slice::from_ref(&source)), ["blue", "green", "one", "red", "spoon"]);
+    place(directory.path(), &["cup.obj"]);
+    let error = objects_of_instances(&[source]).unwrap_err().to_string();
+    assert!(error.contains("two objects are called cup"), "{error}");
+}
+
+#[test]
+fn two_objects_of_one_name_are_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), &["a/cup.obj", "b/cup.obj"]);
+    let error = objects(&[source]).unwrap_err().to_string();
+    assert!(error.contains("two objects are called cup") && error.contains("b/cup.obj"), "{error}");
+}
+
+#[test]
+fn missing_and_empty_sources_are_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = directory.path().to_str().unwrap().to_owned();
+    assert!(objects(std::slice::from_ref(&source)).unwrap_err().to_string().contains("no mesh here"));
+    let error = objects(&[source + "/bultin"]).unwrap_err();
+    assert!(error.to_string().contains("bultin: cannot read the mesh"), "{error}");
+    assert!(matches!(error.problem(), Some(Problem::Mesh(MeshProblem::NoSuchSource { .. }))), "{error:?}");
+}
+
+#[cfg(feature = "objects")]
+#[test]
+fn a_misspelled_built_in_object_is_refused_with_the_names_of_all() {
+    for error in
+        [objects(&["builtin".into(), "mug".into()]), objects(&["mug".into()]), object("mug").map(|one| vec![one])]
+    {
+        let error = error.unwrap_err().to_string();
+        assert!(error.starts_with("mug: ") && !error.contains("os error"), "{error}");
+        assert!(builtin::names().iter().all(|name| error.contains(name)), "{error}");
+    }
+}
+
+#[cfg(feature = "objects")]
+#[test]
+fn several_objects_where_one_is_needed_are_refused_with_their_number() {
+    let error = object("builtin").unwrap_err().to_string();
+    assert!(error.starts_with("builtin: 10 objects"), "{error}");
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), &["cup.obj"]);
+    assert_eq!(object(&source).unwrap().name, "cup");
+    place(directory.path(), &["bowl.obj"]);
+    assert!(object(&source).unwrap_err().to_string().contains("2 objects, where one is needed"));
+}
+
+#[test]
+fn a_name_in_several_formats_is_one_object_of_the_first_of_them_and_a_note_says_so() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), &["cup.dae", "cup.STL", "cup.ply", "fork.glb", "deep/cup2.gltf", "cup.mtl"]);
+    let found = files(&[source]).unwrap();
+    let expected = ["cup.STL", "deep/cup2.gltf", "fork.glb"];
+    for (one, expected) in found.iter().zip(expected) {
+        let Source::File { path, notes, .. } = one else { panic!("{one:?}") };
+        assert!(path.ends_with(expected), "{path:?}");
+        assert_eq!(notes.is_empty(), expected != "cup.STL", "{notes:?}");
+    }
+    let Source::File { notes, .. } = &found[0] else { unreachable!() };
+    assert!(notes[0].ends_with("cup.STL is used; cup.ply, cup.dae are passed over, of the same object"), "{notes:?}");
+}
+
+#[test]
+fn data_sets_of_meshes_give_the_names_of_their_objects() {
+    let directory = tempfile::tempdir().unwrap();
+    let files = [
+        "025_mug/google_16k/nontextured.ply",
+        "025_mug/google_16k/nontextured.stl",
+        "025_mug/google_16k/textured.obj",
+        "025_mug/google_64k/textured.obj",
+        "025_mug/clouds/merged_cloud.ply",
+        "072-a_toy_airplane/tsdf/nontextured.stl",
+        "Threshold_Bowl/meshes/model.obj",
+        "Threshold_Bowl/materials/textures/texture.png",
+        "02958343/10155655850468db78d106ce0a280f87/model.obj",
+        "chair/1a/models/model_normalized.obj",
+        "plain/textured.obj",
+    ];
+    let source = place(directory.path(), &files);
+    let expected = ["025_mug", "02958343", "072-a_toy_airplane", "Threshold_Bowl", "chair", "textured"];
+    let found = super::files(std::slice::from_ref(&source)).unwrap();
+    assert_eq!(found.iter().map(Source::name).collect::<Vec<_>>(), expected);
+    let Source::File { path, notes, .. } = &found[0] else { panic!("{found:?}") };
+    assert!(path.ends_with("google_16k/textured.obj") && notes[0].contains("merged_cloud.ply"), "{path:?} {notes:?}");
+    // One file, named outright.
+    for (file, name) in [(files[0], "025_mug"), (files[6], "Threshold_Bowl"), (files[8], "02958343")] {
+        assert_eq!(super::files(&[format!("{source}/{file}")]).unwrap()[0].name(), name);
+    }
+    let instances = super::found(&[source], true).unwrap();
+    let Source::Instances { name, files, .. } = &instances[0] else { panic!("{instances:?}") };
+    assert_eq!((name.as_str(), files.len(), files[0].0.as_str()), ("025_mug", 1, "google_16k/textured"));
+}
+
+#[test]
+fn instances_whose_files_state_their_units_are_brought_to_one() {
+    let directory = tempfile::tempdir().unwrap();
+    let globe = crate::mesh::Mesh::globe(3);
+    let dae = crate::mesh::samples::collada(&globe);
+    std::fs::create_dir(directory.path().join("cup")).unwrap();
+    std::fs::write(directory.path().join("cup/a.dae"), &dae).unwrap();
+    std::fs::write(directory.path().join("cup/b.dae"), dae.replace("0.0254", "0.0508")).unwrap();
+    let source = directory.path().to_str().unwrap().to_owned();
+    let read = |source: &String| objects_of_instances(std::slice::from_ref(source)).unwrap().remove(0);
+    let cup = read(&source);
+    assert_eq!(cup.millimeters, Some(25.4));
+    let lengths: Vec<f64> = cup.instances().map(|one| cup.true_length(one).unwrap()).collect();
+    assert!((lengths[1] / lengths[0] - 2.0).abs() < 1e-6, "{lengths:?}");
+    place(&directory.path().join("cup"), &["c.obj"]);
+    let cup = read(&source);
+    assert!(cup.millimeters.is_none() && cup.notes[0].contains("its size is unknown"));
+}

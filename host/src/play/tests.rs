@@ -1,0 +1,142 @@
+use super::*;
+use crate::capture;
+use crate::compile::{self, compile};
+use crate::ensemble::{self, Ensemble, Node, Output, Tree};
+use crate::error::Problem;
+use palpate_shared::Descriptor;
+
+/// A nat or less for the disc where the surface is flat, for the globe where it is bent; of full touches.
+fn model() -> Vec<u8> {
+    let nodes = vec![
+        Node::Split { feature: 0, threshold: 9_000.0, missing_left: true, left: 1, right: 2 },
+        Node::Leaf(vec![0.25, -0.25]),
+        Node::Leaf(vec![-0.75, 0.75]),
+    ];
+    let ensemble = Ensemble {
+        inputs: Descriptor::Curvature.into(),
+        objects: vec!["disc".into(), "globe".into()],
+        base_margins: vec![0.0; 2],
+        trees: vec![Tree { nodes, output: Output::Each }],
+        origin: ensemble::Origin::default(),
+    };
+    compile(&ensemble, &compile::Settings::default()).unwrap().bytes
+}
+
+/// The disc and the globe.
+fn game(model: &[u8]) -> Game<'_> {
+    let mut game = Game::new(&Origin::default());
+    for (name, height) in [("disc", 0.1), ("globe", 1.0)] {
+        game.add_object(name, &Mesh::globe(12).stretched([1.0, 1.0, height]), 10.0).unwrap();
+    }
+    game.add_model(compile::open(model).unwrap()).unwrap();
+    game
+}
+
+#[test]
+fn the_approaches_of_a_round_are_the_samples_of_a_capture_with_its_seed_and_noise() {
+    let bytes = model();
+    let mut game = game(&bytes);
+    let noise = Noise { bent: [0.0, 2_000.0, 0.0], ..Noise::switch() };
+    game.set_noise(noise).unwrap();
+    let origin = Origin { approaches: true, pose: true, seed: 7, ..Origin::default() };
+    let scene = std::slice::from_ref(game.scene(0).unwrap());
+    let captured = capture::touches(scene, "disc", &origin, 0..200).unwrap();
+    let mut round = game.round(0, 7).unwrap();
+    for (index, captured) in (0..).zip(captured) {
+        let approached = game.touch_at_random(&mut round);
+        assert_eq!(approached.exact, captured);
+        assert_eq!(noise.add("disc", &[captured], (7 << 32) + index), [approached.touch]);
+    }
+}
+
+#[test]
+fn a_player_does_what_its_recognizer_does_and_stops_with_the_verdict() {
+    let bytes = model();
+    let game = game(&bytes);
+    let mut round = game.round(1, 1).unwrap();
+    let model = compile::open(&bytes).unwrap();
+    let mut alone = Recognizer::<2>::new(&model, Stopping::from_model(&model)).unwrap();
+    let (mut approaches, mut refused) = (0, 0);
+    while alone.verdict() == Verdict::Undecided {
+        let approached = game.touch_at_random(&mut round);
+        let said = alone.push(&approached.touch).err();
+        approaches += 1;
+        refused += u32::from(said.is_some());
+        let player = &round.players()[0];
+        assert_eq!((player.refused(), player.approaches()), (said, approaches));
+        assert_eq!(player.recognizer().evidence(), alone.evidence());
+    }
+    assert!(refused > 0 && refused < approaches);
+    let Verdict::Recognized { object: 1, .. } = alone.verdict() else { panic!("{:?}", alone.verdict()) };
+    let player = &round.players()[0];
+    let (posteriors, thresholds) = (player.posteriors(), player.thresholds());
+    assert!((posteriors.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!((posteriors[1] - alone.posterior(1).to_f64()).abs() < 1e-6);
+    assert!(posteriors[1] >= thresholds[1] && thresholds[1] > 0.9);
+    game.touch_at_random(&mut round);
+    assert_eq!(round.players()[0].approaches(), approaches);
+}
+
+#[test]
+fn an_aimed_approach_moves_along_its_line_and_is_none_beside_the_object() {
+    let bytes = model();
+    let game = game(&bytes);
+    let mut round = game.round(1, 1).unwrap();
+    let (eye, direction) = (DVec3::new(30.0, 1.0, 0.5), DVec3::new(-2.0, 0.0, 0.0));
+    let approached = game.touch_along(&mut round, eye, direction, 0.3).unwrap();
+    let Approach { start, direction, alignment } = approached.approach;
+    assert_eq!((start.y, start.z, direction), (1.0, 0.5, DVec3::NEG_X));
+    assert!(alignment.dot(direction).abs() < 1e-12 && (alignment.length() - 1.0).abs() < 1e-12);
+    let [low, high] = game.scene(1).unwrap().bounds();
+    assert!((start.length() - (high - low).length() / 2.0 - crate::probe::approach::CLEARANCE).abs() < 1e-9);
+    assert!(approached.distances[1].is_some());
+    // Beside it, beyond where approaches start, and nowhere.
+    for (point, direction) in [
+        (DVec3::new(30.0, 6.0, 0.0), DVec3::NEG_X),
+        (DVec3::new(30.0, 60.0, 0.0), DVec3::NEG_X),
+        (eye, DVec3::ZERO),
+        (DVec3::NAN, DVec3::NEG_X),
+    ] {
+        assert_eq!(game.touch_along(&mut round, point, direction, 0.0), None);
+    }
+    assert_eq!(round.players()[0].approaches(), 1);
+}
+
+#[test]
+fn a_series_gives_the_same_scores_in_one_go_and_in_small_steps() {
+    let bytes = model();
+    let game = game(&bytes);
+    let mut whole = Series::new(&game, 1);
+    whole.go_on(&game, 30, u64::MAX);
+    let mut steps = Series::new(&game, 1);
+    while steps.rounds() < 30 {
+        steps.go_on(&game, 30, 7);
+    }
+    assert_eq!(whole.scores(), steps.scores());
+    let score = whole.scores()[0];
+    let (mean, error) = score.mean().unwrap();
+    assert!(score.rounds == 30 && mean > 5.0 && mean < 200.0 && error > 0.0 && error < mean, "{score:?}");
+}
+
+#[test]
+fn what_cannot_be_played_with_is_refused() {
+    let bytes = model();
+    let mut game = game(&bytes);
+    assert!(game.add_object("nothing", &Mesh::default(), 10.0).is_err());
+    assert!(game.add_object("small", &Mesh::globe(4), 0.0).is_err());
+    assert!(game.set_noise(Noise { timer: -1.0, ..Noise::default() }).is_err());
+    assert!(game.round(2, 1).is_none());
+    let mut round = game.round(0, 1).unwrap();
+    assert_eq!(game.touch_as_planned(&mut round, 0), None);
+    assert_eq!(game.touch_as_planned(&mut round, 1), None);
+    let rows = Ensemble {
+        inputs: ensemble::Inputs::unnamed(1),
+        objects: vec!["a".into(), "b".into()],
+        base_margins: vec![0.0; 2],
+        trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.0, 0.5])], output: Output::Each }],
+        origin: ensemble::Origin::default(),
+    };
+    let rows = compile(&rows, &compile::Settings::default()).unwrap().bytes;
+    let error = Game::new(&Origin::default()).add_model(compile::open(&rows).unwrap()).unwrap_err();
+    assert!(matches!(error.problem(), Some(Problem::Evaluate(EvaluateProblem::RawFeatures))), "{error}");
+}

@@ -1,0 +1,96 @@
+"use strict";
+// The game of data: compiles the page's WebAssembly, puts objects and models on the table, and returns what can be done.
+// The module imports nothing, so it can do nothing but compute.
+function openGame(data) {
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const { exports } = new WebAssembly.Instance(new WebAssembly.Module(bytes(data.wasm)));
+  const sure = (number, what) => {
+    if (number < 0) throw new Error(`${what} cannot be used`);
+    return number;
+  };
+  // What was put out: `count` numbers.
+  const taken = (count) => new Float64Array(exports.memory.buffer, exports.output(), count);
+  const put = (...parts) => {
+    const all = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+    parts.reduce((at, part) => (all.set(part, at), at + part.length), 0);
+    // The call may move the memory, so it comes first.
+    const at = exports.input(all.length);
+    new Uint8Array(exports.memory.buffer, at, all.length).set(all);
+  };
+
+  const { radius, spacing, speed, tilt } = data.probe;
+  sure(exports.start(data.millimeters ? 1 : 0, data.aim, radius, spacing, speed, tilt), "the probe");
+  // An object is put on the table when it is first needed: that takes a while. Its number there.
+  const numbers = data.objects.map(() => null);
+  const add = ({ name, mesh, length }) => {
+    const letters = new TextEncoder().encode(name);
+    put(letters, bytes(mesh));
+    return sure(exports.add_object(letters.length, length), name);
+  };
+  const number = (object) => (numbers[object] ??= add(data.objects[object]));
+  for (const model of data.models) {
+    put(bytes(model.bytes));
+    sure(exports.add_model(), model.name);
+  }
+  const setNoise = (noise) => {
+    const { deviation: { least, largest }, timer, debounce, missed, bent, speed, speed_error, speed_bias, pose, pose_bias } = noise;
+    const numbers = [Math.min(least, largest), largest, timer, debounce, missed, ...bent, speed, speed_error, speed_bias, pose, pose_bias];
+    put(new Uint8Array(Float64Array.from(numbers).buffer));
+    sure(exports.set_noise(), "the noise");
+  };
+  setNoise(data.noise);
+
+  const PATTERNS = ["none", "outer", "middle", "outer and middle", "both outer", "all"];
+  // What an approach put out; null where there was none.
+  const approached = (done) => {
+    if (done < 0) return null;
+    const numbers = [...taken(19)];
+    const three = (at) => numbers.slice(at, at + 3);
+    const some = (at) => three(at).map((number) => (Number.isNaN(number) ? null : number));
+    return {
+      start: three(0), direction: three(3), alignment: three(6), distances: some(9), exact: some(12), times: some(15),
+      pattern: PATTERNS[numbers[18]],
+    };
+  };
+  const VERDICTS = ["undecided", "recognized", "unknown", "gave up"];
+  return {
+    exports,
+    setNoise,
+    vertices: (object) => Float32Array.from(taken(sure(exports.vertices(number(object)), "an object"))),
+    triangles: (object) => Uint32Array.from(taken(sure(exports.triangles(number(object)), "an object"))),
+    begin: (object, seed) => sure(exports.begin(number(object), seed), "an object"),
+    touchAtRandom: () => approached(exports.touch_at_random()),
+    touchAsPlanned: (model) => approached(exports.touch_as_planned(model)),
+    touchAlong: (point, direction, roll) => approached(exports.touch_along(...point, ...direction, roll)),
+    player: (model) => {
+      const count = sure(exports.player(model), "a model");
+      const [verdict, best, approaches, touches, refused, ...of] = taken(5 + 2 * count);
+      return {
+        verdict: VERDICTS[verdict], best, approaches, touches, isEvidence: refused === 0,
+        posteriors: of.slice(0, count), thresholds: of.slice(count),
+      };
+    },
+    evidence: (model) => [...new BigInt64Array(exports.memory.buffer, exports.evidence(model), data.models[model].objects.length)],
+    propose: (model) => {
+      if (exports.propose(model) < 0) return null;
+      const [pose, score, ...vectors] = taken(8);
+      return { pose, score, direction: vectors.slice(0, 3), alignment: vectors.slice(3) };
+    },
+    // Puts another object on the table, which a series needs all of; false once they are.
+    prepare: () => {
+      const missing = numbers.indexOf(null);
+      if (missing >= 0) number(missing);
+      return missing >= 0;
+    },
+    beginSeries: (seed) => sure(exports.begin_series(seed), "the series"),
+    goOn: (rounds, approaches) => {
+      const finished = sure(exports.go_on(rounds, approaches), "the series");
+      const all = [...taken(4 * data.models.length)];
+      const score = (_, model) => {
+        const [mean, error, wrong, unnamed] = all.slice(4 * model);
+        return { mean, error, wrong, unnamed };
+      };
+      return { finished, scores: data.models.map(score) };
+    },
+  };
+}

@@ -1,0 +1,120 @@
+//! Whether objects can be taught to an ensemble.
+
+use super::{LEAST, Settings};
+use crate::ensemble::{Ensemble, Output, StatedProbe};
+use crate::error::{Error, Result, TeachProblem};
+use crate::mesh::BACKGROUND;
+use crate::touches::noise::Noise;
+use crate::touches::{Dataset, ObjectTouches};
+use palpate_shared::Descriptor;
+use palpate_shared::format::Counted;
+
+/// Refuses what cannot be taught, all of it before the work begins.
+pub(super) fn check(
+    ensemble: &Ensemble,
+    known: &Dataset,
+    recorded: &Dataset,
+    settings: &Settings,
+) -> Result<Descriptor> {
+    self::settings(settings)?;
+    ensemble.check()?;
+    let descriptor = ensemble.descriptor().ok_or(TeachProblem::NotOfTouches)?;
+    if ensemble.trees.iter().any(|tree| tree.output != Output::Each) {
+        return Err(TeachProblem::OneValue.into());
+    }
+    let has_touches =
+        |name: &&String| known.objects.iter().any(|object| object.name == **name && !object.touches.is_empty());
+    let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
+    if !missing.is_empty() {
+        return Err(TeachProblem::Missing { objects: missing }.into());
+    }
+    if let Some(object) = recorded.objects.iter().find(|object| ensemble.objects.contains(&object.name)) {
+        return Err(TeachProblem::Known { object: object.name.clone() }.into());
+    }
+    names(ensemble, recorded)?;
+    let stated = ensemble.origin.probe.or_else(|| StatedProbe::of(known));
+    same_probe(stated, recorded)?;
+    approaches(ensemble.trained_touches().counted, recorded)?;
+    poses(descriptor, recorded)?;
+    Ok(descriptor)
+}
+
+/// Names that the ensemble, with the recorded objects, can have.
+fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
+    if recorded.objects.is_empty() {
+        return Err(TeachProblem::Nothing.into());
+    }
+    if recorded.objects.iter().any(|object| object.name == BACKGROUND) {
+        return Err(TeachProblem::Known { object: BACKGROUND.into() }.into());
+    }
+    let names: Vec<String> = ensemble.objects.iter().cloned().chain(recorded.names()).collect();
+    crate::ensemble::check_names(&names)?;
+    if names.len() > crate::ensemble::MAX_OBJECTS {
+        return Err(crate::error::EnsembleProblem::TooManyObjects { objects: names.len() }.into());
+    }
+    Ok(())
+}
+
+/// The same probe, where both sides state one.
+fn same_probe(stated: Option<StatedProbe>, recorded: &Dataset) -> Result<()> {
+    if let Some((own, other)) = stated.zip(StatedProbe::of(recorded)) {
+        StatedProbe::compare(["the simulation", "the recording"], [own.trained(), other.trained()])?;
+    }
+    Ok(())
+}
+
+/// Partial touches are evidence only where every approach was recorded.
+pub(super) fn approaches(counted: Counted, recorded: &Dataset) -> Result<()> {
+    match counted {
+        Counted::Full => Ok(()),
+        Counted::Contacts | Counted::All if recorded.holds_approaches() => Ok(()),
+        Counted::Contacts | Counted::All => Err(TeachProblem::FullTouches { counted }.into()),
+    }
+}
+
+/// Every touch has a pose, if the descriptor needs one.
+pub(super) fn poses(descriptor: Descriptor, recorded: &Dataset) -> Result<()> {
+    let without = |object: &&ObjectTouches| object.touches.iter().any(|touch| touch.pose().is_none());
+    match recorded.objects.iter().find(without) {
+        Some(object) if descriptor.needs_pose() => {
+            Err(TeachProblem::NoPose { object: object.name.clone(), descriptor }.into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Enough touches that are evidence to each recorded object, so that parts of them can be held out.
+pub(super) fn enough(recorded: &Dataset, evidence: &[usize]) -> Result<()> {
+    match recorded.objects.iter().zip(evidence).find(|(_, touches)| **touches < LEAST) {
+        Some((object, &touches)) => {
+            Err(TeachProblem::TooFew { object: object.name.clone(), touches, least: LEAST }.into())
+        }
+        None => Ok(()),
+    }
+}
+
+/// What touches of the known objects lack of the noise that the ensemble was trained for.
+pub(super) fn missing_noise(ensemble: &Ensemble, known: &Dataset) -> Result<Noise> {
+    let (stated, there) = (ensemble.origin.noise.unwrap_or_default(), known.real());
+    match there {
+        _ if there == stated => Ok(Noise::default()),
+        _ if there.is_none() => Ok(stated),
+        // What was added to noise that was there is not stated.
+        _ => Err(TeachProblem::OtherNoise { stated: stated.to_string(), there: there.to_string() }.into()),
+    }
+}
+
+/// Settings in their ranges.
+pub(super) fn settings(settings: &Settings) -> Result<()> {
+    if settings.approaches == 0 {
+        return Err(Error::setting("approaches", 0, "1 or more"));
+    }
+    if settings.groups == 0 {
+        return Err(Error::setting("groups", 0, "1 or more"));
+    }
+    if settings.threads == Some(0) {
+        return Err(Error::setting("threads", 0, "at least 1"));
+    }
+    settings.noise.iter().try_for_each(Noise::check)?;
+    Ok(())
+}

@@ -1,0 +1,285 @@
+//! Objects that are learned from recorded touches, since there is no mesh of them.
+//!
+//! [`teach`] adds such objects to an ensemble that knows others: its trees stay as they are, and each leaf gets a value
+//! more. A few hundred touches suffice where new trees would need thousands, and the values of the other objects do not
+//! change. [`alone`](fn@alone) trains an ensemble on recorded touches and nothing else.
+//!
+//! Few touches have not shown everything that an object can do. So they are repeated under jitter, and the values of
+//! leaves are drawn towards 0 by a prior; how much of both is chosen for each object by cross-validation. Then a constant
+//! is added to the object's margin with every touch, so that errors balance: it is missed as often as its name is given
+//! to others. No touch, nor a copy of it, is ever fitted on and held out at once.
+
+mod alone;
+mod balance;
+mod check;
+mod column;
+mod curve;
+mod held_out;
+mod promise;
+mod rows;
+#[cfg(test)]
+mod tests;
+
+pub use alone::alone;
+pub use curve::{Curve, Point};
+pub use promise::Needed;
+
+use crate::ensemble::train::{BASE_MARGIN, round_leaves};
+use crate::ensemble::{Ensemble, Node, Origin};
+use crate::error::Result;
+use crate::progress::Progress;
+use crate::touches::noise::Noise;
+use crate::touches::{Dataset, ObjectTouches};
+use balance::Groups;
+use held_out::{Division, Material};
+use palpate_shared::Touch;
+use palpate_shared::format::TrainedTouches;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Jitters that are tried, in multiples of 30 % and 10 ms on times, 8° on the pose.
+const JITTERS: [f64; 3] = [0.5, 1.0, 2.0];
+/// Priors that are tried, in touches.
+const PRIORS: [f64; 3] = [4.0, 16.0, 64.0];
+/// How smoothings are compared: with few parts, on a share of the known objects' touches.
+const COMPARED: (Division, usize) = (Division { parts: 5, used: 4 }, 4);
+/// How the constants are found.
+const BALANCED: Division = Division { parts: 10, used: 9 };
+/// Touches of a known object that columns are fitted on at most, and of all of them together.
+const KNOWN: [usize; 2] = [12_000, 240_000];
+/// Touches of a known object that columns are fitted on where there are many objects.
+const LEAST_KNOWN: usize = 500;
+/// Touches of a recorded object that are needed at least, for a part of them to say something.
+pub const LEAST: usize = 20;
+
+/// How objects are taught.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Approaches after which errors are balanced and counted; fewer where fewer were recorded.
+    pub approaches: usize,
+    /// Groups of approaches that are drawn for each object.
+    pub groups: usize,
+    /// Seed of the jitter, of the parts and of the groups.
+    pub seed: u64,
+    /// Threads, or all of the machine's; the ensemble is the same for any number.
+    pub threads: Option<usize>,
+    /// As [`crate::ensemble::train::Settings::leaf_bits`].
+    pub leaf_bits: Option<u32>,
+    /// What is added to the touches of the known objects; `None` takes what the ensemble states, less what they have
+    /// already.
+    pub noise: Option<Noise>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { approaches: 60, groups: 500, seed: 1, threads: None, leaf_bits: Some(16), noise: None }
+    }
+}
+
+/// How the touches of an object are smoothed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Smoothing {
+    /// In multiples of 30 % and 10 ms on times, 8° on the pose.
+    pub jitter: f64,
+    /// The prior of a leaf's value, in touches of the object.
+    pub prior: f64,
+}
+
+impl Smoothing {
+    /// The position of the jitter among those that are tried.
+    fn jitter_index(self) -> usize {
+        JITTERS.iter().position(|&jitter| jitter >= self.jitter).unwrap_or(JITTERS.len() - 1)
+    }
+}
+
+/// What was found out about objects that were taught, on recorded touches that were held out. Shares are between 0 and 1.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Taught {
+    /// Approaches of a group.
+    pub approaches: usize,
+    /// The objects, in the order of the recorded data set.
+    pub objects: Vec<TaughtObject>,
+    /// The share of groups of the other objects that are recognized; none if there are none.
+    pub others: Option<f64>,
+    /// What a promise of 1 % wrong names takes.
+    pub promise: Needed,
+}
+
+/// What was found out about one of them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TaughtObject {
+    /// Its name.
+    pub name: String,
+    /// Approaches that were recorded.
+    pub approaches: usize,
+    /// Those of them that are evidence.
+    pub touches: usize,
+    /// How they were smoothed.
+    pub smoothing: Smoothing,
+    /// What is added to its margin with every touch, in nats.
+    pub constant: f64,
+    /// The share of its groups that are recognized.
+    pub recognized: f64,
+    /// The share of the others' groups that are taken for it, added up over the other objects.
+    pub taken_for_it: f64,
+    /// How that would be with fewer approaches, and with more.
+    pub curve: Curve,
+}
+
+/// Adds the objects of `recorded` to `ensemble`, without changing its trees' splits or the values of the objects that it
+/// knows. `known` holds touches of these objects, such as those that the ensemble was trained on. The same touches and settings give the same ensemble on any number of threads.
+///
+/// # Errors
+/// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
+/// is known already, if touches are missing or too few, have no pose, or are not every approach;
+/// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if probes do;
+/// [`Problem::Setting`](crate::error::Problem::Setting); [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn teach(
+    ensemble: &Ensemble,
+    known: &Dataset,
+    recorded: &Dataset,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Ensemble, Taught)> {
+    let descriptor = check::check(ensemble, known, recorded, settings)?;
+    let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
+    on_threads(settings.threads, || {
+        let known = known_touches(ensemble, known, &noise, settings.seed);
+        let touches: Vec<(&str, &[Touch])> =
+            recorded.objects.iter().map(|object| (object.name.as_str(), &object.touches[..])).collect();
+        let material = Material::new(ensemble, descriptor, &known, &touches, settings.seed);
+        let evidence: Vec<usize> = (0..touches.len()).map(|index| material.evidence(index)).collect();
+        check::enough(recorded, &evidence)?;
+        let smoothings = smoothings(&material, touches.len(), progress)?;
+        let all: Vec<usize> = (0..touches.len()).collect();
+        progress.begin("cross-validating", Some((BALANCED.parts + curve::parts()) as u64));
+        let held = material.held_out(&all, &smoothings, 1, BALANCED, progress)?;
+        let fewest = touches.iter().map(|(_, touches)| touches.len()).min().unwrap_or(0);
+        let approaches = settings.approaches.min(fewest / 2).max(1);
+        let background = ensemble.origin.background.then(|| ensemble.known_count());
+        let groups = |held: &[balance::Held]| {
+            let taught = (material.known_count()..held.len()).collect();
+            Groups::draw(held, taught, background, [settings.groups, approaches], settings.seed)
+        };
+        let drawn = groups(&held);
+        let constants = drawn.balanced();
+        let mut curves = curve::curves(&material, &smoothings, &groups, progress)?;
+        let objects = recorded.objects.iter().zip(&evidence).enumerate().map(|(index, (object, &touches))| {
+            let named = drawn.named(index, &constants);
+            let share = BALANCED.share();
+            let mut curve = std::mem::take(&mut curves[index]);
+            curve.finish(object.touches.len(), share, named);
+            TaughtObject {
+                name: object.name.clone(),
+                approaches: object.touches.len(),
+                touches,
+                smoothing: smoothings[index],
+                constant: constants[index],
+                recognized: named.right,
+                taken_for_it: named.wrong,
+                curve,
+            }
+        });
+        let taught = Taught {
+            approaches,
+            objects: objects.collect(),
+            others: Some(drawn.others(&constants)),
+            promise: Needed::new(
+                material.known_count() + evidence.len() - usize::from(background.is_some()),
+                approaches,
+            ),
+        };
+        let columns = material.fitted(&smoothings);
+        let mut extended = extended(ensemble, recorded, &columns, &constants);
+        if let Some(bits) = settings.leaf_bits {
+            round_leaves(&mut extended, bits);
+        }
+        Ok((extended, taught))
+    })
+}
+
+/// Runs on so many threads.
+fn on_threads<T: Send>(threads: Option<usize>, run: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    let Some(threads) = threads else { return run() };
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(run),
+        // No threads to be had: the result is the same on any number.
+        Err(_) => run(),
+    }
+}
+
+/// The touches of each object that the ensemble knows, in its order, with this noise.
+fn known_touches(ensemble: &Ensemble, known: &Dataset, noise: &Noise, seed: u64) -> Vec<Vec<Touch>> {
+    let most = (KNOWN[1] / ensemble.objects.len().max(1)).clamp(LEAST_KNOWN, KNOWN[0]);
+    let of = |name: &String| {
+        let object = known.objects.iter().find(|object| object.name == *name);
+        let touches = object.map_or(&[][..], |object| &object.touches);
+        // Evenly from all of them: instances and a background's shapes stand one after the other.
+        let step = touches.len().div_ceil(most).max(1);
+        let some: Vec<Touch> = touches.iter().step_by(step).copied().collect();
+        if noise.is_none() { some } else { noise.add(name, &some, seed) }
+    };
+    ensemble.objects.iter().map(of).collect()
+}
+
+/// For each recorded object the smoothing with the least loss on held-out touches, beside the objects that the trees know.
+fn smoothings(material: &Material, objects: usize, progress: &dyn Progress) -> Result<Vec<Smoothing>> {
+    let candidates: Vec<Smoothing> =
+        JITTERS.iter().flat_map(|&jitter| PRIORS.map(|prior| Smoothing { jitter, prior })).collect();
+    let (division, thin) = COMPARED;
+    progress.begin("choosing how much to smooth", Some((objects * candidates.len() * division.parts) as u64));
+    let best = |object: usize| {
+        let loss = |&smoothing: &Smoothing| -> Result<(f64, Smoothing)> {
+            let held = material.held_out(&[object], &[smoothing], thin, division, progress)?;
+            Ok((held_out::loss(&held), smoothing))
+        };
+        let losses: Vec<(f64, Smoothing)> = candidates.par_iter().map(loss).collect::<Result<_>>()?;
+        // There are candidates; the first of equal ones.
+        let least = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        Ok(least.map_or(Smoothing { jitter: 1.0, prior: 1.0 }, |(_, smoothing)| smoothing))
+    };
+    (0..objects).map(best).collect()
+}
+
+/// The ensemble with a column more for each recorded object, before the background if there is one.
+fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], constants: &[f64]) -> Ensemble {
+    let mut extended = ensemble.clone();
+    let at = ensemble.known_count();
+    for (index, (object, constant)) in recorded.objects.iter().zip(constants).enumerate() {
+        extended.objects.insert(at + index, object.name.clone());
+        extended.base_margins.insert(at + index, BASE_MARGIN + *constant as f32);
+    }
+    let mut leaf = 0;
+    for node in extended.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+        if let Node::Leaf(values) = node {
+            values.splice(at..at, columns.iter().map(|column| column[leaf] as f32));
+            leaf += 1;
+        }
+    }
+    let own = Origin::new(recorded, None, None);
+    extended.origin.touches.extend(own.touches);
+    let objects = (at, recorded.objects.len());
+    if let Some(trained) = &mut extended.origin.trained {
+        trained.touches = with(trained.touches, &recorded.objects);
+        trained.shares = trained.shares.map(|shares| mean(shares, recorded.shares(), objects));
+    }
+    extended
+}
+
+/// What is evidence to a model that was also taught these objects.
+fn with(mut trained: TrainedTouches, recorded: &[ObjectTouches]) -> TrainedTouches {
+    let patterns = trained.counted.patterns();
+    for touch in recorded.iter().flat_map(|object| &object.touches) {
+        if patterns.contains(touch.pattern()) && (touch.pose().is_some() || !trained.needs_pose) {
+            trained.patterns = trained.patterns.with(touch.pattern());
+            trained.largest_spread = trained.largest_spread.max(touch.spread());
+        }
+    }
+    trained
+}
+
+/// The mean of two means, of so many objects each.
+fn mean(known: [f64; 6], recorded: [f64; 6], (first, second): (usize, usize)) -> [f64; 6] {
+    let all = (first + second).max(1) as f64;
+    std::array::from_fn(|index| (known[index] * first as f64 + recorded[index] * second as f64) / all)
+}

@@ -1,0 +1,338 @@
+use super::balance::{Held, Named};
+use super::column::{Part, fit};
+use super::curve::expected;
+use super::held_out::{places, repeated};
+use super::rows::{Leaves, Rows};
+use super::*;
+use crate::compile;
+use crate::ensemble::train::{self, train, train_with_background};
+use crate::error::{Problem, TeachProblem};
+use crate::evaluate::{Candidate, Margins};
+use crate::touches::noise::Noise;
+use crate::touches::synthetic;
+use palpate_shared::{Descriptor, Pose, Q15_ONE};
+
+/// Few trees on known objects, and few groups.
+fn quick() -> train::Settings {
+    train::Settings { rounds: 8, depth: 4, min_child_weight: 5.0, ..train::Settings::compact() }
+}
+
+fn few_groups() -> Settings {
+    Settings { approaches: 30, groups: 100, ..Settings::default() }
+}
+
+/// Two objects to train on and one that is recorded, with so many touches; all three with other touches, to test on.
+fn setting(recorded: usize) -> [Dataset; 3] {
+    let mut known = synthetic::dataset(&[3_000, 3_000, recorded], 1);
+    let taught = known.objects.split_off(2);
+    [known, Dataset::new(taught), synthetic::dataset(&[3_000, 3_000, 3_000], 2)]
+}
+
+#[test]
+fn a_taught_object_is_recognized_and_the_others_still_are() {
+    let [known, recorded, unseen] = setting(300);
+    let ensemble = train(&known, &quick(), &()).unwrap();
+    let (extended, taught) = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
+    let figures = Margins::new(Candidate::Full(&extended), &unseen).unwrap();
+    let curve = figures.curve(30, 400, 1).unwrap();
+    for (object, least) in [(0, 0.9), (1, 0.8), (2, 0.9)] {
+        let accuracy = curve.object_accuracy(object, 30).value;
+        assert!(accuracy > least, "object {object}: {accuracy}");
+    }
+    let [object] = &taught.objects[..] else { panic!("{taught:?}") };
+    assert_eq!((object.name.as_str(), object.approaches, object.touches), ("object2", 300, 300));
+    // What was said beforehand came true.
+    assert!((object.recognized - curve.object_accuracy(2, 30).value).abs() < 0.08, "{taught:?}");
+    let points = &object.curve.points;
+    assert_eq!(points.iter().map(|point| point.approaches).collect::<Vec<_>>(), [38, 75, 150, 270]);
+    assert!(points[0].error >= points[3].error, "{points:?}");
+}
+
+#[test]
+fn the_values_of_known_objects_and_the_splits_do_not_change() {
+    let [known, recorded, unseen] = setting(60);
+    let ensemble = train(&known, &train::Settings { leaf_bits: None, ..quick() }, &()).unwrap();
+    let settings = Settings { leaf_bits: None, ..few_groups() };
+    let (extended, _) = teach(&ensemble, &known, &recorded, &settings, &()).unwrap();
+    assert_eq!(extended.objects, ["object0", "object1", "object2"]);
+    for touch in unseen.objects.iter().flat_map(|object| &object.touches) {
+        assert_eq!(extended.margins(touch)[..2], ensemble.margins(touch));
+    }
+}
+
+#[test]
+fn threads_change_no_bit_and_seeds_do() {
+    let [known, recorded, _] = setting(60);
+    let ensemble = train(&known, &quick(), &()).unwrap();
+    let with =
+        |threads, seed| teach(&ensemble, &known, &recorded, &Settings { threads, seed, ..few_groups() }, &()).unwrap();
+    let one = with(Some(1), 1);
+    assert_eq!(one, with(Some(3), 1));
+    assert_eq!(one, with(None, 1));
+    assert_ne!(one.0, with(None, 2).0);
+}
+
+#[test]
+fn a_taught_ensemble_is_saved_loaded_and_compiled_without_error() {
+    let [known, recorded, unseen] = setting(60);
+    let ensemble = train(&known, &quick(), &()).unwrap();
+    let (extended, _) = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    extended.save(file.path()).unwrap();
+    assert_eq!(Ensemble::load(file.path()).unwrap(), extended);
+    assert_eq!(extended.origin.trained_on(&recorded), ["object2"]);
+    let compiled = compile::compile(&extended, &compile::Settings::default()).unwrap();
+    assert_eq!(compiled.margin_error, 0.0);
+    let model = compile::open(&compiled.bytes).unwrap();
+    for touch in unseen.objects.iter().flat_map(|object| object.touches.iter().take(200)) {
+        let mut margins = [0; 3];
+        model.margins(touch, &mut margins);
+        assert_eq!(extended.margins(touch), margins.map(|units| units as f32 * model.unit()));
+    }
+}
+
+#[test]
+fn a_background_stays_the_last_and_is_no_name() {
+    let [known, recorded, _] = setting(60);
+    let shapes = synthetic::dataset(&[500; 6], 3);
+    let ensemble = train_with_background(&known, &shapes, &quick(), &()).unwrap();
+    let mut all = known.clone();
+    let touches = shapes.objects.into_iter().flat_map(|object| object.touches).collect();
+    all.objects.push(ObjectTouches { name: crate::mesh::BACKGROUND.into(), touches });
+    let (extended, taught) = teach(&ensemble, &all, &recorded, &few_groups(), &()).unwrap();
+    assert_eq!(extended.objects, ["object0", "object1", "object2", crate::mesh::BACKGROUND]);
+    assert_eq!((extended.known_count(), taught.promise.of_each), (3, 100));
+    // Without the background's touches there is nothing to compare with.
+    let error = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap_err();
+    let missing = TeachProblem::Missing { objects: vec![crate::mesh::BACKGROUND.into()] };
+    assert_eq!(error.problem(), Some(&missing.into()));
+}
+
+#[test]
+fn no_touch_nor_its_copy_is_fitted_on_while_it_is_held_out() {
+    let [known, recorded, unseen] = setting(200);
+    let ensemble = train(&known, &quick(), &()).unwrap();
+    let descriptor = ensemble.descriptor().unwrap();
+    let known: Vec<Vec<Touch>> = known.objects.into_iter().map(|object| object.touches).collect();
+    let smoothing = Smoothing { jitter: 1.0, prior: 4.0 };
+    let division = Division { parts: 5, used: 4 };
+    let place = places("object2", 200, 1);
+    let original = &recorded.objects[0].touches;
+    let held = |touches: &[Touch]| {
+        let material = Material::new(&ensemble, descriptor, &known, &[("object2", touches)], 1);
+        material.held_out(&[0], &[smoothing], 1, division, &()).unwrap().remove(2)
+    };
+    let before = held(original);
+    for part in 0..5 {
+        // Every touch of the part becomes another object's.
+        let is_held = |touch: usize| division.part(place[touch]) == part;
+        let mut changed = original.clone();
+        let foreign = unseen.objects[0].touches.iter();
+        changed
+            .iter_mut()
+            .enumerate()
+            .filter(|(touch, _)| is_held(*touch))
+            .zip(foreign)
+            .for_each(|((_, to), from)| *to = *from);
+        let after = held(&changed);
+        let count = (0..200).filter(|&touch| is_held(touch)).count();
+        assert_eq!(count, 40);
+        // What others say about touches of their parts changes; what the part's own columns say does not.
+        let margins = |held: &Held, touch: usize| held[touch].as_ref().map(|margins| margins[2]);
+        let others = (0..200).filter(|&touch| !is_held(touch));
+        assert!(others.clone().any(|touch| margins(&before, touch) != margins(&after, touch)));
+        let restored: Vec<Touch> =
+            (0..200).map(|touch| if is_held(touch) { original[touch] } else { changed[touch] }).collect();
+        assert_eq!(restored, *original);
+        let columns = |touches: &[Touch]| {
+            let material = Material::new(&ensemble, descriptor, &known, &[("object2", touches)], 1);
+            material.columns(&[0], &[smoothing], 1, |place| division.uses(division.part(place), part))
+        };
+        assert_eq!(columns(&changed), columns(original));
+    }
+}
+
+#[test]
+fn copies_stand_for_the_touch_that_they_are_of() {
+    let touches = synthetic::dataset(&[50], 1).objects.remove(0).touches;
+    let copies = repeated("cup", &touches, 1e-9, 1);
+    assert_eq!(copies.len(), 50 * 64);
+    for (index, copy) in copies.iter().enumerate() {
+        assert_eq!(*copy, touches[index % 50]);
+    }
+    assert_ne!(repeated("cup", &touches, 1.0, 1)[..50], touches[..]);
+    assert_eq!(repeated("cup", &[], 1.0, 1), []);
+}
+
+#[test]
+fn a_prior_counts_touches_and_not_their_copies() {
+    let [known, recorded, _] = setting(40);
+    let ensemble = train(&known, &quick(), &()).unwrap();
+    let leaves = Leaves::of(&ensemble);
+    let rows = |touches: &[Touch], given| Rows::new(&ensemble, &leaves, Descriptor::ContactsCurvature, touches, given);
+    let known: Vec<Rows> = known.objects.iter().map(|object| rows(&object.touches, 3_000)).collect();
+    let once = &recorded.objects[0].touches;
+    let columns = |touches: &[Touch]| {
+        let own = rows(touches, once.len());
+        let part = |rows, column| {
+            let rows: &Rows = rows;
+            Part { rows, chosen: (0..rows.count() as u32).collect(), column }
+        };
+        let parts = [part(&known[0], None), part(&known[1], None), part(&own, Some(0))];
+        fit(&leaves, &parts, &[4.0]).remove(0)
+    };
+    let (single, thrice) = (columns(once), columns(&once.repeat(3)));
+    assert!(single.iter().zip(&thrice).all(|(a, b)| (a - b).abs() < 1e-9));
+    assert!(single.iter().any(|value| value.abs() > 0.1));
+}
+
+/// Margins of two objects over approaches: their difference, in steps from `least`.
+fn ramp(least: f64, step: f64, of_first: bool) -> Held {
+    let margins = |advantage: f64| if of_first { vec![advantage, 0.0] } else { vec![0.0, advantage] };
+    (0..100).map(|index| Some(margins(least + step * f64::from(index)))).collect()
+}
+
+#[test]
+fn the_constant_lets_an_object_be_missed_as_often_as_others_are_taken_for_it() {
+    // Groups of one approach. Without a constant 40 of 100 are missed, and 10 are taken for it.
+    let held = [ramp(-0.0995, 0.01, true), ramp(-0.3995, 0.01, false)];
+    let groups = Groups::draw(&held, vec![1], None, [20_000, 1], 1);
+    let near = |named: Named, right: f64, wrong: f64| {
+        assert!((named.right - right).abs() < 0.02 && (named.wrong - wrong).abs() < 0.02, "{named:?}");
+    };
+    near(groups.named(0, &[0.0]), 0.6, 0.1);
+    let constants = groups.balanced();
+    assert!((constants[0] - 0.15).abs() < 0.01, "{constants:?}");
+    near(groups.named(0, &constants), 0.75, 0.25);
+    assert!((groups.others(&constants) - 0.75).abs() < 0.02);
+    // The other way round it is negative.
+    let groups = Groups::draw(&held, vec![0], None, [20_000, 1], 1);
+    assert!((groups.balanced()[0] + 0.15).abs() < 0.01);
+}
+
+#[test]
+fn where_nothing_is_wrong_no_constant_is_added_and_where_a_range_balances_the_nearest_to_0_is() {
+    let clear = [ramp(5.0, 0.1, true), ramp(5.0, 0.1, false)];
+    assert_eq!(Groups::draw(&clear, vec![1], None, [100, 1], 1).balanced(), [0.0]);
+    // All are missed by at most 1 nat; the other object could spare 5.
+    let shy = [ramp(5.0, 0.1, true), ramp(-1.0, 0.01, false)];
+    let constant = Groups::draw(&shy, vec![1], None, [2_000, 1], 1).balanced()[0];
+    assert!((0.98..1.01).contains(&constant), "{constant}");
+}
+
+#[test]
+fn groups_without_evidence_recognize_nothing() {
+    let held = [vec![None; 10], ramp(1.0, 1.0, false)];
+    let groups = Groups::draw(&held, vec![1], None, [10, 5], 1);
+    assert_eq!(groups.named(0, &[0.0]), Named { right: 1.0, wrong: 0.0 });
+    assert_eq!(groups.others(&[0.0]), 0.0);
+}
+
+#[test]
+fn errors_that_fall_with_a_power_are_carried_on() {
+    let point = |approaches: usize, error| Point { approaches, recognized: 1.0 - error, error };
+    let root: Vec<Point> = [100, 200, 400].map(|count| point(count, 2.0 / f64::from(count as u32).sqrt())).into();
+    assert!((expected(&root, 1_600) - 0.05).abs() < 1e-9);
+    // More touches never make it worse.
+    assert!((expected(&[point(100, 0.1), point(400, 0.4)], 1_600) - 0.2).abs() < 1e-9);
+    assert!((expected(&[point(100, 0.3)], 1_600) - 0.3).abs() < 1e-9);
+    assert!(expected(&[point(100, 0.0), point(200, 0.0)], 400) <= 1.001e-3);
+}
+
+fn problem(ensemble: &Ensemble, known: &Dataset, recorded: &Dataset) -> Problem {
+    teach(ensemble, known, recorded, &few_groups(), &()).unwrap_err().problem().cloned().unwrap()
+}
+
+#[test]
+fn what_cannot_be_taught_says_why() {
+    let [known, recorded, _] = setting(60);
+    let ensemble = train(&known, &quick(), &()).unwrap();
+    let one_value = train(&known, &train::Settings { multi_output: false, ..quick() }, &()).unwrap();
+    assert_eq!(problem(&one_value, &known, &recorded), TeachProblem::OneValue.into());
+    let mut renamed = recorded.clone();
+    renamed.objects[0].name = "object1".into();
+    assert_eq!(problem(&ensemble, &known, &renamed), TeachProblem::Known { object: "object1".into() }.into());
+    let first = known.with(vec![known.objects[0].clone()]);
+    let missing = TeachProblem::Missing { objects: vec!["object1".into()] };
+    assert_eq!(problem(&ensemble, &first, &recorded), missing.into());
+    assert_eq!(problem(&ensemble, &known, &Dataset::default()), TeachProblem::Nothing.into());
+    let mut few = recorded.clone();
+    few.objects[0].touches.truncate(19);
+    let too_few = TeachProblem::TooFew { object: "object2".into(), touches: 19, least: 20 };
+    assert_eq!(problem(&ensemble, &known, &few), too_few.into());
+    let mut full = recorded.clone();
+    full.objects[0].touches.retain(Touch::is_full);
+    let counted = palpate_shared::format::Counted::Contacts;
+    assert_eq!(problem(&ensemble, &known, &full), TeachProblem::FullTouches { counted }.into());
+    let groups = Settings { groups: 0, ..few_groups() };
+    let error = teach(&ensemble, &known, &recorded, &groups, &()).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn another_probe_and_a_missing_pose_are_refused() {
+    let [mut known, mut recorded, _] = setting(60);
+    let with_pose = |dataset: &mut Dataset| {
+        let pose = Pose { direction: [0, 0, Q15_ONE], alignment: [Q15_ONE, 0, 0] };
+        dataset
+            .objects
+            .iter_mut()
+            .flat_map(|object| &mut object.touches)
+            .for_each(|touch| *touch = touch.with_pose(pose));
+    };
+    let origin = |spacing| {
+        let probe = crate::probe::approach::Probe { spacing, ..Default::default() };
+        Some(crate::touches::Origin { probe, approaches: true, ..Default::default() })
+    };
+    with_pose(&mut known);
+    known.origin = origin(1.5);
+    let settings = train::Settings { descriptor: Descriptor::Oriented, ..quick() };
+    let probe = crate::ensemble::StatedProbe::of(&known);
+    let ensemble = train(&known, &train::Settings { probe, ..settings }, &()).unwrap();
+    let no_pose = TeachProblem::NoPose { object: "object2".into(), descriptor: Descriptor::ContactsOriented };
+    assert_eq!(problem(&ensemble, &known, &recorded), no_pose.into());
+    with_pose(&mut recorded);
+    teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
+    recorded.origin = origin(2.0);
+    let different = problem(&ensemble, &known, &recorded);
+    assert!(different.to_string().contains("spacing 1.5 and 2"), "{different}");
+}
+
+#[test]
+fn recorded_touches_alone_make_an_ensemble_that_states_them() {
+    let recorded = synthetic::dataset(&[150, 150], 1);
+    let unseen = synthetic::dataset(&[2_000, 2_000], 2);
+    let (ensemble, taught) = alone(&recorded, &quick(), &few_groups(), &()).unwrap();
+    let margins = Margins::new(Candidate::Full(&ensemble), &unseen).unwrap();
+    let accuracy = margins.curve(20, 300, 1).unwrap().accuracy(20).value;
+    assert!(accuracy > 0.85, "{accuracy}");
+    assert_eq!(ensemble.origin.trained_on(&recorded).len(), 2);
+    assert!(ensemble.origin.noise.is_none() && taught.others.is_none());
+    let ends: Vec<usize> = taught.objects[0].curve.points.iter().map(|point| point.approaches).collect();
+    assert_eq!(ends, [38, 75, 120]);
+    let again = alone(&recorded, &quick(), &Settings { threads: Some(1), ..few_groups() }, &()).unwrap();
+    assert_eq!(again, (ensemble, taught));
+    let few = synthetic::dataset(&[150, 10], 1);
+    let error = alone(&few, &quick(), &few_groups(), &()).unwrap_err();
+    assert!(error.to_string().contains("only 10 recorded touches of object1"), "{error}");
+}
+
+#[test]
+fn known_touches_get_the_noise_that_the_ensemble_was_trained_for_once() {
+    let [known, _, _] = setting(60);
+    let ensemble = train(&known, &train::Settings { noise: Noise::gaussian(5_000.0), ..quick() }, &()).unwrap();
+    let noise = |ensemble: &Ensemble, known: &Dataset| super::check::missing_noise(ensemble, known);
+    let added = noise(&ensemble, &known).unwrap();
+    let touches = known_touches(&ensemble, &known, &added, 1);
+    assert_eq!(touches[0], Noise::gaussian(5_000.0).add("object0", &known.objects[0].touches, 1));
+    let clean = train(&known, &quick(), &()).unwrap();
+    assert!(noise(&clean, &known).unwrap().is_none());
+    assert_eq!(known_touches(&clean, &known, &Noise::default(), 1)[1], known.objects[1].touches);
+    // Touches that have it already get it once only, and other noise is named.
+    let real = |deviation| crate::touches::Origin { real: Noise::gaussian(deviation), ..Default::default() };
+    let there = Dataset { origin: Some(real(5_000.0)), ..known.clone() };
+    assert!(noise(&ensemble, &there).unwrap().is_none());
+    let other = Dataset { origin: Some(real(3_000.0)), ..known };
+    let error = noise(&ensemble, &other).unwrap_err().to_string();
+    assert!(error.contains("noise of 5 ms") && error.contains("noise of 3 ms already"), "{error}");
+}

@@ -1,0 +1,301 @@
+//! What is wrong with a data set, line by line, and what it holds.
+//!
+//! [`Dataset::read`](super::Dataset::read) stops at the first error; a check reads on, and also looks for what reads well
+//! and would train badly: files appended to themselves, an object under two names, times in other units than seconds.
+
+mod summary;
+
+pub use summary::{ObjectSummary, Quantiles, Summary};
+
+use super::checksum::{Checked, checksum};
+use super::{Entry, Format, Listing, Origin, text};
+use crate::error::{Error, Place, Problem, Result, TouchesProblem};
+use palpate_shared::Touch;
+use palpate_shared::format::Length;
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// What a check found.
+#[derive(Clone, Debug, serde::Serialize)]
+#[non_exhaustive]
+pub struct Check {
+    /// What is wrong, or may be, in the order of the files and their lines.
+    pub findings: Vec<Finding>,
+    /// What the data set holds, as far as it can be read.
+    pub summary: Summary,
+}
+
+/// Something that is wrong, or may be.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct Finding {
+    /// Whether training would be wrong, or fail; otherwise it may be meant.
+    pub is_wrong: bool,
+    /// Where and what, as a line without a full stop: `data/fork.txt:3: the time -1 is negative`.
+    pub what: String,
+    /// What to do about it, as a sentence.
+    pub fix: String,
+}
+
+/// How many wrong lines of a file are shown; the others are counted.
+const MOST_LINES: usize = 20;
+/// So many touches must be there before something is said about their sum.
+const ENOUGH: usize = 20;
+
+impl Check {
+    /// How many findings make training wrong.
+    pub fn wrong(&self) -> usize {
+        self.findings.iter().filter(|finding| finding.is_wrong).count()
+    }
+
+    /// Checks the data set in a directory. Memory: that of its touches.
+    ///
+    /// # Errors
+    /// When the directory cannot be read. What is wrong in it is a [`Finding`].
+    pub fn of(directory: &Path) -> Result<Self> {
+        let mut findings = Findings(Vec::new());
+        let listing = match Listing::read(directory) {
+            Ok(listing) => listing,
+            Err(error @ Error::Io { .. }) => return Err(error),
+            Err(error) => {
+                findings.error(error);
+                None
+            }
+        };
+        let origin = listing.as_ref().map(|listing| listing.origin.clone());
+        let objects = match listing {
+            Some(listing) => listed(directory, listing, &mut findings)?,
+            None => found(directory, &mut findings)?,
+        };
+        match objects.as_slice() {
+            [] => findings.problem(directory, TouchesProblem::NoObjects),
+            [one] => findings.problem(directory, TouchesProblem::OneObject { name: one.name.clone() }),
+            _ => {}
+        }
+        objects.iter().for_each(|object| findings.object(object, origin.as_ref()));
+        findings.together(directory, &objects);
+        Ok(Self { findings: findings.0, summary: Summary::of(&objects, origin) })
+    }
+}
+
+/// What could be read of an object.
+struct Read {
+    name: String,
+    path: PathBuf,
+    touches: Vec<Touch>,
+    approaches: Option<u64>,
+}
+
+/// The objects that a listing names.
+fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result<Vec<Read>> {
+    if !listing.complete {
+        findings.problem(directory, TouchesProblem::Incomplete);
+    }
+    let format = listing.origin.format;
+    let mut objects = Vec::new();
+    for Entry { name, touches: stated, approaches, crc32, .. } in listing.objects {
+        let path = directory.join(format!("{name}.{}", format.extension()));
+        if !path.exists() {
+            findings.problem(&path, TouchesProblem::Missing { name });
+            continue;
+        }
+        let before = findings.0.len();
+        let (touches, found) = read(&path, format, findings)?;
+        if findings.0.len() == before && touches.len() as u64 != stated {
+            findings.problem(&path, TouchesProblem::OtherCount { stated, found: touches.len() as u64 });
+        } else if crc32.is_some_and(|stated| stated != found) {
+            match format {
+                Format::Parquet => findings.problem(&path, TouchesProblem::OtherChecksum),
+                Format::Text => {
+                    findings.note(&path, "changed since its capture", "Capture it again if that is not meant.")
+                }
+            }
+        }
+        objects.push(Read { name, path, touches, approaches: Some(approaches) });
+    }
+    for (name, path, _) in super::files(directory)? {
+        if !objects.iter().any(|object| object.path == path)
+            && !findings.0.iter().any(|finding| finding.is_about(&path))
+        {
+            let what = format!("the object {name} is not listed in {}, so it is not read", Listing::FILE);
+            findings.note(&path, &what, "Capture it with --add, or remove the file.");
+        }
+    }
+    Ok(objects)
+}
+
+/// Every object that has a file.
+fn found(directory: &Path, findings: &mut Findings) -> Result<Vec<Read>> {
+    let mut objects: Vec<Read> = Vec::new();
+    for (name, path, format) in super::files(directory)? {
+        if let Some(other) = objects.iter().find(|object| object.name == name) {
+            let (file, other) = (path, other.path.clone());
+            findings.problem(directory, TouchesProblem::TwoFiles { name, file, other });
+            continue;
+        }
+        let (touches, _) = read(&path, format, findings)?;
+        objects.push(Read { name, path, touches, approaches: None });
+    }
+    Ok(objects)
+}
+
+/// The touches of a file that can be read, and the file's checksum.
+fn read(path: &Path, format: Format, findings: &mut Findings) -> Result<(Vec<Touch>, u32)> {
+    if format == Format::Parquet {
+        let touches = match format.read(path) {
+            Err(error @ Error::Io { .. }) => return Err(error),
+            Err(error) => {
+                findings.error(error);
+                Vec::new()
+            }
+            Ok(touches) => touches,
+        };
+        return Ok((touches, checksum(path)?));
+    }
+    let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+    let mut reader = BufReader::with_capacity(1 << 16, Checked::new(file));
+    let (mut touches, mut wrong) = (Vec::new(), 0);
+    for touch in text::touches(&mut reader, path) {
+        match touch {
+            Ok(touch) => touches.push(touch),
+            Err(error @ Error::Io { .. }) => return Err(error),
+            Err(error) => {
+                wrong += 1;
+                if wrong <= MOST_LINES {
+                    findings.error(error);
+                }
+            }
+        }
+    }
+    if wrong > MOST_LINES {
+        findings.wrong(path, format!("{} more lines are wrong", wrong - MOST_LINES), "Correct them, or capture again.");
+    }
+    Ok((touches, reader.into_inner().checksum()))
+}
+
+struct Findings(Vec<Finding>);
+
+impl Finding {
+    fn is_about(&self, path: &Path) -> bool {
+        self.what.starts_with(&Place::file(path).to_string())
+    }
+}
+
+impl Findings {
+    fn wrong(&mut self, path: &Path, what: impl Into<String>, fix: &str) {
+        let what = format!("{}{}", Place::file(path), what.into());
+        self.0.push(Finding { is_wrong: true, what, fix: fix.into() });
+    }
+
+    fn note(&mut self, path: &Path, what: &str, fix: &str) {
+        let what = format!("{}{what}", Place::file(path));
+        self.0.push(Finding { is_wrong: false, what, fix: fix.into() });
+    }
+
+    fn problem(&mut self, path: &Path, problem: TouchesProblem) {
+        self.error(Error::at(Place::file(path), problem));
+    }
+
+    fn error(&mut self, error: Error) {
+        let (what, fix) = match &error {
+            Error::At { place, problem } => (format!("{place}{problem}"), Problem::fix(problem)),
+            other => (other.to_string(), String::new()),
+        };
+        self.0.push(Finding { is_wrong: true, what, fix });
+    }
+
+    /// What is wrong with all touches of an object together.
+    fn object(&mut self, object: &Read, origin: Option<&Origin>) {
+        let Read { path, touches, .. } = object;
+        let count = touches.len();
+        if count == 0 {
+            if !self
+                .0
+                .iter()
+                .any(|finding| finding.is_about(path) || finding.what.starts_with(&format!("{}:", path.display())))
+            {
+                self.problem(path, TouchesProblem::NoTouches);
+            }
+            return;
+        }
+        let of = |number: usize| format!("{number} of {count} touches");
+        let partial = touches.iter().filter(|touch| !touch.is_full()).count();
+        if partial > 0 && origin.is_some_and(|origin| !origin.approaches) {
+            let what = format!("{} miss a contact, but the data set is said to hold full touches only", of(partial));
+            self.wrong(path, what, "Remove those lines, or capture with --approaches.");
+        }
+        if touches.iter().all(|touch| touch.times().iter().all(|time| time.micros().is_none())) {
+            self.wrong(path, "no touch has a contact", "Check that the probe reaches the object.");
+        } else if count >= ENOUGH && touches.iter().all(|touch| touch == &touches[0]) {
+            self.wrong(path, "all touches are the same", "Check that the probe moves and its clock runs.");
+        } else if count >= ENOUGH && is_repeated(touches) {
+            let fix = "Remove the repetition: what was trained on would be tested on too.";
+            self.wrong(path, "every touch stands in it twice or more, as if it was appended to itself", fix);
+        } else if count < 100 {
+            self.note(path, &format!("only {count} touches"), "Capture some thousand of each object.");
+        }
+        let Some(longest) = origin.and_then(longest) else { return };
+        let long = touches.iter().filter(|touch| last(touch) > longest).count();
+        let what = format!("{} last longer than the {longest:.2} s in which the probe passes the object", of(long));
+        if 2 * long > count {
+            self.wrong(path, what + ": the times are no seconds", "Give times in seconds.");
+        } else if long > 0 {
+            self.note(path, &what, "Check those lines.");
+        }
+    }
+
+    /// What is wrong with objects beside each other.
+    fn together(&mut self, directory: &Path, objects: &[Read]) {
+        let with_pose = |object: &Read| object.touches.iter().filter(|touch| touch.pose().is_some()).count();
+        let (posed, all) =
+            objects.iter().fold((0, 0), |(posed, all), object| (posed + with_pose(object), all + object.touches.len()));
+        if posed > 0 && posed < all {
+            let what = format!("{posed} of {all} touches have a pose and the others have none");
+            self.wrong(directory, what, "Give all of them one, or none.");
+        }
+        for (index, object) in objects.iter().enumerate() {
+            let is_same = |other: &&Read| other.touches.len() >= ENOUGH && other.touches == object.touches;
+            if let Some(other) = objects[..index].iter().find(is_same) {
+                let what = format!("{} and {} hold the same touches", other.name, object.name);
+                self.wrong(&object.path, what, "Remove one of the objects, or capture it again.");
+            }
+        }
+        let counts = objects.iter().map(|object| object.touches.len()).filter(|&count| count > 0);
+        if let (Some(least), Some(most)) = (counts.clone().min(), counts.max())
+            && most > 10 * least
+        {
+            let what = format!("one object has {least} touches and another {most}");
+            self.note(directory, &what, "Capture as many of each: training weights touches, not objects.");
+        }
+    }
+}
+
+/// Whether each touch is there at least twice. Coarse clocks repeat touches too, but not every one.
+fn is_repeated(touches: &[Touch]) -> bool {
+    let mut counts: HashMap<Key, usize> = HashMap::new();
+    touches.iter().for_each(|touch| *counts.entry(key(touch)).or_default() += 1);
+    counts.values().all(|&count| count >= 2)
+}
+
+type Key = ([Option<u32>; 3], Option<([i16; 3], [i16; 3])>);
+
+/// A touch, to be compared with others.
+fn key(touch: &Touch) -> Key {
+    (touch.times().map(|time| time.micros()), touch.pose().map(|pose| (pose.direction, pose.alignment)))
+}
+
+/// The time between the first and the last contact, in seconds.
+fn last(touch: &Touch) -> f64 {
+    f64::from(touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or_default()) / 1e6
+}
+
+/// The longest time between two contacts: the whole way of an approach. Unknown where objects have different sizes.
+fn longest(origin: &Origin) -> Option<f64> {
+    let way = 3_f64.sqrt() * origin.length + 2.0 * origin.clearance([glam::DVec3::ZERO; 2]);
+    (origin.unit == Length::Tenth).then(|| way / origin.probe.speed)
+}
+
+#[cfg(test)]
+mod tests;

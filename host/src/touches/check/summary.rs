@@ -1,0 +1,94 @@
+//! What a data set holds: counts, patterns, ranges, quantiles of features.
+
+use super::{Key, Read, key};
+use crate::touches::Origin;
+use palpate_shared::{Descriptor, Touch};
+use std::collections::HashSet;
+
+/// What a data set holds, as far as it can be read.
+#[derive(Clone, Debug, serde::Serialize)]
+#[non_exhaustive]
+pub struct Summary {
+    /// The objects, in the order of their names.
+    pub objects: Vec<ObjectSummary>,
+    /// How the touches were made, where the data set says so: the probe among other things.
+    pub origin: Option<Origin>,
+}
+
+/// What there is of one object.
+#[derive(Clone, Debug, serde::Serialize)]
+#[non_exhaustive]
+pub struct ObjectSummary {
+    /// The object's name.
+    pub name: String,
+    /// How many touches it has.
+    pub touches: u64,
+    /// How many approaches they took, where the data set says so.
+    pub approaches: Option<u64>,
+    /// How many touches there are of each contact pattern, in the order of the patterns' codes: none, outer, middle, outer
+    /// and middle, both outer, all.
+    pub patterns: [u64; 6],
+    /// How many touches equal an earlier one of the same object, to the microsecond.
+    pub duplicates: u64,
+    /// How many have the probe's pose.
+    pub posed: u64,
+    /// The longest time between two contacts, in seconds.
+    pub longest: f64,
+    /// Curvature of the full touches, in milliseconds; none without full touches.
+    pub curvature: Option<Quantiles>,
+    /// Slope of the full touches, in milliseconds.
+    pub slope: Option<Quantiles>,
+}
+
+/// The least, the quantiles of 5, 25, 50, 75 and 95 %, and the largest.
+pub type Quantiles = [f64; 7];
+
+impl Summary {
+    pub(super) fn of(objects: &[Read], origin: Option<Origin>) -> Self {
+        Self { objects: objects.iter().map(ObjectSummary::of).collect(), origin }
+    }
+
+    /// How many touches there are in all.
+    pub fn touches(&self) -> u64 {
+        self.objects.iter().map(|object| object.touches).sum()
+    }
+}
+
+impl ObjectSummary {
+    fn of(Read { name, touches, approaches, .. }: &Read) -> Self {
+        let mut patterns = [0; 6];
+        for touch in touches {
+            if let Some(count) = patterns.get_mut(usize::from(touch.pattern().code())) {
+                *count += 1;
+            }
+        }
+        let mut known: HashSet<Key> = HashSet::with_capacity(touches.len());
+        let duplicates = touches.iter().filter(|touch| !known.insert(key(touch))).count() as u64;
+        let feature = |index: usize| {
+            let full = touches.iter().filter(|touch| touch.is_full());
+            let value = |touch: &Touch| Descriptor::Curvature.features(touch).as_slice().get(index).copied();
+            quantiles(full.filter_map(value).collect())
+        };
+        Self {
+            name: name.clone(),
+            touches: touches.len() as u64,
+            approaches: *approaches,
+            patterns,
+            duplicates,
+            posed: touches.iter().filter(|touch| touch.pose().is_some()).count() as u64,
+            longest: touches.iter().map(super::last).fold(0.0, f64::max),
+            curvature: feature(0),
+            slope: feature(1),
+        }
+    }
+}
+
+/// The quantiles of microseconds, in milliseconds; none of nothing.
+fn quantiles(mut values: Vec<i32>) -> Option<Quantiles> {
+    values.sort_unstable();
+    let last = values.len().checked_sub(1)?;
+    Some([0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0].map(|share| {
+        let index = (share * last as f64).round() as usize;
+        f64::from(values.get(index).copied().unwrap_or_default()) / 1e3
+    }))
+}

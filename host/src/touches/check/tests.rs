@@ -1,0 +1,145 @@
+use super::*;
+use crate::touches::{Dataset, write_touch};
+
+/// Thirty touches that differ, of an object with this number.
+fn touches(object: u32) -> Vec<Touch> {
+    (0..30).map(|i| Touch::from_micros([0, 1_000 * i + object, 77 * i])).collect()
+}
+
+fn lines(touches: &[Touch]) -> String {
+    let mut text = String::new();
+    touches.iter().for_each(|touch| write_touch(&mut text, touch, true));
+    text
+}
+
+/// A directory with a fork and a spoon, complete with its listing.
+fn captured() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    let mut listing = Listing::new(&Origin { touches: 30, ..Origin::default() }, ["fork".into(), "spoon".into()]);
+    listing.complete = true;
+    for (index, entry) in listing.objects.iter_mut().enumerate() {
+        let path = directory.path().join(format!("{}.txt", entry.name));
+        std::fs::write(&path, lines(&touches(index as u32))).unwrap();
+        (entry.touches, entry.approaches, entry.crc32) = (30, 90, Some(checksum(&path).unwrap()));
+    }
+    listing.write(directory.path()).unwrap();
+    directory
+}
+
+fn change(directory: &Path, listing: impl FnOnce(&mut Listing)) {
+    let mut read = Listing::read(directory).unwrap().unwrap();
+    listing(&mut read);
+    read.write(directory).unwrap();
+}
+
+/// What is wrong, and what is only noted.
+fn said(directory: &Path) -> (Vec<String>, Vec<String>) {
+    let (wrong, notes): (Vec<_>, Vec<_>) =
+        Check::of(directory).unwrap().findings.into_iter().partition(|finding| finding.is_wrong);
+    (wrong.into_iter().map(|one| one.what).collect(), notes.into_iter().map(|one| one.what).collect())
+}
+
+#[track_caller]
+fn wrong(directory: &Path, expected: &str) {
+    let (wrong, _) = said(directory);
+    assert!(wrong.iter().any(|what| what.contains(expected)), "{wrong:?}");
+}
+
+#[test]
+fn a_good_data_set_is_summed_up_and_nothing_is_wrong() {
+    let directory = captured();
+    let check = Check::of(directory.path()).unwrap();
+    assert_eq!((check.wrong(), check.summary.touches()), (0, 60));
+    let fork = &check.summary.objects[0];
+    assert_eq!((fork.name.as_str(), fork.touches, fork.approaches), ("fork", 30, Some(90)));
+    assert_eq!((fork.patterns, fork.duplicates, fork.posed), ([0, 0, 0, 0, 0, 30], 0, 0));
+    assert_eq!(fork.longest, 0.029);
+    // Slope: 77 i microseconds, for i from 0 to 29.
+    assert_eq!(fork.slope.unwrap()[..2], [0.0, 0.077]);
+    assert_eq!(fork.slope.unwrap()[6], 2.233);
+    // The same touches as training reads.
+    assert_eq!(Dataset::read(directory.path()).unwrap().len(), 60);
+}
+
+#[test]
+fn every_wrong_line_is_named_and_more_than_twenty_are_counted() {
+    let directory = captured();
+    std::fs::remove_file(Listing::path(directory.path())).unwrap();
+    let path = directory.path().join("fork.txt");
+    std::fs::write(&path, lines(&touches(0)) + "0 0\n0 0 -1\n0 x 0\n\n0 0 0\n").unwrap();
+    let (wrong, _) = said(directory.path());
+    assert_eq!(wrong.len(), 3, "{wrong:?}");
+    for (line, (what, expected)) in (31..).zip(wrong.iter().zip(["2 fields", "negative", "\"x\" is not a number"])) {
+        assert!(what.contains(&format!("fork.txt:{line}: ")) && what.contains(expected), "{what}");
+    }
+    std::fs::write(&path, lines(&touches(0)) + &"0\n".repeat(50)).unwrap();
+    let (wrong, _) = said(directory.path());
+    assert_eq!(wrong.len(), 21);
+    assert!(wrong[20].ends_with("30 more lines are wrong"), "{}", wrong[20]);
+}
+
+#[test]
+fn what_a_listing_states_must_be_there() {
+    let directory = captured();
+    change(directory.path(), |listing| listing.complete = false);
+    wrong(directory.path(), "not complete");
+    let directory = captured();
+    change(directory.path(), |listing| listing.objects[0].touches = 31);
+    wrong(directory.path(), "fork.txt: 30 touches where dataset.json states 31");
+    let directory = captured();
+    std::fs::remove_file(directory.path().join("spoon.txt")).unwrap();
+    wrong(directory.path(), "spoon.txt: missing");
+    wrong(directory.path(), "only one object here");
+    let directory = captured();
+    std::fs::write(directory.path().join("cup.txt"), lines(&touches(5))).unwrap();
+    std::fs::write(directory.path().join("fork.txt"), lines(&touches(6))).unwrap();
+    let (wrong_ones, notes) = said(directory.path());
+    assert_eq!(wrong_ones, [""; 0]);
+    assert!(notes[0].contains("fork.txt: changed since its capture"), "{notes:?}");
+    assert!(notes[1].contains("cup.txt: the object cup is not listed"), "{notes:?}");
+    std::fs::write(Listing::path(directory.path()), "{").unwrap();
+    wrong(directory.path(), "dataset.json:1: not the listing of a data set");
+}
+
+#[test]
+fn what_reads_well_and_trains_badly_is_wrong() {
+    let with = |spoon: &[Touch], listed: bool| {
+        let directory = captured();
+        std::fs::write(directory.path().join("spoon.txt"), lines(spoon)).unwrap();
+        match listed {
+            true => change(directory.path(), |listing| listing.objects[1].touches = spoon.len() as u64),
+            false => std::fs::remove_file(Listing::path(directory.path())).unwrap(),
+        }
+        directory
+    };
+    let spoon = touches(1);
+    wrong(with(&[spoon.clone(), spoon.clone()].concat(), false).path(), "every touch stands in it twice or more");
+    wrong(with(&touches(0), false).path(), "fork and spoon hold the same touches");
+    wrong(with(&vec![spoon[3]; 40], false).path(), "all touches are the same");
+    let missing = crate::touches::parse_touch("- - -").unwrap();
+    wrong(with(&[missing; 25], false).path(), "no touch has a contact");
+    wrong(with(&[&spoon[..], &[missing]].concat(), true).path(), "1 of 31 touches miss a contact");
+    let posed: Vec<Touch> = spoon
+        .iter()
+        .map(|touch| touch.with_pose(palpate_shared::Pose { direction: [0, 0, 32767], alignment: [32767, 0, 0] }))
+        .collect();
+    wrong(with(&posed, false).path(), "30 of 60 touches have a pose and the others have none");
+    let slow: Vec<Touch> = (1..31).map(|i| Touch::from_micros([0, 3_000_000 * i, 9_000_000])).collect();
+    wrong(with(&slow, true).path(), "30 of 30 touches last longer than the 2.73 s");
+    let (none, notes) = said(with(&[&spoon[..], &slow[..2]].concat(), true).path());
+    assert_eq!(none, [""; 0]);
+    assert!(notes.iter().any(|note| note.contains("2 of 32 touches last longer")), "{notes:?}");
+    wrong(tempfile::tempdir().unwrap().path(), "no touches here");
+    assert!(Check::of(Path::new("nowhere")).is_err());
+}
+
+#[test]
+fn the_published_format_survives_reading_and_writing_to_the_byte() {
+    let text = "0.000000 0.123456 12.000001\n0.031000 0.000000 0.002000\n";
+    let read: Vec<Touch> = text::touches(text.as_bytes(), Path::new("cup.txt")).collect::<Result<_>>().unwrap();
+    assert_eq!(lines(&read), text);
+    let posed =
+        lines(&[read[0].with_pose(palpate_shared::Pose { direction: [1, -2, 32767], alignment: [-32767, 0, 3] })]);
+    let again: Vec<Touch> = text::touches(posed.as_bytes(), Path::new("cup.txt")).collect::<Result<_>>().unwrap();
+    assert_eq!(lines(&again), posed);
+}

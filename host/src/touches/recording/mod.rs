@@ -1,0 +1,361 @@
+//! Touches of a real probe on their way to the disk.
+//!
+//! Each touch is a line appended to `<object>.txt` and flushed to the disk before the next one is waited for, so that
+//! whatever ends a recording (a pulled cable, Ctrl-C, a power cut) costs at most the touch that is being written. The
+//! listing follows twice a second and at the end; until then a file may hold more than is listed. Readers count what the
+//! file holds, up to the last whole line, and the next recording cuts off what is behind it.
+
+#[cfg(test)]
+mod tests;
+
+use super::checksum::CRC;
+use super::dataset::{Warning, files};
+use super::listing::is_file_name;
+use super::{Entry, Format, Listing, Origin, text, write_touch};
+use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::output;
+use crc::{Digest, Table};
+use palpate_shared::Touch;
+use palpate_shared::format::Length;
+use std::fs::File;
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+/// How often the listing is written while touches come.
+const CHECKPOINT: Duration = Duration::from_millis(500);
+
+/// A recording of one object: when, from where and by what its touches came.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Recorded {
+    /// The object's name.
+    pub object: String,
+    /// How many touches the recording added.
+    pub touches: u64,
+    /// When it began, in UTC: `2026-11-22T11:00:00Z`.
+    pub began: String,
+    /// Where the touches came from: a port or a file.
+    pub source: String,
+    /// Name and version of the chip's program, where it says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub firmware: Option<String>,
+    /// The checksum of the chip's model, which says how long the chip waits for a finger; none without a model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<u32>,
+    /// The CRC-32 of its lines, if they came from a file: so that no file is recorded twice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crc32: Option<u32>,
+}
+
+/// A data set to which touches of an object are added.
+pub struct Recording {
+    directory: PathBuf,
+    path: PathBuf,
+    listing: Listing,
+    /// What this recording says about itself; among the listed ones once it has a touch.
+    recorded: Recorded,
+    open: Option<Open>,
+    /// Touches of the object that earlier recordings added.
+    before: u64,
+    /// Touches that were added since it was opened.
+    added: u64,
+    warnings: Vec<Warning>,
+    checkpointed: Instant,
+    /// Held as long as the recording lives.
+    _lock: File,
+}
+
+/// The object's file.
+struct Open {
+    file: File,
+    bytes: u64,
+    digest: Digest<'static, u32, Table<16>>,
+}
+
+impl Recording {
+    /// Opens the directory, which is created if it is missing, for touches of `object`. Nothing is written before the
+    /// first touch.
+    ///
+    /// `origin` says how the touches are made ([`Origin::recorded`]); none: as those in the directory, or by the published
+    /// probe. `source` is where they come from, and `began` the time.
+    ///
+    /// # Errors
+    /// When the directory cannot be read, another program is writing into it, or it holds simulated touches, files that
+    /// no listing names, or touches that were recorded with another probe, at another scale, or with the pose where these
+    /// are without it; when `object` cannot be a file's name; when the object's file has lost touches.
+    pub fn open(
+        directory: &Path,
+        object: &str,
+        origin: Option<&Origin>,
+        source: &str,
+        began: SystemTime,
+    ) -> Result<Self> {
+        if !is_file_name(object) {
+            return Err(TouchesProblem::BadName { name: object.into() }.into());
+        }
+        std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
+        let wrong = |problem| Error::at(Place::file(directory), problem);
+        let lock = output::lock(directory)?.ok_or_else(|| wrong(TouchesProblem::Busy))?;
+        output::remove_leftovers(directory)?;
+        let listing = match Listing::read(directory)? {
+            Some(listing) => admit(listing, origin).map_err(wrong)?,
+            None => {
+                let names = |(_, path, _): &(_, PathBuf, _)| path.file_name().map(|name| name.display().to_string());
+                let files: Vec<String> = files(directory)?.iter().filter_map(names).collect();
+                if !files.is_empty() {
+                    return Err(wrong(TouchesProblem::Unlisted { files: files.join(", ") }));
+                }
+                let usual = || Origin::recorded(super::Origin::default().probe, Length::Tenth, false);
+                Listing { complete: true, ..Listing::new(&origin.cloned().unwrap_or_else(usual), []) }
+            }
+        };
+        let path = Entry { name: object.into(), ..Entry::default() }.file(directory, Format::Text);
+        let recorded = Recorded {
+            object: object.into(),
+            began: humantime::format_rfc3339_seconds(began).to_string(),
+            source: source.into(),
+            ..Recorded::default()
+        };
+        let mut recording = Self {
+            directory: directory.into(),
+            path,
+            listing,
+            recorded,
+            open: None,
+            before: 0,
+            added: 0,
+            warnings: Vec::new(),
+            checkpointed: Instant::now(),
+            _lock: lock,
+        };
+        recording.before = recording.take_up()?;
+        Ok(recording)
+    }
+
+    /// Brings what is listed of the object in line with its file, and returns how many touches there are.
+    fn take_up(&mut self) -> Result<u64> {
+        let object = &self.recorded.object;
+        let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == *object) else { return Ok(0) };
+        let touches = read(entry, &self.path, &mut self.warnings)?.len() as u64;
+        // What an interrupted recording had not listed is its own.
+        let more = touches - entry.touches;
+        if let Some(last) = self.listing.recorded.iter_mut().rev().find(|recorded| recorded.object == *object) {
+            last.touches += more;
+        }
+        entry.touches = touches;
+        entry.approaches = touches;
+        Ok(touches)
+    }
+
+    /// How the touches are made.
+    pub fn origin(&self) -> &Origin {
+        &self.listing.origin
+    }
+
+    /// The object's name.
+    pub fn object(&self) -> &str {
+        &self.recorded.object
+    }
+
+    /// What looked wrong about the object's touches when they were added to.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// How many touches were added since this was opened.
+    pub fn touches(&self) -> u64 {
+        self.added
+    }
+
+    /// How many touches of the object there are now.
+    pub fn all_touches(&self) -> u64 {
+        self.before + self.recorded.touches
+    }
+
+    /// Says which program made the touches that follow, and with which model, by its checksum. Returns what made the newest
+    /// touches of the data set, if that is something else.
+    ///
+    /// # Errors
+    /// When the listing cannot be written.
+    pub fn made_by(&mut self, firmware: Option<String>, model: Option<u32>) -> Result<Option<String>> {
+        let newest = self.listing.recorded.iter().rev().find_map(|recorded| recorded.firmware.clone());
+        let other = newest.filter(|other| firmware.as_ref().is_some_and(|own| own != other));
+        let is_same = self.recorded.firmware == firmware && self.recorded.model == model;
+        if !is_same && self.recorded.touches > 0 {
+            // Another program since the cable was out: a recording of its own.
+            self.checkpoint()?;
+            self.before += self.recorded.touches;
+            self.recorded.touches = 0;
+        }
+        (self.recorded.firmware, self.recorded.model) = (firmware, model);
+        Ok(other)
+    }
+
+    /// Whether the touch lacks the pose that the touches of this data set are recorded with.
+    pub fn lacks_pose(&self, touch: &Touch) -> bool {
+        self.listing.origin.pose && touch.pose().is_none()
+    }
+
+    /// Adds a touch. When this returns, the touch is on the disk.
+    ///
+    /// # Errors
+    /// [`TouchesProblem::NoPose`] if it [lacks its pose](Self::lacks_pose); when the file cannot be written.
+    pub fn add(&mut self, touch: &Touch) -> Result<()> {
+        self.append(std::slice::from_ref(touch))?;
+        if self.checkpointed.elapsed() >= CHECKPOINT { self.checkpoint() } else { Ok(()) }
+    }
+
+    /// Adds the touches of a file: all or, if one of them is wrong, none.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add), and [`TouchesProblem::RecordedBefore`] if the same touches of the object were.
+    pub fn add_all(&mut self, touches: &[Touch]) -> Result<()> {
+        let crc32 = CRC.checksum(lines(touches).as_bytes());
+        let is_same = |other: &&Recorded| {
+            (&other.object, other.crc32, other.touches) == (&self.recorded.object, Some(crc32), touches.len() as u64)
+        };
+        if let Some(Recorded { object, touches, began, .. }) = self.listing.recorded.iter().find(is_same).cloned() {
+            return Err(TouchesProblem::RecordedBefore { object, touches, began }.into());
+        }
+        self.recorded.crc32 = Some(crc32);
+        self.append(touches)?;
+        self.checkpoint()
+    }
+
+    fn append(&mut self, touches: &[Touch]) -> Result<()> {
+        if touches.iter().any(|touch| self.lacks_pose(touch)) {
+            return Err(TouchesProblem::NoPose.into());
+        }
+        let lines = lines(touches);
+        if self.recorded.touches == 0 {
+            self.list()?;
+        }
+        let path = &self.path;
+        let io = |error| Error::io(path, "write the touches", error);
+        let open = match &mut self.open {
+            Some(open) => open,
+            None => self.open.insert(Open::new(path)?),
+        };
+        // In one piece, so that hardly anything can come in between.
+        open.file.write_all(lines.as_bytes()).and_then(|()| open.file.sync_data()).map_err(io)?;
+        open.bytes += lines.len() as u64;
+        open.digest.update(lines.as_bytes());
+        self.recorded.touches += touches.len() as u64;
+        self.added += touches.len() as u64;
+        Ok(())
+    }
+
+    /// Lists this recording, before its first touch: a file that is not listed would not be read.
+    fn list(&mut self) -> Result<()> {
+        let object = &self.recorded.object;
+        if !self.listing.objects.iter().any(|entry| entry.name == *object) {
+            self.listing.objects.push(Entry { name: object.clone(), ..Entry::default() });
+            self.listing.objects.sort_by(|a, b| a.name.cmp(&b.name));
+        }
+        self.listing.recorded.push(self.recorded.clone());
+        self.listing.write(&self.directory)
+    }
+
+    /// Writes the listing as it is now. Without a touch there is nothing to list.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn checkpoint(&mut self) -> Result<()> {
+        self.checkpointed = Instant::now();
+        let (Some(open), Some(last)) = (&self.open, self.listing.recorded.last_mut()) else { return Ok(()) };
+        if self.recorded.touches > 0 {
+            last.clone_from(&self.recorded);
+        }
+        let all = self.before + self.recorded.touches;
+        if let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == self.recorded.object) {
+            (entry.touches, entry.approaches, entry.bytes) = (all, all, open.bytes);
+            entry.crc32 = Some(open.digest.clone().finalize());
+        }
+        self.listing.write(&self.directory)
+    }
+}
+
+impl Open {
+    /// Opens an object's file behind its last whole line; what follows that is cut off.
+    fn new(path: &Path) -> Result<Self> {
+        let io = |error| Error::io(path, "write the touches", error);
+        let mut file = File::options().write(true).create(true).truncate(false).open(path).map_err(io)?;
+        let mut there = std::fs::read(path).map_err(io)?;
+        there.truncate(whole(&there).len());
+        let bytes = there.len() as u64;
+        file.set_len(bytes).map_err(io)?;
+        file.seek(SeekFrom::End(0)).map_err(io)?;
+        let mut digest = CRC.digest();
+        digest.update(&there);
+        Ok(Self { file, bytes, digest })
+    }
+}
+
+/// A recorded listing to add to.
+fn admit(listing: Listing, origin: Option<&Origin>) -> Result<Listing, TouchesProblem> {
+    if !listing.is_recorded() {
+        let (objects, touches) = (listing.names().join(", "), listing.objects.iter().map(|entry| entry.touches).sum());
+        return Err(TouchesProblem::HoldsSimulated { objects, touches });
+    }
+    let differences = origin.map_or_else(Vec::new, |origin| differences(&listing.origin, origin));
+    match differences.is_empty() {
+        true => Ok(listing),
+        false => Err(TouchesProblem::OtherRecording { differences: differences.join(", ") }),
+    }
+}
+
+/// What differs between the ways in which touches were and are recorded, and how.
+fn differences(there: &Origin, here: &Origin) -> Vec<String> {
+    let numbers = |origin: &Origin| {
+        let probe = origin.probe;
+        [("radius", probe.radius), ("spacing", probe.spacing), ("speed", probe.speed), ("tilt", probe.tilt)]
+    };
+    let mut differences = Vec::new();
+    if there.unit != here.unit {
+        differences.push(format!("unit is {} there and {} here", there.unit.name(), here.unit.name()));
+    }
+    let pairs = numbers(there).into_iter().zip(numbers(here)).filter(|(there, here)| there != here);
+    differences.extend(pairs.map(|((name, there), (_, here))| format!("{name} is {there} there and {here} here")));
+    if there.pose != here.pose {
+        let said = |pose| if pose { "with" } else { "without" };
+        differences.push(format!("{} the pose there and {} it here", said(there.pose), said(here.pose)));
+    }
+    differences
+}
+
+/// The touches of a recorded object: at least as many as listed.
+pub(super) fn read(entry: &Entry, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
+    let bytes = match std::fs::read(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound && entry.touches == 0 => return Ok(Vec::new()),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            return Err(Error::at(Place::file(path), TouchesProblem::Missing { name: entry.name.clone() }));
+        }
+        read => read.map_err(|error| Error::io(path, "read the touches", error))?,
+    };
+    let whole = whole(&bytes);
+    let touches = text::touches(whole, path).collect::<Result<Vec<_>>>()?;
+    let (stated, found) = (entry.touches, touches.len() as u64);
+    if found < stated {
+        return Err(Error::at(Place::file(path), TouchesProblem::OtherCount { stated, found }));
+    }
+    if whole.len() < bytes.len() {
+        warnings.push(Warning::HalfLine { path: path.into() });
+    }
+    if found == stated && entry.crc32.is_some_and(|stated| stated != CRC.checksum(whole)) {
+        warnings.push(Warning::Changed { path: path.into() });
+    }
+    Ok(touches)
+}
+
+/// Up to the end of the last whole line.
+fn whole(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
+    &bytes[..end]
+}
+
+/// The lines of touches; with the poses of those that have one.
+fn lines(touches: &[Touch]) -> String {
+    let mut lines = String::new();
+    touches.iter().for_each(|touch| write_touch(&mut lines, touch, true));
+    lines
+}

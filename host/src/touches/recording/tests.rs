@@ -1,0 +1,229 @@
+use super::*;
+use crate::error::Problem;
+use crate::touches::Dataset;
+use std::fs;
+
+/// The second of October 2026, around noon.
+fn noon() -> SystemTime {
+    SystemTime::UNIX_EPOCH + Duration::from_secs(1_790_942_400)
+}
+
+fn touch(number: u32) -> Touch {
+    Touch::from_micros([0, 1_000 * number, 30_000])
+}
+
+fn touches(numbers: std::ops::Range<u32>) -> Vec<Touch> {
+    numbers.map(touch).collect()
+}
+
+fn open(directory: &Path, object: &str) -> Result<Recording> {
+    Recording::open(directory, object, None, "/dev/ttyACM0", noon())
+}
+
+/// Records touches one by one, and ends as a killed program does: without a last listing.
+fn killed(directory: &Path, object: &str, numbers: std::ops::Range<u32>) {
+    let mut recording = open(directory, object).unwrap();
+    touches(numbers).iter().for_each(|touch| recording.add(touch).unwrap());
+}
+
+fn whole(directory: &Path, object: &str, numbers: std::ops::Range<u32>) {
+    let mut recording = open(directory, object).unwrap();
+    touches(numbers).iter().for_each(|touch| recording.add(touch).unwrap());
+    recording.checkpoint().unwrap();
+}
+
+fn problem(error: &Error) -> &TouchesProblem {
+    match error.problem() {
+        Some(Problem::Touches(problem)) => problem,
+        _ => panic!("{error}"),
+    }
+}
+
+fn read(directory: &Path) -> Dataset {
+    let dataset = Dataset::read_any(directory).unwrap();
+    assert_eq!(dataset.warnings, []);
+    dataset
+}
+
+#[test]
+fn a_recording_is_a_data_set_whose_listing_says_when_from_where_and_by_what() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut recording = open(directory.path(), "spoon").unwrap();
+    assert_eq!(recording.made_by(Some("gpio 1.0".into()), Some(7)).unwrap(), None);
+    touches(0..3).iter().for_each(|touch| recording.add(touch).unwrap());
+    recording.checkpoint().unwrap();
+    drop(recording);
+    whole(directory.path(), "fork", 5..6);
+    let dataset = read(directory.path());
+    assert_eq!(dataset.names(), ["fork", "spoon"]);
+    assert_eq!(dataset.objects[1].touches, touches(0..3));
+    assert!(dataset.is_recorded() && dataset.holds_approaches());
+    let expected = Recorded {
+        object: "spoon".into(),
+        touches: 3,
+        began: "2026-10-02T12:00:00Z".into(),
+        source: "/dev/ttyACM0".into(),
+        firmware: Some("gpio 1.0".into()),
+        model: Some(7),
+        crc32: None,
+    };
+    assert_eq!(dataset.recorded[0], expected);
+    assert_eq!(dataset.recorded[1].firmware, None);
+    let listing = Listing::read(directory.path()).unwrap().unwrap();
+    assert!(listing.complete);
+    let text = fs::read(directory.path().join("spoon.txt")).unwrap();
+    let entry = &listing.objects[1];
+    assert_eq!((entry.touches, entry.approaches, entry.bytes), (3, 3, text.len() as u64));
+    assert_eq!(entry.crc32, Some(CRC.checksum(&text)));
+}
+
+#[test]
+fn nothing_is_written_before_the_first_touch() {
+    let directory = tempfile::tempdir().unwrap();
+    open(directory.path(), "spoon").unwrap().checkpoint().unwrap();
+    let names: Vec<_> = fs::read_dir(directory.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(names, [".lock"]);
+}
+
+#[test]
+fn every_touch_counts_although_the_recorder_was_killed_after_it() {
+    let directory = tempfile::tempdir().unwrap();
+    killed(directory.path(), "fork", 0..5);
+    let listing = Listing::read(directory.path()).unwrap().unwrap();
+    assert!(listing.objects[0].touches < 5, "this test needs a listing that lags behind");
+    assert_eq!(read(directory.path()).objects[0].touches, touches(0..5));
+    // The next recording lists them as what they are.
+    whole(directory.path(), "fork", 5..7);
+    let dataset = read(directory.path());
+    assert_eq!(dataset.objects[0].touches, touches(0..7));
+    assert_eq!(dataset.recorded.iter().map(|recorded| recorded.touches).collect::<Vec<_>>(), [5, 2]);
+}
+
+#[test]
+fn a_recording_cut_off_at_any_byte_keeps_its_whole_lines_and_goes_on_behind_them() {
+    let lines = lines(&touches(0..2));
+    let line = lines.len() / 2;
+    for cut in line..lines.len() {
+        let directory = tempfile::tempdir().unwrap();
+        killed(directory.path(), "fork", 0..2);
+        let path = directory.path().join("fork.txt");
+        fs::write(&path, &lines[..cut]).unwrap();
+        let dataset = Dataset::read_any(directory.path()).unwrap();
+        assert_eq!(dataset.objects[0].touches, touches(0..1), "{cut}");
+        let half = Warning::HalfLine { path: path.clone() };
+        assert_eq!(dataset.warnings, if cut == line { vec![] } else { vec![half.clone()] }, "{cut}");
+        let mut recording = open(directory.path(), "fork").unwrap();
+        assert_eq!(recording.warnings(), dataset.warnings);
+        recording.add(&touch(8)).unwrap();
+        recording.checkpoint().unwrap();
+        assert_eq!(read(directory.path()).objects[0].touches, [touch(0), touch(8)]);
+    }
+}
+
+#[test]
+fn an_interruption_before_the_first_touch_leaves_the_other_objects_readable() {
+    let directory = tempfile::tempdir().unwrap();
+    whole(directory.path(), "fork", 0..3);
+    let mut recording = open(directory.path(), "spoon").unwrap();
+    recording.list().unwrap();
+    drop(recording);
+    assert_eq!(read(directory.path()).names(), ["fork"]);
+    fs::write(directory.path().join("spoon.txt"), "0.0").unwrap();
+    assert_eq!(Dataset::read_any(directory.path()).unwrap().names(), ["fork"]);
+    whole(directory.path(), "spoon", 0..2);
+    assert_eq!(read(directory.path()).objects[1].touches, touches(0..2));
+}
+
+#[test]
+fn a_file_that_lost_recorded_touches_is_neither_read_nor_added_to() {
+    let directory = tempfile::tempdir().unwrap();
+    whole(directory.path(), "fork", 0..5);
+    let path = directory.path().join("fork.txt");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, &text[..text.len() - 1]).unwrap();
+    let lost = TouchesProblem::OtherCount { stated: 5, found: 4 };
+    assert_eq!(problem(&Dataset::read_any(directory.path()).unwrap_err()), &lost);
+    assert_eq!(problem(&open(directory.path(), "fork").err().unwrap()), &lost);
+    fs::remove_file(&path).unwrap();
+    let missing = TouchesProblem::Missing { name: "fork".into() };
+    assert_eq!(problem(&open(directory.path(), "fork").err().unwrap()), &missing);
+    // As many, but others: somebody edited them.
+    fs::write(&path, text.replacen("0.001000", "0.009000", 1)).unwrap();
+    assert_eq!(Dataset::read_any(directory.path()).unwrap().warnings, [Warning::Changed { path }]);
+}
+
+#[test]
+fn another_program_on_the_chip_is_a_recording_of_its_own_and_is_said() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut recording = open(directory.path(), "fork").unwrap();
+    recording.made_by(Some("gpio 1.0".into()), None).unwrap();
+    recording.add(&touch(0)).unwrap();
+    // The same after the cable was out.
+    assert_eq!(recording.made_by(Some("gpio 1.0".into()), None).unwrap(), None);
+    recording.add(&touch(1)).unwrap();
+    assert_eq!(recording.made_by(Some("gpio 2.0".into()), None).unwrap().as_deref(), Some("gpio 1.0"));
+    recording.add(&touch(2)).unwrap();
+    recording.checkpoint().unwrap();
+    assert_eq!((recording.touches(), recording.all_touches()), (3, 3));
+    drop(recording);
+    let dataset = read(directory.path());
+    assert_eq!(dataset.objects[0].touches, touches(0..3));
+    let said: Vec<_> = dataset.recorded.iter().map(|r| (r.firmware.as_deref().unwrap(), r.touches)).collect();
+    assert_eq!(said, [("gpio 1.0", 2), ("gpio 2.0", 1)]);
+}
+
+#[test]
+fn touches_of_another_probe_or_scale_or_without_their_pose_are_not_added() {
+    let directory = tempfile::tempdir().unwrap();
+    whole(directory.path(), "fork", 0..2);
+    let usual = Origin::recorded(Origin::default().probe, Length::Tenth, false);
+    let mut wider = usual.clone();
+    wider.probe.spacing = 2.0;
+    let others = [
+        (wider, "spacing is 1.5 there and 2 here"),
+        (Origin { unit: Length::Millimeter, ..usual.clone() }, "unit is unit there and mm here"),
+        (Origin { pose: true, ..usual.clone() }, "without the pose there and with it here"),
+    ];
+    for (origin, differences) in others {
+        let error = Recording::open(directory.path(), "fork", Some(&origin), "", noon()).err().unwrap();
+        assert_eq!(problem(&error), &TouchesProblem::OtherRecording { differences: differences.into() });
+    }
+    Recording::open(directory.path(), "fork", Some(&usual), "", noon()).unwrap();
+    let posed = tempfile::tempdir().unwrap();
+    let origin = Origin { pose: true, ..usual };
+    let mut recording = Recording::open(posed.path(), "fork", Some(&origin), "", noon()).unwrap();
+    assert!(recording.lacks_pose(&touch(0)));
+    assert_eq!(problem(&recording.add(&touch(0)).unwrap_err()), &TouchesProblem::NoPose);
+    let pose = palpate_shared::Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] };
+    recording.add(&touch(0).with_pose(pose)).unwrap();
+    assert_eq!(read(posed.path()).objects[0].touches, [touch(0).with_pose(pose)]);
+}
+
+#[test]
+fn a_directory_with_simulated_or_unlisted_touches_or_another_recorder_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let _first = open(directory.path(), "fork").unwrap();
+    assert_eq!(problem(&open(directory.path(), "spoon").err().unwrap()), &TouchesProblem::Busy);
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("cup.txt"), "0 0 0\n").unwrap();
+    let unlisted = TouchesProblem::Unlisted { files: "cup.txt".into() };
+    assert_eq!(problem(&open(directory.path(), "fork").err().unwrap()), &unlisted);
+    Listing::new(&Origin::default(), ["cup".into()]).write(directory.path()).unwrap();
+    let simulated = TouchesProblem::HoldsSimulated { objects: "cup".into(), touches: 0 };
+    assert_eq!(problem(&open(directory.path(), "fork").err().unwrap()), &simulated);
+    for name in ["", "../fork", "a/b"] {
+        assert!(matches!(problem(&open(directory.path(), name).err().unwrap()), TouchesProblem::BadName { .. }));
+    }
+}
+
+#[test]
+fn the_touches_of_a_file_are_added_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let add = |object: &str, numbers| open(directory.path(), object).unwrap().add_all(&touches(numbers));
+    add("fork", 0..5).unwrap();
+    assert!(matches!(problem(&add("fork", 0..5).unwrap_err()), TouchesProblem::RecordedBefore { touches: 5, .. }));
+    add("fork", 0..4).unwrap();
+    add("spoon", 0..5).unwrap();
+    let dataset = read(directory.path());
+    assert_eq!(dataset.objects.iter().map(|object| object.touches.len()).collect::<Vec<_>>(), [9, 5]);
+}

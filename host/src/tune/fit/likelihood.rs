@@ -1,0 +1,236 @@
+//! How well a candidate probe explains recorded touches.
+
+use super::density::{Densities, FULL, NOISE, OUTER, Observed};
+use super::posed::{self, InPose};
+use std::f64::consts::TAU;
+
+/// The share of touches that come from nowhere: so that one odd touch cannot decide a fit.
+const ODD: f64 = 0.004;
+/// How far the times of odd touches are apart, in milliseconds.
+const ODD_SPREAD: f64 = 150.0;
+
+/// A probe that may have made recorded touches. Times are in milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    /// What contact times are multiplied by: one over the speed's factor.
+    pub(super) factor: f64,
+    /// How much later each finger touches than it should; 0 for the first.
+    pub(super) late: [f64; 3],
+    /// Standard deviation of each contact time, with what the timer adds.
+    pub(super) noise: f64,
+    /// The share of contacts that each finger misses.
+    pub(super) missed: [f64; 3],
+}
+
+/// How many numbers a candidate has.
+pub(super) const NUMBERS: usize = 7;
+
+impl Candidate {
+    /// As numbers of about the same scale for a search.
+    pub(super) fn numbers(&self) -> [f64; NUMBERS] {
+        let [_, middle, third] = self.late;
+        let [a, b, c] = self.missed.map(f64::sqrt);
+        [self.factor.ln() / 0.03, middle, third, self.noise.ln() / 0.3, a / 0.1, b / 0.1, c / 0.1]
+    }
+
+    /// The reverse. Noise that no table exists for becomes the nearest that there is.
+    pub(super) fn of(numbers: &[f64; NUMBERS]) -> Self {
+        let [factor, middle, third, noise, a, b, c] = *numbers;
+        Self {
+            factor: (0.03 * factor).exp().clamp(0.2, 5.0),
+            late: [0.0, middle, third],
+            noise: (0.3 * noise).exp().clamp(NOISE[0], NOISE[1]),
+            missed: [a, b, c].map(|root| (0.1 * root).powi(2).min(0.95)),
+        }
+    }
+}
+
+/// How crooked probes usually are: standard deviations of the logarithm of the factor, of offsets in milliseconds, and of
+/// the logarithm of the noise about [`USUAL_NOISE`]. Of candidates that explain touches equally well the usual one is taken;
+/// a few dozen touches outweigh it wherever they say something.
+const USUAL: [f64; 3] = [0.15, 8.0, 1.0];
+/// In milliseconds.
+const USUAL_NOISE: f64 = 2.0;
+
+impl Candidate {
+    /// The logarithm of how usual it is, but for a constant.
+    pub(super) fn usual(&self) -> f64 {
+        let [factor, offset, noise] = USUAL;
+        // Whichever finger counts as straight.
+        let mean = self.late.iter().sum::<f64>() / 3.0;
+        let late: f64 = self.late.iter().map(|late| ((late - mean) / offset).powi(2)).sum();
+        let own = (self.factor.ln() / factor).powi(2) + ((self.noise / USUAL_NOISE).ln() / noise).powi(2);
+        -0.5 * (own + late)
+    }
+}
+
+/// Which approaches were recorded: what the probability of a touch is relative to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kept {
+    /// Every approach.
+    All,
+    /// Those with a contact.
+    Contacts,
+    /// Full touches.
+    Full,
+}
+
+/// Recorded touches of one object.
+#[derive(Debug)]
+pub(super) struct Recording<'a> {
+    pub(super) name: &'a str,
+    pub(super) touches: Vec<Observed>,
+    /// Simulated approaches in the pose of each touch; empty if no touch has one.
+    pub(super) in_poses: Vec<Option<InPose>>,
+    pub(super) kept: Kept,
+}
+
+/// What a candidate makes of one object.
+pub(super) struct Explained<'a> {
+    candidate: Candidate,
+    smoothed: super::density::Smoothed<'a>,
+    shares: [f64; 8],
+    /// The logarithm of the share of approaches that were recorded.
+    recorded: f64,
+    kept: Kept,
+}
+
+impl<'a> Explained<'a> {
+    pub(super) fn new(candidate: &Candidate, object: &'a Densities, kept: Kept) -> Self {
+        let touched = |fingers: u8| -> f64 { object.shares[usize::from(fingers)] };
+        // An approach is not recorded if every finger that touched missed its contact.
+        let nothing: f64 = (0..8).map(|fingers| touched(fingers) * product(fingers, 0, &candidate.missed)).sum();
+        let recorded = match kept {
+            Kept::All | Kept::Full => 0.0,
+            Kept::Contacts => (1.0 - nothing).max(1e-9).ln(),
+        };
+        Self {
+            candidate: *candidate,
+            smoothed: object.under(candidate.noise / candidate.factor),
+            shares: object.shares,
+            recorded,
+            kept,
+        }
+    }
+
+    pub(super) fn candidate(&self) -> &Candidate {
+        &self.candidate
+    }
+
+    pub(super) fn kept(&self) -> Kept {
+        self.kept
+    }
+
+    /// The logarithm of the share of approaches that were recorded.
+    pub(super) fn recorded(&self) -> f64 {
+        self.recorded
+    }
+
+    /// The logarithm of the density of a touch in any pose.
+    pub(super) fn log_density(&self, observed: &Observed) -> f64 {
+        let Candidate { factor, late: [first, middle, third], missed, .. } = self.candidate;
+        let Observed { fingers, first: x, second: y } = *observed;
+        let (times, odd) = match fingers {
+            FULL => {
+                let curvature = (x - (first - 2.0 * middle + third)) / factor;
+                let slope = (y - (third - first)) / factor;
+                ([0.0, self.smoothed.full(curvature, slope) / (factor * factor)], wide(x) * wide(y))
+            }
+            0b011 => (self.smoothed.neighbors((x - (middle - first)) / factor).map(|d| d / factor), wide(x)),
+            0b110 => (self.smoothed.neighbors((third - middle - x) / factor).map(|d| d / factor), wide(x)),
+            OUTER => (self.smoothed.outer((x - (third - first)) / factor).map(|d| d / factor), wide(x)),
+            _ => ([1.0; 2], 1.0),
+        };
+        if self.kept == Kept::Full {
+            return (times[1] * (1.0 - ODD) + ODD * odd).ln();
+        }
+        // What was touched may be more than what was recorded.
+        let mut density = 0.0;
+        for touched in (0..8).filter(|touched| touched & fingers == fingers) {
+            let share = self.shares[usize::from(touched)] * product(touched, fingers, &missed);
+            density += share * times[usize::from(touched == FULL)];
+        }
+        (density * (1.0 - ODD) + ODD * odd / 8.0).ln() - self.recorded
+    }
+
+    /// The logarithm of the likelihood of a recording of the object.
+    pub(super) fn of_recording(&self, recording: &Recording<'_>) -> f64 {
+        if recording.in_poses.is_empty() {
+            return self.log_likelihood(&recording.touches);
+        }
+        let of = |(touch, in_pose): (&Observed, &Option<InPose>)| match in_pose {
+            Some(in_pose) => posed::log_density(self, touch, in_pose),
+            None => self.log_density(touch),
+        };
+        recording.touches.iter().zip(&recording.in_poses).map(of).sum()
+    }
+
+    /// The logarithm of the likelihood of touches in any pose.
+    pub(super) fn log_likelihood(&self, touches: &[Observed]) -> f64 {
+        touches.iter().map(|touch| self.log_density(touch)).sum()
+    }
+}
+
+/// The probability that of the `touched` fingers these are `recorded` and the others missed their contact.
+pub(super) fn product(touched: u8, recorded: u8, missed: &[f64; 3]) -> f64 {
+    let of = |(finger, missed): (u8, &f64)| match (touched >> finger & 1, recorded >> finger & 1) {
+        (0, _) => 1.0,
+        (_, 0) => *missed,
+        _ => 1.0 - missed,
+    };
+    (0..).zip(missed).map(of).product()
+}
+
+/// A density that is nowhere small: Cauchy's.
+fn wide(x: f64) -> f64 {
+    2.0 / (TAU * ODD_SPREAD * (1.0 + (x / ODD_SPREAD).powi(2)))
+}
+
+/// Presses on a flat plate: curvature is 0 but for the probe, and the slope is the plate's, with the other sign after each
+/// half turn.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plate {
+    /// Full touches of presses in one direction of the row, and in the other.
+    pub(super) presses: Vec<(f64, Observed)>,
+    /// How many presses there were, and how many of them each finger missed.
+    pub(super) count: usize,
+    pub(super) missed: [usize; 3],
+}
+
+impl Plate {
+    pub(super) fn new(touches: impl IntoIterator<Item = Observed>) -> Self {
+        let mut plate = Self::default();
+        for (turn, observed) in [1.0, -1.0].into_iter().cycle().zip(touches) {
+            plate.count += 1;
+            for (finger, missed) in plate.missed.iter_mut().enumerate() {
+                *missed += usize::from(observed.fingers >> finger & 1 == 0);
+            }
+            if observed.fingers == FULL {
+                plate.presses.push((turn, observed));
+            }
+        }
+        plate
+    }
+
+    /// How likely they are, at the slope of the plate that suits them best.
+    pub(super) fn log_likelihood(&self, candidate: &Candidate) -> f64 {
+        let Candidate { late: [first, middle, third], noise, missed, .. } = *candidate;
+        let [curvature, slope] = [first - 2.0 * middle + third, third - first];
+        let count = self.presses.len().max(1) as f64;
+        let tilt: f64 = self.presses.iter().map(|(turn, press)| turn * (press.second - slope)).sum::<f64>() / count;
+        let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt());
+        let [root6, root2] = [6.0_f64.sqrt() * noise, 2.0_f64.sqrt() * noise];
+        let of = |(turn, press): &(f64, Observed)| {
+            let times = normal(press.first - curvature, root6) * normal(press.second - slope - turn * tilt, root2);
+            ((1.0 - ODD) * times + ODD * wide(press.first) * wide(press.second)).ln()
+        };
+        let all = self.count as f64;
+        let contacts: f64 = (self.missed.iter().zip(missed))
+            .map(|(&count, missed)| {
+                let (count, share) = (count as f64, missed.clamp(1e-6, 1.0 - 1e-6));
+                count * share.ln() + (all - count) * (1.0 - share).ln()
+            })
+            .sum();
+        self.presses.iter().map(of).sum::<f64>() + contacts
+    }
+}

@@ -1,0 +1,130 @@
+//! Meshes in other formats than OBJ, wherever a mesh is read.
+
+use crate::{command, globe, stderr, stdout};
+use palpate::mesh::Mesh;
+use std::path::Path;
+
+/// A mesh as binary STL.
+fn stl(mesh: &Mesh) -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend((mesh.triangles.len() as u32).to_le_bytes());
+    for triangle in &mesh.triangles {
+        bytes.extend([0; 12]);
+        let corners = triangle.map(|index| mesh.vertices[index as usize]);
+        corners.iter().flatten().for_each(|x| bytes.extend(x.to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// A mesh as PLY text.
+fn ply(mesh: &Mesh) -> String {
+    let (vertices, faces) = (mesh.vertices.len(), mesh.triangles.len());
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+    );
+    mesh.vertices.iter().for_each(|[x, y, z]| text += &format!("{x} {y} {z}\n"));
+    mesh.triangles.iter().for_each(|[a, b, c]| text += &format!("3 {a} {b} {c}\n"));
+    text
+}
+
+fn capture(source: &Path, out: &Path) -> (Vec<u8>, String) {
+    let output = command(["capture", "--touches", "50", "-o"]).args([out, source]).output().unwrap();
+    let error = String::from_utf8(output.stderr.clone()).unwrap();
+    stdout(output);
+    let name = source.file_stem().unwrap().to_str().unwrap();
+    (std::fs::read(out.join(format!("{name}.txt"))).unwrap(), error)
+}
+
+#[test]
+fn one_object_in_three_formats_gives_the_same_touches_to_the_byte() {
+    let directory = tempfile::tempdir().unwrap();
+    let obj = globe(directory.path(), "cup", 8);
+    let mesh = palpate::mesh::obj::read(&obj).unwrap();
+    std::fs::write(directory.path().join("cup.stl"), stl(&mesh)).unwrap();
+    std::fs::write(directory.path().join("cup.ply"), ply(&mesh)).unwrap();
+    let touches =
+        |name: &str| capture(&directory.path().join(name), &directory.path().join(format!("{name}-touches"))).0;
+    let expected = touches("cup.obj");
+    assert!(expected == touches("cup.stl") && expected == touches("cup.ply"));
+    // The content counts, not the name.
+    std::fs::rename(directory.path().join("cup.stl"), directory.path().join("cup.dae")).unwrap();
+    assert!(expected == touches("cup.dae"));
+}
+
+#[test]
+fn one_name_in_several_formats_is_touched_once_with_a_note() {
+    let directory = tempfile::tempdir().unwrap();
+    let meshes = directory.path().join("meshes");
+    std::fs::create_dir(&meshes).unwrap();
+    std::fs::write(meshes.join("cup.ply"), ply(&Mesh::globe(6))).unwrap();
+    std::fs::write(meshes.join("cup.stl"), stl(&Mesh::globe(5))).unwrap();
+    let output =
+        command(["capture", "--touches", "10", "-o"]).args([&directory.path().join("out"), &meshes]).output().unwrap();
+    let error = String::from_utf8(output.stderr.clone()).unwrap();
+    stdout(output);
+    let note = error.lines().find(|line| line.contains("passed over")).unwrap_or_default();
+    assert!(note.starts_with("cup: ") && note.contains("cup.stl is used; cup.ply is passed over"), "{error}");
+}
+
+#[test]
+fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal() {
+    let directory = tempfile::tempdir().unwrap();
+    let page = directory.path().join("page.html");
+    let view = |mesh: &Mesh| {
+        let path = directory.path().join("cup.stl");
+        std::fs::write(&path, stl(mesh)).unwrap();
+        let said = stdout(command(["view", "-o"]).args([&page, &path]).output().unwrap());
+        (said, std::fs::read_to_string(&page).unwrap())
+    };
+    let good = Mesh::globe(6);
+    let (said, _) = view(&good);
+    assert!(said.contains("cup: nothing is wrong with the mesh"), "{said}");
+    // Another globe beside it, inside out and far away; and a hole in the first.
+    let mut bad = good.clone();
+    let base = bad.vertices.len() as u32;
+    bad.vertices.extend(good.vertices.iter().map(|&[x, y, z]| [x * 0.1 + 9.0, y * 0.1, z * 0.1]));
+    bad.triangles.extend(good.triangles.iter().map(|&[a, b, c]| [a + base, c + base, b + base]));
+    bad.triangles.remove(0);
+    bad.vertices.iter_mut().flatten().for_each(|x| *x *= 1e6);
+    let (said, shown) = view(&bad);
+    for expected in [
+        "The mesh is open: 3 edges belong to one triangle only, in 1 of 2 parts",
+        "The mesh is partly inside out: 1 of 2 parts is (120 triangles around (9.00e6, 0, 0))",
+        "The mesh has stray parts: 1 piece floats apart from the rest",
+        "The mesh has a size that can be neither meters nor millimeters",
+    ] {
+        assert!(said.contains(expected), "{said}");
+        assert!(shown.contains(expected), "the page lacks: {expected}");
+    }
+    let (_, error) = capture(&directory.path().join("cup.stl"), &directory.path().join("touches"));
+    let line = error.lines().find(|line| line.starts_with("cup: The mesh is open")).unwrap_or_default();
+    assert!(
+        line.contains("partly inside out") && line.contains("stray parts") && line.contains("a size that"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_damaged_mesh_of_any_format_is_refused_with_its_place_and_a_cure() {
+    let directory = tempfile::tempdir().unwrap();
+    let (out, cut) = (directory.path().join("out"), stl(&Mesh::globe(4)));
+    for (name, bytes, expected) in [
+        ("cup.stl", &cut[..cut.len() - 50], "cup.stl: byte 80: the STL file is damaged: it states 48 triangles"),
+        ("cup.ply", b"ply\nformat ascii 1.0\nelement face 3\nend_header\n", "cup.ply:3: the PLY file is damaged"),
+        ("cup.glb", b"glTF\x02\0\0\0\xff\0\0\0", "cup.glb: byte 8: the GLB file is damaged"),
+        ("cup.dae", b"<COLLADA>\n<a></b></COLLADA>", "cup.dae:2: the COLLADA file is damaged"),
+    ] {
+        let path = directory.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        for name in ["capture", "view", "run"] {
+            let error = stderr(command([name, "-o"]).args([&out, &path]).output().unwrap(), 1);
+            assert!(error.contains(expected) && error.contains("Export the mesh again"), "{error}");
+        }
+        let casts = directory.path().join("casts.csv");
+        std::fs::write(&casts, "a,0,0,9,0,0,-1\n").unwrap();
+        assert!(stderr(command(["cast"]).args([&path, &casts]).output().unwrap(), 1).contains(expected));
+    }
+    assert!(!out.exists());
+}
