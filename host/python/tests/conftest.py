@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
+# Before the libraries are loaded: their threads spin where others want the cores too.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import palpate
 import pytest
 

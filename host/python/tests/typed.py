@@ -50,4 +50,5 @@ assert_type(surface.bounds, tuple[list[float], list[float]])
 
 palpate.capture(1)  # type: ignore[arg-type]
 model.margins(data, 3)  # type: ignore[call-arg]
-recognizer.push("touch").nothing  # type: ignore[attr-defined]
+recognizer.push("touch")  # type: ignore[arg-type]
+recognizer.push((0.0, 0.0, 0.0)).nothing  # type: ignore[attr-defined]

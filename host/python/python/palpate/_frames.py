@@ -14,7 +14,8 @@ def to_pandas(data: DataSet) -> pandas.DataFrame:
     """The touches as a table that shares the arrays' memory."""
     import pandas
 
-    columns: dict[str, object] = {"object": pandas.Categorical.from_codes(data.objects, categories=data.names)}
+    categories = pandas.Index(data.names)
+    columns: dict[str, object] = {"object": pandas.Categorical.from_codes(data.objects, categories=categories)}
     columns.update({f"t{finger + 1}": data.times[:, finger] for finger in range(3)})
     for name, vectors in (("direction", data.direction), ("alignment", data.alignment)):
         if vectors is not None:

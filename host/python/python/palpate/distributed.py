@@ -409,7 +409,7 @@ def train(
     columns = ["t1", "t2", "t3", "direction", "alignment"]
     count = len(_features(pd.DataFrame({name: [] for name in columns}), descriptor).columns)
 
-    def rows(table: pd.DataFrame) -> pd.DataFrame:
+    def rows(table: Any) -> Any:
         found = _features(table, descriptor)
         found["label"] = table["object"].map({name: number for number, name in enumerate(names)}).astype("int32")
         found["weight"] = (table["object"].map(weights).astype("float64") * mean).astype("float32")
