@@ -181,7 +181,9 @@ impl Device for Fingers {
 }
 
 fn touch(number: u32) -> Touch {
-    Touch::new([0, 1_000 * number, if number.is_multiple_of(2) { u32::MAX } else { 40_000 }].map(ContactTime::from_micros))
+    Touch::new(
+        [0, 1_000 * number, if number.is_multiple_of(2) { u32::MAX } else { 40_000 }].map(ContactTime::from_micros),
+    )
 }
 
 /// What the chip reports about a touch: counted or not, it was one.
