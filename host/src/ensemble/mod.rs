@@ -14,7 +14,9 @@ mod origin;
 pub mod train;
 mod xgboost;
 
-pub(crate) use check::{MAX_FEATURES, MAX_OBJECTS, check_leaf, check_names};
+#[cfg(feature = "train")]
+pub(crate) use check::check_names;
+pub(crate) use check::{MAX_FEATURES, MAX_OBJECTS, check_leaf};
 pub use inputs::Inputs;
 pub use origin::{Imported, Origin, StatedProbe, Trained};
 
