@@ -26,8 +26,8 @@ Examples:
   palpate capture meshes/ -o data --true-size --unit mm --probe probe.toml
                                                   as large as they are
   palpate capture meshes/ -o data --probe probe.toml
-                                                  as your probe would: the file's
-                                                  [real] is added to each touch
+                                                  as your probe would, with
+                                                  what [real] says of it
   palpate capture meshes/ -o data --instances     a directory for each object
   palpate capture builtin -o data --instances 20  twenty forks are a fork
   palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts

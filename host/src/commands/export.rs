@@ -35,7 +35,8 @@ Examples:
   palpate export lightgbm.txt -o model.palpate --for speed
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
   palpate export ensemble.json -o model.palpate --emit c  # also model.h
-  palpate export lightgbm.txt -o model.palpate --emit json  # also model.json, which XGBoost opens")]
+  palpate export lightgbm.txt -o model.palpate --emit json
+                                                  # also model.json, for XGBoost")]
 pub(crate) struct Arguments {
     /// Ensemble that `palpate train` or another library saved
     ensemble: PathBuf,

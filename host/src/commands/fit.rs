@@ -29,7 +29,7 @@ pub(super) struct FitArguments {
     /// The recorded touches: a directory with a file for each object
     #[arg(value_name = "RECORDED")]
     recorded: PathBuf,
-    /// The objects: `builtin` or a built-in object's name, an OBJ file, or a directory that is searched for OBJ files
+    /// The objects: `builtin` or a built-in object's name, a mesh, or a directory of meshes
     #[arg(value_name = "MESHES", required = true)]
     sources: Vec<String>,
     /// Where to write the probe, such as probe.toml

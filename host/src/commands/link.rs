@@ -101,7 +101,7 @@ Examples:
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
   palpate link /dev/ttyACM0 - --active                where to touch next
   palpate link /dev/ttyACM0 --record recorded --object bowl
-                                                      keep what its fingers touch
+                                                      keep its touches
   palpate link emulator --load model.palpate --parity touches/ --touches 10000
   palpate link emulator --load model.palpate --parity touches/ \\
       --bad-line 0.001,0.001,0.01,5

@@ -12,18 +12,18 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-The page works in any browser with WebGL and WebAssembly, without a network: objects and models are in it, and what touches the ones and reads the others is this program's own code. `palpate run` writes such a page beside its report.
+The page works in any browser with WebGL and WebAssembly, without a network. Objects and models are in it. What touches the ones and reads the others is this program's own code. `palpate run` writes such a page beside its report.
 
 Without --model four are trained for the page, which takes about a minute: the published method (times of full touches), curvature of full touches, curvature of every contact, and oriented with a plan, which also knows where the probe came from. With --model several times, the page compares those.
 
 Examples:
-  palpate play -o play.html                          ten built-in objects, four models
+  palpate play -o play.html                          ten objects, four models
   palpate play bowl mouse fork -o play.html          three of them
-  palpate play meshes/ -o play.html                  your own OBJ files
+  palpate play meshes/ -o play.html                  your own meshes
   palpate play --model models/household.palpate -o play.html
   palpate play --model curvature.palpate --model planned.palpate -o play.html")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin` or built-in objects' names, OBJ files, directories of them
+    /// What to touch: `builtin` or built-in objects' names, mesh files, directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// A model that `palpate export` wrote; may be given several times [default: four are trained]

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate view bowl -o bowl.html                  a built-in object
-  palpate view cup.stl -o cup.html                your own mesh: what is wrong with it?
+  palpate view cup.stl -o cup.html                is your own mesh right?
   palpate view fork -o fork.html --touches 60     more touches
   palpate view cup.obj -o cup.html --radius 0.05  with thinner fingers
   palpate view cup.obj -o cup.html --true-size --unit mm --probe probe.toml

@@ -91,7 +91,7 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
     let (said, shown) = view(&bad);
     for expected in [
         "The mesh is open: 3 edges belong to one triangle only, in 1 of 2 parts",
-        "The mesh is partly inside out: 1 of 2 parts is (120 triangles around (9.00e6, 0, 0))",
+        "The mesh is partly inside out: 1 of 2 parts is (120 triangles around (9.00e6, -7949, 0))",
         "The mesh has stray parts: 1 piece floats apart from the rest",
         "The mesh has a size that can be neither meters nor millimeters",
     ] {

@@ -51,6 +51,6 @@ fn a_directory_of_several_objects_is_refused_with_their_number() {
     globe(directory.path(), "two", 4);
     let page = directory.path().join("page.html");
     let error = stderr(command(["view", "-o"]).args([&page, directory.path()]).output().unwrap(), 1);
-    assert!(error.contains("2 objects, where one is needed. Give one OBJ file"), "{error}");
+    assert!(error.contains("2 objects, where one is needed. Give one mesh file"), "{error}");
     assert!(!page.exists());
 }

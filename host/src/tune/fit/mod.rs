@@ -22,7 +22,7 @@
 //! use palpate::tune::fit::{self, fit};
 //!
 //! # fn main() -> palpate::Result<()> {
-//! let objects = source::objects(&["meshes"])?;
+//! let objects = source::objects(&["meshes".into()])?;
 //! let recorded = Dataset::read_any("recorded".as_ref())?;
 //! let fit = fit(&recorded, &objects, None, &fit::Settings::default(), &())?;
 //! println!("{}", fit.toml());
@@ -42,6 +42,7 @@ mod tests;
 mod timer;
 
 pub use advice::Warning;
+#[cfg(feature = "cli")]
 pub(crate) use outcome::between;
 pub use outcome::{Estimate, Fit};
 pub use suspects::Suspect;

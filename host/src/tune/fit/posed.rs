@@ -19,12 +19,26 @@ use rayon::prelude::*;
 const APPROACHES: usize = 160;
 /// The share of a touch's density that comes from approaches in its pose.
 const TRUSTED: f64 = 0.8;
-/// By how much of their distance from 0 simulated times are smoothed: there are few, and poses are not exact.
+/// By how much of their distance from 0 simulated times are smoothed: poses are not exact.
 const SMOOTHING: f64 = 0.06;
+/// Which neighbor an approach is smoothed toward: there are few, and gaps between them must not be taken for noise.
+const NEIGHBOR: usize = 3;
 
-/// Contact times in milliseconds of approaches in the pose of one recorded touch, with which fingers touched.
+/// Approaches in the pose of one recorded touch.
 #[derive(Debug)]
-pub(super) struct InPose(Vec<(u8, [f32; 3])>);
+pub(super) struct InPose(Vec<Simulated>);
+
+#[derive(Clone, Copy, Debug)]
+struct Simulated {
+    /// Which fingers touched.
+    touched: u8,
+    /// Contact times in milliseconds.
+    times: [f32; 3],
+    /// How far the differences of times are smoothed, in milliseconds: half the way to its third neighbor with the same
+    /// contacts. Method: Breiman, Meisel and Purcell, Variable kernel estimates of multivariate densities, Technometrics
+    /// 19 (1977).
+    gap: f32,
+}
 
 /// For each recorded touch of an object, approaches in its pose; none for a touch without a pose. Nothing if no touch has
 /// one.
@@ -40,11 +54,31 @@ pub(super) fn in_poses(name: &str, touches: &[Touch], scenes: &[Scene], settings
             let approach = aimed(&mut random, &pose, scene, settings);
             let touch = approach.touch(approach.distances(scene, &settings.origin.probe), &settings.origin.probe);
             let times = touch.times().map(|time| time.micros().map_or(0.0, |micros| micros as f32 / 1e3));
-            (Observed::of(&touch).fingers, times)
+            Simulated { touched: Observed::of(&touch).fingers, times, gap: 0.0 }
         });
-        Some(InPose(approaches.collect()))
+        let mut approaches: Vec<Simulated> = approaches.collect();
+        let gaps: Vec<f32> = approaches.iter().map(|approach| gap(approach, &approaches)).collect();
+        approaches.iter_mut().zip(gaps).for_each(|(approach, gap)| approach.gap = gap);
+        Some(InPose(approaches))
     };
     touches.par_iter().enumerate().map(one).collect()
+}
+
+/// Half the way to the third neighbor with the same contacts; 0 where there are not as many.
+fn gap(one: &Simulated, all: &[Simulated]) -> f32 {
+    // Times of fingers that did not touch are 0, and so are what they add here.
+    let away = |other: &Simulated| {
+        let [a, b, c]: [f32; 3] = std::array::from_fn(|finger| other.times[finger] - one.times[finger]);
+        let touched = |fingers: u8| one.touched & fingers == fingers;
+        let differences = [(0b011, b - a), (0b110, c - b), (0b101, c - a)];
+        differences.iter().map(|(fingers, away)| if touched(*fingers) { away.abs() } else { 0.0 }).fold(0.0, f32::max)
+    };
+    let mut neighbors: Vec<f32> = all.iter().filter(|other| other.touched == one.touched).map(away).collect();
+    // The nearest is the approach itself.
+    if neighbors.len() <= NEIGHBOR {
+        return 0.0;
+    }
+    *neighbors.select_nth_unstable_by(NEIGHBOR, f32::total_cmp).1 / 2.0
 }
 
 /// An approach in this pose, aimed as the robot aims.
@@ -74,7 +108,7 @@ pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pos
 fn density(candidate: &Candidate, kept: Kept, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
     let Candidate { factor, late, noise, missed } = candidate;
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (touched, times) in approaches {
+    for Simulated { touched, times, gap } in approaches {
         let weight = match kept {
             Kept::Full => f64::from(u8::from(*touched == FULL)),
             Kept::All | Kept::Contacts => product(*touched, observed.fingers, missed),
@@ -85,7 +119,7 @@ fn density(candidate: &Candidate, kept: Kept, observed: &Observed, InPose(approa
         }
         let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];
         let kernel = |expected: f64, found: f64, variance: f64, of: f64| {
-            let variance = variance * noise * noise + (SMOOTHING * of).powi(2);
+            let variance = variance * noise * noise + (SMOOTHING * of).powi(2) + (factor * f64::from(*gap)).powi(2);
             (-0.5 * (found - expected).powi(2) / variance).exp() / (std::f64::consts::TAU * variance).sqrt()
         };
         sum += weight

@@ -1,8 +1,9 @@
 //! Recordings that look wrong: of another object than their name says, of two objects, of a probe that was changed.
 //!
-//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits all. Likelihood ratios of the right object against a wrong
-//! one pass e^x with a probability of at most e^−x, wherever in the recording one looks (Ville's inequality), so that a
-//! few hundred comparisons at [`CERTAIN`] nats together give a false alarm once in a thousand recordings.
+//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits all.
+//! Likelihood ratios of the right object against a wrong one pass e^x with a probability of at most e^−x, wherever in the
+//! recording one looks (Ville's inequality), so that a few hundred comparisons at [`CERTAIN`] nats together give a false
+//! alarm once in a thousand recordings.
 
 use super::Evidence;
 use super::density::Observed;
@@ -109,24 +110,85 @@ impl fmt::Display for Suspect {
     }
 }
 
-/// Everything that looks wrong, recording by recording.
-pub(super) fn suspects(evidence: &Evidence<'_>, best: &Best, progress: &dyn Progress) -> Result<Vec<Suspect>> {
-    let one = |index: usize| -> Result<Option<Suspect>> {
-        progress::check(progress)?;
-        Ok(suspect(evidence, best, index))
-    };
-    let found: Vec<Option<Suspect>> = (0..evidence.recordings.len()).into_par_iter().map(one).collect::<Result<_>>()?;
-    Ok(found.into_iter().flatten().collect())
+/// Recordings that nothing is wrong with as far as is known, and the fit to them.
+struct Sound<'a> {
+    evidence: &'a Evidence<'a>,
+    is_sound: Vec<bool>,
+    best: Best,
 }
 
-fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect> {
+impl Sound<'_> {
+    /// Whether a recording is all that there is to go by.
+    fn is_only(&self) -> bool {
+        self.count() == 1 && self.evidence.plate.is_none()
+    }
+
+    fn count(&self) -> usize {
+        self.is_sound.iter().filter(|is_sound| **is_sound).count()
+    }
+
+    /// How likely a candidate is by all sound recordings but this one.
+    fn others(&self, candidate: &Candidate, index: usize) -> f64 {
+        self.evidence.log_likelihood(candidate, |other| other != index && self.is_sound[other])
+    }
+
+    /// Goes on without a recording.
+    fn leave_out(&mut self, index: usize) {
+        self.is_sound[index] = false;
+        let likelihood = |candidate: &Candidate| self.evidence.log_likelihood(candidate, |other| self.is_sound[other]);
+        self.best = search::best(&likelihood, Some(self.best.candidate));
+    }
+}
+
+/// Something that looks wrong, and by how many nats.
+struct Found {
+    index: usize,
+    suspect: Suspect,
+    nats: f64,
+}
+
+impl Found {
+    /// Wrong names come first: they make the fit wrong, and with it what is said about the probe of the others.
+    fn rank(&self) -> (bool, f64) {
+        (matches!(self.suspect, Suspect::OtherObject { .. } | Suspect::TwoObjects { .. }), self.nats)
+    }
+}
+
+/// Everything that looks wrong, in the order of the recordings. One wrong recording makes others look wrong beside it: the
+/// worst is named and left out, until the others agree.
+pub(super) fn suspects(evidence: &Evidence<'_>, best: &Best, progress: &dyn Progress) -> Result<Vec<Suspect>> {
+    let mut sound = Sound { evidence, is_sound: vec![true; evidence.recordings.len()], best: *best };
+    let mut named: Vec<Found> = Vec::new();
+    while sound.count() > 0 {
+        let one = |index: usize| -> Result<Option<Found>> {
+            progress::check(progress)?;
+            let found = if sound.is_sound[index] { suspect(&sound, index) } else { None };
+            Ok(found.map(|(suspect, nats)| Found { index, suspect, nats }))
+        };
+        let found: Vec<Option<Found>> =
+            (0..evidence.recordings.len()).into_par_iter().map(one).collect::<Result<_>>()?;
+        let worst = found.into_iter().flatten().max_by(|a, b| {
+            let ((a_name, a_nats), (b_name, b_nats)) = (a.rank(), b.rank());
+            a_name.cmp(&b_name).then(a_nats.total_cmp(&b_nats))
+        });
+        let Some(worst) = worst else { break };
+        sound.leave_out(worst.index);
+        named.push(worst);
+    }
+    named.sort_by_key(|found| found.index);
+    Ok(named.into_iter().map(|found| found.suspect).collect())
+}
+
+/// What looks wrong about a recording, and by how many nats.
+fn suspect(sound: &Sound<'_>, index: usize) -> Option<(Suspect, f64)> {
+    let (evidence, best) = (sound.evidence, &sound.best);
     let recording = &evidence.recordings[index];
     let (touches, own, name) = (&recording.touches, evidence.of[index], recording.name.to_owned());
     if touches.len() < LEAST {
         return None;
     }
-    let only = evidence.recordings.len() == 1 && evidence.plate.is_none();
-    let others = |candidate: &Candidate| evidence.log_likelihood(candidate, |other| other != index);
+    let only = sound.is_only();
+    let others = |candidate: &Candidate| sound.others(candidate, index);
     let rest = if only { *best } else { search::near(&others, &best.candidate) };
     let by = |candidate: &Candidate, object: usize| -> Vec<f64> {
         let explained = Explained::new(candidate, &evidence.objects[object], recording.kept);
@@ -164,30 +226,30 @@ fn suspect(evidence: &Evidence<'_>, best: &Best, index: usize) -> Option<Suspect
     };
     if let Some((other, gain)) = whole.filter(|(other, gain)| *gain > CERTAIN && renamed(*other)) {
         // A part of the recording may still be the object's own.
-        if let Some((part, (from, to, _))) = stretch.filter(|(_, (from, to, most))| {
+        if let Some((part, (from, to, most))) = stretch.filter(|(_, (from, to, most))| {
             *most > gain + CERTAIN && to - from >= LEAST && touches.len() - (to - from) >= LEAST
         }) {
-            return Some(two(name, object(part), Some((from, to)), touches.len()));
+            return Some((two(name, object(part), (from, to), touches.len()), most));
         }
-        return Some(Suspect::OtherObject { object: name, looks_like: object(other) });
+        return Some((Suspect::OtherObject { object: name, looks_like: object(other) }, gain));
     }
-    if let Some((other, (from, to, _))) =
+    if let Some((other, (from, to, gain))) =
         stretch.filter(|(_, (from, to, gain))| *gain > CERTAIN && to - from >= LEAST / 2)
     {
-        return Some(two(name, object(other), Some((from, to)), touches.len()));
+        return Some((two(name, object(other), (from, to), touches.len()), gain));
     }
     let mixed = rivals.iter().map(|(other, theirs)| (*other, mixture(theirs, &mine)));
-    if let Some((other, (share, _))) =
+    if let Some((other, (share, gain))) =
         mixed.filter(|(_, (share, gain))| *gain > CERTAIN && *share > 0.05).max_by(|a, b| a.1.1.total_cmp(&b.1.1))
     {
-        return Some(Suspect::TwoObjects { object: name, other: object(other), from: None, to: None, share });
+        return Some((Suspect::TwoObjects { object: name, other: object(other), from: None, to: None, share }, gain));
     }
-    changed(evidence, best, &rest, index).or_else(|| unlike(evidence, &rest, index, &mine))
+    changed(sound, &rest, index).or_else(|| unlike(evidence, &rest, index, &mine))
 }
 
-fn two(object: String, other: String, place: Option<(usize, usize)>, all: usize) -> Suspect {
-    let share = place.map_or(0.0, |(from, to)| (to - from) as f64 / all as f64);
-    Suspect::TwoObjects { object, other, from: place.map(|(from, _)| from + 1), to: place.map(|(_, to)| to), share }
+fn two(object: String, other: String, (from, to): (usize, usize), all: usize) -> Suspect {
+    let share = (to - from) as f64 / all as f64;
+    Suspect::TwoObjects { object, other, from: Some(from + 1), to: Some(to), share }
 }
 
 /// The stretch of touches that another object explains better by the most nats: from, to (excluded), nats. Kadane's
@@ -217,8 +279,9 @@ fn mixture(theirs: &[f64], mine: &[f64]) -> (f64, f64) {
     (share, odds().map(|odds| (share * odds + 1.0 - share).ln()).sum())
 }
 
-/// Whether another probe made the recording, or the rest of it.
-fn changed(evidence: &Evidence<'_>, best: &Best, rest: &Best, index: usize) -> Option<Suspect> {
+/// Whether another probe made the recording, or the rest of it, and by how many nats that is likelier.
+fn changed(sound: &Sound<'_>, rest: &Best, index: usize) -> Option<(Suspect, f64)> {
+    let (evidence, best) = (sound.evidence, &sound.best);
     let recording = &evidence.recordings[index];
     let (touches, name) = (&recording.touches, recording.name.to_owned());
     let explained =
@@ -243,23 +306,20 @@ fn changed(evidence: &Evidence<'_>, best: &Best, rest: &Best, index: usize) -> O
             let explained = explained(&part.candidate);
             touches.iter().map(|touch| explained.log_density(touch)).collect::<Vec<f64>>()
         });
-        let mut gain: f64 = 0.0;
+        let mut later: f64 = 0.0;
         let mut most = (f64::NEG_INFINITY, 0);
         for (at, (one, other)) in one.iter().zip(&other).enumerate().rev() {
-            gain += other - one;
-            if gain > most.0 {
-                most = (gain, at);
+            later += other - one;
+            if later > most.0 {
+                most = (later, at);
             }
         }
-        return Some(Suspect::Changed {
-            object: name,
-            from: most.1 + 1,
-            what: difference(&before.candidate, &after.candidate),
-        });
+        let what = difference(&before.candidate, &after.candidate);
+        return Some((Suspect::Changed { object: name, from: most.1 + 1, what }, gain));
     }
     let gained = whole.log_likelihood + rest.log_likelihood - best.log_likelihood;
-    (evidence.recordings.len() > 1 && gained > CERTAIN_PROBE)
-        .then(|| Suspect::OtherProbe { object: name, what: difference(&rest.candidate, &whole.candidate) })
+    (sound.count() > 1 && gained > CERTAIN_PROBE)
+        .then(|| (Suspect::OtherProbe { object: name, what: difference(&rest.candidate, &whole.candidate) }, gained))
 }
 
 /// What changed, in words.
@@ -281,8 +341,8 @@ fn difference(before: &Candidate, after: &Candidate) -> String {
     if said.is_empty() { "several small differences".into() } else { said.join(", ") }
 }
 
-/// Whether the touches are far less likely than the object's own would be.
-fn unlike(evidence: &Evidence<'_>, rest: &Best, index: usize, mine: &[f64]) -> Option<Suspect> {
+/// Whether the touches are far less likely than the object's own would be, and about how many nats that is.
+fn unlike(evidence: &Evidence<'_>, rest: &Best, index: usize, mine: &[f64]) -> Option<(Suspect, f64)> {
     let recording = &evidence.recordings[index];
     let object = &evidence.objects[evidence.of[index]];
     let explained = Explained::new(&rest.candidate, object, recording.kept);
@@ -295,7 +355,7 @@ fn unlike(evidence: &Evidence<'_>, rest: &Best, index: usize, mine: &[f64]) -> O
     );
     let [own, _] = moments(mine);
     let errors = (mean - own) / (variance / mine.len() as f64).sqrt();
-    (errors > UNLIKE).then(|| Suspect::Unlike { object: recording.name.to_owned(), errors })
+    (errors > UNLIKE).then(|| (Suspect::Unlike { object: recording.name.to_owned(), errors }, 0.5 * errors * errors))
 }
 
 fn moments(values: &[f64]) -> [f64; 2] {

@@ -36,7 +36,8 @@ pub(super) fn timer<'a>(touches: impl IntoIterator<Item = &'a Touch>) -> Timer {
         if near.len() >= LEAST {
             enough = true;
             if closeness(near, resolution) > CLOSE {
-                let finer = (-20..=20).map(|step| resolution * (1.0 + 2e-4 * f64::from(step)));
+                // Coming from above, and with times of few ticks, this is the side of the peak.
+                let finer = (-600..=20).map(|step| resolution * (1.0 + 2e-4 * f64::from(step)));
                 let best = finer.max_by(|a, b| closeness(near, *a).total_cmp(&closeness(near, *b)));
                 return Timer::Found(usual(best.unwrap_or(resolution)));
             }
