@@ -26,27 +26,34 @@ row() { # name, full touches, approaches, more options of train
     shift 3
     quiet train "$full" -o "$out/full.json" "$@"
     quiet train "$all" -o "$out/contacts.json" "$@"
-    echo "== $name"
-    "$palpate" evaluate "$out/full.json" "$out/test" --at 10,20,30,60 | grep -A 3 '^touches' | sed 's/^/full touches   /'
-    "$palpate" evaluate "$out/contacts.json" "$out/test" --at 10,20,30,60 | grep -A 3 '^approaches' | sed 's/^/every contact  /'
+    printf '| %s' "$name"
+    for model in full contacts; do
+        # Of the first table (touches, or approaches) the row of all objects.
+        "$palpate" evaluate "$out/$model.json" "$out/test" --at 10,30,60 2>>"$out/log" |
+            awk -v want="$([ $model = full ] && echo touches || echo approaches)" '
+                $1 == want { on = 1 } on && $1 == "all" { printf " | %s / %s / %s | %s", $2, $4, $6, $9; exit }'
+    done
+    echo " |"
 }
 
 if [ ! -e "$out/../clean-all/dataset.json" ]; then
     quiet capture "$meshes" -o "$out/../clean" --touches "$touches" --force
     quiet capture "$meshes" -o "$out/../clean-all" --approaches --touches "$approaches" --force
 fi
+echo "| $(basename "$robot") | full touches: correct after 10 / 30 / 60 | wrong | every contact: after 10 / 30 / 60 approaches | wrong |"
+echo "|---|---|---|---|---|"
 row "trained clean" "$out/../clean" "$out/../clean-all"
 row "mixture" "$out/../clean" "$out/../clean-all" --noise 0..6ms --timer 1ms --speed-error 15% --missed 2%
 
 fitted() { # name, recorded touches, more options of fit
     name=$1 recorded=$2
     shift 2
-    echo "== $name"
     # shellcheck disable=SC2086
-    "$palpate" probe fit "$recorded" $known -o "$out/probe.toml" "$@"
+    "$palpate" probe fit "$recorded" $known -o "$out/probe.toml" "$@" >"$out/fit.txt"
     quiet capture "$meshes" -o "$out/fitted" --touches "$touches" --probe "$out/probe.toml" --force
     quiet capture "$meshes" -o "$out/fitted-all" --approaches --touches "$approaches" --probe "$out/probe.toml" --force
     row "$name" "$out/fitted" "$out/fitted-all"
+    sed -n '/interval/,/^timer/p' "$out/fit.txt" >"$out/$name.txt"
 }
 
 mkdir -p "$out/part"
@@ -54,3 +61,8 @@ for file in "$robot"/known/*.txt; do head -n 75 "$file" >"$out/part/$(basename "
 fitted "fitted from 300 approaches" "$out/part"
 fitted "fitted from all approaches" "$robot/known"
 fitted "fitted from all approaches and the plate" "$robot/known" --plate "$robot/plate.txt"
+echo
+for name in "$out"/fitted*.txt; do
+    basename "$name" .txt
+    cat "$name"
+done
