@@ -261,7 +261,8 @@ int peer_class(const float *row)
 
 def ours_rust(ensemble, directory, palpate, leaf, goal):
     exported = export(palpate, ensemble, directory, leaf, goal)
-    return rust(ensemble, directory, directory / "model.palpate", ["palpate", exported["layout"], f"{leaf}-leaves"])
+    features = ["palpate", exported["layout"], f"{leaf}-leaves", *(["shared-leaves"] if "shared_leaves" in exported else [])]
+    return rust(ensemble, directory, directory / "model.palpate", features)
 
 
 def rust(ensemble, directory, model, features):
