@@ -74,7 +74,18 @@ fn walked(
     let instructions = Instructions::new(&shape);
     let base = forest.base.iter().map(|&base| base_bits(base, leaf, scale)).collect();
     let (unit, margin_error) = (scale.unit, margin_error());
-    Some(Parts { axes, cuts, groups, nodes, leaves: leaves.into_bytes(), base, unit, margin_error, instructions })
+    Some(Parts {
+        axes,
+        cuts,
+        groups,
+        nodes,
+        leaves: leaves.into_bytes(),
+        base,
+        unit,
+        margin_error,
+        instructions,
+        factors: Vec::new(),
+    })
 }
 
 fn base_bits(base: f32, leaf: LeafType, scale: &Scale) -> i32 {
