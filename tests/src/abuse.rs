@@ -50,7 +50,8 @@ pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
 /// A small model whose leaves are shared: numbers of one byte, or of two.
 pub fn shared(layout: Layout, is_wide: bool) -> Vec<u8> {
     let trees = if is_wide { 80 } else { 4 };
-    let shape = Shape { descriptor: Descriptor::Curvature, objects: 3, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
+    let shape =
+        Shape { descriptor: Descriptor::Curvature, objects: 3, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
     let settings = Settings { leaf: Leaf::I8, layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
     let ensemble = random::ensemble(shape, 5);
     let ensemble = if is_wide { ensemble } else { random::with_few_leaves(ensemble, 5) };

@@ -119,12 +119,8 @@ fn tables_by_contact_pattern_with_other_axes_are_refused() {
 
 #[test]
 fn the_sections_of_a_model_with_shared_leaves_are_pinned() {
-    let settings = Settings {
-        leaf: Leaf::I8,
-        layout: Some(Layout::Compact),
-        shared_leaves: Some(true),
-        ..Settings::default()
-    };
+    let settings =
+        Settings { leaf: Leaf::I8, layout: Some(Layout::Compact), shared_leaves: Some(true), ..Settings::default() };
     let compiled = compile(&ensemble(), &settings).unwrap();
     let at = 97 + env!("CARGO_PKG_VERSION").len();
     let body = &compiled.bytes[at..compiled.bytes.len() - 4];

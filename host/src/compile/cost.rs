@@ -7,7 +7,7 @@
 //! RAM and stack are those that `evaluator` prints. All figures are of the firmware's profile (`opt-level = "s"`).
 
 use palpate_onboard::Model;
-use palpate_shared::format::{Axis, Group, HEADER_LENGTH, Layout, LeafType};
+use palpate_shared::format::{Axis, Factors, Group, HEADER_LENGTH, Layout, LeafType};
 use serde::Serialize;
 
 /// A processor that costs are known for.
@@ -75,12 +75,27 @@ impl Instructions {
         let nodes = bytes.get(groups_end..groups_end + length(header.nodes_length())).unwrap_or_default();
         let is_shared = model.shared_leaves().is_some();
         let (layout, leaf) = (model.layout(), model.leaf_type());
-        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared })
+        let shape = |objects| Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared };
+        match model.factors() {
+            Some(factors) => Self::new(&shape(factors.count())).mixed(objects, factors.count()),
+            None => Self::new(&shape(objects)),
+        }
     }
 
     pub(super) fn new(shape: &Shape<'_>) -> Self {
         let m0_plus = (shape.leaf != LeafType::F32).then(|| M0_PLUS.touch(shape));
         Self { m4f: M4F.touch(shape), m0_plus }
+    }
+
+    /// The same where leaves hold so many factors, and margins of so many objects are made of them: by the instructions of
+    /// the loops that do it.
+    pub(super) fn mixed(self, objects: usize, factors: usize) -> Self {
+        let products = (objects * factors) as u64;
+        let objects = objects as u64;
+        Self {
+            m4f: self.m4f + 4 * products + 16 * objects,
+            m0_plus: self.m0_plus.map(|number| number + 6 * products + 24 * objects),
+        }
     }
 
     /// On a processor.
@@ -100,6 +115,7 @@ impl Memory {
         let ram = 8 * objects + 32 + 64;
         // The most that was seen for ten objects, less their margins.
         let stack = 4 * objects
+            + model.factors().map_or(0, |_| 4 * Factors::MOST)
             + match model.layout() {
                 Layout::Grid => 276,
                 Layout::Patterns => 380,
@@ -320,7 +336,15 @@ mod tests {
                 Group { depth, shift: 0, object, trees }
             };
             let groups: Vec<Group> = (0..parts).map(group).collect();
-            let shape = Shape { layout: Layout::Complete, leaf, objects: 10, axes, groups: &groups, nodes: &[], is_shared: false };
+            let shape = Shape {
+                layout: Layout::Complete,
+                leaf,
+                objects: 10,
+                axes,
+                groups: &groups,
+                nodes: &[],
+                is_shared: false,
+            };
             let estimate = Instructions::new(&shape);
             for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
                 assert!(
@@ -329,13 +353,29 @@ mod tests {
                 );
             }
         }
-        let grid = Shape { layout: Layout::Grid, leaf: LeafType::I8, objects: 10, axes: 2, groups: &[], nodes: &[], is_shared: false };
+        let grid = Shape {
+            layout: Layout::Grid,
+            leaf: LeafType::I8,
+            objects: 10,
+            axes: 2,
+            groups: &[],
+            nodes: &[],
+            is_shared: false,
+        };
         assert_eq!(Instructions::new(&grid), Instructions { m4f: 492, m0_plus: Some(576) });
     }
 
     #[test]
     fn with_f32_leaves_nothing_is_said_about_a_processor_without_float_unit() {
-        let shape = Shape { layout: Layout::Grid, leaf: LeafType::F32, objects: 10, axes: 2, groups: &[], nodes: &[], is_shared: false };
+        let shape = Shape {
+            layout: Layout::Grid,
+            leaf: LeafType::F32,
+            objects: 10,
+            axes: 2,
+            groups: &[],
+            nodes: &[],
+            is_shared: false,
+        };
         assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
         assert!(Instructions::new(&shape).on(Core::M4F).is_some());
     }
