@@ -10,7 +10,7 @@ use crate::chip::{self, PIN_CHANGED, SWITCHES};
 use crate::uart::{Port, Uart};
 use core::cell::RefCell;
 use core::convert::Infallible;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::{NVIC, SCB};
 use critical_section::Mutex;
 use embedded_hal::digital::{ErrorType, InputPin};
@@ -18,6 +18,8 @@ use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 
 /// Microseconds.
 static TIME: AtomicU32 = AtomicU32::new(0);
+/// Whether the pin interrupt still has to look at an edge.
+static EDGE: AtomicBool = AtomicBool::new(false);
 /// When the main loop last found that nothing more had happened.
 static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);
 
@@ -59,6 +61,7 @@ pub fn watch() {
 /// The pin interrupt.
 pub fn changed() {
     with(|watcher| watcher.interrupt(&PlayedClock));
+    EDGE.store(false, Ordering::Relaxed);
 }
 
 /// What the pins have to say to the main loop.
@@ -103,9 +106,9 @@ pub fn play() {
 
 /// The timer's interrupt: one edge.
 pub fn tick() {
-    // The pin interrupt comes soon after an edge; edges are further apart than that. And a main loop that has fallen
-    // behind catches up between touches.
-    let busy = NVIC::is_pending(PIN_CHANGED) || with(|watcher| watcher.waiting() > 32).unwrap_or(true);
+    // The pin interrupt comes soon after an edge; edges are further apart than that, also where the emulator is halted on
+    // the way and this timer runs on. And a main loop that has fallen behind catches up between touches.
+    let busy = EDGE.load(Ordering::Relaxed) || with(|watcher| watcher.waiting() > 32).unwrap_or(true);
     let wait = critical_section::with(|cs| {
         let mut player = PLAYER.borrow_ref_mut(cs);
         let player = player.as_mut()?;
@@ -148,6 +151,7 @@ impl Player {
         if finger < 3 {
             let levels = SWITCHES.load(Ordering::Relaxed) & !(1 << finger);
             SWITCHES.store(levels | u32::from(level & 1) << finger, Ordering::Relaxed);
+            EDGE.store(true, Ordering::Relaxed);
             NVIC::pend(PIN_CHANGED);
         }
     }

@@ -47,7 +47,8 @@ fn main() {
 }
 
 fn compare(name: &str, ensemble: &Ensemble, touches: &[Touch]) {
-    let rows: Vec<Vec<f32>> = touches.iter().filter_map(|touch| Some(feature_row(ensemble.descriptor()?, touch))).collect();
+    let rows: Vec<Vec<f32>> =
+        touches.iter().filter_map(|touch| Some(feature_row(ensemble.descriptor()?, touch))).collect();
     let expected: Vec<Vec<f32>> = touches.iter().map(|touch| ensemble.margins(touch)).collect();
     println!("\n{name}: {} touches", touches.len());
     let mut ours = f64::INFINITY;
