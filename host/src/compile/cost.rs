@@ -184,7 +184,7 @@ const M4F: Costs = Costs {
     axis: 140,
     block: 130,
     shift: 60,
-    walk: [(12, 6), (18, 13)],
+    walk: [(12, 6), (17, 8)],
     leaf: Leaf { ten_i8: 29, five_i16: 19, five_f32: 30, alone: 11 },
     number: 12,
     shared_tree: 30,
@@ -198,7 +198,7 @@ const M0_PLUS: Costs = Costs {
     axis: 203,
     block: 189,
     shift: 87,
-    walk: [(18, 7), (26, 19)],
+    walk: [(18, 7), (26, 16)],
     // No estimate is made with f32.
     leaf: Leaf { ten_i8: 57, five_i16: 31, five_f32: 0, alone: 14 },
     number: 16,

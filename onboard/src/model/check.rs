@@ -29,11 +29,10 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     ranks::check(model, header.last_feature())?;
     let section = |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(Wrong::Section(model.offset(part))) };
     let values = model.objects();
-    let shared = match stated.by_object & HAS_SHARED_LEAVES {
-        0 => None,
-        _ => SharedLeaves::from_bytes(optional::find(optional, Tag::SharedLeaves)),
-    };
-    let shared = shared.filter(|_| built_in::SHARED_LEAVES);
+    let mut shared = None;
+    if built_in::SHARED_LEAVES && stated.by_object & HAS_SHARED_LEAVES != 0 {
+        shared = SharedLeaves::from_bytes(optional::find(optional, Tag::SharedLeaves));
+    }
     let mut nodes = model.nodes;
     let mut leaves = model.leaves;
     if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
