@@ -50,7 +50,8 @@ pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
 /// A small model whose leaves are shared: numbers of one byte, or of two.
 pub fn shared(layout: Layout, is_wide: bool) -> Vec<u8> {
     let trees = if is_wide { 80 } else { 4 };
-    let shape = Shape { descriptor: Descriptor::Curvature, objects: 3, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
+    let shape =
+        Shape { descriptor: Descriptor::Curvature, objects: 3, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
     let settings = Settings { leaf: Leaf::I8, layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
     let ensemble = random::ensemble(shape, 5);
     let ensemble = if is_wide { ensemble } else { random::with_few_leaves(ensemble, 5) };
@@ -388,7 +389,8 @@ fn shared_leaves(put: Put<'_>) {
     let number = values.len() / 3;
     put("leaves numbered by no byte", "field", optional, changed(&good, content, &[0]));
     put("leaves numbered by three bytes", "field", optional, changed(&good, content, &[3]));
-    put("leaves without their table", "section", splits_of(&good), with_sections(&good, &[]));
+    let alone = with_sections(&good, &[]);
+    put("leaves without their table", "section", splits_of(&alone), alone);
     let tag = Tag::SharedLeaves.code() | MUST_UNDERSTAND;
     put("a table of leaves that is too short", "field", optional, with_sections(&good, &section(tag, &[1, 0, 0])));
     // The greatest number is one that was given.

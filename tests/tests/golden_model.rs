@@ -119,12 +119,8 @@ fn tables_by_contact_pattern_with_other_axes_are_refused() {
 
 #[test]
 fn the_sections_of_a_model_with_shared_leaves_are_pinned() {
-    let settings = Settings {
-        leaf: Leaf::I8,
-        layout: Some(Layout::Compact),
-        shared_leaves: Some(true),
-        ..Settings::default()
-    };
+    let settings =
+        Settings { leaf: Leaf::I8, layout: Some(Layout::Compact), shared_leaves: Some(true), ..Settings::default() };
     let compiled = compile(&ensemble(), &settings).unwrap();
     let at = 97 + env!("CARGO_PKG_VERSION").len();
     let body = &compiled.bytes[at..compiled.bytes.len() - 4];
@@ -175,7 +171,7 @@ const HEADER: [&str; 6] = [
 
 const PATTERNS: &str = "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 01 04 01 02 01 02 00 03 01 04 01 e9 03 00 00 70 11 01 00 d8 24 d8 24 d8 24 c8 70 b8 74 b8 74 b8 74 78 64";
 
-const SHARED: &str = "02 61 62 01 63 00 0c 80 00 00 0e 00 00 00 01 00 00 00 88 80 78 84 c0 40 a0 90 60 80 00 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 01 01 00 00 00 01 02 03 04";
+const SHARED: &str = "02 61 62 01 63 00 0c 80 00 00 0e 00 00 00 01 00 00 00 88 80 78 84 c0 40 a0 90 60 80 00 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 00 01 02 03 04";
 
 const SECTIONS: [(Leaf, Layout, &str); 5] = [
     (

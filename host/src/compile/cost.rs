@@ -187,7 +187,7 @@ const M4F: Costs = Costs {
     walk: [(12, 6), (17, 8)],
     leaf: Leaf { ten_i8: 29, five_i16: 19, five_f32: 30, alone: 11 },
     number: 12,
-    shared_tree: 30,
+    shared_tree: 45,
     preorder: (25.0, 57, 5),
     step: (17.0, 28.0),
     grid: (442, 5),
@@ -202,7 +202,7 @@ const M0_PLUS: Costs = Costs {
     // No estimate is made with f32.
     leaf: Leaf { ten_i8: 57, five_i16: 31, five_f32: 0, alone: 14 },
     number: 16,
-    shared_tree: 42,
+    shared_tree: 60,
     preorder: (35.0, 80, 7),
     step: (24.0, 39.0),
     grid: (506, 7),
@@ -320,7 +320,15 @@ mod tests {
                 Group { depth, shift: 0, object, trees }
             };
             let groups: Vec<Group> = (0..parts).map(group).collect();
-            let shape = Shape { layout: Layout::Complete, leaf, objects: 10, axes, groups: &groups, nodes: &[], is_shared: false };
+            let shape = Shape {
+                layout: Layout::Complete,
+                leaf,
+                objects: 10,
+                axes,
+                groups: &groups,
+                nodes: &[],
+                is_shared: false,
+            };
             let estimate = Instructions::new(&shape);
             for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
                 assert!(
@@ -329,13 +337,29 @@ mod tests {
                 );
             }
         }
-        let grid = Shape { layout: Layout::Grid, leaf: LeafType::I8, objects: 10, axes: 2, groups: &[], nodes: &[], is_shared: false };
+        let grid = Shape {
+            layout: Layout::Grid,
+            leaf: LeafType::I8,
+            objects: 10,
+            axes: 2,
+            groups: &[],
+            nodes: &[],
+            is_shared: false,
+        };
         assert_eq!(Instructions::new(&grid), Instructions { m4f: 492, m0_plus: Some(576) });
     }
 
     #[test]
     fn with_f32_leaves_nothing_is_said_about_a_processor_without_float_unit() {
-        let shape = Shape { layout: Layout::Grid, leaf: LeafType::F32, objects: 10, axes: 2, groups: &[], nodes: &[], is_shared: false };
+        let shape = Shape {
+            layout: Layout::Grid,
+            leaf: LeafType::F32,
+            objects: 10,
+            axes: 2,
+            groups: &[],
+            nodes: &[],
+            is_shared: false,
+        };
         assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
         assert!(Instructions::new(&shape).on(Core::M4F).is_some());
     }

@@ -182,7 +182,8 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
-    let made = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout, settings.shared_leaves)?;
+    let made =
+        layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout, settings.shared_leaves)?;
     let overhead = write::overhead(ensemble, settings, &forest)?;
     let candidate = |(layout, parts): &(Layout, parts::Parts)| Candidate {
         layout: *layout,

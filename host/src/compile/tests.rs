@@ -452,7 +452,8 @@ fn few_leaves(trees: usize, different: usize) -> Ensemble {
     let values = |number: usize| leaf(&[(number % different) as f32 / 1024.0, -((number % different) as f32) / 2048.0]);
     let tree = |tree: usize| {
         let at = |number: usize| 1_000.0 * ((7 * tree + number) % 90) as f32;
-        let splits = [split(tree % 8, at(0), 1, 2), split((tree + 1) % 8, at(1), 3, 4), split((tree + 3) % 8, at(2), 5, 6)];
+        let splits =
+            [split(tree % 8, at(0), 1, 2), split((tree + 1) % 8, at(1), 3, 4), split((tree + 3) % 8, at(2), 5, 6)];
         splits.into_iter().chain((0..4).map(|number| values(4 * tree + number))).collect()
     };
     ensemble(Descriptor::Oriented, (0..trees).map(tree).collect())

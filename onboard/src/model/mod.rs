@@ -13,7 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
     Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
-    Section, SharedLeaves, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
+    Section, SharedLeaves, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature,
+    take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 

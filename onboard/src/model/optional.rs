@@ -4,7 +4,8 @@ use super::{HAS_SHARED_LEAVES, HAS_STRANGERS, MARKS, Stated};
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Layout, OddsByObject, Plan, Section, SharedLeaves, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+    Layout, OddsByObject, Plan, Section, SharedLeaves, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
+    take_section,
 };
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
