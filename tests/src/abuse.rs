@@ -389,7 +389,8 @@ fn shared_leaves(put: Put<'_>) {
     let number = values.len() / 3;
     put("leaves numbered by no byte", "field", optional, changed(&good, content, &[0]));
     put("leaves numbered by three bytes", "field", optional, changed(&good, content, &[3]));
-    put("leaves without their table", "section", splits_of(&good), with_sections(&good, &[]));
+    let alone = with_sections(&good, &[]);
+    put("leaves without their table", "section", splits_of(&alone), alone);
     let tag = Tag::SharedLeaves.code() | MUST_UNDERSTAND;
     put("a table of leaves that is too short", "field", optional, with_sections(&good, &section(tag, &[1, 0, 0])));
     // The greatest number is one that was given.

@@ -130,8 +130,9 @@ fn walk_any(depth: u8, columns: &[u8], thresholds: &[u8], ranks: &Ranks, reached
     let mut first = low(slots).wrapping_neg();
     for (leaf, (columns, thresholds)) in reached.iter_mut().zip(trees) {
         let mut slot = 1;
-        while slot < slots {
-            slot = step(columns, thresholds, ranks, slot);
+        // Both are as long as there are slots, so what ends the walk is the bounds check, once for each step.
+        while let (Some(&column), Some(&threshold)) = (columns.get(slot), thresholds.get(slot)) {
+            slot = child(ranks, column, threshold, slot);
         }
         *leaf = first.wrapping_add(low(slot));
         first = first.wrapping_add(low(slots));
@@ -148,11 +149,17 @@ fn low(number: usize) -> u16 {
 /// From a slot to one of its children.
 #[inline(always)]
 fn step(columns: &[u8], thresholds: &[u8], ranks: &Ranks, slot: usize) -> usize {
+    child(ranks, at(columns, slot), at(thresholds, slot), slot)
+}
+
+/// From a slot with this column and threshold to one of its children.
+#[inline(always)]
+fn child(ranks: &Ranks, column: u8, threshold: u8, slot: usize) -> usize {
     if !ARM {
-        return (slot << 1) + usize::from(at(ranks, usize::from(at(columns, slot))) > at(thresholds, slot));
+        return (slot << 1) + usize::from(at(ranks, usize::from(column)) > threshold);
     }
-    let rank = isize::from(i16::from(at(ranks, usize::from(at(columns, slot)))));
+    let rank = isize::from(i16::from(at(ranks, usize::from(column))));
     // All ones for right, and not a comparison, of which the compiler would make branches.
-    let right = (isize::from(i16::from(at(thresholds, slot))) - rank) >> 8;
+    let right = (isize::from(i16::from(threshold)) - rank) >> 8;
     (slot << 1).wrapping_sub(right.cast_unsigned())
 }

@@ -134,7 +134,6 @@ fn tree<const SIZE: usize>(nodes: &mut &[u8], split: impl Fn([u8; SIZE]) -> (boo
     Some((leaf, count))
 }
 
-#[inline(always)]
 fn add_leaf(leaf: usize, splits: usize, leaves: &mut &[u8], sum: &mut Sum<'_>, numbers: &mut Numbers<'_>) {
     let length = sum.stored_length();
     let Some((tree, rest)) = leaves.split_at_checked((splits + 1) * length) else { return };

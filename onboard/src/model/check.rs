@@ -39,12 +39,11 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
         return Err(Wrong::Field(7));
     }
     let section = |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(Wrong::Section(model.offset(part))) };
-    let shared = match stated.by_object & HAS_SHARED_LEAVES {
-        0 => None,
-        _ => SharedLeaves::from_bytes(optional::find(optional, Tag::SharedLeaves)),
-    };
-    let shared = shared.filter(|_| built_in::SHARED_LEAVES);
     let values = factors.map_or(model.objects(), |factors| factors.count());
+    let mut shared = None;
+    if built_in::SHARED_LEAVES && stated.by_object & HAS_SHARED_LEAVES != 0 {
+        shared = SharedLeaves::from_bytes(optional::find(optional, Tag::SharedLeaves));
+    }
     let mut nodes = model.nodes;
     let mut leaves = model.leaves;
     if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
