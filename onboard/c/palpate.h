@@ -380,7 +380,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 if (!palpate_check_strangers_(model, content, length)) {
                     return PALPATE_FIELD;
                 }
-            } else if (PALPATE_FACTORS && last == 12) {
+            } else if (PALPATE_FACTORS && last == 13) {
                 if (length < 4 || (PALPATE_BYTE(content) & 3) != 0 || PALPATE_BYTE(content) - 1u > 63 ||
                     PALPATE_BYTE(content + 1) > 30) {
                     return PALPATE_FIELD;

@@ -37,14 +37,14 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. The two highest bits: whether there is a section about
+    /// Where thresholds by object stand; 0 if there are none. Of the highest bits: whether there is a section about
     /// strangers, and one about factors.
     by_object: u32,
 }
 
 /// See [`Stated::by_object`]: no model is as long.
 const HAS_STRANGERS: u32 = 1 << 31;
-const HAS_FACTORS: u32 = 1 << 30;
+const HAS_FACTORS: u32 = 1 << 29;
 /// The other bits.
 const OFFSET: u32 = HAS_FACTORS - 1;
 

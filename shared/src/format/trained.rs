@@ -49,7 +49,7 @@ impl Tag {
             Self::PatternShares => 9,
             Self::Promise => 10,
             Self::Temperature => 11,
-            Self::Factors => 12,
+            Self::Factors => 13,
         }
     }
 }
