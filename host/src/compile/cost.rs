@@ -94,7 +94,7 @@ impl Instructions {
         let objects = objects as u64;
         Self {
             m4f: self.m4f + 4 * products + 16 * objects,
-            m0_plus: self.m0_plus.map(|number| number + 6 * products + 24 * objects),
+            m0_plus: self.m0_plus.map(|number| number + 15 * products / 2 + 30 * objects),
         }
     }
 

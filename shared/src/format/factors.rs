@@ -62,7 +62,7 @@ impl<'a> Factors<'a> {
 
     /// Sets `margins`, one for each object, to the products of `sums`, one for each factor, and the objects' weights, shifted.
     ///
-    /// Cost: about four instructions for each object and factor on a Cortex-M4, six on a Cortex-M0+, and 12 for each object.
+    /// Cost: about four instructions for each object and factor on a Cortex-M4, eight on a Cortex-M0+, and 18 to 24 for each object.
     /// Wraps around where the products leave 32 bits, which those of no model that was checked do.
     pub fn mix(&self, sums: &[i32], margins: &mut [i32]) {
         let (sums, _) = sums.as_chunks::<4>();
