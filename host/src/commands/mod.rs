@@ -38,8 +38,7 @@ mod view;
 mod watch;
 
 use crate::error::{Problem, TouchesProblem};
-use crate::touches::LOG;
-use crate::touches::{Dataset, Format, Listing, Warning};
+use crate::touches::{Dataset, Format, Listing, Log, Warning};
 use crate::{Error, Result};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -237,7 +236,7 @@ fn files_of(directory: &Path) -> Vec<PathBuf> {
     let is_touches = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default();
         path.file_name().is_some_and(|name| name == Listing::FILE)
-            || extension == LOG
+            || extension == Log::EXTENSION
             || Format::ALL.iter().any(|format| extension == format.extension())
     };
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();

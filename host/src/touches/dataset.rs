@@ -306,13 +306,10 @@ pub(crate) fn logs(directory: &Path) -> Result<Vec<PathBuf>> {
     let io = |source| Error::io(directory, "read the data set", source);
     let entries = std::fs::read_dir(directory).map_err(io)?;
     let mut paths = entries.map(|entry| Ok(entry.map_err(io)?.path())).collect::<Result<Vec<_>>>()?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == LOG));
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == Log::EXTENSION));
     paths.sort();
     Ok(paths)
 }
-
-/// How the names of logs end.
-pub(crate) const LOG: &str = "mcap";
 
 /// The object that a file is called like.
 pub(super) fn name_of(path: &Path) -> String {

@@ -114,6 +114,9 @@ pub fn read_touches(path: &Path) -> Result<Vec<Touch>> {
 }
 
 impl Log {
+    /// How the names of logs end.
+    pub const EXTENSION: &'static str = "mcap";
+
     /// Reads a log.
     ///
     /// Memory: 48 bytes for each touch, up to ten million of them, and that of the largest chunk, at most 256 MiB.

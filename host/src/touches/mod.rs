@@ -57,7 +57,7 @@ pub(crate) mod synthetic;
 pub mod text;
 
 pub(crate) use checksum::checksum;
-pub(crate) use dataset::{LOG, files, logs};
+pub(crate) use dataset::{files, logs};
 pub use dataset::{Dataset, ObjectTouches, Warning};
 pub use format::Format;
 pub use listing::{Entry, Listing};

@@ -123,7 +123,8 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
 
     /// A record that is no chunk.
     fn plain(&mut self, opcode: u8, data: &[u8], offset: u64) -> Result<()> {
-        let wrong = |problem| Error::at(Place::byte(self.path, offset), problem);
+        let path = self.path;
+        let wrong = |problem| Error::at(Place::byte(path, offset), problem);
         // The others are of no interest, and not parsed.
         if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
             return Ok(());
