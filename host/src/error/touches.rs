@@ -350,7 +350,9 @@ impl TouchesProblem {
             Self::ParquetNotWritten { .. } => "Check the disk and the space on it, then resume the capture.",
             Self::NotMcap { .. } => "Repair it with `mcap recover`, or copy the log again.",
             Self::NoMcap => "Build it with the feature mcap, which is on by default.",
-            Self::TooLarge { .. } => "If it is meant, keep the touches alone: mcap filter LOG -o TOUCHES.mcap -y TOPIC.",
+            Self::TooLarge { .. } => {
+                "If it is meant, keep the touches alone: mcap filter LOG -o TOUCHES.mcap -y TOPIC."
+            }
             Self::TooMany { .. } => "Divide the log: mcap filter LOG -o PART.mcap --start-secs S --end-secs S.",
             Self::OtherCompression { .. } => "Compress it anew: mcap compress LOG -o OTHER.mcap --compression zstd.",
             Self::OtherEncoding { .. } | Self::OtherDefinition { .. } => {

@@ -57,8 +57,8 @@ pub(crate) mod synthetic;
 pub mod text;
 
 pub(crate) use checksum::checksum;
-pub(crate) use dataset::{files, logs};
 pub use dataset::{Dataset, ObjectTouches, Warning};
+pub(crate) use dataset::{files, logs};
 pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use log::{Channels, Log, LogWriter, Logged, LoggedVerdict, Message, Said, begins_log, is_log, read_touches};

@@ -89,8 +89,14 @@ fn touches_and_verdicts_become_a_log_that_is_recognized_again() {
     for (line, verdict) in lines.lines().zip(&verdicts) {
         let line: serde_json::Value = serde_json::from_str(line).unwrap();
         assert_eq!(line["touch"], verdict.touch);
-        assert_eq!((&line["verdict"], &line["object"]), (&verdict.verdict.as_str().into(), &verdict.object.as_str().into()));
-        assert_eq!((line["posterior"].as_f64(), line["refused"].as_str()), (Some(verdict.posterior), verdict.refused.as_deref()));
+        assert_eq!(
+            (&line["verdict"], &line["object"]),
+            (&verdict.verdict.as_str().into(), &verdict.object.as_str().into())
+        );
+        assert_eq!(
+            (line["posterior"].as_f64(), line["refused"].as_str()),
+            (Some(verdict.posterior), verdict.refused.as_deref())
+        );
         let names: Vec<_> = verdict.posteriors.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["bowl", "fork"]);
         let sum: f64 = verdict.posteriors.iter().map(|(_, posterior)| posterior).sum();
@@ -114,7 +120,8 @@ fn touches_and_verdicts_become_a_log_that_is_recognized_again() {
 #[test]
 fn a_log_is_a_data_set_to_evaluate_and_to_train_on_and_so_is_a_directory_with_logs() {
     let place = Place::new();
-    let lines = |late: usize| -> Vec<String> { (0..60).map(|i| format!("0 0.00{} 0.{:03}", i % 7, late + i % 10)).collect() };
+    let lines =
+        |late: usize| -> Vec<String> { (0..60).map(|i| format!("0 0.00{} 0.{:03}", i % 7, late + i % 10)).collect() };
     let (bowl, fork) = (lines(10), lines(80));
     std::fs::write(place.path("data/bowl.txt"), bowl.join("\n")).unwrap();
     std::fs::write(place.path("data/fork.txt"), fork.join("\n")).unwrap();
@@ -150,7 +157,10 @@ fn a_log_is_recorded_into_a_data_set_object_by_object() {
     let record = |object: &str| run(["data", "record", PYTHON, "--object", object, "-o", data.to_str().unwrap()]);
     let output = record("bowl");
     let said = error_of(&output);
-    assert!(said.contains("json-zstd.mcap: skipped 1 other channel") && said.contains("skipped 20 touches of other objects"));
+    assert!(
+        said.contains("json-zstd.mcap: skipped 1 other channel")
+            && said.contains("skipped 20 touches of other objects")
+    );
     assert!(stdout(output).starts_with("recorded 20 touches of bowl into "));
     stdout(record("mug"));
     let dataset = Dataset::read(&data).unwrap();

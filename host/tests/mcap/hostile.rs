@@ -17,12 +17,17 @@ static MEMORY: PeakAlloc = PeakAlloc;
 fn taken(bytes: &[u8]) -> (usize, Result<usize, String>) {
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
-    let read = Log::of(bytes, Path::new("robot.mcap")).map(|log| log.touches().len()).map_err(|error| error.to_string());
+    let read =
+        Log::of(bytes, Path::new("robot.mcap")).map(|log| log.touches().len()).map_err(|error| error.to_string());
     (MEMORY.peak_usage() - before, read)
 }
 
 fn touches() -> Vec<Vec<u8>> {
-    vec![schema(1, "palpate.Touch", "jsonschema", ""), channel(1, 1, "/touch", "json"), message(1, 1, br#"{"times":[0,0,0]}"#)]
+    vec![
+        schema(1, "palpate.Touch", "jsonschema", ""),
+        channel(1, 1, "/touch", "json"),
+        message(1, 1, br#"{"times":[0,0,0]}"#),
+    ]
 }
 
 /// One, since several at a time would measure each other's memory.
@@ -74,7 +79,10 @@ fn what_unpacks_to_more_than_it_states_is_not_unpacked() {
             let (memory, read) = taken(&file(&[chunk(compression, size, 0, data)]));
             assert!(memory < 32 << 20, "{compression} {size}: {memory}");
             let said = read.unwrap_err();
-            assert!(said.contains(&format!("at least {} bytes where it states {size}", size + 1)), "{compression}: {said}");
+            assert!(
+                said.contains(&format!("at least {} bytes where it states {size}", size + 1)),
+                "{compression}: {said}"
+            );
         }
         // What it states is what it is, but no records.
         let said = taken(&file(&[chunk(compression, 40 << 20, 0, data)])).1.unwrap_err();

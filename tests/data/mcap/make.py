@@ -66,7 +66,7 @@ for name, compression in [
         add(writer, touch, time + 1, {"times": times, "pose": pose, "object": object, "note": "not known to Palpate"})
     writer.finish()
 
-writer, joints, touch = written("plain.mcap", CompressionType.NONE, use_chunking=False)
+writer, joints, touch = written("plain.mcap", CompressionType.NONE, use_chunking=False, enable_data_crcs=True)
 for i, (times, *_) in reversed(list(enumerate(touches()))):
     # On a clock that counts from 1970.
     times = [None if time is None else 1_767_225_600 + i + time for time in times]

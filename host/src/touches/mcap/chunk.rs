@@ -1,10 +1,10 @@
 //! What is in a chunk: decompressed without C, no further than it says.
 
 use super::LARGEST;
+use super::records::Chunk;
 use crate::error::TouchesProblem;
 use crate::touches::checksum::CRC;
 use lz4_flex::frame::FrameDecoder;
-use mcap::records::ChunkHeader;
 use ruzstd::decoding::StreamingDecoder;
 use std::borrow::Cow;
 use std::io::Read;
@@ -13,12 +13,12 @@ use std::io::Read;
 const WINDOW: u64 = 16 << 20;
 
 /// The records of a chunk, with the checksum that it states, if it states one.
-pub(super) fn records<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, TouchesProblem> {
-    let stated = header.uncompressed_size;
+pub(super) fn records<'a>(chunk: &Chunk<'a>) -> Result<Cow<'a, [u8]>, TouchesProblem> {
+    let Chunk { size: stated, data, .. } = *chunk;
     if stated > LARGEST as u64 {
         return Err(TouchesProblem::TooLarge { what: "a chunk".into(), bytes: stated, most: LARGEST as u64 });
     }
-    let records = match header.compression.as_str() {
+    let records = match chunk.compression {
         "" => Cow::Borrowed(data),
         "zstd" => Cow::Owned(zstd(data, stated).map_err(|message| damaged("zstd", &message))?),
         "lz4" => Cow::Owned(lz4(data, stated).map_err(|message| damaged("lz4", &message))?),
@@ -29,7 +29,7 @@ pub(super) fn records<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a
         let message = format!("a chunk holds {least}{} bytes where it states {stated}", records.len());
         return Err(TouchesProblem::NotMcap { message });
     }
-    let (stated, found) = (header.uncompressed_crc, CRC.checksum(&records));
+    let (stated, found) = (chunk.crc, CRC.checksum(&records));
     if stated != 0 && stated != found {
         let message = format!("a chunk is damaged: its checksum is {found:08x} where it states {stated:08x}");
         return Err(TouchesProblem::NotMcap { message });

@@ -2,8 +2,8 @@
 
 use super::Kind;
 use crate::error::TouchesProblem;
-use crate::touches::log::{LoggedVerdict, Said};
 use crate::touches::listing::is_file_name;
+use crate::touches::log::{LoggedVerdict, Said};
 use crate::touches::touch_of_seconds;
 use byteorder::{BigEndian, LittleEndian};
 use palpate_shared::{Q15_ONE, Touch};
@@ -162,7 +162,8 @@ fn checked(verdict: LoggedVerdict) -> Result<Said, TouchesProblem> {
         return wrong(format!("{:?}, where {} are known", verdict.verdict, LoggedVerdict::VERDICTS.join(", ")));
     }
     let posteriors = verdict.posteriors.iter().map(|(_, posterior)| posterior);
-    if let Some(posterior) = posteriors.chain([&verdict.posterior]).find(|posterior| !(0.0..=1.0).contains(*posterior)) {
+    if let Some(posterior) = posteriors.chain([&verdict.posterior]).find(|posterior| !(0.0..=1.0).contains(*posterior))
+    {
         return wrong(format!("a posterior of {posterior}"));
     }
     Ok(Said::Verdict(verdict))
@@ -182,9 +183,7 @@ pub(super) fn touch_json(touch: &Touch, object: Option<&str>) -> Result<Vec<u8>,
     let unit = |vector: [i16; 3]| vector.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE));
     serde_json::to_vec(&JsonTouch {
         times: touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e6)),
-        pose: touch
-            .pose()
-            .map(|pose| JsonPose { direction: unit(pose.direction), alignment: unit(pose.alignment) }),
+        pose: touch.pose().map(|pose| JsonPose { direction: unit(pose.direction), alignment: unit(pose.alignment) }),
         object: object.map(String::from),
     })
 }

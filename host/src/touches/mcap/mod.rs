@@ -9,8 +9,7 @@
 mod chunk;
 mod message;
 mod read;
-#[cfg(test)]
-mod tests;
+mod records;
 mod write;
 
 pub use read::read;

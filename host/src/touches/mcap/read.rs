@@ -1,12 +1,13 @@
 //! From a file's records to touches and verdicts.
 
 use super::message::Encoding;
+use super::records::{self, Chunk};
 use super::{Kind, LARGEST, chunk};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::touches::log::{Channels, Message};
-use ::mcap::records::{Record, op};
+use ::mcap::records::op;
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use ::mcap::{MAGIC, McapError, parse_record};
+use ::mcap::{MAGIC, McapError};
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
@@ -28,12 +29,13 @@ const LATEST: u64 = i64::MAX as u64;
 pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Result<()>) -> Result<Channels> {
     let options = LinearReaderOptions::default()
         .with_emit_chunks(true)
+        .with_check_finishes_after_end_magic(true)
         .with_validate_data_section_crc(true)
         .with_record_length_limit(LARGEST);
     let mut reader = LinearReader::new_with_options(options);
     let mut log = Reading { path, each, schemas: BTreeMap::new(), channels: BTreeMap::new(), names: 0 };
     let mut offset = MAGIC.len() as u64;
-    let mut in_data = true;
+    let (mut in_data, mut is_first) = (true, true);
     loop {
         match reader.next_event() {
             None => break,
@@ -53,6 +55,11 @@ pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Resu
                         read => break read.map_err(|error| Error::io(path, "read the touches", error))?,
                     }
                 };
+                // Said here, since a short text would be called a log that ends early.
+                if is_first && count > 0 && buffer[0] != MAGIC[0] {
+                    return Err(Error::at(Place::file(path), problem(McapError::BadMagic)));
+                }
+                is_first = false;
                 reader.notify_read(count);
             }
             Some(Ok(LinearReadEvent::Record { opcode, data })) => {
@@ -99,8 +106,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         let wrong = |problem| Error::at(Place::byte(self.path, offset), problem);
         match opcode {
             op::CHUNK => {
-                let Record::Chunk { header, data } = parse(opcode, data).map_err(wrong)? else { return Ok(()) };
-                let records = chunk::records(&header, &data).map_err(wrong)?;
+                let records = Chunk::of(data).and_then(|chunk| chunk::records(&chunk)).map_err(wrong)?;
                 self.chunk(&records, offset)
             }
             _ => self.plain(opcode, data, offset),
@@ -125,21 +131,18 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     fn plain(&mut self, opcode: u8, data: &[u8], offset: u64) -> Result<()> {
         let path = self.path;
         let wrong = |problem| Error::at(Place::byte(path, offset), problem);
-        // The others are of no interest, and not parsed.
-        if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
-            return Ok(());
-        }
-        match parse(opcode, data).map_err(wrong)? {
-            Record::Schema { header, data } => {
-                let definition = Kind::of(&header.name).map(|_| super::message::essence(&data));
-                let schema = Schema { name: header.name, encoding: header.encoding, definition };
-                self.schema(header.id, schema).map_err(wrong)
+        match opcode {
+            op::SCHEMA => {
+                let records::Schema { id, name, encoding, data } = records::Schema::of(data).map_err(wrong)?;
+                let definition = Kind::of(name).map(|_| super::message::essence(data));
+                self.schema(id, Schema { name: name.into(), encoding: encoding.into(), definition }).map_err(wrong)
             }
-            Record::Channel(channel) => {
-                let ::mcap::records::Channel { id, schema_id: schema, topic, message_encoding: encoding, .. } = channel;
+            op::CHANNEL => {
+                let records::Channel { id, schema, topic, encoding } = records::Channel::of(data).map_err(wrong)?;
+                let (topic, encoding) = (topic.into(), encoding.into());
                 self.channel(id, Channel { topic, schema, encoding, reads: None, messages: 0 }).map_err(wrong)
             }
-            Record::Message { header, data } => self.message(&header, &data, offset),
+            op::MESSAGE => self.message(&records::Message::of(data).map_err(wrong)?, offset),
             _ => Ok(()),
         }
     }
@@ -180,6 +183,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
                     let expected = super::message::essence(kind.definition().as_bytes());
                     let found = schema.definition.clone().unwrap_or_default();
                     if found != expected {
+                        let found = found.chars().take(300).collect();
                         return Err(TouchesProblem::OtherDefinition { topic: topic(), name, found, expected });
                     }
                     (kind, Encoding::Cdr)
@@ -194,22 +198,22 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         Ok(())
     }
 
-    fn message(&mut self, header: &::mcap::records::MessageHeader, data: &[u8], offset: u64) -> Result<()> {
+    fn message(&mut self, message: &records::Message<'_>, offset: u64) -> Result<()> {
         let wrong = |problem| Error::at(Place::byte(self.path, offset), problem);
-        let Some(channel) = self.channels.get_mut(&header.channel_id) else {
-            return Err(wrong(not_mcap(format!("a message of channel {}, which is missing", header.channel_id))));
+        let Some(channel) = self.channels.get_mut(&message.channel) else {
+            return Err(wrong(not_mcap(format!("a message of channel {}, which is missing", message.channel))));
         };
         channel.messages += 1;
         let Some((kind, encoding)) = channel.reads else { return Ok(()) };
-        let said = match header.log_time {
-            ..=LATEST => encoding.read(kind, data),
+        let said = match message.log_time {
+            ..=LATEST => encoding.read(kind, message.data),
             time => Err(TouchesProblem::BadMessage { what: "log time", message: format!("{time} ns, after 2262") }),
         };
         let said = said.map_err(|problem| {
             let (topic, number) = (channel.topic.clone(), channel.messages);
             wrong(TouchesProblem::Message { topic, number, problem: problem.into() })
         });
-        (self.each)(Message { time: header.log_time, offset, said: said? })
+        (self.each)(Message { time: message.log_time, offset, said: said? })
     }
 
     /// Takes memory for names.
@@ -218,9 +222,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         let most = NAMES as u64;
         match self.names <= NAMES {
             true => Ok(()),
-            false => {
-                Err(TouchesProblem::TooLarge { what: "names of channels".into(), bytes: self.names as u64, most })
-            }
+            false => Err(TouchesProblem::TooLarge { what: "names of channels".into(), bytes: self.names as u64, most }),
         }
     }
 
@@ -249,10 +251,6 @@ fn split(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let (length, rest) = rest.split_first_chunk()?;
     let (data, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
     Some((opcode, data, rest))
-}
-
-fn parse(opcode: u8, data: &[u8]) -> Result<Record<'_>, TouchesProblem> {
-    parse_record(opcode, data).map_err(problem)
 }
 
 fn not_mcap(message: String) -> TouchesProblem {
