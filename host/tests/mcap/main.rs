@@ -3,6 +3,7 @@
 mod files;
 
 use files::{channel, chunk, file, message, python, record, schema, touches};
+use palpate::chip::{Step, Steps};
 use palpate::error::{Error, Place, Problem, TouchesProblem};
 use palpate::touches::check::Check;
 use palpate::touches::mcap::{self, TOUCH, VERDICT, Writer};
@@ -460,4 +461,17 @@ fn what_is_written_satisfies_the_reader_of_the_mcap_crate_with_its_index() {
     let [index] = summary.chunk_indexes.as_slice() else { panic!("{}", summary.chunk_indexes.len()) };
     assert!(index.compression.is_empty());
     assert_eq!(summary.stream_chunk(&bytes, index).unwrap().count(), 20);
+}
+
+#[test]
+fn a_log_is_streamed_to_a_chip_with_the_names_of_its_objects() {
+    let [fork, bowl] = ["fork", "bowl"].map(|name| format!(r#"{{"times": [0, 0, 0], "object": "{name}"}}"#));
+    let mut steps = Steps::logged(&read(&touches(&[&fork, &fork, &bowl])).unwrap());
+    assert_eq!(steps.count(), Some(3));
+    let touch = Step::Touch(parse_touch("0 0 0").unwrap());
+    let object = |name: &str| Step::Object(Some(name.into()));
+    for expected in [object("fork"), touch.clone(), touch.clone(), object("bowl"), touch] {
+        assert_eq!(steps.next_step().unwrap(), Some(expected));
+    }
+    assert_eq!((steps.next_step().unwrap(), steps.count()), (None, Some(0)));
 }
