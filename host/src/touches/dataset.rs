@@ -317,7 +317,7 @@ pub(super) fn name_of(path: &Path) -> String {
 }
 
 /// Some channels by name, and how many others.
-fn channels_said(channels: &[String]) -> String {
+pub(super) fn channels_said(channels: &[String]) -> String {
     const SHOWN: usize = 8;
     let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
     let count = match channels.len() {

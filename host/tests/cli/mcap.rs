@@ -182,7 +182,7 @@ fn a_log_is_checked_like_a_directory() {
     for expected in [
         "note: ",
         "json-zstd.mcap/bowl: only 20 touches",
-        "1 other channels are skipped",
+        "json-zstd.mcap: skipped 1 other channel: /joints (robot.Joints)",
         "probe: unknown, since there is no dataset.json",
         "2 objects, 40 touches",
     ] {

@@ -8,7 +8,7 @@ mod summary;
 pub use summary::{ObjectSummary, Quantiles, Summary};
 
 use super::checksum::{Checked, checksum};
-use super::dataset::name_of;
+use super::dataset::{channels_said, name_of};
 use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Warning, is_log, logs, text};
 use crate::error::{Error, Place, Problem, Result, TouchesProblem};
 use palpate_shared::Touch;
@@ -194,8 +194,7 @@ fn logged(path: &Path, objects: &mut Vec<Read>, findings: &mut Findings) -> Resu
         Ok(read) => read,
     };
     if let Some(Warning::SkippedChannels { channels, .. }) = skipped {
-        let what = format!("{} other channels are skipped", channels.len());
-        findings.note(path, &what, "Nothing needs to be done about them.");
+        findings.note(path, &format!("skipped {}", channels_said(&channels)), "Nothing needs to be done about them.");
     }
     for ObjectTouches { name, touches } in found {
         // Findings name the object beside the log, where the log is not called like it.
