@@ -124,24 +124,20 @@ pub enum TouchesProblem {
         name: String,
     },
     /// A channel with touches or verdicts is in an encoding that is not read.
-    #[error("{topic} carries {name} in the encoding {encoding:?} with a schema in {schema:?}")]
+    #[error("{channel} is in the encoding {encoding:?} with a schema in {schema:?}")]
     OtherEncoding {
-        /// The channel's topic.
-        topic: String,
-        /// The schema's name.
-        name: String,
+        /// The channel: its topic, with the name of its schema.
+        channel: String,
         /// The messages' encoding.
         encoding: String,
         /// The schema's encoding.
         schema: String,
     },
     /// A channel with touches or verdicts has a schema of another definition.
-    #[error("{topic} carries {name} by the definition {found:?}, where Palpate has {expected:?}")]
+    #[error("{channel} is defined as {found:?}, where Palpate has {expected:?}")]
     OtherDefinition {
-        /// The channel's topic.
-        topic: String,
-        /// The schema's name.
-        name: String,
+        /// The channel: its topic, with the name of its schema.
+        channel: String,
         /// What the log says.
         found: String,
         /// What it should say.

@@ -36,7 +36,7 @@ fn problem(bytes: &[u8]) -> (TouchesProblem, Place) {
 /// The touches that make.py wrote, with and without their poses.
 fn expected(pose: bool) -> Vec<(Touch, &'static str)> {
     let touch = |i: usize| {
-        let (name, late) = if i % 2 == 0 { ("bowl", 0.010) } else { ("mug", 0.060) };
+        let (name, late) = if i.is_multiple_of(2) { ("bowl", 0.010) } else { ("mug", 0.060) };
         let middle = (i % 10 != 7).then_some(0.0015 * i as f64);
         let (sin, cos) = (i as f64 / 7.0).sin_cos();
         let vectors = pose.then_some(([cos, sin, 0.0], [-sin, cos, 0.0]));
@@ -168,10 +168,7 @@ fn a_definition_counts_without_its_comments_and_another_one_is_refused() {
                 ====\nMSG: another\nint8 x\n";
     assert_eq!(read(&log(bare)).unwrap().touches().len(), 1);
     let said = error(&log(&TOUCH.replace("float64[3] times", "float32[3] times")));
-    assert!(
-        said.contains("/touch carries palpate_msgs/msg/Touch by the definition \"float32[3] times; bool"),
-        "{said}"
-    );
+    assert!(said.contains("/touch (palpate_msgs/msg/Touch) is defined as \"float32[3] times; bool"), "{said}");
     assert!(said.contains("where Palpate has \"float64[3] times; bool has_pose;"), "{said}");
     assert!(VERDICT.contains("float64[] posteriors"));
 }

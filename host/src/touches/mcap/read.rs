@@ -176,7 +176,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
             return Err(not_mcap(format!("{topic} has the schema {number}, which is missing")));
         }
         if let Some((schema, kind)) = schema.and_then(|schema| Kind::of(&schema.name).map(|kind| (schema, kind))) {
-            let (topic, name) = (|| topic.clone(), schema.name.clone());
+            let said = || format!("{topic} ({})", schema.name);
             channel.reads = Some(match (encoding.as_str(), schema.encoding.as_str()) {
                 ("json", _) => (kind, Encoding::Json),
                 ("cdr", "ros2msg") => {
@@ -184,13 +184,13 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
                     let found = schema.definition.clone().unwrap_or_default();
                     if found != expected {
                         let found = found.chars().take(300).collect();
-                        return Err(TouchesProblem::OtherDefinition { topic: topic(), name, found, expected });
+                        return Err(TouchesProblem::OtherDefinition { channel: said(), found, expected });
                     }
                     (kind, Encoding::Cdr)
                 }
                 (encoding, schema) => {
-                    let (encoding, schema) = (encoding.into(), schema.into());
-                    return Err(TouchesProblem::OtherEncoding { topic: topic(), name, encoding, schema });
+                    let (channel, encoding, schema) = (said(), encoding.into(), schema.into());
+                    return Err(TouchesProblem::OtherEncoding { channel, encoding, schema });
                 }
             });
         }
