@@ -4,8 +4,8 @@
 //! cargo run --release --example growth -- 100 4000 30x6 30x6:i8 8x6:eta=0.5:i8 30x6:stages=10 30x6:factors=16
 //! ```
 //!
-//! The arguments are the number of objects ([`builtin::many`]), the approaches to each, a fifth of which test, and the
-//! ways: rounds `x` depth, then any of
+//! The arguments are the numbers of objects ([`builtin::many`]; `20,50,100`), the approaches to each, half as many more of
+//! which test, and the ways: rounds `x` depth, then any of
 //!
 //! | part | meaning |
 //! |---|---|
@@ -20,12 +20,13 @@
 
 use palpate::capture;
 use palpate::compile::{self, Compiled, Goal, Layout, Leaf, Sharing};
+use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use palpate::mesh::builtin;
 use palpate::onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate::shared::Touch;
-use palpate::touches::{Dataset, ObjectTouches, Origin, folds};
+use palpate::touches::{Dataset, ObjectTouches, Origin};
 use rayon::prelude::*;
 use std::error::Error;
 use std::time::Instant;
@@ -36,28 +37,56 @@ type Failed = Box<dyn Error + Send + Sync>;
 const ERROR_RATE: f64 = 0.01;
 /// Touches after which they give up.
 const LIMIT: u32 = 400;
+/// Sequences of approaches, of all objects together.
+const SEQUENCES: usize = 5_000;
 
 fn main() -> Result<(), Failed> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     // Small enough for a test of this program.
     let usual = ["12", "300", "4x3", "4x3:i8", "4x3:stages=3", "4x3:factors=4"].map(String::from);
     let arguments = if arguments.is_empty() { usual.to_vec() } else { arguments };
-    let [count, approaches, ways @ ..] = &arguments[..] else { return Err("give objects, approaches and ways".into()) };
+    let [counts, approaches, ways @ ..] = &arguments[..] else {
+        return Err("give objects, approaches and ways".into());
+    };
+    let counts: Vec<usize> = counts.split(',').map(str::parse).collect::<Result<_, _>>()?;
+    let approaches: u64 = approaches.parse()?;
     let began = Instant::now();
-    let objects = builtin::many(count.parse()?)?;
+    let objects = builtin::many(counts.iter().copied().max().unwrap_or(0))?;
     let made = began.elapsed().as_secs_f64();
     let began = Instant::now();
-    let origin = Origin { touches: approaches.parse()?, approaches: true, ..Origin::default() };
+    let origin = Origin { touches: approaches + approaches / 2, approaches: true, ..Origin::default() };
     let (data, _) = capture::in_memory(&objects, &origin.into(), &())?;
     let touched = began.elapsed().as_secs_f64();
-    println!("{} objects made in {made:.1} s, approached {approaches} times each in {touched:.1} s", objects.len());
-    let split = folds::split(&data, 0.2, 1)?;
     println!(
-        "{:34} {:>9} {:>9} {:>8} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        "{} objects made in {made:.1} s, approached {approaches} times each, and half as often to test, in {touched:.1} s",
+        objects.len()
+    );
+    for count in counts {
+        let names: Vec<&str> = objects[..count].iter().map(|object| object.name.as_str()).collect();
+        let part = |from: usize, to: usize| {
+            let known = data.objects.iter().filter(|object| names.contains(&object.name.as_str()));
+            let part = |object: &ObjectTouches| ObjectTouches {
+                name: object.name.clone(),
+                touches: object.touches[from.min(object.touches.len())..to.min(object.touches.len())].to_vec(),
+            };
+            Dataset { origin: data.origin.clone(), ..Dataset::new(known.map(part).collect()) }
+        };
+        let train = usize::try_from(approaches)?;
+        compare(ways, &part(0, train), &part(train, usize::MAX))?;
+    }
+    Ok(())
+}
+
+/// Measures every way on the same approaches.
+fn compare(ways: &[String], data: &Dataset, test: &Dataset) -> Result<(), Failed> {
+    println!(
+        "\n{} objects\n{:34} {:>9} {:>9} {:>8} {:>7} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        data.objects.len(),
         "way",
         "bytes",
         "M4F",
         "layout",
+        "leaves",
         "factors",
         "error",
         "train",
@@ -68,21 +97,35 @@ fn main() -> Result<(), Failed> {
         "wrong",
         "undec."
     );
+    let mut before = None;
     for way in ways {
-        let measured = Way::new(way)?.measure(&split.train, &split.test)?;
-        let Measured { bytes, instructions, factors, margin_error, layout, seconds, accuracy, stops, wrong, undecided } =
-            measured;
+        let Measured {
+            bytes,
+            instructions,
+            leaves,
+            factors,
+            margin_error,
+            layout,
+            seconds,
+            accuracy,
+            stops,
+            wrong,
+            undecided,
+        } = Way::new(way)?.measure(data, test, &mut before)?;
         let factors = factors.map_or_else(|| "-".into(), |factors| factors.to_string());
         let [at_20, at_60, at_200] = accuracy.map(|share| 100.0 * share);
         println!(
-            "{way:34} {bytes:>9} {instructions:>9} {layout:>8} {factors:>7} {margin_error:>7.4} {seconds:>6.1} {at_20:>6.1} {at_60:>6.1} {at_200:>6.1} \
-             {stops:>6.1} {:>6.2} {:>7.2}",
+            "{way:34} {bytes:>9} {instructions:>9} {layout:>8} {leaves:>7} {factors:>7} {margin_error:>7.4} {seconds:>6.1} \
+             {at_20:>6.1} {at_60:>6.1} {at_200:>6.1} {stops:>6.1} {:>6.2} {:>7.2}",
             100.0 * wrong,
             100.0 * undecided
         );
     }
     Ok(())
 }
+
+/// The ensemble that was trained last, how, and the seconds that it took: the next way may be the same training.
+type Before = Option<(train::Settings, Ensemble, f64)>;
 
 /// How a model is made.
 struct Way {
@@ -95,6 +138,7 @@ struct Way {
 struct Measured {
     bytes: usize,
     instructions: u64,
+    leaves: usize,
     factors: Option<usize>,
     margin_error: f32,
     layout: &'static str,
@@ -133,21 +177,26 @@ impl Way {
         Ok(Self { settings, compile, stages })
     }
 
-    fn measure(&self, data: &Dataset, test: &Dataset) -> Result<Measured, Failed> {
+    fn measure(&self, data: &Dataset, test: &Dataset, before: &mut Before) -> Result<Measured, Failed> {
         match self.stages {
             Some(groups) => self.in_stages(groups, data, test),
-            None => self.flat(data, test),
+            None => self.flat(data, test, before),
         }
     }
 
-    fn flat(&self, data: &Dataset, test: &Dataset) -> Result<Measured, Failed> {
-        let began = Instant::now();
-        let ensemble = train(data, &self.settings, &())?;
-        let seconds = began.elapsed().as_secs_f64();
-        let compiled = compile::compile(&ensemble, &self.compile)?;
+    fn flat(&self, data: &Dataset, test: &Dataset, before: &mut Before) -> Result<Measured, Failed> {
+        let (_, ensemble, seconds) = match before.take() {
+            Some(same) if same.0 == self.settings => before.insert(same),
+            _ => {
+                let began = Instant::now();
+                let ensemble = train(data, &self.settings, &())?;
+                before.insert((self.settings.clone(), ensemble, began.elapsed().as_secs_f64()))
+            }
+        };
+        let compiled = compile::compile(ensemble, &self.compile)?;
         let model = Model::new(&compiled.bytes)?;
         let margins = Margins::new(Candidate::Compiled(&model), test)?;
-        let sequences = 20_000 / test.objects.len() + 1;
+        let sequences = SEQUENCES / test.objects.len() + 1;
         let settings = SequentialSettings { error_rate: None, max_touches: None, sequences, seed: 1 };
         let at = [20, 60, 200].map(|at| at.min(margins.fewest_approaches()));
         let measured = margins.approaches(&at, &settings)?;
@@ -158,7 +207,8 @@ impl Way {
             factors: compiled.factors,
             margin_error: compiled.margin_error,
             layout: compiled.layout.name(),
-            seconds,
+            leaves: compiled.leaves,
+            seconds: *seconds,
             accuracy: at.map(|at| measured.accuracy[&at]),
             stops: sequential.mean_approaches,
             wrong: sequential.error,
@@ -195,7 +245,7 @@ impl Way {
 
         // Half of the error rate for each stage.
         let stopping = Stopping::new(ERROR_RATE / 2.0, LIMIT).ok_or("an error rate")?;
-        let sequences = 4_000 / test.objects.len() + 1;
+        let sequences = SEQUENCES / test.objects.len() + 1;
         let at = [20, 60, 200];
         let cases: Vec<(usize, usize)> =
             (0..test.objects.len()).flat_map(|object| (0..sequences).map(move |sequence| (object, sequence))).collect();
@@ -242,7 +292,7 @@ impl Way {
                         Some(model) => {
                             let never = Stopping::new(1e-12, u32::MAX).ok_or("a rate")?;
                             let mut recognizer = Recognizer::<256>::new(model, never)?;
-                            kept.iter().for_each(|touch| drop(recognizer.push(touch)));
+                            kept.iter().for_each(|touch| _ = recognizer.push(touch));
                             members[best][recognizer.best()]
                         }
                     };
@@ -256,10 +306,8 @@ impl Way {
             let wrong = named.is_some_and(|named| named != object);
             Ok((right_at, approaches as f64, f64::from(u8::from(wrong)), f64::from(u8::from(named.is_none()))))
         });
-        let outcomes: Vec<([f64; 3], f64, f64, f64)> = outcomes.collect::<Result<_, _>>()?;
-        let mean = |value: &dyn Fn(&([f64; 3], f64, f64, f64)) -> f64| {
-            outcomes.iter().map(value).sum::<f64>() / outcomes.len() as f64
-        };
+        let outcomes: Vec<Outcome> = outcomes.collect::<Result<_, _>>()?;
+        let mean = |value: &dyn Fn(&Outcome) -> f64| outcomes.iter().map(value).sum::<f64>() / outcomes.len() as f64;
         let all = || fine.iter().flatten();
         Ok(Measured {
             bytes: coarse.bytes.len() + all().map(|fine| fine.bytes.len()).sum::<usize>(),
@@ -269,6 +317,7 @@ impl Way {
             factors: coarse.factors,
             margin_error: coarse.margin_error,
             layout: coarse.layout.name(),
+            leaves: coarse.leaves + all().map(|fine| fine.leaves).sum::<usize>(),
             seconds,
             accuracy: [0, 1, 2].map(|place| mean(&|outcome| outcome.0[place])),
             stops: mean(&|outcome| outcome.1),
@@ -277,6 +326,9 @@ impl Way {
         })
     }
 }
+
+/// How often the best was right after each number of approaches; approaches; whether it was wrong; whether undecided.
+type Outcome = ([f64; 3], f64, f64, f64);
 
 /// Tells the second stage a touch, unless it has ended.
 fn push(
