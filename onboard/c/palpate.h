@@ -19,7 +19,9 @@
  * Before the #include may be defined:
  *   PALPATE_LAYOUTS      which layouts are read, as PALPATE_COMPACT | PALPATE_COMPLETE; all of them by default
  *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
+ *   PALPATE_SHARED       0: a model whose equal leaves stand once, in a table, is refused
  *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
+ *   PALPATE_FACTORS      0: a model whose leaves hold factors instead of a value for each object is refused
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default. 8 bytes of state, and 4 of stack, for each
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
  *   PALPATE_API          instead of `static inline`
@@ -47,8 +49,14 @@
 #ifndef PALPATE_LEAVES
 #define PALPATE_LEAVES 7
 #endif
+#ifndef PALPATE_SHARED
+#define PALPATE_SHARED 1
+#endif
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 1
+#endif
+#ifndef PALPATE_FACTORS
+#define PALPATE_FACTORS 1
 #endif
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 32
@@ -143,11 +151,14 @@ typedef struct {
     const uint8_t *cuts_;    /* thresholds of the axes */
     const uint8_t *odds_;    /* thresholds by object, or NULL */
     const uint8_t *strangers_; /* what it states of objects that it does not know, or NULL */
+    const uint8_t *table_; /* values of the leaves that are shared, or NULL; before them the length of their numbers */
+    const uint8_t *factors_;   /* what makes margins of factors, or NULL */
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
     uint16_t known;          /* that can be named: all, or all but the last, a background */
     uint16_t features;       /* of a row, 1 to 256 */
+    uint16_t values_;        /* of a leaf: one for each object, or factors */
     uint8_t layout_;
     uint8_t leaf_;
     uint8_t descriptor; /* 255: rows of features */
@@ -171,6 +182,9 @@ typedef struct {
 /* Parts of a model. */
 enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPATE_GROUPS_, PALPATE_SPLITS_, PALPATE_LEAVES_, PALPATE_END_ };
 
+/* Whether a model's leaves hold factors. */
+#define PALPATE_HAS_FACTORS_(model) (PALPATE_FACTORS && (model)->factors_ != NULL)
+
 /* Whether a model has this layout, or type of leaf: without a question where only one is built in. */
 #define PALPATE_IS_LAYOUT_(model, bit, code) \
     (PALPATE_LAYOUTS == (bit) || ((PALPATE_LAYOUTS & (bit)) != 0 && (model)->layout_ == (code)))
@@ -181,6 +195,8 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 #define PALPATE_IS_GRID_(model) PALPATE_IS_LAYOUT_(model, PALPATE_GRID, 2)
 #define PALPATE_IS_WIDE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_WIDE, 3)
 #define PALPATE_IS_PATTERNS_(model) PALPATE_IS_LAYOUT_(model, PALPATE_PATTERNS, 4)
+/* Whether leaves are numbers of a table. */
+#define PALPATE_IS_SHARED_(model) (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && (model)->table_ != NULL)
 #define PALPATE_IS_I8_(model) PALPATE_IS_LEAF_(model, PALPATE_I8, 0)
 #define PALPATE_IS_I16_(model) PALPATE_IS_LEAF_(model, PALPATE_I16, 1)
 #define PALPATE_IS_F32_(model) PALPATE_IS_LEAF_(model, PALPATE_F32, 2)
@@ -229,6 +245,12 @@ static inline int32_t palpate_signed_(const uint8_t *p, uint_fast8_t width)
 }
 
 /* ---- Opening a model: after it nothing can fail ---- */
+
+/* The number of a shared leaf at `leaf`. */
+static inline uint32_t palpate_number_(const palpate_model *model, const uint8_t *leaf)
+{
+    return PALPATE_BYTE(model->table_ - 4) == 1 ? PALPATE_BYTE(leaf) : palpate_u16_(leaf);
+}
 
 static inline size_t palpate_leaf_size_(const palpate_model *model)
 {
@@ -371,6 +393,20 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 if (!palpate_check_strangers_(model, content, length)) {
                     return PALPATE_FIELD;
                 }
+            } else if (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && last == 12) {
+                /* Tables of margins have no leaves to share. */
+                if (length < 4 || PALPATE_BYTE(content) - 1u > 1 || PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
+                    return PALPATE_FIELD;
+                }
+                model->table_ = content + 4;
+            } else if (PALPATE_FACTORS && last == 13) {
+                if (length < 4 || (PALPATE_BYTE(content) & 3) != 0 || PALPATE_BYTE(content) - 1u > 63 ||
+                    PALPATE_BYTE(content + 1) > 30) {
+                    return PALPATE_FIELD;
+                }
+                model->factors_ = content;
+                model->values_ = PALPATE_BYTE(content);
+                least = 4 + (uint32_t)model->objects * model->values_;
             } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
@@ -436,8 +472,11 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
     uint32_t range = (uint32_t)1 << 20, most = 0;
     uint_fast16_t object;
     uint_fast8_t shift = 24;
+    if (PALPATE_HAS_FACTORS_(model) && !PALPATE_IS_I8_(model)) {
+        return palpate_wrong_(model, PALPATE_FIELD, model->bytes + 7);
+    }
     if (PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
-        uint32_t size = palpate_cells_(model) * model->objects * (uint32_t)palpate_leaf_size_(model);
+        uint32_t size = palpate_cells_(model) * model->values_ * (uint32_t)palpate_leaf_size_(model);
         if (size == 0) {
             return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_AXES_]);
         }
@@ -450,10 +489,11 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         }
     }
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
-        uint32_t trees = palpate_u32_(group + 4), leaf = (uint32_t)palpate_leaf_size_(model);
+        uint32_t trees = palpate_u32_(group + 4), leaf = (uint32_t)palpate_leaf_size_(model), length, table = 0;
+        const uint8_t *number = leaves;
         uint8_t depth = PALPATE_BYTE(group), one = PALPATE_BYTE(group + 2);
         int fits = 1;
-        if (PALPATE_BYTE(group + 1) > shift || one > 1 || (one != 0 && PALPATE_BYTE(group + 3) >= model->objects) ||
+        if (PALPATE_BYTE(group + 1) > shift || one > 1 || (one != 0 && PALPATE_BYTE(group + 3) >= model->values_) ||
             (PALPATE_IS_F32_(model) && PALPATE_BYTE(group + 1) != 0)) {
             return palpate_wrong_(model, PALPATE_FIELD, group);
         }
@@ -466,7 +506,12 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
             range = range > limit ? limit + 1 : range;
         }
         if (one == 0) {
-            leaf *= model->objects;
+            leaf *= model->values_;
+        }
+        length = leaf;
+        if (PALPATE_IS_SHARED_(model)) {
+            leaf = PALPATE_BYTE(model->table_ - 4);
+            table = palpate_u32_(model->table_ - 8) - 4;
         }
         if (PALPATE_IS_COMPLETE_(model)) {
             if (depth - 1u > 7) {
@@ -499,12 +544,26 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         if (!fits) {
             return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_SPLITS_]);
         }
+        for (; PALPATE_IS_SHARED_(model) && number != leaves; number += leaf) {
+            if ((palpate_number_(model, number) + 1) * length > table) {
+                return palpate_wrong_(model, PALPATE_FIELD, number);
+            }
+        }
     }
     if (splits != model->part_[PALPATE_LEAVES_]) {
         return palpate_wrong_(model, PALPATE_SECTION, splits);
     }
     if (leaves != end) {
         return palpate_wrong_(model, PALPATE_SECTION, leaves);
+    }
+    if (PALPATE_HAS_FACTORS_(model)) {
+        /* What the leaves add up to, or one of a table, times as many weights of at most 128: it has to fit as well. */
+        const uint32_t sum = range - ((uint32_t)1 << 20);
+        const uint64_t products = (uint64_t)(sum < 128 ? 128 : sum) * 128 * model->values_;
+        if (products > limit) {
+            return palpate_wrong_(model, PALPATE_MARGIN_RANGE, model->bytes + 8);
+        }
+        range = ((uint32_t)1 << 20) + ((uint32_t)products >> PALPATE_BYTE(model->factors_ + 1));
     }
     for (object = 0; !PALPATE_IS_F32_(model) && object < model->objects; object++) {
         uint32_t base = palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (size_t)object);
@@ -633,6 +692,9 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     }
     model->odds_ = NULL;
     model->strangers_ = NULL;
+    model->table_ = NULL;
+    model->factors_ = NULL;
+    model->values_ = model->objects;
     model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
@@ -925,15 +987,21 @@ PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int
     return leaf;
 }
 
+/* Where the `length` bytes of a leaf's values are. */
+static inline const uint8_t *palpate_values_(const palpate_model *model, const uint8_t *leaf, size_t length)
+{
+    return PALPATE_IS_SHARED_(model) ? model->table_ + palpate_number_(model, leaf) * length : leaf;
+}
+
 static inline void palpate_shift_(const palpate_model *model, uint32_t *sums, uint_fast8_t shift)
 {
     uint_fast16_t i;
-    for (i = 0; shift != 0 && i < model->objects; i++) {
+    for (i = 0; shift != 0 && i < model->values_; i++) {
         sums[i] <<= shift;
     }
 }
 
-/* The sums of a row of features, in units or as the bits of f32 values. */
+/* The sums of a row of features, in units or as the bits of f32 values: one for each value of a leaf. */
 static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
 {
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
@@ -945,7 +1013,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     uint8_t *ranks = (uint8_t *)words;
     uint_fast16_t i;
     uint_fast8_t last;
-    for (i = 0; i < model->objects; i++) {
+    for (i = 0; i < model->values_; i++) {
         /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
         sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * (size_t)i);
     }
@@ -1002,8 +1070,8 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 cell = 0;
             }
         }
-        palpate_add_leaf_(model, sums, model->objects, leaves + (size_t)cell * model->objects * size);
-        for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
+        palpate_add_leaf_(model, sums, model->values_, leaves + (size_t)cell * model->values_ * size);
+        for (i = 0; PALPATE_IS_I8_(model) && i < model->values_; i++) {
             sums[i] -= 128;
         }
         return;
@@ -1012,8 +1080,9 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
         const uint8_t depth = PALPATE_BYTE(group), shift = PALPATE_BYTE(group + 1);
         const int one = PALPATE_BYTE(group + 2) != 0;
-        const uint16_t values = one ? 1 : model->objects;
+        const uint16_t values = one ? 1 : model->values_;
         const size_t length = size * values;
+        const size_t stored = PALPATE_IS_SHARED_(model) ? PALPATE_BYTE(model->table_ - 4) : length;
         uint32_t *first = one ? sums + PALPATE_BYTE(group + 3) : sums;
         uint32_t trees = palpate_u32_(group + 4);
         /* Shifts get smaller: what was added before is shifted on the way. */
@@ -1027,10 +1096,10 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
             const uint8_t *thresholds = splits + (size_t)(trees << depth);
             for (; trees != 0; trees--) {
                 const size_t leaf = palpate_walk_complete_(ranks, splits, thresholds, slots);
-                palpate_add_leaf_(model, first, values, leaves + leaf * length);
+                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + leaf * stored, length));
                 splits += slots;
                 thresholds += slots;
-                leaves += slots * length;
+                leaves += slots * stored;
             }
             splits = thresholds;
         } else {
@@ -1045,16 +1114,37 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                     leaf = palpate_walk_compact_(ranks, splits, all);
                     splits += (size_t)(all * 3);
                 }
-                palpate_add_leaf_(model, first, values, leaves + (size_t)leaf * length);
-                leaves += (size_t)(all + 1) * length;
+                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + (size_t)leaf * stored, length));
+                leaves += (size_t)(all + 1) * stored;
             }
         }
     }
     if (!PALPATE_IS_F32_(model)) {
         palpate_shift_(model, sums, last);
-        for (i = 0; i < model->objects; i++) {
+        for (i = 0; !PALPATE_HAS_FACTORS_(model) && i < model->objects; i++) {
             sums[i] += palpate_u32_(base + 4 * (size_t)i);
         }
+    }
+}
+
+/* The sums of a row of features whose leaves hold factors: one for each object. */
+PALPATE_APART_ void palpate_sum_factors_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *margins)
+{
+    const uint8_t *base = model->part_[PALPATE_MARGINS_], *weight = model->factors_ + 4;
+    const uint8_t shift = PALPATE_BYTE(model->factors_ + 1);
+    uint32_t sums[64];
+    uint_fast16_t object;
+    palpate_sum_(model, features, count, sums);
+    for (object = 0; object < model->objects; object++) {
+        uint32_t sum = 0;
+        uint_fast8_t i;
+        for (i = 0; i < model->values_; i++) {
+            /* A byte with its sign; products modulo 2^32, as what they add up to fits. */
+            sum += sums[i] * ((PALPATE_BYTE(weight) ^ 0x80u) - 0x80u);
+            weight++;
+        }
+        /* Rounded down. */
+        margins[object] = (sum >> 31 != 0 ? ~(~sum >> shift) : sum >> shift) + palpate_u32_(base + 4 * (size_t)object);
     }
 }
 
@@ -1081,6 +1171,10 @@ static inline int32_t palpate_q16_(uint32_t bits)
 PALPATE_API void palpate_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
 {
     uint_fast16_t i;
+    if (PALPATE_HAS_FACTORS_(model)) {
+        palpate_sum_factors_(model, features, count, (uint32_t *)margins);
+        return;
+    }
     palpate_sum_(model, features, count, (uint32_t *)margins);
     for (i = 0; PALPATE_IS_F32_(model) && i < model->objects; i++) {
         margins[i] = palpate_q16_((uint32_t)margins[i]);

@@ -39,6 +39,7 @@ mod axes;
 mod cells;
 mod cost;
 mod emit;
+mod factors;
 mod fit;
 mod forest;
 mod layout;
@@ -47,6 +48,7 @@ mod parts;
 mod quantize;
 mod restate;
 mod rounding;
+mod share;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -59,6 +61,7 @@ pub use fit::compile_within;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
+pub use share::{different_leaves, unshared};
 
 use crate::ensemble::Ensemble;
 use crate::error::{CompileProblem, Error, Result};
@@ -74,8 +77,11 @@ pub struct Settings {
     pub leaf: Leaf,
     /// How trees are laid out; `None` takes the layout that is best for `goal`.
     pub layout: Option<Layout>,
-    /// What a layout is chosen for, where none is asked for.
+    /// What a layout is chosen for, where none is asked for; and whether its equal leaves stand once.
     pub goal: Goal,
+    /// Whether equal leaves stand once, in a table: `Some(true)` wherever they can, `None` where that makes a model smaller,
+    /// if it is better for `goal`.
+    pub shared_leaves: Option<bool>,
     /// The error rate that recognizers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
     /// The touches after which they give up.
@@ -85,7 +91,57 @@ pub struct Settings {
     /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
     /// feature's scale; `None` compares f32 values.
     pub scales: Option<Vec<f32>>,
+    /// How many numbers a leaf holds, where it does not hold a value for each object.
+    pub sharing: Sharing,
 }
+
+impl Settings {
+    /// What `palpate export` takes for models of touches of so many objects: leaves that share a table with more than 50,
+    /// which are of one byte then; otherwise the default.
+    pub fn for_touches(objects: usize) -> Self {
+        match Sharing::usual(objects) {
+            Sharing::None => Self::default(),
+            sharing => Self { sharing, leaf: Leaf::I8, ..Self::default() },
+        }
+    }
+}
+
+/// Compiles an ensemble with settings of [`Settings::for_touches`]: where the leaves cannot share a table, or not without
+/// leaving out too much, with leaves of two bytes.
+///
+/// # Errors
+/// As [`compile`].
+pub fn compile_usual(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
+    if settings.sharing == Sharing::Auto && factors_of(ensemble, settings)?.is_none() {
+        return compile(ensemble, &Settings { sharing: Sharing::None, leaf: Leaf::I16, ..settings.clone() });
+    }
+    compile(ensemble, settings)
+}
+
+/// Whether leaves share a table: each then holds a few *factors*, from which one matrix in the model makes a value for each
+/// object. With many objects nearly all of a model is leaves, which resemble each other. Only for leaves of one byte, and
+/// trees whose leaves have a value for each object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sharing {
+    /// A leaf holds a value for each object.
+    #[default]
+    None,
+    /// The fewest factors that leave out at most [`LEFT_OUT`] nats of a margin (the root of the mean square); no sharing
+    /// where none are so few that the model would be smaller.
+    Auto,
+    /// So many factors: a multiple of 4 up to 64.
+    Factors(usize),
+}
+
+impl Sharing {
+    /// What is usual for models of touches: [`Sharing::Auto`] with more than 50 objects, otherwise a value for each.
+    pub const fn usual(objects: usize) -> Self {
+        if objects > 50 { Self::Auto } else { Self::None }
+    }
+}
+
+/// What factors that are chosen by [`Sharing::Auto`] may leave out of a margin, in nats: the root of the mean square.
+pub const LEFT_OUT: f64 = 0.05;
 
 impl Default for Settings {
     fn default() -> Self {
@@ -93,10 +149,12 @@ impl Default for Settings {
             leaf: Leaf::I16,
             layout: None,
             goal: Goal::Balanced(Core::M4F),
+            shared_leaves: None,
             error_rate: 0.01,
             max_touches: 200,
             priors: None,
             scales: None,
+            sharing: Sharing::None,
         }
     }
 }
@@ -118,6 +176,8 @@ pub struct Candidate {
     /// The layout.
     #[serde(serialize_with = "name_of")]
     pub layout: Layout,
+    /// Whether equal leaves stand once.
+    pub shared_leaves: bool,
     /// Bytes of the model.
     pub bytes: usize,
     /// About how many instructions a touch takes.
@@ -143,10 +203,14 @@ pub struct Compiled {
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
+    /// How many different leaves stand in a table, if equal ones stand once.
+    pub shared_leaves: Option<usize>,
     /// About how many instructions a touch takes.
     pub instructions: Instructions,
     /// All layouts that were tried.
     pub candidates: Vec<Candidate>,
+    /// How many numbers a leaf holds, if it does not hold a value for each object.
+    pub factors: Option<usize>,
 }
 
 /// When recognizers stop.
@@ -172,10 +236,18 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
-    let made = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
+    let factors = factors_of(ensemble, settings)?;
+    let made = match factors {
+        Some(count) => factored(ensemble, settings, &forest, cells.as_ref(), count)?,
+        None => {
+            let shared = settings.shared_leaves;
+            layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout, shared)?
+        }
+    };
     let overhead = write::overhead(ensemble, settings, &forest)?;
     let candidate = |(layout, parts): &(Layout, parts::Parts)| Candidate {
         layout: *layout,
+        shared_leaves: parts.shared.is_some(),
         bytes: parts.bytes() + overhead,
         instructions: parts.instructions,
         margin_error: parts.margin_error,
@@ -190,7 +262,46 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding);
     let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts, margin_error)?;
     let (splits, leaves) = (forest.splits(), forest.leaves());
-    Ok(Compiled { bytes, splits, leaves, margin_error, layout, instructions, candidates })
+    let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
+    Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates, factors })
+}
+
+/// How many factors the leaves of a compiled model hold, if they share a table; see [`Settings::sharing`].
+///
+/// # Errors
+/// [`Problem::Setting`](crate::error::Problem::Setting) `factors` or `leaf` if the leaves cannot share one.
+pub fn factors_of(ensemble: &Ensemble, settings: &Settings) -> Result<Option<usize>> {
+    match settings.sharing {
+        Sharing::None => Ok(None),
+        Sharing::Factors(count) => factors::check(ensemble, count, settings.leaf).map(|()| Some(count)),
+        Sharing::Auto if factors::check(ensemble, 4, settings.leaf).is_err() => Ok(None),
+        // Two thirds of the values: a matrix takes room as well.
+        Sharing::Auto => {
+            Ok(factors::fewest(ensemble, LEFT_OUT).filter(|count| 3 * count <= 2 * ensemble.objects.len()))
+        }
+    }
+}
+
+/// What the layouts make of an ensemble whose leaves share a table.
+fn factored(
+    ensemble: &Ensemble,
+    settings: &Settings,
+    forest: &Forest<'_>,
+    cells: Option<&Cells>,
+    count: usize,
+) -> Result<Vec<(Layout, parts::Parts)>> {
+    // Leaves of factors are short, and hardly any are equal.
+    if settings.shared_leaves == Some(true) {
+        return Err(Error::setting("shared_leaves", true, "false where leaves hold factors"));
+    }
+    let factored = factors::Factored::new(ensemble, count);
+    let scales = settings.scales.as_deref();
+    let small = Forest::new(&factored.small, scales)?;
+    let axes = Axes::new(&small);
+    let full = factors::Full { ensemble, forest, cells, scales };
+    // No table: cells of factors would be as many.
+    let made = layout::candidates(&small, &axes, None, settings.leaf, settings.layout, Some(false))?;
+    made.into_iter().map(|(layout, parts)| Ok((layout, factored.parts(&full, parts)?))).collect()
 }
 
 /// The best of the candidates.

@@ -5,7 +5,7 @@ use crate::bytes::AlignedTo8;
 use crate::layouts::leaves::{BLOCK, Sum};
 use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
 use palpate_shared::Touch;
-use palpate_shared::format::{Group, Layout};
+use palpate_shared::format::{Factors, Group, Layout};
 
 impl Model<'_> {
     /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
@@ -49,7 +49,7 @@ impl Model<'_> {
     }
 
     /// Whether margins are added up; those of a table are set.
-    fn has_trees(&self) -> bool {
+    pub(super) fn has_trees(&self) -> bool {
         built_in::TREES && !matches!(self.layout(), Layout::Grid | Layout::Patterns)
     }
 
@@ -69,28 +69,66 @@ impl Model<'_> {
     }
 
     /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits.
-    fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
-        let margins = margins.get_mut(..self.object_count())?;
+    pub(super) fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
+        let Some(factors) = self.factors() else {
+            return self.sum_values(features, margins.get_mut(..self.object_count())?);
+        };
+        self.sum_factors(&factors, features, margins.get_mut(..self.object_count())?)
+    }
+
+    /// The same of leaves that hold factors.
+    #[inline(never)]
+    fn sum_factors<'m>(
+        &self,
+        factors: &Factors<'_>,
+        features: &[i32],
+        margins: &'m mut [i32],
+    ) -> Option<&'m mut [i32]> {
+        let mut sums = [0; Factors::MOST];
+        let sums = sums.get_mut(..factors.count())?;
+        if self.has_trees() {
+            let shared = self.shared_leaves();
+            let bias =
+                self.add_trees(features, &mut Sum { margins: sums, leaf: self.sections.leaf, object: None, shared });
+            sums.iter_mut().for_each(|sum| *sum = sum.wrapping_sub(bias));
+        } else {
+            self.look_up(features, sums);
+        }
+        factors.mix(sums, margins);
+        let (base, _) = self.sections.base_and_priors();
+        let bases = base.as_chunks().0.iter().map(|base| i32::from_le_bytes(*base));
+        margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base));
+        Some(margins)
+    }
+
+    /// Reads the values of a cell, if the layout is a table.
+    fn look_up(&self, features: &[i32], values: &mut [i32]) -> bool {
         if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
-            grid::look_up(&self.sections, features, margins);
-            return Some(margins);
+            grid::look_up(&self.sections, features, values);
+            return true;
         }
         if built_in::layout(Layout::Patterns) && self.layout() == Layout::Patterns {
-            patterns::look_up(&self.sections, features, margins);
+            patterns::look_up(&self.sections, features, values);
+            return true;
+        }
+        false
+    }
+
+    /// The same of leaves that hold a value for each object.
+    fn sum_values<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
+        if self.look_up(features, margins) || !built_in::TREES {
             return Some(margins);
         }
-        if !built_in::TREES {
-            return Some(margins);
-        }
+        let shared = self.shared_leaves();
         let (base, _) = self.sections.base_and_priors();
         let bases = base.as_chunks().0.iter().map(|base| i32::from_le_bytes(*base));
         if self.is_float() {
             // Added in this order: the base, then the trees.
             margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = base);
-            self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
+            self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None, shared });
             return Some(margins);
         }
-        let bias = self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
+        let bias = self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None, shared });
         margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base).wrapping_sub(bias));
         Some(margins)
     }
@@ -120,10 +158,11 @@ impl Model<'_> {
                     complete::add(&group, ranks, &mut reached.0, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Wide if built_in::layout(Layout::Wide) => {
-                    preorder::add_wide(self.sections.axes_and_cuts().1, &group, features, &mut nodes, &mut leaves, sum);
+                    let cuts = self.sections.axes_and_cuts().1;
+                    preorder::add_wide(cuts, &group, features, &mut reached.0, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Compact if built_in::layout(Layout::Compact) => {
-                    preorder::add_compact(&group, ranks, &mut nodes, &mut leaves, sum);
+                    preorder::add_compact(&group, ranks, &mut reached.0, &mut nodes, &mut leaves, sum);
                 }
                 // Refused when the model was opened.
                 _ => {}

@@ -30,6 +30,10 @@ pub enum Tag {
     Promise,
     /// [`Temperature`](super::Temperature).
     Temperature,
+    /// The values of leaves that stand for many: [`SharedLeaves`](super::SharedLeaves).
+    SharedLeaves,
+    /// [`Factors`](super::Factors).
+    Factors,
 }
 
 impl Tag {
@@ -47,6 +51,8 @@ impl Tag {
             Self::PatternShares => 9,
             Self::Promise => 10,
             Self::Temperature => 11,
+            Self::SharedLeaves => 12,
+            Self::Factors => 13,
         }
     }
 }
