@@ -19,9 +19,6 @@ pub(super) fn instructions(instructions: Instructions) -> String {
 }
 
 /// The line that names the cargo features that a chip needs.
-pub(super) fn features(layout: &str, leaf: &str, has_factors: bool) -> String {
-    let factors = if has_factors { ", factors" } else { "" };
-    format!(
-        "A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves{factors}\n"
-    )
+pub(super) fn features(layout: &str, leaf: &str) -> String {
+    format!("A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves\n")
 }

@@ -74,18 +74,7 @@ fn walked(
     let instructions = Instructions::new(&shape);
     let base = forest.base.iter().map(|&base| base_bits(base, leaf, scale)).collect();
     let (unit, margin_error) = (scale.unit, margin_error());
-    Some(Parts {
-        axes,
-        cuts,
-        groups,
-        nodes,
-        leaves: leaves.into_bytes(),
-        base,
-        unit,
-        margin_error,
-        instructions,
-        factors: Vec::new(),
-    })
+    Some(Parts { axes, cuts, groups, nodes, leaves: leaves.into_bytes(), base, unit, margin_error, instructions })
 }
 
 fn base_bits(base: f32, leaf: LeafType, scale: &Scale) -> i32 {

@@ -1,7 +1,7 @@
 //! The parts of a compiled model, before they are written.
 
 use super::cost::Instructions;
-use palpate_shared::format::{Axis, Group, HEADER_LENGTH, SECTION_HEADER_LENGTH};
+use palpate_shared::format::{Axis, Group, HEADER_LENGTH};
 
 /// What a layout makes of a forest.
 pub(super) struct Parts {
@@ -15,15 +15,12 @@ pub(super) struct Parts {
     pub(super) unit: f32,
     pub(super) margin_error: f32,
     pub(super) instructions: Instructions,
-    /// The content of the section that makes margins of factors; empty where a leaf has a value for each object.
-    pub(super) factors: Vec<u8>,
 }
 
 impl Parts {
     /// Bytes of the model, but for its text and what is the same in all layouts.
     pub(super) fn bytes(&self) -> usize {
         let records = Axis::LENGTH * self.axes.len() + Group::LENGTH * self.groups.len() + 8 * self.base.len();
-        let section = if self.factors.is_empty() { 0 } else { SECTION_HEADER_LENGTH + self.factors.len() };
-        HEADER_LENGTH + section + records + self.cuts.len() + self.nodes.len() + self.leaves.len()
+        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len()
     }
 }

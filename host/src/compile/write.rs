@@ -26,11 +26,7 @@ pub(super) fn write(
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
     // Where nothing is known, the published probe.
     let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
-    let mut optional = optional(ensemble, settings, forest)?;
-    if !parts.factors.is_empty() {
-        // The last of the tags.
-        write_section(Tag::Factors, true, &parts.factors, &mut |part| optional.extend_from_slice(part));
-    }
+    let optional = optional(ensemble, settings, forest)?;
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);

@@ -12,9 +12,8 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, Factors, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan,
-    Promise, Section, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature,
-    take_section,
+    Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
+    Section, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -37,16 +36,12 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. Of the highest bits: whether there is a section about
-    /// strangers, and one about factors.
+    /// Where thresholds by object stand; 0 if there are none. The highest bit: whether there is a section about strangers.
     by_object: u32,
 }
 
 /// See [`Stated::by_object`]: no model is as long.
 const HAS_STRANGERS: u32 = 1 << 31;
-const HAS_FACTORS: u32 = 1 << 29;
-/// The other bits.
-const OFFSET: u32 = HAS_FACTORS - 1;
 
 impl Stated {
     /// What a model without optional sections states.
@@ -140,16 +135,6 @@ impl<'a> Model<'a> {
         self.object_count().saturating_sub(background.into())
     }
 
-    /// How factors become margins, if the leaves hold factors instead of a value for each object.
-    ///
-    /// Cost: about 30 instructions for each optional section. Cannot fail.
-    pub fn factors(&self) -> Option<Factors<'a>> {
-        if !cfg!(feature = "factors") || self.stated.by_object & HAS_FACTORS == 0 {
-            return None;
-        }
-        Factors::from_bytes(optional::find(self.optional(), Tag::Factors), self.object_count())
-    }
-
     /// How many features a row has: 1 to 256.
     pub fn feature_count(&self) -> usize {
         usize::from(self.header().last_feature()) + 1
@@ -226,7 +211,7 @@ impl<'a> Model<'a> {
     ///
     /// Cost: about 15 instructions. Cannot fail.
     pub fn odds_of(&self, object: usize) -> Option<u64> {
-        let start = usize::try_from(self.stated.by_object & OFFSET).ok().filter(|&start| start > 0)?;
+        let start = usize::try_from(self.stated.by_object & !HAS_STRANGERS).ok().filter(|&start| start > 0)?;
         let section = self.sections.bytes.get(start..)?;
         OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
     }

@@ -1,10 +1,10 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_FACTORS, HAS_STRANGERS, OFFSET, Stated};
+use super::{HAS_STRANGERS, Stated};
 use crate::bytes::Wrong;
 use crate::layouts::Sections;
 use palpate_shared::format::{
-    Factors, OddsByObject, Plan, Section, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+    OddsByObject, Plan, Section, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
@@ -32,7 +32,7 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
                 TrainedTouches::from_bytes(content).map(|touches| stated.set_touches(touches)).is_some()
             }
             _ if tag == Tag::ThresholdsByObject.code() => {
-                stated.by_object |= u32::try_from(model.offset(content)).unwrap_or_default() & OFFSET;
+                stated.by_object |= u32::try_from(model.offset(content)).unwrap_or_default() & !HAS_STRANGERS;
                 content.len() >= OddsByObject::LENGTH * model.objects()
             }
             _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
@@ -41,11 +41,6 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if cfg!(feature = "strangers") && tag == Tag::Strangers.code() => {
                 stated.by_object |= HAS_STRANGERS;
                 Strangers::from_bytes(content, model.objects()).is_some()
-            }
-            // Nor this one.
-            _ if cfg!(feature = "factors") && tag == Tag::Factors.code() => {
-                stated.by_object |= HAS_FACTORS;
-                Factors::from_bytes(content, model.objects()).is_some()
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

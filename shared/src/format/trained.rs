@@ -30,8 +30,6 @@ pub enum Tag {
     Promise,
     /// [`Temperature`](super::Temperature).
     Temperature,
-    /// [`Factors`](super::Factors).
-    Factors,
 }
 
 impl Tag {
@@ -49,7 +47,6 @@ impl Tag {
             Self::PatternShares => 9,
             Self::Promise => 10,
             Self::Temperature => 11,
-            Self::Factors => 13,
         }
     }
 }
