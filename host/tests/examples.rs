@@ -48,3 +48,12 @@ fn compare_models_measures_both_on_the_same_touches() {
     assert!(printed.contains("published ") && printed.contains("compact "), "{printed}");
     assert_eq!(printed.matches(" of 1000 verdicts differ from the full model's").count(), 2, "{printed}");
 }
+
+#[test]
+fn growth_measures_every_way_on_the_same_approaches() {
+    let printed = run("growth");
+    assert!(printed.starts_with("12 objects made in "), "{printed}");
+    for way in ["4x3 ", "4x3:i8 ", "4x3:stages=3 "] {
+        assert_eq!(printed.lines().filter(|line| line.starts_with(way)).count(), 1, "{way}: {printed}");
+    }
+}

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 ENSEMBLE is what `palpate train` saved, or a model of another library over features of any kind: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). Its content says which. `palpate verify` compares the model with it, and with the library.
 
 Leaves:
-  i16  two bytes per value: verdicts as the full model's (the default)
-  i8   one byte per value: half the size, margins within hundredths of a nat
+  i16  two bytes per value: verdicts as the full model's (the default for up to 50 objects, and for rows of features)
+  i8   one byte per value: half the size, margins within hundredths of a nat (the default for touches of more objects)
   f32  four bytes per value, added as the trainer adds them: the same margins
 
 Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
@@ -46,9 +46,9 @@ pub(crate) struct Arguments {
     /// The classes' names, in the order of the labels, or a file with one per line [default: the file's own, or 0, 1, …]
     #[arg(long, value_name = "A,B,…|FILE")]
     names: Option<String>,
-    /// What leaves are stored as
-    #[arg(long, value_parser = leaf, default_value = "i16", value_name = "i8|i16|f32")]
-    leaf: Leaf,
+    /// What leaves are stored as [default: i16; i8 for touches of more than 50 objects]
+    #[arg(long, value_parser = leaf, value_name = "i8|i16|f32")]
+    leaf: Option<Leaf>,
     /// How trees are laid out; auto lets --for decide
     #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid|wide|patterns")]
     layout: LayoutChoice,
@@ -147,8 +147,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let names = arguments.names.as_deref().map(names).transpose()?;
     let ensemble = Ensemble::load_named(&arguments.ensemble, names.as_deref())?;
     let scales = scales(&arguments, &ensemble)?;
+    let usual = match ensemble.inputs {
+        Inputs::Touches(_) => Settings::for_touches(ensemble.objects.len()),
+        Inputs::Rows(_) => Settings::default(),
+    };
     let settings = Settings {
-        leaf: arguments.leaf,
+        leaf: arguments.leaf.unwrap_or(usual.leaf),
         layout: arguments.layout.0,
         goal: arguments.goal,
         error_rate: arguments.error_rate,

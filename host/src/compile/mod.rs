@@ -101,6 +101,19 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// What is usual for a model of touches of so many objects: leaves of one byte with more than
+    /// [`MANY`], where nearly all of a model is leaves; otherwise the default.
+    pub fn for_touches(objects: usize) -> Self {
+        let leaf = if objects > MANY { Leaf::I8 } else { Leaf::I16 };
+        Self { leaf, ..Self::default() }
+    }
+}
+
+/// Models of more objects than this are usually compiled with leaves of one byte: `docs/growth.md` has what that saves and
+/// what it costs.
+pub const MANY: usize = 50;
+
 /// What a layout is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {

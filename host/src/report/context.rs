@@ -117,12 +117,11 @@ impl<'a> Context<'a> {
     }
 
     /// Instances of the ten built-in kinds, each sorted by name: the canonical ones first, then others with varied
-    /// proportions, as many as growth and generalization need.
+    /// proportions, as many as generalization needs.
     pub(super) fn kinds(&self) -> Result<&[Vec<Object>]> {
         let settings = self.settings;
-        let grown = settings.growth_objects.iter().copied().max().unwrap_or(0).div_ceil(builtin::names().len());
         let trained = settings.instances.iter().copied().max().unwrap_or(0);
-        let count = grown.max(trained + settings.test_instances);
+        let count = trained + settings.test_instances;
         get_or_try(&self.kinds, || {
             let mut names = builtin::names();
             names.sort_unstable();

@@ -1,19 +1,21 @@
 //! Growth: what more objects and finer meshes cost.
 
-use super::context::{Context, compiled, touch};
+use super::context::{Context, touch};
 use super::instructions::Instructions;
-use crate::compile;
+use crate::capture;
+use crate::compile::{self, Leaf};
 use crate::error::Result;
-use crate::evaluate::{Candidate, Margins};
-use crate::mesh::{Mesh, Object};
+use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::mesh::{Mesh, Object, builtin};
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Side};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use crate::probe::scene::Scene;
-use crate::touches::folds;
-use crate::touches::{Dataset, Origin};
+use crate::progress;
+use crate::touches::{Dataset, ObjectTouches, Origin};
+use palpate_onboard::Refused;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -36,15 +38,26 @@ pub(super) struct Objects {
     pub(super) capture: f64,
     /// Seconds of training.
     pub(super) train: f64,
-    /// Bytes of the compiled model.
+    /// Bytes of the model with leaves of two bytes.
+    pub(super) two_bytes: usize,
+    /// Bytes of the model that is usual for so many objects; the rest is about this one.
     pub(super) bytes: usize,
     /// Instructions per touch on the chips.
     pub(super) instructions: Instructions,
-    /// Accuracy after ten touches.
-    pub(super) at_10: f64,
-    /// Accuracy after sixty touches.
-    pub(super) at_60: f64,
+    /// Accuracy after each of [`AT`] approaches; none where an object has fewer to test.
+    pub(super) accuracy: Vec<Option<f64>>,
+    /// Approaches to a verdict, on average.
+    pub(super) approaches: f64,
+    /// The share of wrong verdicts.
+    pub(super) wrong: f64,
+    /// The share of sequences without a verdict.
+    pub(super) undecided: f64,
 }
+
+/// Numbers of approaches after which accuracy is shown.
+const AT: [usize; 3] = [20, 60, 200];
+/// Touches after which a recognizer gives up: twice the usual, since many objects take more.
+const MAX_TOUCHES: u32 = 400;
 
 /// What a number of triangles costs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,47 +73,77 @@ pub(super) struct Triangles {
 /// Touches more and more objects, and finer and finer meshes.
 pub(super) fn measure(context: &Context) -> Result<Growth> {
     let settings = context.settings;
-    let all: Vec<Object> = context
-        .kinds()?
-        .iter()
-        .enumerate()
-        .flat_map(|(instance, kinds)| {
-            kinds.iter().map(move |object| Object::new(format!("{}-{instance}", object.name), object.mesh().clone()))
-        })
-        .collect();
-    let grown = settings.growth_objects.iter().map(|&count| objects_cost(context, &all[..count]));
+    let most = settings.growth_objects.iter().copied().max().unwrap_or(0);
+    context.progress.begin("making objects", None);
+    let all = builtin::many(most)?;
+    context.progress.begin("touching", u64::try_from(most).ok());
+    let touched: Vec<Touched> = all.iter().map(|object| touched(context, object)).collect::<Result<_>>()?;
+    let grown = settings.growth_objects.iter().map(|&count| objects_cost(context, &touched[..count]));
     let triangles = settings.growth_triangles.iter().map(|&count| triangles_cost(context, count));
     Ok(Growth { objects: grown.collect::<Result<_>>()?, triangles: triangles.collect::<Result<_>>()? })
 }
 
-fn objects_cost(context: &Context, objects: &[Object]) -> Result<Objects> {
+/// An object's approaches, to train on and to test on, and the seconds that they took.
+struct Touched {
+    train: ObjectTouches,
+    test: ObjectTouches,
+    seconds: f64,
+}
+
+fn origin(context: &Context) -> Origin {
+    Origin { seed: context.settings.seed, approaches: true, ..Origin::default() }
+}
+
+fn touched(context: &Context, object: &Object) -> Result<Touched> {
+    progress::advance(context.progress, 1)?;
+    let origin = origin(context);
+    let began = Instant::now();
+    let scene = Scene::new(object.mesh(), origin.length)?;
+    let count = context.settings.growth_approaches;
+    let touches = capture::touches(&[scene], &object.name, &origin, 0..count + count / 4)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let (train, test) = touches.split_at(usize::try_from(count).unwrap_or(usize::MAX).min(touches.len()));
+    let named = |touches: &[Touch]| ObjectTouches { name: object.name.clone(), touches: touches.to_vec() };
+    Ok(Touched { train: named(train), test: named(test), seconds })
+}
+
+fn objects_cost(context: &Context, touched: &[Touched]) -> Result<Objects> {
     let settings = context.settings;
-    let origin = Origin { seed: settings.seed, ..Origin::default() };
+    let data = |of: fn(&Touched) -> &ObjectTouches| {
+        let mut objects: Vec<ObjectTouches> = touched.iter().map(|touched| of(touched).clone()).collect();
+        objects.sort_by(|a, b| a.name.cmp(&b.name));
+        Dataset { origin: Some(origin(context)), ..Dataset::new(objects) }
+    };
+    let (train, test) = (data(|touched| &touched.train), data(|touched| &touched.test));
     let began = Instant::now();
-    let touched = objects.iter().map(|object| {
-        let scene = Scene::new(object.mesh(), origin.length)?;
-        Ok(touch(&[scene], &object.name, settings.growth_touches, &origin, context.progress)?.0)
-    });
-    let mut data = Dataset::new(touched.collect::<Result<_>>()?);
-    let capture = began.elapsed().as_secs_f64();
-    data.objects.sort_by(|a, b| a.name.cmp(&b.name));
-    let split = folds::split(&data, 0.2, settings.seed)?;
-    let began = Instant::now();
-    let ensemble = context.train(&split.train, &context.ours())?;
-    let train = began.elapsed().as_secs_f64();
-    let compiled = compiled(&ensemble)?;
+    let ensemble = context.train(&train, &context.ours())?;
+    let seconds = began.elapsed().as_secs_f64();
+    let usual = compile::Settings { max_touches: MAX_TOUCHES, ..compile::Settings::for_touches(touched.len()) };
+    let compiled = compile::compile(&ensemble, &usual)?;
+    let two_bytes = match usual.leaf {
+        Leaf::I16 => compiled.bytes.len(),
+        Leaf::I8 | Leaf::F32 => compile::compile(&ensemble, &compile::Settings::default())?.bytes.len(),
+    };
     let model = compile::open(&compiled.bytes)?;
+    let touches: Vec<Touch> = test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
     let touches: Vec<Touch> =
-        split.test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
-    let curve = Margins::new(Candidate::Compiled(&model), &split.test)?.curve(60, 100, settings.seed)?;
+        touches.into_iter().filter(|touch| Refused::check(&model.trained_touches(), touch).is_ok()).collect();
+    let margins = Margins::new(Candidate::Compiled(&model), &test)?;
+    let at: Vec<usize> = AT.into_iter().filter(|&at| at <= margins.fewest_approaches()).collect();
+    let sequences = (if settings.quick { 2_000 } else { 20_000 } / touched.len()).clamp(20, 1_000);
+    let drawn = SequentialSettings { error_rate: None, max_touches: None, sequences, seed: settings.seed };
+    let measured = margins.approaches(&at, &drawn)?;
     Ok(Objects {
-        count: objects.len(),
-        capture,
-        train,
+        count: touched.len(),
+        capture: touched.iter().map(|touched| touched.seconds).sum(),
+        train: seconds,
+        two_bytes,
         bytes: compiled.bytes.len(),
         instructions: Instructions::new(&compiled, &touches)?,
-        at_10: curve.accuracy(10).value,
-        at_60: curve.accuracy(60).value,
+        accuracy: AT.iter().map(|at| measured.accuracy.get(at).copied()).collect(),
+        approaches: measured.sequential.mean_approaches,
+        wrong: measured.sequential.error,
+        undecided: measured.sequential.undecided,
     })
 }
 
@@ -132,10 +175,12 @@ pub(super) fn left_out() -> Section {
 pub(super) fn section(context: &Context, growth: &Growth) -> Result<Section> {
     let mut section = Section::new("growth", "Growth");
     section.text(format!(
-        "More objects: the ten built-in ones, then others of the same kinds with varied proportions, which are harder to \
-         distinguish; {} touches each, four fifths of them for training our method. Finer meshes: the same bumpy \
-         globe, cut into more and more triangles. Times are of this machine, all threads.",
-        context.settings.growth_touches
+        "More objects: the ten built-in ones, then in turn ten shapes of no kind and ten others of the same kinds with \
+         varied proportions, which are harder to distinguish; {} approaches to each train our method on every contact, a \
+         quarter as many test it. With more than {} objects leaves are of one byte, as is usual then. Finer meshes: the \
+         same bumpy globe, cut into more and more triangles. Times are of this machine, all threads.",
+        context.settings.growth_approaches,
+        compile::MANY
     ));
     section.figure(objects_figure(context, growth)?);
     section.table(objects_table(context, growth));
@@ -171,12 +216,20 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
                 ("training", color::OURS, Shape::Disc, of(|o| o.train)),
             ],
         )?,
-        panel("Size", "bytes", &[("model", color::OURS, Shape::Disc, of(|o| o.bytes as f64))])?,
+        panel(
+            "Size",
+            "bytes",
+            &[
+                ("leaves of two bytes", color::GREEN, Shape::Triangle, of(|o| o.two_bytes as f64)),
+                ("usual", color::OURS, Shape::Disc, of(|o| o.bytes as f64)),
+            ],
+        )?,
         panel(
             &format!("Instructions ({source})"),
             "instructions per touch, M4F",
-            &[("model", color::OURS, Shape::Disc, of(|o| o.instructions.m4f.number as f64))],
+            &[("usual", color::OURS, Shape::Disc, of(|o| o.instructions.m4f.number as f64))],
         )?,
+        panel("Approaches to a verdict", "approaches", &[("usual", color::OURS, Shape::Disc, of(|o| o.approaches))])?,
     ];
     Ok(Figure {
         id: "growth-objects-figure".into(),
@@ -198,20 +251,34 @@ fn objects_data(growth: &Growth) -> Records {
         "objects",
         "capture (s)",
         "training (s)",
-        "bytes",
+        "bytes, i16 leaves",
+        "bytes, usual",
         &format!("instructions, M4F ({})", source(growth)),
-        "accuracy at 10",
-        "accuracy at 60",
+        &format!("accuracy at {}", AT[0]),
+        &format!("accuracy at {}", AT[1]),
+        &format!("accuracy at {}", AT[2]),
+        "approaches to a verdict",
+        "wrong",
+        "undecided",
     ]);
     for objects in &growth.objects {
+        let at = |place: usize| match objects.accuracy.get(place).copied().flatten() {
+            Some(share) => Cell::Percent(share, 1),
+            None => Cell::Missing,
+        };
         data.push([
             Cell::count(objects.count),
             Cell::Number(objects.capture, 2),
             Cell::Number(objects.train, 2),
+            Cell::count(objects.two_bytes),
             Cell::count(objects.bytes),
             Cell::count(objects.instructions.m4f.number),
-            Cell::Percent(objects.at_10, 1),
-            Cell::Percent(objects.at_60, 1),
+            at(0),
+            at(1),
+            at(2),
+            Cell::Number(objects.approaches, 1),
+            Cell::Percent(objects.wrong, 2),
+            Cell::Percent(objects.undecided, 2),
         ]);
     }
     data
@@ -221,7 +288,10 @@ fn objects_table(context: &Context, growth: &Growth) -> Table {
     Table {
         id: "growth-objects".into(),
         title: "More objects, in numbers".into(),
-        caption: "Accuracy is over all objects: beyond ten, a fork can be mistaken for another fork.".into(),
+        caption:
+            "Accuracy, after so many approaches, is over all objects: beyond ten, a fork can be mistaken for another \
+                  fork. A recognizer stops at a posterior of 99 %, or gives up after 400 touches."
+                .into(),
         command: context.settings.command.clone(),
         data: objects_data(growth),
     }

@@ -57,8 +57,8 @@ pub struct Settings {
     pub growth_objects: Vec<usize>,
     /// Numbers of triangles in the growth figures.
     pub growth_triangles: Vec<usize>,
-    /// Touches of each object in the growth figures.
-    pub growth_touches: usize,
+    /// Approaches to each object in the growth figures; a quarter as many more test.
+    pub growth_approaches: u64,
     /// Numbers of instances of each kind that are trained on, to see how well others are recognized.
     pub instances: Vec<usize>,
     /// Instances of each kind that are tested on.
@@ -93,9 +93,9 @@ impl Settings {
             approaches: 60_000,
             limit_touches: 300_000,
             limit_rounds: 80,
-            growth_objects: vec![2, 5, 10, 20, 50, 100],
+            growth_objects: vec![2, 5, 10, 20, 50, 100, 256],
             growth_triangles: vec![1_000, 10_000, 100_000, 1_000_000],
-            growth_touches: 4_000,
+            growth_approaches: 4_000,
             instances: vec![1, 2, 4, 8],
             test_instances: 3,
             instance_touches: 12_000,
@@ -118,7 +118,7 @@ impl Settings {
             limit_rounds: 60,
             growth_objects: vec![2, 5, 10, 20],
             growth_triangles: vec![1_000, 10_000, 100_000],
-            growth_touches: 1_000,
+            growth_approaches: 1_200,
             instances: vec![1, 2],
             test_instances: 1,
             instance_touches: 2_000,

@@ -244,7 +244,7 @@ mod tests {
             growth: true,
             growth_objects: vec![2, 3],
             growth_triangles: vec![100, 1_000],
-            growth_touches: 400,
+            growth_approaches: 400,
             instances: vec![1],
             test_instances: 1,
             instance_touches: 200,

@@ -435,3 +435,27 @@ fn export_emits_sources_beside_the_model_and_refuses_a_name_that_leaves_no_room_
     }
     assert!(!place.path("model.h").exists() && !place.path("palpate.palpate").exists());
 }
+
+#[test]
+fn leaves_of_touches_of_more_than_fifty_objects_take_a_byte_unless_told_otherwise() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    let leaf = |objects: usize, more: &[&str]| {
+        let mut many = ensemble();
+        for node in many.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+            if let Node::Leaf(values) = node {
+                *values = (0..objects).map(|object| values[object % 2]).collect();
+            }
+        }
+        many.objects = (0..objects).map(|object| format!("object-{object:03}")).collect();
+        many.base_margins = vec![0.5; objects];
+        many.save(path("many.json")).unwrap();
+        let (from, to) = (path("many.json"), path("many.palpate"));
+        let exported = json(&[&["export", &from, "-o", &to, "--json"], more].concat());
+        exported["leaf"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(leaf(50, &[]), "i16");
+    assert_eq!(leaf(51, &[]), "i8");
+    assert_eq!(leaf(51, &["--leaf", "i16"]), "i16");
+    assert_eq!(leaf(50, &["--leaf", "i8"]), "i8");
+}

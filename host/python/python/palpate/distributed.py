@@ -259,23 +259,28 @@ def _objects(
     if isinstance(meshes, Mapping):
         import numpy
 
-        named: list[tuple[str, str | Mesh, bytes]] = []
+        named: list[tuple[str, str | Mesh]] = []
         for name, mesh in sorted(meshes.items()):
             if isinstance(mesh, (str, os.PathLike)):
-                named.append((name, os.fspath(mesh), Path(mesh).read_bytes()))
+                named.append((name, os.fspath(mesh)))
                 continue
             vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, mesh.faces)
-            arrays = (numpy.ascontiguousarray(vertices, dtype="f4"), numpy.ascontiguousarray(faces, dtype="i8"))
-            named.append((name, arrays, arrays[0].tobytes() + arrays[1].tobytes()))
+            named.append((name, (numpy.ascontiguousarray(vertices, dtype="f4"), numpy.ascontiguousarray(faces, dtype="i8"))))
     else:
         given = [meshes] if isinstance(meshes, (str, os.PathLike)) else list(meshes)
-        named = []
-        for name, source in _native.sources(given):
-            path = Path(source)
-            named.append((name, source, path.read_bytes() if path.is_file() else source.encode()))
+        named = [(name, source) for name, source in _native.sources(given)]
     if not named:
         raise InputError("no meshes are given. Give a mesh at least.")
-    for name, mesh, content in named:
+    for name, mesh in named:
+        # One after the other: all meshes together may be more than fits the memory.
+        if isinstance(mesh, str):
+            path = Path(mesh)
+            content = path.read_bytes() if isinstance(meshes, Mapping) or path.is_file() else mesh.encode()
+        else:
+            import numpy
+
+            vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, mesh.faces)
+            content = numpy.asarray(vertices).tobytes() + numpy.asarray(faces).tobytes()
         digest = hashlib.blake2b(content, digest_size=16)
         for text in [name, *setting]:
             digest.update(text.encode() + b"\0")

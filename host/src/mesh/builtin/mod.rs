@@ -138,6 +138,40 @@ fn shape(first: u64, number: u64) -> Result<Instance> {
     }
 }
 
+/// Seeds of [`many`]'s shapes: none of a background's at usual seeds.
+const MANY_SHAPES: u64 = 7_000_000_049_000;
+
+/// `count` objects that differ: the ten built-in ones, then in turn ten shapes as those of [`background`] (`shape-0` and
+/// on), one of each family, and another [`varied`] object of each kind (`bowl-1` and on). Of two numbers, the objects of
+/// the smaller are the first of the larger. What more objects cost is measured on them.
+///
+/// Takes about a tenth of a second of one thread's time per object.
+///
+/// # Errors
+/// As [`background`].
+pub fn many(count: usize) -> Result<Vec<Object>> {
+    let kinds = KINDS.len();
+    let make = |number: usize| -> Result<Object> {
+        let (turn, kind) = (number / kinds, number % kinds);
+        match (turn, turn.is_multiple_of(2)) {
+            (0, _) => make_one(&KINDS[kind], None),
+            (_, true) => {
+                let instance = turn / 2;
+                let seeds = (0..100_u64).map(|attempt| 2_000 + instance as u64 + 1_000 * attempt);
+                let made = seeds.map(|seed| make_one(&KINDS[kind], Some(seed))).find(Result::is_ok);
+                let name = format!("{}-{instance}", KINDS[kind].0);
+                let object = made.ok_or_else(|| MeshProblem::NotMeshed { name: name.clone(), seed: None })??;
+                Ok(Object { millimeters: Some(MILLIMETERS), ..Object::new(name, object.mesh().clone()) })
+            }
+            (_, false) => {
+                let shape = shape(MANY_SHAPES, (turn / 2 * kinds + kind) as u64)?;
+                Ok(Object { millimeters: Some(MILLIMETERS), ..Object::new(shape.name, shape.mesh) })
+            }
+        }
+    };
+    (0..count).into_par_iter().map(make).collect()
+}
+
 /// The objects `names`, in that order: canonical, or with a seed [`varied`].
 ///
 /// # Errors

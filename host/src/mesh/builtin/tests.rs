@@ -169,3 +169,16 @@ fn shapes_of_a_background_are_closed_right_side_out_and_of_their_own() {
     let other = background(3, 6).unwrap();
     assert!(other.instances().zip(object.instances()).all(|(a, b)| a.mesh != b.mesh), "another seed, the same shapes");
 }
+
+#[test]
+fn many_objects_begin_with_the_built_in_ones_and_all_have_names_of_their_own() {
+    let (few, more) = (many(12).unwrap(), many(23).unwrap());
+    let names_of = |objects: &[Object]| objects.iter().map(|object| object.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names_of(&few), names_of(&more)[..12]);
+    assert_eq!(names_of(&few)[..10], names());
+    assert_eq!(names_of(&more)[10], "shape-0");
+    assert_eq!(names_of(&more)[20], format!("{}-1", names()[0]));
+    assert_ne!(more[20].mesh(), more[0].mesh());
+    let different: std::collections::BTreeSet<String> = names_of(&more).into_iter().collect();
+    assert_eq!(different.len(), 23);
+}
