@@ -663,7 +663,9 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     }
     model->odds_ = NULL;
     model->strangers_ = NULL;
-    model->table_ = NULL;
+    if (PALPATE_SHARED) {
+        model->table_ = NULL;
+    }
     model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
