@@ -36,8 +36,10 @@ fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     let layouts = std::iter::once(None).chain(Layout::ALL.iter().copied().map(Some));
     let settings = |layout| Settings { leaf, layout, ..Settings::default() };
     let plain = layouts.map(settings);
-    let walked = [Layout::Compact, Layout::Complete, Layout::Wide].map(|layout| settings(Some(layout)));
-    let shared = walked.map(|settings| Settings { shared_leaves: Some(true), ..settings });
+    // Of those that walk trees, one with shared leaves.
+    let walked = [Layout::Compact, Layout::Complete, Layout::Wide];
+    let shared = walked.get(ensemble.trees.len() % walked.len()).copied();
+    let shared = shared.map(|layout| Settings { shared_leaves: Some(true), ..settings(Some(layout)) });
     plain.chain(shared).filter_map(|settings| compile(ensemble, &settings).ok()).collect()
 }
 
