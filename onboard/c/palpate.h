@@ -19,6 +19,7 @@
  * Before the #include may be defined:
  *   PALPATE_LAYOUTS      which layouts are read, as PALPATE_COMPACT | PALPATE_COMPLETE; all of them by default
  *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
+ *   PALPATE_SHARED       0: a model whose equal leaves stand once, in a table, is refused
  *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default. 8 bytes of state, and 4 of stack, for each
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
@@ -46,6 +47,9 @@
 #endif
 #ifndef PALPATE_LEAVES
 #define PALPATE_LEAVES 7
+#endif
+#ifndef PALPATE_SHARED
+#define PALPATE_SHARED 1
 #endif
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 1
@@ -143,6 +147,7 @@ typedef struct {
     const uint8_t *cuts_;    /* thresholds of the axes */
     const uint8_t *odds_;    /* thresholds by object, or NULL */
     const uint8_t *strangers_; /* what it states of objects that it does not know, or NULL */
+    const uint8_t *table_; /* values of the leaves that are shared, or NULL; before them the length of their numbers */
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
@@ -181,6 +186,8 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 #define PALPATE_IS_GRID_(model) PALPATE_IS_LAYOUT_(model, PALPATE_GRID, 2)
 #define PALPATE_IS_WIDE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_WIDE, 3)
 #define PALPATE_IS_PATTERNS_(model) PALPATE_IS_LAYOUT_(model, PALPATE_PATTERNS, 4)
+/* Whether leaves are numbers of a table. */
+#define PALPATE_IS_SHARED_(model) (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && (model)->table_ != NULL)
 #define PALPATE_IS_I8_(model) PALPATE_IS_LEAF_(model, PALPATE_I8, 0)
 #define PALPATE_IS_I16_(model) PALPATE_IS_LEAF_(model, PALPATE_I16, 1)
 #define PALPATE_IS_F32_(model) PALPATE_IS_LEAF_(model, PALPATE_F32, 2)
@@ -229,6 +236,12 @@ static inline int32_t palpate_signed_(const uint8_t *p, uint_fast8_t width)
 }
 
 /* ---- Opening a model: after it nothing can fail ---- */
+
+/* The number of a shared leaf at `leaf`. */
+static inline uint32_t palpate_number_(const palpate_model *model, const uint8_t *leaf)
+{
+    return PALPATE_BYTE(model->table_ - 4) == 1 ? PALPATE_BYTE(leaf) : palpate_u16_(leaf);
+}
 
 static inline size_t palpate_leaf_size_(const palpate_model *model)
 {
@@ -371,6 +384,12 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 if (!palpate_check_strangers_(model, content, length)) {
                     return PALPATE_FIELD;
                 }
+            } else if (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && last == 12) {
+                /* Tables of margins have no leaves to share. */
+                if (length < 4 || PALPATE_BYTE(content) - 1u > 1 || PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
+                    return PALPATE_FIELD;
+                }
+                model->table_ = content + 4;
             } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
@@ -450,7 +469,8 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         }
     }
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
-        uint32_t trees = palpate_u32_(group + 4), leaf = (uint32_t)palpate_leaf_size_(model);
+        uint32_t trees = palpate_u32_(group + 4), leaf = (uint32_t)palpate_leaf_size_(model), length, table = 0;
+        const uint8_t *number = leaves;
         uint8_t depth = PALPATE_BYTE(group), one = PALPATE_BYTE(group + 2);
         int fits = 1;
         if (PALPATE_BYTE(group + 1) > shift || one > 1 || (one != 0 && PALPATE_BYTE(group + 3) >= model->objects) ||
@@ -467,6 +487,11 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         }
         if (one == 0) {
             leaf *= model->objects;
+        }
+        length = leaf;
+        if (PALPATE_IS_SHARED_(model)) {
+            leaf = PALPATE_BYTE(model->table_ - 4);
+            table = palpate_u32_(model->table_ - 8) - 4;
         }
         if (PALPATE_IS_COMPLETE_(model)) {
             if (depth - 1u > 7) {
@@ -498,6 +523,11 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         }
         if (!fits) {
             return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_SPLITS_]);
+        }
+        for (; PALPATE_IS_SHARED_(model) && number != leaves; number += leaf) {
+            if ((palpate_number_(model, number) + 1) * length > table) {
+                return palpate_wrong_(model, PALPATE_FIELD, number);
+            }
         }
     }
     if (splits != model->part_[PALPATE_LEAVES_]) {
@@ -633,6 +663,9 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     }
     model->odds_ = NULL;
     model->strangers_ = NULL;
+    if (PALPATE_SHARED) {
+        model->table_ = NULL;
+    }
     model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
@@ -925,6 +958,12 @@ PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int
     return leaf;
 }
 
+/* Where the `length` bytes of a leaf's values are. */
+static inline const uint8_t *palpate_values_(const palpate_model *model, const uint8_t *leaf, size_t length)
+{
+    return PALPATE_IS_SHARED_(model) ? model->table_ + palpate_number_(model, leaf) * length : leaf;
+}
+
 static inline void palpate_shift_(const palpate_model *model, uint32_t *sums, uint_fast8_t shift)
 {
     uint_fast16_t i;
@@ -1014,6 +1053,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
         const int one = PALPATE_BYTE(group + 2) != 0;
         const uint16_t values = one ? 1 : model->objects;
         const size_t length = size * values;
+        const size_t stored = PALPATE_IS_SHARED_(model) ? PALPATE_BYTE(model->table_ - 4) : length;
         uint32_t *first = one ? sums + PALPATE_BYTE(group + 3) : sums;
         uint32_t trees = palpate_u32_(group + 4);
         /* Shifts get smaller: what was added before is shifted on the way. */
@@ -1027,10 +1067,10 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
             const uint8_t *thresholds = splits + (size_t)(trees << depth);
             for (; trees != 0; trees--) {
                 const size_t leaf = palpate_walk_complete_(ranks, splits, thresholds, slots);
-                palpate_add_leaf_(model, first, values, leaves + leaf * length);
+                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + leaf * stored, length));
                 splits += slots;
                 thresholds += slots;
-                leaves += slots * length;
+                leaves += slots * stored;
             }
             splits = thresholds;
         } else {
@@ -1045,8 +1085,8 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                     leaf = palpate_walk_compact_(ranks, splits, all);
                     splits += (size_t)(all * 3);
                 }
-                palpate_add_leaf_(model, first, values, leaves + (size_t)leaf * length);
-                leaves += (size_t)(all + 1) * length;
+                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + (size_t)leaf * stored, length));
+                leaves += (size_t)(all + 1) * stored;
             }
         }
     }

@@ -47,6 +47,7 @@
 //! | `station` | [`station`], with both of these |
 //! | `compact`, `complete`, `grid`, `wide` | layouts of trees that can be read |
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
+//! | `shared-leaves` | trees whose equal leaves stand once |
 //! | `defmt` | touches, verdicts, refusals and faults can be logged; the only one that is off by default |
 //!
 //! `no_std`, without a heap and without `unsafe`; once a model has been validated nothing here can panic.

@@ -47,6 +47,17 @@ pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
     compile(&random::ensemble(shape, 5), &settings).expect("a small ensemble").bytes
 }
 
+/// A small model whose leaves are shared: numbers of one byte, or of two.
+pub fn shared(layout: Layout, is_wide: bool) -> Vec<u8> {
+    let trees = if is_wide { 80 } else { 4 };
+    let shape =
+        Shape { descriptor: Descriptor::Curvature, objects: 3, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
+    let settings = Settings { leaf: Leaf::I8, layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
+    let ensemble = random::ensemble(shape, 5);
+    let ensemble = if is_wide { ensemble } else { random::with_few_leaves(ensemble, 5) };
+    compile(&ensemble, &settings).expect("a small ensemble").bytes
+}
+
 /// Puts the checksum right.
 pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let body = bytes.len() - 4;
@@ -135,6 +146,7 @@ pub fn cases() -> Vec<Abuse> {
     axes(&mut put);
     groups(&mut put);
     tables(&mut put);
+    shared_leaves(&mut put);
     cases
 }
 
@@ -366,4 +378,40 @@ fn tables(put: Put<'_>) {
     let [_, _, axes, ..] = places(&good);
     put("tables by pattern with axes in another order", "section", axes, changed(&good, axes, &[2]));
     put("tables by pattern of another descriptor", "section", axes, changed(&good, 12, &[Descriptor::Gravity.code()]));
+}
+
+/// Leaves that are numbers of a table.
+fn shared_leaves(put: Put<'_>) {
+    let good = shared(Layout::Compact, false);
+    let [optional, base, .., end] = places(&good);
+    let content = optional + 8;
+    let values = &good[content + 4..base];
+    let number = values.len() / 3;
+    put("leaves numbered by no byte", "field", optional, changed(&good, content, &[0]));
+    put("leaves numbered by three bytes", "field", optional, changed(&good, content, &[3]));
+    let alone = with_sections(&good, &[]);
+    put("leaves without their table", "section", splits_of(&alone), alone);
+    let tag = Tag::SharedLeaves.code() | MUST_UNDERSTAND;
+    put("a table of leaves that is too short", "field", optional, with_sections(&good, &section(tag, &[1, 0, 0])));
+    // The greatest number is one that was given.
+    put("the number of a leaf that does not exist", "field", end - 1, changed(&good, end - 1, &[number as u8]));
+    let cut = with_sections(&good, &section(tag, &[&[1, 0, 0, 0][..], &values[..2]].concat()));
+    let [.., first, _] = places(&cut);
+    put("a leaf that is cut", "field", first, cut);
+    put("numbers of leaves that are twice as long", "section", splits_of(&good), changed(&good, content, &[2]));
+    let wide = shared(Layout::Complete, true);
+    let [.., end] = places(&wide);
+    put("a long number of a leaf that does not exist", "field", end - 2, changed(&wide, end - 1, &[0xff]));
+    for layout in [Layout::Grid, Layout::Patterns] {
+        let table = model(layout, Leaf::I8, true);
+        let [at, ..] = places(&table);
+        let bytes = with_sections(&table, &section(tag, &[&[1, 0, 0, 0][..], &[128; 9]].concat()));
+        put(&format!("shared leaves of {}", layout.name()), "field", at, bytes);
+    }
+}
+
+/// Where a model's splits start.
+fn splits_of(model: &[u8]) -> usize {
+    let [.., splits, _, _] = places(model);
+    splits
 }

@@ -49,6 +49,8 @@ pub struct Plain<'a> {
     thresholds: &'a [u8],
     splits: &'a [u8],
     leaves: &'a [u8],
+    /// Bytes of a leaf's number, and the values of all leaves, if the model shares them.
+    shared: Option<(usize, &'a [u8])>,
     /// For each object.
     pub evidence: Vec<i64>,
     /// How many were counted.
@@ -110,7 +112,7 @@ impl<'a> Plain<'a> {
             object: (group[2] == 1).then_some(group[3].into()),
             trees: number(&group[4..]) as usize,
         });
-        let (mut odds_by_object, mut sharpness) = (Vec::new(), 1 << 16);
+        let (mut odds_by_object, mut sharpness, mut shared) = (Vec::new(), 1 << 16, None);
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -120,6 +122,7 @@ impl<'a> Plain<'a> {
                 2 => (patterns, needs_pose, largest) = (content[0], content[2] == 1, number(&content[4..8]) as u32),
                 5 => odds_by_object = content[..4 * objects].chunks(4).map(|odds| number(odds) << 24).collect(),
                 11 if (1 << 12..=1 << 20).contains(&number(&content[..4])) => sharpness = number(&content[..4]),
+                12 => shared = Some((content[0].into(), &content[4..])),
                 _ => {}
             }
             optional = &optional[8 + length.next_multiple_of(4)..];
@@ -145,6 +148,7 @@ impl<'a> Plain<'a> {
             thresholds,
             splits,
             leaves,
+            shared,
             evidence: Vec::new(),
             touches: 0,
             decision: Decision::Undecided,
@@ -274,7 +278,10 @@ impl<'a> Plain<'a> {
                         (leaf, count + 1)
                     }
                 };
-                let values = leaves[leaf * length..][..length].chunks(size).map(|value| self.value(value));
+                let stored = self.shared.map_or(length, |(width, _)| width);
+                let own = &leaves[leaf * stored..][..stored];
+                let own = self.shared.map_or(own, |(_, table)| &table[number(own) as usize * length..][..length]);
+                let values = own.chunks(size).map(|value| self.value(value));
                 for (index, value) in values.enumerate() {
                     let sum = &mut sums[group.object.unwrap_or(index)];
                     *sum = if self.leaf == 2 {
@@ -283,7 +290,7 @@ impl<'a> Plain<'a> {
                         *sum + (value << group.shift)
                     };
                 }
-                leaves = &leaves[count * length..];
+                leaves = &leaves[count * stored..];
             }
             if self.layout == 1 {
                 splits = &splits[(2 * group.trees) << group.depth..];

@@ -41,6 +41,23 @@ pub fn ensemble(shape: Shape, seed: u64) -> Ensemble {
     Ensemble { inputs: shape.descriptor.into(), objects, base_margins, trees, origin: Origin::default() }
 }
 
+/// The same trees with no more than so many different leaves, of those that there are.
+pub fn with_few_leaves(mut ensemble: Ensemble, most: usize) -> Ensemble {
+    let nodes = ensemble.trees.iter().flat_map(|tree| &tree.nodes);
+    let leaves: Vec<Vec<f32>> =
+        nodes.filter_map(|node| if let Node::Leaf(values) = node { Some(values.clone()) } else { None }).collect();
+    let mut number = 0;
+    for node in ensemble.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+        if let Node::Leaf(values) = node {
+            // Spread over the trees, and more often the first ones.
+            let picked = (number * 7 + number / 5) % most;
+            values.clone_from(&leaves[(picked * picked / most).min(leaves.len() - 1)]);
+            number += 1;
+        }
+    }
+    ensemble
+}
+
 fn threshold(rng: &mut SmallRng) -> f32 {
     let whole = match rng.random_range(0..4) {
         0 => rng.random_range(-40_i32..40),

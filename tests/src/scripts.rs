@@ -50,6 +50,8 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         write_section(Tag::Plan, false, &plan, &mut put);
     }
     write_section(Tag::Temperature, false, &temperature.to_bytes(), &mut put);
+    let own = model.optional_sections().filter(|section| section.tag == Tag::SharedLeaves.code());
+    own.for_each(|section| section.write(&mut put));
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
     with_sections(bytes, &sections)
 }

@@ -1,6 +1,6 @@
 //! Models with optional sections.
 
-use palpate_shared::format::{HEADER_LENGTH, Header, Trained, VERSION, checksum};
+use palpate_shared::format::{HEADER_LENGTH, Header, Tag, Trained, VERSION, checksum};
 
 /// The model with these optional sections instead of those that it has.
 ///
@@ -26,5 +26,9 @@ pub fn with_sections(model: &[u8], sections: &[u8]) -> Vec<u8> {
 pub fn trained(model: &[u8], trained: &Trained) -> Vec<u8> {
     let mut sections = Vec::new();
     trained.write(|bytes| sections.extend_from_slice(bytes));
+    // What the leaves' meaning depends on stays.
+    let opened = palpate_onboard::Model::new(model).expect("a model");
+    let own = opened.optional_sections().filter(|section| section.tag == Tag::SharedLeaves.code());
+    own.for_each(|section| section.write(&mut |bytes| sections.extend_from_slice(bytes)));
     with_sections(model, &sections)
 }

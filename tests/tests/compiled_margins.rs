@@ -35,7 +35,12 @@ fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
 fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     let layouts = std::iter::once(None).chain(Layout::ALL.iter().copied().map(Some));
     let settings = |layout| Settings { leaf, layout, ..Settings::default() };
-    layouts.filter_map(|layout| compile(ensemble, &settings(layout)).ok()).collect()
+    let plain = layouts.map(settings);
+    // Of those that walk trees, one with shared leaves.
+    let walked = [Layout::Compact, Layout::Complete, Layout::Wide];
+    let shared = walked.get(ensemble.trees.len() % walked.len()).copied();
+    let shared = shared.map(|layout| Settings { shared_leaves: Some(true), ..settings(Some(layout)) });
+    plain.chain(shared).filter_map(|settings| compile(ensemble, &settings).ok()).collect()
 }
 
 /// The same trees over this many f32 features, as an imported model has them.

@@ -118,6 +118,19 @@ fn tables_by_contact_pattern_with_other_axes_are_refused() {
 }
 
 #[test]
+fn the_sections_of_a_model_with_shared_leaves_are_pinned() {
+    let settings =
+        Settings { leaf: Leaf::I8, layout: Some(Layout::Compact), shared_leaves: Some(true), ..Settings::default() };
+    let compiled = compile(&ensemble(), &settings).unwrap();
+    let at = 97 + env!("CARGO_PKG_VERSION").len();
+    let body = &compiled.bytes[at..compiled.bytes.len() - 4];
+    assert_eq!(body.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" "), SHARED);
+    // Who does not know the section must not take numbers for values.
+    let tag = u16::from_le_bytes([compiled.bytes[at + 6], compiled.bytes[at + 7]]);
+    assert_eq!((compiled.bytes[4], tag), (2, 12 | 1 << 15));
+}
+
+#[test]
 fn a_golden_model_gives_the_margins_worked_out_by_hand() {
     let touches = [
         // κ = 80000, slope = 20000: right, right; right.
@@ -130,7 +143,11 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
     let compiled = SECTIONS.map(|(leaf, layout, _)| {
         compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap().bytes
     });
-    for bytes in compiled.iter().chain([&palpate_tests::unaligned::model()]) {
+    let shared = [Layout::Compact, Layout::Complete, Layout::Wide].map(|layout| {
+        let settings = Settings { layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
+        compile(&ensemble(), &settings).unwrap().bytes
+    });
+    for bytes in compiled.iter().chain(&shared).chain([&palpate_tests::unaligned::model()]) {
         let model = Model::new(bytes).unwrap();
         for (touch, expected) in touches {
             let mut margins = [0; 2];
@@ -153,6 +170,8 @@ const HEADER: [&str; 6] = [
 ];
 
 const PATTERNS: &str = "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 01 04 01 02 01 02 00 03 01 04 01 e9 03 00 00 70 11 01 00 d8 24 d8 24 d8 24 c8 70 b8 74 b8 74 b8 74 78 64";
+
+const SHARED: &str = "02 61 62 01 63 00 0c 80 00 00 0e 00 00 00 01 00 00 00 88 80 78 84 c0 40 a0 90 60 80 00 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 00 01 02 03 04";
 
 const SECTIONS: [(Leaf, Layout, &str); 5] = [
     (

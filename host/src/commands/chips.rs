@@ -19,6 +19,9 @@ pub(super) fn instructions(instructions: Instructions) -> String {
 }
 
 /// The line that names the cargo features that a chip needs.
-pub(super) fn features(layout: &str, leaf: &str) -> String {
-    format!("A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves\n")
+pub(super) fn features(layout: &str, leaf: &str, is_shared: bool) -> String {
+    let shared = if is_shared { ", shared-leaves" } else { "" };
+    format!(
+        "A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves{shared}\n"
+    )
 }

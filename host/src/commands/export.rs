@@ -22,6 +22,8 @@ Leaves:
 
 Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
 
+Shared leaves: where many leaves are equal, as in forests, each stands once in a table, and a leaf is its number there; margins are the same. It is tried with every layout that walks trees.
+
 Instructions per touch are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
 
 Whole numbers: --scale says in which units a chip without a float unit measures a feature: --scale width=100 for hundredths. A value is its whole number of units, the nearest one; thresholds become whole numbers, too. Values beyond ±(2^31 - 1) units count as that. --fit-scales chooses the scales that hold the values of rows exactly, or to seven digits, as powers of ten.
@@ -61,6 +63,10 @@ pub(crate) struct Arguments {
         conflicts_with = "layout"
     )]
     goal: Goal,
+    /// Whether equal leaves stand once, in a table that a leaf is a number of: `auto` where that is smaller, and better
+    /// for what --for says
+    #[arg(long, value_parser = sharing, default_value = "auto", value_name = "auto|yes|no")]
+    shared_leaves: Sharing,
     /// Compare whole numbers: how many units of a feature make up 1
     #[arg(long, value_name = "FEATURE=UNITS,…", value_delimiter = ',', value_parser = scale)]
     scale: Vec<(String, f32)>,
@@ -87,6 +93,10 @@ pub(crate) struct Arguments {
 #[derive(Clone)]
 struct LayoutChoice(Option<Layout>);
 
+/// Whether leaves are shared; `None` leaves it open.
+#[derive(Clone)]
+struct Sharing(Option<bool>);
+
 /// What is written beside the model.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Emitted {
@@ -110,6 +120,9 @@ struct Exported {
     bytes: usize,
     layout: &'static str,
     leaf: &'static str,
+    /// How many different leaves there are, if equal ones stand once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shared_leaves: Option<usize>,
     trees: usize,
     splits: usize,
     leaves: usize,
@@ -155,6 +168,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         leaf: arguments.leaf.unwrap_or(usual.leaf),
         layout: arguments.layout.0,
         goal: arguments.goal,
+        shared_leaves: arguments.shared_leaves.0,
         error_rate: arguments.error_rate,
         max_touches: arguments.max_touches,
         scales,
@@ -171,6 +185,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         bytes: compiled.bytes.len(),
         layout: compiled.layout.name(),
         leaf: settings.leaf.name(),
+        shared_leaves: compiled.shared_leaves,
         trees: ensemble.trees.len(),
         splits: compiled.splits,
         leaves: compiled.leaves,
@@ -287,9 +302,10 @@ fn text(path: &Path, exported: &Exported) -> String {
     if let (Some(kind), Some(features)) = (&exported.imported, &exported.features) {
         _ = writeln!(text, "{kind}: {} features, {}", features.len(), classes(&exported.classes));
     }
+    let shared = exported.shared_leaves.map_or(String::new(), |count| format!(", {count} different"));
     _ = writeln!(
         text,
-        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}), margins within {:.2e} nats",
+        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}{shared}), margins within {:.2e} nats",
         path.display(),
         exported.bytes,
         exported.trees,
@@ -300,12 +316,14 @@ fn text(path: &Path, exported: &Exported) -> String {
         exported.margin_error,
     );
     if exported.candidates.len() > 1 {
-        _ = writeln!(text, "{:10} {:>9} {:>12} {:>12}", "layout", "bytes", "Cortex-M4F", "Cortex-M0+");
+        _ = writeln!(text, "{:16} {:>9} {:>12} {:>12}", "layout", "bytes", "Cortex-M4F", "Cortex-M0+");
         for candidate in &exported.candidates {
-            let Candidate { layout, bytes, instructions, .. } = candidate;
+            let Candidate { layout, shared_leaves, bytes, instructions, .. } = candidate;
             let m0_plus = instructions.m0_plus.map_or_else(|| "unknown".into(), |number| number.to_string());
-            let mark = if layout.name() == exported.layout { " *" } else { "" };
-            _ = writeln!(text, "{:10} {bytes:>9} {:>12} {m0_plus:>12}{mark}", layout.name(), instructions.m4f);
+            let is_chosen = layout.name() == exported.layout && *shared_leaves == exported.shared_leaves.is_some();
+            let mark = if is_chosen { " *" } else { "" };
+            let name = format!("{}{}", layout.name(), if *shared_leaves { ", shared" } else { "" });
+            _ = writeln!(text, "{name:16} {bytes:>9} {:>12} {m0_plus:>12}{mark}", instructions.m4f);
         }
     }
     _ = writeln!(text, "Instructions per touch, estimated: {}", instructions(exported.instructions));
@@ -325,7 +343,7 @@ fn text(path: &Path, exported: &Exported) -> String {
     for note in &exported.notes {
         _ = writeln!(text, "Note: {note}");
     }
-    text + &features(exported.layout, exported.leaf)
+    text + &features(exported.layout, exported.leaf, exported.shared_leaves.is_some())
 }
 
 fn classes(names: &[String]) -> String {
@@ -347,6 +365,15 @@ fn layout(name: &str) -> Result<LayoutChoice, String> {
     layout
         .map(|layout| LayoutChoice(Some(layout)))
         .ok_or_else(|| "use one of auto, compact, complete, grid, wide, patterns".to_owned())
+}
+
+fn sharing(name: &str) -> Result<Sharing, String> {
+    match name {
+        "auto" => Ok(Sharing(None)),
+        "yes" => Ok(Sharing(Some(true))),
+        "no" => Ok(Sharing(Some(false))),
+        _ => Err("use one of auto, yes, no".into()),
+    }
 }
 
 fn goal(name: &str) -> Result<Goal, String> {

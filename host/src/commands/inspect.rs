@@ -51,6 +51,9 @@ struct Inspected<'a> {
     objects: Vec<&'a str>,
     layout: &'static str,
     leaf: &'static str,
+    /// How many different leaves there are, if equal ones stand once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shared_leaves: Option<usize>,
     trees: u32,
     splits: u32,
     leaves: u32,
@@ -126,6 +129,7 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         objects: (0..model.known_count()).map(|object| model.object_name(object)).collect(),
         layout: model.layout().name(),
         leaf: model.leaf_type().name(),
+        shared_leaves: compile::different_leaves(model),
         trees: header.trees(),
         splits: header.splits(),
         leaves: header.leaves(),
@@ -230,7 +234,8 @@ fn text(inspected: &Inspected<'_>) -> String {
     }
     line("objects", format!("{}: {}", inspected.objects.len(), inspected.objects.join(", ")));
     line("trees", format!("{}, {} splits, {} leaves", inspected.trees, inspected.splits, inspected.leaves));
-    line("layout", format!("{}, {} leaves", inspected.layout, inspected.leaf));
+    let shared = inspected.shared_leaves.map_or(String::new(), |count| format!(", {count} different ones, each once"));
+    line("layout", format!("{}, {} leaves{shared}", inspected.layout, inspected.leaf));
     line(
         "margins",
         format!("units of {:.3e} nats, within {:.2e} nats of the ensemble's", inspected.unit, inspected.margin_error),

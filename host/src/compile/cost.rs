@@ -73,7 +73,9 @@ impl Instructions {
         let records = bytes.get(groups_start..groups_end).unwrap_or_default();
         let groups: Vec<Group> = records.as_chunks().0.iter().filter_map(|record| Group::from_bytes(*record)).collect();
         let nodes = bytes.get(groups_end..groups_end + length(header.nodes_length())).unwrap_or_default();
-        Self::new(&Shape { layout: model.layout(), leaf: model.leaf_type(), objects, axes, groups: &groups, nodes })
+        let is_shared = model.shared_leaves().is_some();
+        let (layout, leaf) = (model.layout(), model.leaf_type());
+        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared })
     }
 
     pub(super) fn new(shape: &Shape<'_>) -> Self {
@@ -138,6 +140,8 @@ pub(super) struct Shape<'a> {
     pub(super) groups: &'a [Group],
     /// The splits, as the model has them.
     pub(super) nodes: &'a [u8],
+    /// Whether leaves are numbers of a table.
+    pub(super) is_shared: bool,
 }
 
 /// The costs of the evaluator's parts on one processor, in instructions.
@@ -155,6 +159,10 @@ struct Costs {
     walk: [(usize, usize); 2],
     /// A leaf's values of one byte: of ten together; of two bytes or f32: of five together; one value alone.
     leaf: Leaf,
+    /// Reading a leaf's number in a block of complete trees.
+    number: usize,
+    /// The same in preorder, for a tree.
+    shared_tree: usize,
     /// A tree in preorder; then each value of its leaf.
     preorder: (f64, usize, usize),
     /// A step in a compact and in a wide tree.
@@ -176,8 +184,10 @@ const M4F: Costs = Costs {
     axis: 140,
     block: 130,
     shift: 60,
-    walk: [(12, 6), (18, 13)],
+    walk: [(12, 6), (17, 8)],
     leaf: Leaf { ten_i8: 29, five_i16: 19, five_f32: 30, alone: 11 },
+    number: 12,
+    shared_tree: 45,
     preorder: (25.0, 57, 5),
     step: (17.0, 28.0),
     grid: (442, 5),
@@ -188,9 +198,11 @@ const M0_PLUS: Costs = Costs {
     axis: 203,
     block: 189,
     shift: 87,
-    walk: [(18, 7), (26, 19)],
+    walk: [(18, 7), (26, 16)],
     // No estimate is made with f32.
     leaf: Leaf { ten_i8: 57, five_i16: 31, five_f32: 0, alone: 14 },
+    number: 16,
+    shared_tree: 60,
     preorder: (35.0, 80, 7),
     step: (24.0, 39.0),
     grid: (506, 7),
@@ -221,15 +233,19 @@ impl Costs {
         let depth = usize::from(group.depth);
         let trees = usize::try_from(group.trees).unwrap_or(usize::MAX);
         let (start, level) = self.walk[usize::from(!(4..=6).contains(&depth))];
+        let leaf = self.leaf_together(values(group, shape), shape.leaf) + if shape.is_shared { self.number } else { 0 };
+        trees.div_ceil(64) * self.block + trees * (start + level * depth + leaf) + if shifted { self.shift } else { 0 }
+    }
+
+    /// A leaf of those that are added together.
+    fn leaf_together(&self, values: usize, leaf: LeafType) -> usize {
         // A few values are added together, the last ones alone.
-        let (few, together) = match shape.leaf {
+        let (few, together) = match leaf {
             LeafType::I8 => (10, self.leaf.ten_i8),
             LeafType::I16 => (5, self.leaf.five_i16),
             LeafType::F32 => (5, self.leaf.five_f32),
         };
-        let values = values(group, shape);
-        let leaf = together * (values / few) + self.leaf.alone * (values % few);
-        trees.div_ceil(64) * self.block + trees * (start + level * depth + leaf) + if shifted { self.shift } else { 0 }
+        together * (values / few) + self.leaf.alone * (values % few)
     }
 
     /// Trees in preorder, each after its number of splits: steps to the leaf that is reached on average, and its values.
@@ -238,7 +254,11 @@ impl Costs {
         let mut rest = shape.nodes;
         let mut sum = 0;
         for group in shape.groups {
-            let leaf = tree + value * values(group, shape);
+            let values = values(group, shape);
+            let leaf = match shape.is_shared {
+                true => self.shared_tree + self.leaf_together(values, shape.leaf),
+                false => tree + value * values,
+            };
             for _ in 0..group.trees {
                 let Some((splits, after)) = rest.split_first_chunk() else { return sum };
                 let splits = length * usize::from(u16::from_le_bytes(*splits));
@@ -300,7 +320,15 @@ mod tests {
                 Group { depth, shift: 0, object, trees }
             };
             let groups: Vec<Group> = (0..parts).map(group).collect();
-            let shape = Shape { layout: Layout::Complete, leaf, objects: 10, axes, groups: &groups, nodes: &[] };
+            let shape = Shape {
+                layout: Layout::Complete,
+                leaf,
+                objects: 10,
+                axes,
+                groups: &groups,
+                nodes: &[],
+                is_shared: false,
+            };
             let estimate = Instructions::new(&shape);
             for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
                 assert!(
@@ -309,13 +337,29 @@ mod tests {
                 );
             }
         }
-        let grid = Shape { layout: Layout::Grid, leaf: LeafType::I8, objects: 10, axes: 2, groups: &[], nodes: &[] };
+        let grid = Shape {
+            layout: Layout::Grid,
+            leaf: LeafType::I8,
+            objects: 10,
+            axes: 2,
+            groups: &[],
+            nodes: &[],
+            is_shared: false,
+        };
         assert_eq!(Instructions::new(&grid), Instructions { m4f: 492, m0_plus: Some(576) });
     }
 
     #[test]
     fn with_f32_leaves_nothing_is_said_about_a_processor_without_float_unit() {
-        let shape = Shape { layout: Layout::Grid, leaf: LeafType::F32, objects: 10, axes: 2, groups: &[], nodes: &[] };
+        let shape = Shape {
+            layout: Layout::Grid,
+            leaf: LeafType::F32,
+            objects: 10,
+            axes: 2,
+            groups: &[],
+            nodes: &[],
+            is_shared: false,
+        };
         assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
         assert!(Instructions::new(&shape).on(Core::M4F).is_some());
     }

@@ -7,6 +7,7 @@ use super::forest::Forest;
 use super::parts::Parts;
 use super::quantize::Scale;
 use super::rounding;
+use super::share::share;
 use super::table;
 use super::trees::{self, Leaves, Run, Sections};
 use crate::error::{CompileProblem, Result};
@@ -20,6 +21,7 @@ pub(super) fn candidates(
     cells: Option<&Cells>,
     leaf: LeafType,
     wanted: Option<Layout>,
+    shared: Option<bool>,
 ) -> Result<Vec<(Layout, Parts)>> {
     let mut layouts = wanted
         .map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid, Layout::Patterns], |layout| vec![layout]);
@@ -46,7 +48,17 @@ pub(super) fn candidates(
             Layout::Patterns => cells.and_then(|cells| table::patterns(forest, cells, leaf)),
         };
         match parts {
-            Some(parts) => candidates.push((layout, parts)),
+            Some(parts) => {
+                let sharing = if shared == Some(false) { None } else { share(&parts, leaf, forest.objects()) };
+                let sharing = sharing.filter(|sharing| shared == Some(true) || sharing.bytes() < parts.bytes());
+                if shared != Some(true) || sharing.is_none() {
+                    candidates.push((layout, parts));
+                }
+                if let Some(mut parts) = sharing {
+                    parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
+                    candidates.push((layout, parts));
+                }
+            }
             None if wanted.is_some() => return Err(CompileProblem::DoesNotFit { layout }.into()),
             None => {}
         }
@@ -69,12 +81,31 @@ fn walked(
     if groups.len() > usize::from(u16::MAX) {
         return None;
     }
-    let objects = forest.objects();
-    let shape = Shape { layout, leaf, objects, axes: axes.len(), groups: &groups, nodes: &nodes };
-    let instructions = Instructions::new(&shape);
     let base = forest.base.iter().map(|&base| base_bits(base, leaf, scale)).collect();
     let (unit, margin_error) = (scale.unit, margin_error());
-    Some(Parts { axes, cuts, groups, nodes, leaves: leaves.into_bytes(), base, unit, margin_error, instructions })
+    let leaves_bytes = leaves.into_bytes();
+    let none = Instructions { m4f: 0, m0_plus: None };
+    let mut parts = Parts {
+        axes,
+        cuts,
+        groups,
+        nodes,
+        leaves: leaves_bytes,
+        shared: None,
+        base,
+        unit,
+        margin_error,
+        instructions: none,
+    };
+    parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
+    Some(parts)
+}
+
+/// What a touch costs in a layout that walks trees.
+fn instructions(layout: Layout, leaf: LeafType, objects: usize, parts: &Parts) -> Instructions {
+    let Parts { axes, groups, nodes, shared, .. } = parts;
+    let is_shared = shared.is_some();
+    Instructions::new(&Shape { layout, leaf, objects, axes: axes.len(), groups, nodes, is_shared })
 }
 
 fn base_bits(base: f32, leaf: LeafType, scale: &Scale) -> i32 {

@@ -47,6 +47,7 @@ mod parts;
 mod quantize;
 mod restate;
 mod rounding;
+mod share;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -59,6 +60,7 @@ pub use fit::compile_within;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
+pub use share::{different_leaves, unshared};
 
 use crate::ensemble::Ensemble;
 use crate::error::{CompileProblem, Error, Result};
@@ -74,8 +76,11 @@ pub struct Settings {
     pub leaf: Leaf,
     /// How trees are laid out; `None` takes the layout that is best for `goal`.
     pub layout: Option<Layout>,
-    /// What a layout is chosen for, where none is asked for.
+    /// What a layout is chosen for, where none is asked for; and whether its equal leaves stand once.
     pub goal: Goal,
+    /// Whether equal leaves stand once, in a table: `Some(true)` wherever they can, `None` where that makes a model smaller,
+    /// if it is better for `goal`.
+    pub shared_leaves: Option<bool>,
     /// The error rate that recognizers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
     /// The touches after which they give up.
@@ -93,6 +98,7 @@ impl Default for Settings {
             leaf: Leaf::I16,
             layout: None,
             goal: Goal::Balanced(Core::M4F),
+            shared_leaves: None,
             error_rate: 0.01,
             max_touches: 200,
             priors: None,
@@ -131,6 +137,8 @@ pub struct Candidate {
     /// The layout.
     #[serde(serialize_with = "name_of")]
     pub layout: Layout,
+    /// Whether equal leaves stand once.
+    pub shared_leaves: bool,
     /// Bytes of the model.
     pub bytes: usize,
     /// About how many instructions a touch takes.
@@ -156,6 +164,8 @@ pub struct Compiled {
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
+    /// How many different leaves stand in a table, if equal ones stand once.
+    pub shared_leaves: Option<usize>,
     /// About how many instructions a touch takes.
     pub instructions: Instructions,
     /// All layouts that were tried.
@@ -185,10 +195,12 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
-    let made = layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout)?;
+    let made =
+        layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout, settings.shared_leaves)?;
     let overhead = write::overhead(ensemble, settings, &forest)?;
     let candidate = |(layout, parts): &(Layout, parts::Parts)| Candidate {
         layout: *layout,
+        shared_leaves: parts.shared.is_some(),
         bytes: parts.bytes() + overhead,
         instructions: parts.instructions,
         margin_error: parts.margin_error,
@@ -203,7 +215,8 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding);
     let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts, margin_error)?;
     let (splits, leaves) = (forest.splits(), forest.leaves());
-    Ok(Compiled { bytes, splits, leaves, margin_error, layout, instructions, candidates })
+    let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
+    Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates })
 }
 
 /// The best of the candidates.

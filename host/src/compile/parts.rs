@@ -1,15 +1,18 @@
 //! The parts of a compiled model, before they are written.
 
 use super::cost::Instructions;
-use palpate_shared::format::{Axis, Group, HEADER_LENGTH};
+use palpate_shared::format::{Axis, Group, HEADER_LENGTH, Tag, write_section};
 
 /// What a layout makes of a forest.
+#[derive(Clone)]
 pub(super) struct Parts {
     pub(super) axes: Vec<Axis>,
     pub(super) cuts: Vec<u8>,
     pub(super) groups: Vec<Group>,
     pub(super) nodes: Vec<u8>,
     pub(super) leaves: Vec<u8>,
+    /// The section with the leaves' values, where leaves are numbers.
+    pub(super) shared: Option<Vec<u8>>,
     /// What margins start from: in units, or f32 bits.
     pub(super) base: Vec<i32>,
     pub(super) unit: f32,
@@ -18,9 +21,18 @@ pub(super) struct Parts {
 }
 
 impl Parts {
+    /// The optional section with the values of leaves; nothing if there is none.
+    pub(super) fn section(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        if let Some(content) = &self.shared {
+            write_section(Tag::SharedLeaves, true, content, &mut |part| bytes.extend_from_slice(part));
+        }
+        bytes
+    }
+
     /// Bytes of the model, but for its text and what is the same in all layouts.
     pub(super) fn bytes(&self) -> usize {
         let records = Axis::LENGTH * self.axes.len() + Group::LENGTH * self.groups.len() + 8 * self.base.len();
-        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len()
+        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + self.section().len()
     }
 }

@@ -53,7 +53,7 @@ fn table(
         }
     }
     let (axes, cuts) = axes(dimensions);
-    let shape = Shape { layout, leaf, objects, axes: axes.len(), groups: &[], nodes: &[] };
+    let shape = Shape { layout, leaf, objects, axes: axes.len(), groups: &[], nodes: &[], is_shared: false };
     Some(Parts {
         instructions: Instructions::new(&shape),
         axes,
@@ -61,6 +61,7 @@ fn table(
         groups: Vec::new(),
         nodes: Vec::new(),
         leaves: leaves.into_bytes(),
+        shared: None,
         base: vec![0; objects],
         unit: scale.unit,
         margin_error: round_up(worst),

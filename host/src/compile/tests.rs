@@ -81,7 +81,9 @@ fn the_layout_chosen_is_the_fastest_of_those_that_are_not_three_times_the_smalle
         let bytes = |candidate: &Candidate| candidate.bytes;
         let smallest = chosen.candidates.iter().map(bytes).min().unwrap();
         for other in &chosen.candidates {
-            let compiled = compile(&ensemble, &with(Some(other.layout), Leaf::I16)).unwrap();
+            let shared_leaves = Some(other.shared_leaves);
+            let how = Settings { shared_leaves, ..with(Some(other.layout), Leaf::I16) };
+            let compiled = compile(&ensemble, &how).unwrap();
             assert_eq!((other.bytes, other.instructions), (compiled.bytes.len(), compiled.instructions));
             let is_large = other.bytes > 3 * smallest;
             assert!(is_large || other.instructions.m4f >= chosen.instructions.m4f, "{:?}", other.layout);
@@ -443,4 +445,69 @@ fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
     let problem = compile_within(&ensemble, &settings, i8 - 1).unwrap_err().problem().cloned();
     let over = CompileProblem::OverBudget { bytes: i8, most: i8 - 1 };
     assert_eq!(problem, Some(crate::error::Problem::Compile(over)));
+}
+
+/// Trees of three splits over the oriented touch's features, whose leaves are the first so many of a sequence.
+fn few_leaves(trees: usize, different: usize) -> Ensemble {
+    let values = |number: usize| leaf(&[(number % different) as f32 / 1024.0, -((number % different) as f32) / 2048.0]);
+    let tree = |tree: usize| {
+        let at = |number: usize| 1_000.0 * ((7 * tree + number) % 90) as f32;
+        let splits =
+            [split(tree % 8, at(0), 1, 2), split((tree + 1) % 8, at(1), 3, 4), split((tree + 3) % 8, at(2), 5, 6)];
+        splits.into_iter().chain((0..4).map(|number| values(4 * tree + number))).collect()
+    };
+    ensemble(Descriptor::Oriented, (0..trees).map(tree).collect())
+}
+
+#[test]
+fn equal_leaves_stand_once_where_that_is_smaller_and_give_the_same_margins() {
+    let forest = few_leaves(100, 5);
+    for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {
+        for &leaf in Leaf::ALL {
+            let how = |shared| Settings { shared_leaves: Some(shared), ..with(Some(layout), leaf) };
+            let (plain, shared) = (compile(&forest, &how(false)).unwrap(), compile(&forest, &how(true)).unwrap());
+            assert_eq!((plain.shared_leaves, shared.shared_leaves), (None, Some(5)));
+            assert!(shared.bytes.len() < plain.bytes.len(), "{layout:?} {leaf:?}");
+            // What stands for a leaf is put back where the leaf was.
+            let model = open(&shared.bytes).unwrap();
+            assert_eq!(unshared(&model).unwrap().unwrap(), plain.bytes);
+            assert_eq!(unshared(&open(&plain.bytes).unwrap()).unwrap(), None);
+            let mut margins = [[0; 2]; 2];
+            for touch in (0..50).map(|at| Touch::from_micros([1_900 * at, 0, 700 * at])) {
+                open(&plain.bytes).unwrap().margins(&touch, &mut margins[0]);
+                model.margins(&touch, &mut margins[1]);
+                assert_eq!(margins[0], margins[1]);
+            }
+        }
+        let small = compile(&forest, &Settings { goal: Goal::Size, ..with(Some(layout), Leaf::I16) }).unwrap();
+        assert_eq!((small.candidates.len(), small.shared_leaves), (2, Some(5)));
+    }
+    // Where all of them differ, a number is only more.
+    let all = compile(&few_leaves(100, 400), &Settings { goal: Goal::Size, ..with(None, Leaf::I16) }).unwrap();
+    assert!(all.candidates.iter().all(|candidate| !candidate.shared_leaves), "{:?}", all.candidates);
+    // Tables have none.
+    let table = Settings { shared_leaves: Some(true), ..with(Some(Layout::Grid), Leaf::I16) };
+    assert_eq!(compile(&stump(500.0, [[1.0, -1.0], [1.0, -1.0]]), &table).unwrap().shared_leaves, None);
+}
+
+#[test]
+fn the_number_of_a_leaf_has_two_bytes_if_more_than_256_leaves_differ() {
+    for (different, width) in [(256, 1), (257, 2)] {
+        let how = Settings { shared_leaves: Some(true), ..with(Some(Layout::Compact), Leaf::I16) };
+        let compiled = compile(&few_leaves(100, different), &how).unwrap();
+        assert_eq!(compiled.shared_leaves, Some(different));
+        let model = open(&compiled.bytes).unwrap();
+        assert_eq!(model.shared_leaves().unwrap().number_length(), width);
+        assert_eq!(model.header().leaves_length(), 400 * width as u32);
+    }
+}
+
+#[test]
+fn what_is_restated_about_a_model_leaves_its_table_of_leaves_alone() {
+    let how = Settings { shared_leaves: Some(true), ..with(Some(Layout::Compact), Leaf::I16) };
+    let compiled = compile(&few_leaves(20, 5), &how).unwrap();
+    let restated = Restated { max_touches: Some(7), priors: Some(vec![0, -5]), ..Restated::default() };
+    let bytes = restate(&open(&compiled.bytes).unwrap(), &restated).unwrap();
+    let (model, own) = (open(&bytes).unwrap(), open(&compiled.bytes).unwrap());
+    assert_eq!((model.shared_leaves(), model.header().max_touches(), model.prior(1)), (own.shared_leaves(), 7, -5));
 }

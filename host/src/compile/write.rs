@@ -26,7 +26,8 @@ pub(super) fn write(
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
     // Where nothing is known, the published probe.
     let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
-    let optional = optional(ensemble, settings, forest)?;
+    // Its tag is the largest of those that are written.
+    let optional = [optional(ensemble, settings, forest)?, parts.section()].concat();
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);
@@ -181,7 +182,8 @@ fn byte(number: usize) -> Result<u8> {
     u8::try_from(number).map_err(|_| too_large())
 }
 
-fn count(number: usize) -> Result<u32> {
+/// A length in the header.
+pub(super) fn count(number: usize) -> Result<u32> {
     u32::try_from(number).map_err(|_| too_large())
 }
 

@@ -16,6 +16,10 @@ pub(super) fn first_different_tree(
     ensemble: &Ensemble,
     row: &[f32],
 ) -> Option<usize> {
+    // Each leaf's values where the leaf is, so that those of one tree alone can be changed.
+    let plain = compile::unshared(model).ok()?;
+    let plain = plain.as_deref().map(Model::new).transpose().ok()?;
+    let model = plain.as_ref().unwrap_or(model);
     let order = compile::order_of_trees(ensemble, model.leaf_type()).ok()?;
     let leaves = leaves(model)?;
     if order.len() != leaves.len() {

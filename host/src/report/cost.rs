@@ -100,7 +100,10 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
 /// # Errors
 /// Whatever else is wrong with the ensemble.
 fn fitting(ensemble: &Ensemble, leaf: Leaf, layout: Option<compile::Layout>) -> Result<Option<compile::Compiled>> {
-    match compile::compile(ensemble, &compile::Settings { leaf, layout, ..compile::Settings::default() }) {
+    match compile::compile(
+        ensemble,
+        &compile::Settings { leaf, layout, shared_leaves: Some(false), ..compile::Settings::default() },
+    ) {
         Ok(compiled) => Ok(Some(compiled)),
         Err(error) if is_unfit(&error) => Ok(None),
         Err(error) => Err(error),

@@ -245,6 +245,7 @@ fn compiled_models<'e>(
             let how = compile::Settings {
                 leaf,
                 layout: Some(layout),
+                shared_leaves: Some(false),
                 error_rate: settings.error_rate,
                 ..compile::Settings::default()
             };

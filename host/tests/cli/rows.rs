@@ -318,3 +318,39 @@ fn whole_numbers_in_the_users_units_split_as_the_values_do_and_say_what_they_cha
         assert!(message.contains(expected), "{message}");
     }
 }
+
+#[test]
+fn equal_leaves_of_a_forest_stand_once_and_that_is_said_everywhere() {
+    let (_directory, path) = place();
+    let (forest, rows) = (data("sklearn-1.9-forest.onnx"), data("sklearn-1.9-forest.rows.csv"));
+    let export = |shared: &str| {
+        let leaf = ["--leaf", "i8", "--layout", "compact", "--shared-leaves", shared, "--json"];
+        json(run([&["export", &forest, "-o", &path(shared)], &leaf[..]].concat()))
+    };
+    let (shared, plain) = (export("yes"), export("no"));
+    let different = shared["shared_leaves"].as_u64().unwrap();
+    assert!(different >= 2 && different <= shared["leaves"].as_u64().unwrap(), "{shared}");
+    assert_eq!((&plain["shared_leaves"], &plain["margin_error"]), (&Value::Null, &shared["margin_error"]));
+    // What is wrong with no tree of it is found out in both.
+    for model in ["yes", "no"] {
+        let verified = json(run(["verify", &path(model), &forest, &rows, "--json"]));
+        assert_eq!(verified["class_differs"], 0, "{verified}");
+    }
+    let inspected = json(run(["inspect", &path("yes"), "--json"]));
+    assert_eq!(inspected["shared_leaves"], different);
+    let parts = inspected["bytes_by_part"].as_object().unwrap().values();
+    assert_eq!(inspected["bytes"], parts.map(|bytes| bytes.as_u64().unwrap()).sum::<u64>());
+    let text = stdout(run(["inspect", &path("yes")]));
+    assert!(text.contains(&format!("{different} different ones, each once")), "{text}");
+    let text = stdout(run(["export", &forest, "-o", &path("m"), "--leaf", "i8", "--shared-leaves", "yes"]));
+    assert!(text.contains(", shared ") && text.contains("i8-leaves, shared-leaves"), "{text}");
+    // All candidates are the same whatever is asked for; sharing is one of them only where it is smaller.
+    let all = json(run(["export", &forest, "-o", &path("m"), "--leaf", "i8", "--json"]));
+    for candidate in all["candidates"].as_array().unwrap() {
+        let of = |other: &&Value| other["layout"] == candidate["layout"] && other["shared_leaves"] == false;
+        let own = all["candidates"].as_array().unwrap().iter().find(of).unwrap();
+        assert!(candidate["shared_leaves"] == false || candidate["bytes"].as_u64() < own["bytes"].as_u64(), "{all}");
+    }
+    let message = stderr(run(["export", &forest, "-o", &path("m"), "--shared-leaves", "maybe"]), 2);
+    assert!(message.contains("use one of auto, yes, no"), "{message}");
+}

@@ -16,6 +16,9 @@ pub(crate) const fn layout(layout: Layout) -> bool {
 /// Whether models with trees are read, and not only tables.
 pub(crate) const TREES: bool = layout(Layout::Compact) || layout(Layout::Complete) || layout(Layout::Wide);
 
+/// Whether trees with leaves in a table are read.
+pub(crate) const SHARED_LEAVES: bool = TREES && cfg!(feature = "shared-leaves");
+
 /// Whether models with a type of leaf are read.
 pub(crate) const fn leaf(leaf: LeafType) -> bool {
     match leaf {

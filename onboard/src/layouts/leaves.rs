@@ -2,7 +2,7 @@
 
 use super::built_in;
 use core::sync::atomic::{Ordering, compiler_fence};
-use palpate_shared::format::LeafType;
+use palpate_shared::format::{LeafType, SharedLeaves};
 
 /// Trees walked before their leaves are added: a few, so that code for walking is not repeated forevery type of leaf.
 pub(crate) const BLOCK: usize = 64;
@@ -15,15 +15,28 @@ pub(crate) struct Sum<'a> {
     pub(crate) leaf: LeafType,
     /// The object that leaves of the present group are for; `None` when they have a value for each.
     pub(crate) object: Option<u8>,
+    /// The table that leaves are numbers of; always `None` where none is [built in](built_in::SHARED_LEAVES).
+    pub(crate) shared: Option<SharedLeaves<'a>>,
 }
 
 /// How much more a stored byte is than its value.
 pub(crate) const BIAS: i32 = 128;
 
-impl Sum<'_> {
+impl<'a> Sum<'a> {
     /// Bytes of a leaf in the present group.
     pub(crate) fn leaf_length(&self) -> usize {
         self.leaf.size() * if self.object.is_some() { 1 } else { self.margins.len() }
+    }
+
+    /// Bytes that stand for a leaf of the present group where the trees' leaves are.
+    pub(crate) fn stored_length(&self) -> usize {
+        self.shared().map_or_else(|| self.leaf_length(), |shared| shared.number_length())
+    }
+
+    /// The table that leaves are numbers of.
+    #[inline(always)]
+    pub(crate) fn shared(&self) -> Option<SharedLeaves<'a>> {
+        self.shared.filter(|_| built_in::SHARED_LEAVES)
     }
 
     /// Adds one leaf; bytes with their bias.
@@ -288,7 +301,7 @@ mod tests {
     #[test]
     fn leaves_of_every_type_keep_their_sign() {
         let mut margins = [0, 5];
-        let mut sum = Sum { margins: &mut margins, leaf: LeafType::I8, object: None };
+        let mut sum = Sum { margins: &mut margins, leaf: LeafType::I8, object: None, shared: None };
         sum.add(&[0, 255]);
         let bias = sum.settle(1);
         sum.leaf = LeafType::I16;
@@ -326,7 +339,7 @@ mod tests {
         for objects in 1..23_usize {
             let leaves: std::vec::Vec<u8> = (0..4 * 2 * objects).map(|i| (i * 37 % 251) as u8).collect();
             let mut margins = std::vec![7; objects];
-            Sum { margins: &mut margins, leaf: LeafType::I16, object: None }.add_reached(
+            Sum { margins: &mut margins, leaf: LeafType::I16, object: None, shared: None }.add_reached(
                 &leaves,
                 &[2, 0, 3],
                 2 * objects,

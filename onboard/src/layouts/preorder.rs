@@ -3,6 +3,8 @@
 //! A tree is the number of its splits, then the splits, each with the number of splits in its left subtree; its leaves
 //! are in order, so going right skips as many leaves as splits, plus one.
 
+use super::built_in;
+use super::complete::Reached;
 use super::leaves::Sum;
 use super::ranks::{Ranks, at_or_missing};
 use crate::bytes::{at, take};
@@ -21,12 +23,47 @@ pub(crate) fn check(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], leaf: 
     Some(())
 }
 
+/// Leaves that are numbers of a table, kept until there are enough of them to add together.
+struct Numbers<'a> {
+    numbers: &'a mut Reached,
+    count: usize,
+}
+
+impl Numbers<'_> {
+    /// Keeps a number.
+    fn put(&mut self, number: u16, sum: &mut Sum<'_>) {
+        if self.count == self.numbers.len() {
+            self.add(sum);
+        }
+        if let Some(place) = self.numbers.get_mut(self.count) {
+            *place = number;
+            self.count += 1;
+        }
+    }
+
+    /// Adds the leaves that were kept.
+    fn add(&mut self, sum: &mut Sum<'_>) {
+        if let Some((shared, numbers)) = sum.shared().zip(self.numbers.get(..self.count)) {
+            sum.add_reached(shared.values(), numbers, sum.leaf_length());
+        }
+        self.count = 0;
+    }
+}
+
 /// Adds up a group of compact trees, and moves `nodes` and `leaves` past it. A split has three bytes: column,
 /// threshold, splits in the left subtree.
 ///
-/// Cost: about twelve instructions per step, 30 per tree; then the leaves.
+/// Cost: about twelve instructions per step, 30 per tree; then the leaves, those that are shared all together.
 #[inline(never)]
-pub(crate) fn add_compact(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leaves: &mut &[u8], sum: &mut Sum<'_>) {
+pub(crate) fn add_compact(
+    group: &Group,
+    ranks: &Ranks,
+    reached: &mut Reached,
+    nodes: &mut &[u8],
+    leaves: &mut &[u8],
+    sum: &mut Sum<'_>,
+) {
+    let mut numbers = Numbers { numbers: reached, count: 0 };
     for _ in 0..group.trees {
         let Some((leaf, splits)) = tree(nodes, |[column, threshold, left]: [u8; 3]| {
             let right = at(ranks, usize::from(column)) > threshold;
@@ -34,24 +71,29 @@ pub(crate) fn add_compact(group: &Group, ranks: &Ranks, nodes: &mut &[u8], leave
         }) else {
             return;
         };
-        add_leaf(leaf, splits, leaves, sum);
+        add_leaf(leaf, splits, leaves, sum, &mut numbers);
+    }
+    if built_in::SHARED_LEAVES {
+        numbers.add(sum);
     }
 }
 
 /// Adds up a group of wide trees, and moves `nodes` and `leaves` past it. A split has six bytes: feature, where a
 /// missing value goes (1 = left), the threshold's number, splits in the left subtree.
 ///
-/// Cost: about 25 instructions per step, 30 per tree; then the leaves.
+/// Cost: about 25 instructions per step, 30 per tree; then the leaves, those that are shared all together.
 #[inline(never)]
 pub(crate) fn add_wide(
     cuts: &[u8],
     group: &Group,
     features: &[i32],
+    reached: &mut Reached,
     nodes: &mut &[u8],
     leaves: &mut &[u8],
     sum: &mut Sum<'_>,
 ) {
     let (cuts, _) = cuts.as_chunks();
+    let mut numbers = Numbers { numbers: reached, count: 0 };
     for _ in 0..group.trees {
         let Some((leaf, splits)) = tree(nodes, |[feature, missing_left, a, b, c, d]: [u8; 6]| {
             let value = at_or_missing(features, feature);
@@ -61,7 +103,10 @@ pub(crate) fn add_wide(
         }) else {
             return;
         };
-        add_leaf(leaf, splits, leaves, sum);
+        add_leaf(leaf, splits, leaves, sum, &mut numbers);
+    }
+    if built_in::SHARED_LEAVES {
+        numbers.add(sum);
     }
 }
 
@@ -89,11 +134,13 @@ fn tree<const SIZE: usize>(nodes: &mut &[u8], split: impl Fn([u8; SIZE]) -> (boo
     Some((leaf, count))
 }
 
-fn add_leaf(leaf: usize, splits: usize, leaves: &mut &[u8], sum: &mut Sum<'_>) {
-    let length = sum.leaf_length();
+fn add_leaf(leaf: usize, splits: usize, leaves: &mut &[u8], sum: &mut Sum<'_>, numbers: &mut Numbers<'_>) {
+    let length = sum.stored_length();
     let Some((tree, rest)) = leaves.split_at_checked((splits + 1) * length) else { return };
     *leaves = rest;
-    if let Some(leaf) = tree.get(leaf * length..leaf * length + length) {
+    if let Some(shared) = sum.shared() {
+        numbers.put(shared.number(tree, leaf), sum);
+    } else if let Some(leaf) = tree.get(leaf * length..leaf * length + length) {
         sum.add(leaf);
     }
 }

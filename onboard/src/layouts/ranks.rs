@@ -109,7 +109,8 @@ fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
 // By itself, so that all that it needs is in registers on a Cortex-M0+.
 #[inline(never)]
 fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32) -> u8 {
-    let mut step = 128;
+    // Most axes of small ensembles have a few.
+    let mut step = if cuts.len() < 16 { 8 } else { 128 };
     while step > cuts.len() {
         step >>= 1;
     }

@@ -1,9 +1,11 @@
 //! What is checked when a model is opened, so that no later step can fail.
 
-use super::{Stated, optional};
+use super::{HAS_SHARED_LEAVES, Stated, optional};
 use crate::bytes::{Wrong, take};
 use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
-use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH};
+use palpate_shared::format::{
+    Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, SharedLeaves, Tag,
+};
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
@@ -27,6 +29,10 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     ranks::check(model, header.last_feature())?;
     let section = |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(Wrong::Section(model.offset(part))) };
     let values = model.objects();
+    let mut shared = None;
+    if built_in::SHARED_LEAVES && stated.by_object & HAS_SHARED_LEAVES != 0 {
+        shared = SharedLeaves::from_bytes(optional::find(optional, Tag::SharedLeaves));
+    }
     let mut nodes = model.nodes;
     let mut leaves = model.leaves;
     if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
@@ -64,7 +70,9 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
             }
             range = range.saturating_add(group.trees << ((leaf_bits + shift) & 31));
         }
-        let leaf = model.leaf.size() * if group.object.is_none() { values } else { 1 };
+        let length = model.leaf.size() * if group.object.is_none() { values } else { 1 };
+        let leaf = shared.map_or(length, |shared| shared.number_length());
+        let before = leaves;
         let fits = match model.layout {
             Layout::Complete
                 if built_in::layout(Layout::Complete) && (1..=MAX_COMPLETE_DEPTH).contains(&group.depth) =>
@@ -80,6 +88,12 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
             _ => return Err(wrong),
         };
         section(fits.is_some(), model.nodes)?;
+        if let Some(shared) = shared {
+            let own = before.get(..before.len() - leaves.len()).unwrap_or_default();
+            if let Some(unknown) = shared.first_unknown(own, length) {
+                return Err(Wrong::Field(model.offset(before) + unknown * leaf));
+            }
+        }
     }
     section(nodes.is_empty(), nodes)?;
     section(leaves.is_empty(), leaves)?;

@@ -82,15 +82,16 @@ impl Model<'_> {
         if !built_in::TREES {
             return Some(margins);
         }
+        let shared = self.shared_leaves();
         let (base, _) = self.sections.base_and_priors();
         let bases = base.as_chunks().0.iter().map(|base| i32::from_le_bytes(*base));
         if self.is_float() {
             // Added in this order: the base, then the trees.
             margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = base);
-            self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
+            self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None, shared });
             return Some(margins);
         }
-        let bias = self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None });
+        let bias = self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None, shared });
         margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base).wrapping_sub(bias));
         Some(margins)
     }
@@ -120,10 +121,11 @@ impl Model<'_> {
                     complete::add(&group, ranks, &mut reached.0, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Wide if built_in::layout(Layout::Wide) => {
-                    preorder::add_wide(self.sections.axes_and_cuts().1, &group, features, &mut nodes, &mut leaves, sum);
+                    let cuts = self.sections.axes_and_cuts().1;
+                    preorder::add_wide(cuts, &group, features, &mut reached.0, &mut nodes, &mut leaves, sum);
                 }
                 Layout::Compact if built_in::layout(Layout::Compact) => {
-                    preorder::add_compact(&group, ranks, &mut nodes, &mut leaves, sum);
+                    preorder::add_compact(&group, ranks, &mut reached.0, &mut nodes, &mut leaves, sum);
                 }
                 // Refused when the model was opened.
                 _ => {}

@@ -13,7 +13,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
     Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
-    Section, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section,
+    Section, SharedLeaves, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature,
+    take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -36,12 +37,17 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. The highest bit: whether there is a section about strangers.
+    /// Where thresholds by object stand; 0 if there are none. The two highest bits: whether there are
+    /// sections about strangers and of shared leaves.
     by_object: u32,
 }
 
 /// See [`Stated::by_object`]: no model is as long.
 const HAS_STRANGERS: u32 = 1 << 31;
+/// The same.
+const HAS_SHARED_LEAVES: u32 = 1 << 30;
+/// What is no place in [`Stated::by_object`].
+const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES;
 
 impl Stated {
     /// What a model without optional sections states.
@@ -135,6 +141,16 @@ impl<'a> Model<'a> {
         self.object_count().saturating_sub(background.into())
     }
 
+    /// The table that leaves are numbers of, if equal leaves stand once.
+    ///
+    /// Cost: about 30 instructions for each optional section. Cannot fail.
+    pub fn shared_leaves(&self) -> Option<SharedLeaves<'a>> {
+        if !built_in::SHARED_LEAVES || self.stated.by_object & HAS_SHARED_LEAVES == 0 {
+            return None;
+        }
+        SharedLeaves::from_bytes(optional::find(self.optional(), Tag::SharedLeaves))
+    }
+
     /// How many features a row has: 1 to 256.
     pub fn feature_count(&self) -> usize {
         usize::from(self.header().last_feature()) + 1
@@ -211,7 +227,7 @@ impl<'a> Model<'a> {
     ///
     /// Cost: about 15 instructions. Cannot fail.
     pub fn odds_of(&self, object: usize) -> Option<u64> {
-        let start = usize::try_from(self.stated.by_object & !HAS_STRANGERS).ok().filter(|&start| start > 0)?;
+        let start = usize::try_from(self.stated.by_object & !MARKS).ok().filter(|&start| start > 0)?;
         let section = self.sections.bytes.get(start..)?;
         OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
     }

@@ -1,10 +1,11 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_STRANGERS, Stated};
+use super::{HAS_SHARED_LEAVES, HAS_STRANGERS, MARKS, Stated};
 use crate::bytes::Wrong;
-use crate::layouts::Sections;
+use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    OddsByObject, Plan, Section, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, take_section,
+    Layout, OddsByObject, Plan, Section, SharedLeaves, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
+    take_section,
 };
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
@@ -32,7 +33,7 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
                 TrainedTouches::from_bytes(content).map(|touches| stated.set_touches(touches)).is_some()
             }
             _ if tag == Tag::ThresholdsByObject.code() => {
-                stated.by_object |= u32::try_from(model.offset(content)).unwrap_or_default() & !HAS_STRANGERS;
+                stated.by_object |= u32::try_from(model.offset(content)).unwrap_or_default() & !MARKS;
                 content.len() >= OddsByObject::LENGTH * model.objects()
             }
             _ if tag == Tag::Noise.code() => content.len() >= TrainedNoise::LENGTH,
@@ -41,6 +42,11 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if cfg!(feature = "strangers") && tag == Tag::Strangers.code() => {
                 stated.by_object |= HAS_STRANGERS;
                 Strangers::from_bytes(content, model.objects()).is_some()
+            }
+            // Tables have no leaves to share.
+            _ if built_in::SHARED_LEAVES && tag == Tag::SharedLeaves.code() => {
+                stated.by_object |= HAS_SHARED_LEAVES;
+                SharedLeaves::from_bytes(content).is_some() && !matches!(model.layout, Layout::Grid | Layout::Patterns)
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

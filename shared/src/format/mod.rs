@@ -7,6 +7,7 @@
 mod codes;
 mod header;
 mod key;
+mod leaves;
 mod plan;
 mod promise;
 mod records;
@@ -17,6 +18,7 @@ pub use crate::checksum::checksum;
 pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
+pub use leaves::SharedLeaves;
 pub use plan::Plan;
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};

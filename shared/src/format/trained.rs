@@ -30,6 +30,8 @@ pub enum Tag {
     Promise,
     /// [`Temperature`](super::Temperature).
     Temperature,
+    /// The values of leaves that stand for many: [`SharedLeaves`](super::SharedLeaves).
+    SharedLeaves,
 }
 
 impl Tag {
@@ -47,6 +49,7 @@ impl Tag {
             Self::PatternShares => 9,
             Self::Promise => 10,
             Self::Temperature => 11,
+            Self::SharedLeaves => 12,
         }
     }
 }

@@ -216,7 +216,8 @@ def irithyll(ensemble, directory):
                     nodes += struct.pack("<fHHHH", cut, 0, 0, 0x8000, 0)
                 else:
                     # It goes right above a threshold, XGBoost at one.
-                    below = np.nextafter(np.float32(cut), np.float32(-np.inf))
+                    with np.errstate(under="ignore"):
+                        below = np.nextafter(np.float32(cut), np.float32(-np.inf))
                     nodes += struct.pack("<fHHHH", below, left, right, feature, 0)
         part = b"IRIT" + struct.pack("<HHHHf", 1, len(trees), features, 0, base[output % len(base)]) + table + nodes
         out += struct.pack("<I", len(part)) + part
@@ -261,7 +262,8 @@ int peer_class(const float *row)
 
 def ours_rust(ensemble, directory, palpate, leaf, goal):
     exported = export(palpate, ensemble, directory, leaf, goal)
-    return rust(ensemble, directory, directory / "model.palpate", ["palpate", exported["layout"], f"{leaf}-leaves"])
+    features = ["palpate", exported["layout"], f"{leaf}-leaves", *(["shared-leaves"] if "shared_leaves" in exported else [])]
+    return rust(ensemble, directory, directory / "model.palpate", features)
 
 
 def rust(ensemble, directory, model, features):

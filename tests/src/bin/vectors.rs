@@ -24,6 +24,7 @@ fn main() {
     sections(&mut text);
     rows(&mut text);
     decisions(&mut text);
+    shared_leaves(&mut text);
     refused(&mut text);
     assert!(text.lines().all(|line| line.len() < 16_384), "a line is too long");
     print!("{text}");
@@ -365,6 +366,26 @@ fn limits(text: &mut String) {
     ] {
         assert_eq!(recognizer.restore(&bytes).is_ok(), answer == "ok");
         *text += &format!("restore {} {answer}\n", hex(&bytes));
+    }
+}
+
+/// Leaves that are numbers of a table: of one byte and of two, with a value for each object and for one.
+fn shared_leaves(text: &mut String) {
+    let compiled = |shape: Shape, different: Option<usize>, leaf, layout| {
+        let ensemble = random::ensemble(shape, 23);
+        let ensemble = different.map_or(ensemble.clone(), |most| random::with_few_leaves(ensemble, most));
+        let settings = Settings { leaf, layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
+        stated(&compile(&ensemble, &settings).expect("it fits").bytes, ALL)
+    };
+    for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {
+        for (leaf, each) in [(Leaf::I8, true), (Leaf::I16, true), (Leaf::F32, true), (Leaf::F32, false)] {
+            let bytes = compiled(Shape { trees: 12, each, ..SHAPE }, Some(7), leaf, layout);
+            let name = format!("{} {} {}", layout.name(), leaf.name(), if each { "each" } else { "one" });
+            play(text, &format!("shared leaves, {name}"), &bytes, &touches(5, 24));
+        }
+        // More than a block of trees.
+        let bytes = compiled(Shape { trees: 70, objects: 11, ..SHAPE }, None, Leaf::I8, layout);
+        play(text, &format!("shared leaves, numbers of two bytes, {}", layout.name()), &bytes, &touches(5, 25));
     }
 }
 

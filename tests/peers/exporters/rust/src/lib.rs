@@ -54,14 +54,12 @@ mod peer {
         let Some(model) = (unsafe { &*(&raw const MODEL) }) else { return -1 };
         // SAFETY: so says the caller.
         let row = unsafe { core::slice::from_raw_parts(row, FEATURES) };
-        let mut features = [MISSING_FEATURE; FEATURES];
-        let is_real = model.key() == Key::Real;
-        for (feature, &value) in features.iter_mut().zip(row) {
-            if is_real {
-                *feature = f32_key(value);
-            } else if !value.is_nan() {
-                *feature = value as i32;
-            }
+        let whole = |value: f32| if value.is_nan() { MISSING_FEATURE } else { value as i32 };
+        let mut features = [0; FEATURES];
+        if model.key() == Key::Real {
+            features.iter_mut().zip(row).for_each(|(feature, &value)| *feature = f32_key(value));
+        } else {
+            features.iter_mut().zip(row).for_each(|(feature, &value)| *feature = whole(value));
         }
         let mut margins = [0; CLASSES];
         model.margins_of(&features, &mut margins);
