@@ -85,6 +85,7 @@
 //! | `train` | yes | `ensemble::train`, `teach` and `tune`; the trainer is hessboost |
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
+//! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |
 //! | `serial` | yes | chips at serial ports |
 //! | `cli` | yes | the program `palpate`, and `page`, `report` and `run`, which only it needs; includes `train`, `objects` and `experiments` |
 //! | `experiments` | yes | `probe::sweep::precision`: other precisions to compare the sweep with |

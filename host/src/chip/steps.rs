@@ -1,7 +1,7 @@
 //! What is streamed to a chip: touches, and where one object ends and the next begins.
 
 use crate::error::{Error, Place, Result};
-use crate::touches::{Dataset, parse_touch};
+use crate::touches::{Dataset, Log, parse_touch};
 use palpate_shared::Touch;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
@@ -28,6 +28,8 @@ pub enum Steps {
         /// Which sequence, and which touch of it.
         at: (usize, usize),
     },
+    /// Touches of a log, in the order of their times; where the object changes, another one begins.
+    Logged(std::vec::IntoIter<Step>),
     /// Lines of text as they come; an empty line begins another object.
     Lines {
         /// The lines.
@@ -51,10 +53,29 @@ impl Steps {
         Self::Lines { reader, path: path.into(), line: 0 }
     }
 
+    /// The touches of a log.
+    pub fn logged(log: &Log) -> Self {
+        let mut steps = Vec::with_capacity(log.touches().len());
+        let mut before = None;
+        for logged in log.touches() {
+            let object = log.object(logged);
+            if object != before {
+                steps.push(Step::Object(object.map(String::from)));
+            }
+            before = object;
+            steps.push(Step::Touch(logged.touch));
+        }
+        Self::Logged(steps.into_iter())
+    }
+
     /// How many touches there will be, where that is known.
     pub fn count(&self) -> Option<u64> {
         match self {
             Self::Sequences { left, .. } => Some(*left),
+            Self::Logged(steps) => {
+                let is_touch = |step: &&Step| matches!(step, Step::Touch(_));
+                Some(steps.as_slice().iter().filter(is_touch).count() as u64)
+            }
             Self::Lines { .. } => None,
         }
     }
@@ -81,6 +102,7 @@ impl Steps {
                 (*sequence, *touch) = if touch == length { (*sequence + 1, 0) } else { (*sequence, *touch + 1) };
                 Ok(next.map(Step::Touch))
             }
+            Self::Logged(steps) => Ok(steps.next()),
             Self::Lines { reader, path, line } => {
                 let mut text = String::new();
                 *line += 1;

@@ -35,12 +35,15 @@ With --active, on approaches with pose, each next approach is drawn from those o
 
 With --label the file has rows of features for a model that was exported from another library's (CSV): each row is classified alone, and compared with the class in the column, its name or its number from 0; or for a model with one output with the number there.
 
+A robot's log (MCAP, see docs/mcap.md) is a data set of the objects that its messages name. A directory may hold logs too: NAME.mcap beside NAME.txt, where messages name no object.
+
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 
 Examples:
   palpate capture builtin -o unseen --touches 2000 --seed 2
   palpate evaluate model.palpate unseen
   palpate evaluate ensemble.json unseen --at 10,30 --json
+  palpate evaluate model.palpate monday.mcap
   palpate evaluate model.palpate unseen --noise 5ms
   palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
   palpate evaluate model.palpate unseen --probe probe.toml
@@ -56,7 +59,7 @@ Examples:
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
-    /// Directory that `palpate capture` filled; with --label a CSV file of rows
+    /// Directory that `palpate capture` filled, or a robot's log (MCAP); with --label a CSV file of rows
     directory: PathBuf,
     /// Column of the rows' classes, or of the numbers that a regression should give
     #[arg(long, value_name = "COLUMN", conflicts_with_all = ["at", "confusion"])]

@@ -5,7 +5,7 @@ use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use crate::error::TuneProblem;
 use crate::output;
-use crate::touches::{Origin, text};
+use crate::touches::{Origin, read_touches};
 use crate::tune::fit::{Estimate, Fit, Settings, between, fit};
 use crate::{Error, Result};
 use std::fmt::Write as _;
@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &FitArguments) -> Result<()> {
     }
     let origin = arguments.size.origin(base)?;
     let objects = arguments.size.objects(&arguments.sources, arguments.seed)?;
-    let plate = arguments.plate.as_deref().map(text::read).transpose()?;
+    let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
     let settings = Settings { origin, approaches: arguments.approaches, seed: arguments.seed };
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
     let suspects: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();

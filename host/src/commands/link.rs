@@ -8,6 +8,7 @@ use crate::compile::CompiledModel;
 use crate::error::{ChipProblem, Place};
 use crate::output::{print, print_json};
 use crate::progress::Progress;
+use crate::touches::{Log, is_log};
 use crate::{Error, Result};
 use clap::ArgGroup;
 use palpate_shared::link::{Decision, HostSettings};
@@ -77,7 +78,7 @@ impl ChipOptions {
         Ok((connection, model))
     }
 
-    /// The touches in `source`: a data set's directory, a file of lines, or `-` for standard input.
+    /// The touches in `source`: a data set's directory, a file of lines, a log, or `-` for standard input.
     pub(crate) fn steps(&self, source: &Path) -> Result<Steps> {
         if source.as_os_str() == "-" {
             return Ok(Steps::lines(Box::new(BufReader::new(std::io::stdin())), Path::new("standard input")));
@@ -86,6 +87,11 @@ impl ChipOptions {
             let dataset = super::dataset(source)?;
             let count = self.touches.unwrap_or(dataset.len() as u64);
             return Ok(Steps::sequences(dataset, self.sequence, count));
+        }
+        if is_log(source) {
+            let log = Log::read(source)?;
+            log.skipped().iter().for_each(super::say);
+            return Ok(Steps::logged(&log));
         }
         let file = std::fs::File::open(source).map_err(|e| Error::io(source, "read the touches", e))?;
         Ok(Steps::lines(Box::new(BufReader::new(file)), source))
@@ -117,7 +123,7 @@ pulled, this waits for it; recording the same object again adds to it. See docs/
 pub(crate) struct Arguments {
     /// A serial port, tcp://HOST:PORT, or emulator
     port: Port,
-    /// Touches to recognize: a data set's directory, a file of lines, or - for standard input
+    /// Touches to recognize: a data set's directory, a file of lines, a robot's log (MCAP), or - for standard input
     source: Option<PathBuf>,
     /// Recognize a data set's touches, and compare every verdict, posterior and evidence with the host's recognizer
     #[arg(long, value_name = "DIR", conflicts_with = "source", requires = "expected")]

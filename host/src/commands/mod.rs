@@ -38,7 +38,7 @@ mod view;
 mod watch;
 
 use crate::error::{Problem, TouchesProblem};
-use crate::touches::{Dataset, Format, Listing};
+use crate::touches::{Dataset, Format, Listing, Log, Warning};
 use crate::{Error, Result};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -216,17 +216,27 @@ fn dataset(directory: &Path) -> Result<Dataset> {
 
 /// A data set whose warnings went to stderr.
 fn checked(dataset: Dataset) -> Dataset {
-    for warning in &dataset.warnings {
-        eprintln!("palpate: warning: {warning}");
-    }
+    dataset.warnings.iter().for_each(say);
     dataset
+}
+
+/// Says to stderr what looks wrong, or what was skipped.
+fn say(warning: &Warning) {
+    match warning {
+        Warning::SkippedChannels { .. } => eprintln!("palpate: {warning}"),
+        _ => eprintln!("palpate: warning: {warning}"),
+    }
 }
 
 /// The files that a data set consists of, as far as they can be found: what a command that reads it must not write.
 fn files_of(directory: &Path) -> Vec<PathBuf> {
+    if directory.is_file() {
+        return vec![directory.into()];
+    }
     let is_touches = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default();
         path.file_name().is_some_and(|name| name == Listing::FILE)
+            || extension == Log::EXTENSION
             || Format::ALL.iter().any(|format| extension == format.extension())
     };
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();

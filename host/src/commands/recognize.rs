@@ -5,8 +5,8 @@ use crate::chip::Entry;
 use crate::compile::{self, CompiledModel};
 use crate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
 use crate::output;
-use crate::touches::parse_touch;
-use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
+use crate::touches::{Log, LogWriter, Logged, LoggedVerdict, begins_log, parse_touch};
+use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::link::ApproachMessage;
 use std::fs::File;
@@ -18,6 +18,10 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided; recognized; unknown where the touches fit no object of the model, which only a model with a test of fit says (`palpate calibrate --strangers`); or gave-up once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
 
+FILE may be a robot's log as well (MCAP, see docs/mcap.md): its touches are taken in the order of their log times, and where the object that they name changes, the next touch is the first of another object.
+
+With --mcap touches and verdicts are written as a log, with the posterior of every object after every touch, once all touches are recognized. Foxglove shows it: plot /verdict.posteriors.fork. Touches that are not from a log are logged a second apart.
+
 With --features each line in is a row of features for a model that was exported from another library's: CSV with the features' names in the header, or as many columns as features, empty cells for missing values. Each line out is the verdict of that row alone, or with --add-up of all rows since the last verdict. A model with one output gives its value and no verdict.
 
 Examples:
@@ -28,13 +32,15 @@ Examples:
   palpate recognize model.palpate data/fork.txt --only fork,spoon,bowl
   palpate recognize model.palpate data/fork.txt --prior fork=0.3,spoon=0.3
   probe | palpate recognize planned.palpate --active
+  palpate recognize model.palpate monday.mcap
+  palpate recognize model.palpate data/fork.txt --mcap verdicts.mcap
   palpate recognize model.palpate rows.csv --features --json
 
 The posterior is that of the model's temperature, if it was calibrated. What it promises holds for its own priors and all of its objects; `palpate evaluate` with --prior or --only says what becomes of it.")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
-    /// File with touches; - is standard input
+    /// File with touches, or a robot's log (MCAP); - is standard input
     #[arg(default_value = "-")]
     file: PathBuf,
     /// The file has rows of features, not touches
@@ -52,6 +58,9 @@ pub(crate) struct Arguments {
     /// Say after each touch where to touch next; the model needs a plan (see `palpate plan`)
     #[arg(long)]
     active: bool,
+    /// Write touches and verdicts as a log, which Foxglove shows
+    #[arg(long, value_name = "FILE", conflicts_with = "features")]
+    mcap: Option<PathBuf>,
     /// Print one JSON object per line
     #[arg(long)]
     json: bool,
@@ -71,6 +80,24 @@ struct Line<'a> {
     /// The approach that helps most.
     #[serde(skip_serializing_if = "Option::is_none")]
     next: Option<Entry>,
+}
+
+impl Line<'_> {
+    fn print(&self, json: bool) -> Result<()> {
+        if json {
+            // Numbers and strings are always JSON.
+            let text = serde_json::to_string(self).unwrap_or_default();
+            return output::print(&format!("{text}\n"));
+        }
+        match &self.refused {
+            Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", self.touch))?,
+            None => output::print(&format!(
+                "{:4}  {:10}  {} {:.4}\n",
+                self.touch, self.verdict, self.object, self.posterior
+            ))?,
+        }
+        self.next.as_ref().map_or(Ok(()), |next| output::print(&format!("      {next}\n")))
+    }
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
@@ -99,14 +126,29 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let weights = arguments.expected.weights(&compiled.names(), &expected::own_weights(&model))?;
     let longest = compile::longest_time(&model);
     let (active, json) = (arguments.active, arguments.json);
-    let mut stream = Stream { recognizer, model: &model, weights, longest, active, json };
+    let log = arguments.mcap.as_deref().map(|log| log_to(log, &arguments, &compiled.names())).transpose()?;
+    let mut stream = Stream { recognizer, model: &model, weights, longest, active, json, log };
     stream.reset();
     let path = &arguments.file;
     if path.as_os_str() == "-" {
-        return stream.run(std::io::stdin().lock(), Path::new("standard input"));
+        stream.run(std::io::stdin().lock(), Path::new("standard input"))?;
+    } else {
+        let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+        stream.run(touches, path)?;
     }
-    let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-    stream.run(touches, path)
+    match (stream.log, &arguments.mcap) {
+        (Some(log), Some(path)) => log.finish(path),
+        _ => Ok(()),
+    }
+}
+
+/// A log of verdicts that is to become the file at `path`.
+fn log_to(path: &Path, arguments: &Arguments, objects: &[String]) -> Result<LogWriter> {
+    if output::is_stdout(path) {
+        return Err(Error::setting("mcap", "standard output", "a file: the verdicts are printed there"));
+    }
+    output::refuse_input(path, [&arguments.model, &arguments.file])?;
+    LogWriter::new(objects)
 }
 
 /// A stream of touches and what recognizes them.
@@ -119,12 +161,18 @@ struct Stream<'m> {
     longest: f64,
     active: bool,
     json: bool,
+    /// Where touches and verdicts are written too.
+    log: Option<LogWriter>,
 }
 
-impl Stream<'_> {
-    /// Prints a verdict for each line before the next line is waited for.
-    fn run(mut self, touches: impl Read, path: &Path) -> Result<()> {
+impl<'m> Stream<'m> {
+    /// Prints a verdict for each touch; of lines, before the next line is waited for.
+    fn run(&mut self, touches: impl Read, path: &Path) -> Result<()> {
         let mut reader = BufReader::new(touches);
+        let begin = reader.fill_buf().map_err(|source| Error::io(path, "read the touches", source))?;
+        if begins_log(begin) {
+            return self.run_log(&Log::of(reader, path)?, path);
+        }
         let mut bytes = Vec::new();
         for number in 1.. {
             bytes.clear();
@@ -140,11 +188,49 @@ impl Stream<'_> {
             }
             let touch = parse_touch(line).map_err(|problem| wrong(problem.into()))?;
             self.check(&touch).map_err(|problem| wrong(problem.into()))?;
-            let verdict = self.recognizer.push(&touch);
-            self.print(verdict.err())?;
-            if self.recognizer.verdict() != Verdict::Undecided {
+            self.push(&touch, None, None)?;
+        }
+        Ok(())
+    }
+
+    /// Prints a verdict for each touch of a log.
+    fn run_log(&mut self, log: &Log, path: &Path) -> Result<()> {
+        log.skipped().iter().for_each(super::say);
+        let mut before = None;
+        for logged in log.touches() {
+            let Logged { time, touch, offset, .. } = logged;
+            let object = log.object(logged);
+            if object != before {
                 self.reset();
             }
+            before = object;
+            self.check(touch).map_err(|problem| Error::at(Place::byte(path, *offset), problem))?;
+            self.push(touch, object, Some(*time))?;
+        }
+        Ok(())
+    }
+
+    /// Takes a touch, with what a log says of it.
+    fn push(&mut self, touch: &Touch, object: Option<&str>, time: Option<u64>) -> Result<()> {
+        let refused = self.recognizer.push(touch).err().map(|refused| refused.to_string());
+        let line = self.line(refused);
+        line.print(self.json)?;
+        if let Some(log) = &mut self.log {
+            let posteriors = (0..self.model.object_count())
+                .map(|object| (self.model.object_name(object).into(), self.recognizer.posterior(object).to_f64()));
+            let verdict = LoggedVerdict {
+                touch: line.touch,
+                verdict: line.verdict.into(),
+                object: line.object.into(),
+                posterior: line.posterior,
+                refused: line.refused,
+                posteriors: posteriors.collect(),
+            };
+            log.touch(touch, object, time)?;
+            log.verdict(&verdict)?;
+        }
+        if self.recognizer.verdict() != Verdict::Undecided {
+            self.reset();
         }
         Ok(())
     }
@@ -168,9 +254,10 @@ impl Stream<'_> {
         Err(EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed: self.model.header().speed() })
     }
 
-    fn print(&self, refused: Option<Refused>) -> Result<()> {
+    /// What there is to say after a touch.
+    fn line(&self, refused: Option<String>) -> Line<'m> {
         let best = self.recognizer.best();
-        let line = Line {
+        Line {
             touch: self.recognizer.touches(),
             verdict: match self.recognizer.verdict() {
                 Verdict::Undecided => "undecided",
@@ -181,22 +268,9 @@ impl Stream<'_> {
             // Before the first counted touch no object is more likely than the others.
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),
-            refused: refused.map(|refused| refused.to_string()),
+            refused,
             next: self.next(),
-        };
-        if self.json {
-            // Numbers and strings are always JSON.
-            let text = serde_json::to_string(&line).unwrap_or_default();
-            return output::print(&format!("{text}\n"));
         }
-        match line.refused {
-            Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", line.touch))?,
-            None => output::print(&format!(
-                "{:4}  {:10}  {} {:.4}\n",
-                line.touch, line.verdict, line.object, line.posterior
-            ))?,
-        }
-        line.next.map_or(Ok(()), |next| output::print(&format!("      {next}\n")))
     }
 
     /// The approach that helps most, where that is asked for and nothing is decided.

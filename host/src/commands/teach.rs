@@ -3,15 +3,15 @@
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::report::teach::{more_approaches, page, promise};
 use crate::teach::{Taught, TaughtObject};
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches, is_log};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Recorded touches, and what they are taught to.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TeachArguments {
-    /// Recorded touches of objects of which there is no mesh: a directory, or a file of touches called like its object;
-    /// may be given several times. Their values are added to the trees of the simulated objects; without DIRECTORY the
+    /// Recorded touches of objects of which there is no mesh: a directory, a file of touches called like its object,
+    /// or a robot's log (MCAP); may be given several times. Their values are added to the trees of the simulated objects; without DIRECTORY the
     /// ensemble is trained on them alone
     #[arg(long, value_name = "RECORDED")]
     pub(crate) teach: Vec<PathBuf>,
@@ -37,7 +37,8 @@ impl TeachArguments {
     pub(crate) fn read(&self) -> Result<Option<Dataset>> {
         let mut all: Option<Dataset> = None;
         for path in &self.teach {
-            let read = if path.is_dir() { super::checked(Dataset::read_any(path)?) } else { file(path)? };
+            let is_whole = path.is_dir() || is_log(path);
+            let read = if is_whole { super::checked(Dataset::read_any(path)?) } else { file(path)? };
             match &mut all {
                 None => all = Some(read),
                 Some(all) => add(all, read, path)?,

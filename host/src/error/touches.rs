@@ -92,11 +92,97 @@ pub enum TouchesProblem {
     /// A Parquet file, read by a build without Parquet.
     #[error("this program was built without Parquet")]
     NoParquet,
+    /// A file is no log in MCAP, or is damaged.
+    #[error("not a usable MCAP file: {message}")]
+    NotMcap {
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A log, for a build without MCAP.
+    #[error("this program was built without MCAP")]
+    NoMcap,
+    /// Something in a log is larger than what is read.
+    #[error("{what} of {bytes} bytes, where at most {most} are read")]
+    TooLarge {
+        /// What: "a record".
+        what: String,
+        /// How large it is.
+        bytes: u64,
+        /// How large it may be.
+        most: u64,
+    },
+    /// A log has more touches than are read.
+    #[error("more than {most} touches")]
+    TooMany {
+        /// How many are read.
+        most: usize,
+    },
+    /// A chunk of a log is compressed by something that nobody here knows.
+    #[error("a chunk is compressed as {name:?}, where zstd and lz4 are known")]
+    OtherCompression {
+        /// Its name.
+        name: String,
+    },
+    /// A channel with touches or verdicts is in an encoding that is not read.
+    #[error("{channel} is in the encoding {encoding:?} with a schema in {schema:?}")]
+    OtherEncoding {
+        /// The channel: its topic, with the name of its schema.
+        channel: String,
+        /// The messages' encoding.
+        encoding: String,
+        /// The schema's encoding.
+        schema: String,
+    },
+    /// A channel with touches or verdicts has a schema of another definition.
+    #[error("{channel} is defined as {found:?}, where Palpate has {expected:?}")]
+    OtherDefinition {
+        /// The channel: its topic, with the name of its schema.
+        channel: String,
+        /// What the log says.
+        found: String,
+        /// What it should say.
+        expected: String,
+    },
+    /// A log has no channel of touches.
+    #[error("no channel of touches in this log: {}", channels_or_none(channels))]
+    NoTouchChannel {
+        /// The channels that it has: topics, with the names of their schemas.
+        channels: Vec<String>,
+    },
+    /// A message of a log is wrong.
+    #[error("message {number} on {topic}: {problem}")]
+    Message {
+        /// The channel's topic.
+        topic: String,
+        /// The message among those of its channel, counted from 1.
+        number: u64,
+        /// What is wrong with it.
+        problem: Box<Self>,
+    },
+    /// A message of a log is not what its schema says.
+    #[error("no {what}: {message}")]
+    BadMessage {
+        /// What it should be: "touch in JSON".
+        what: &'static str,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Some touches of a log name an object and others do not.
+    #[error("this touch names no object, and others of the log do")]
+    NamelessTouch,
+    /// A log has no touch of an object.
+    #[error("no touch of {object} in this log, only of {objects}")]
+    NotInLog {
+        /// The object.
+        object: String,
+        /// The objects that it has.
+        objects: String,
+    },
     /// A file holds no touch.
     #[error("no touches in it")]
     NoTouches,
     /// A directory holds no file of touches.
-    #[error("no touches here (no .txt or .parquet file)")]
+    #[error("no touches here (no .txt, .parquet or .mcap file)")]
     NoObjects,
     /// A directory holds one object.
     #[error("only one object here, {name}, and nothing to distinguish it from")]
@@ -258,6 +344,24 @@ impl TouchesProblem {
                 "Capture the object again, or remove the file."
             }
             Self::ParquetNotWritten { .. } => "Check the disk and the space on it, then resume the capture.",
+            Self::NotMcap { .. } => "Repair it with `mcap recover`, or copy the log again.",
+            Self::NoMcap => "Build it with the feature mcap, which is on by default.",
+            Self::TooLarge { .. } => {
+                "If it is meant, keep the touches alone: mcap filter LOG -o TOUCHES.mcap -y TOPIC."
+            }
+            Self::TooMany { .. } => "Divide the log: mcap filter LOG -o PART.mcap --start TIME --end TIME.",
+            Self::OtherCompression { .. } => "Compress it anew: mcap compress LOG -o OTHER.mcap --compression zstd.",
+            Self::OtherEncoding { .. } | Self::OtherDefinition { .. } => {
+                "Log them as docs/mcap.md says: JSON, or CDR by the definitions in host/msg."
+            }
+            Self::NoTouchChannel { .. } => {
+                "Name the schema of the touches palpate.Touch, or in ROS 2 palpate_msgs/msg/Touch: docs/mcap.md."
+            }
+            Self::Message { .. } | Self::BadMessage { .. } => {
+                "Correct what logged it: docs/mcap.md says what belongs in a message."
+            }
+            Self::NamelessTouch => "Name the object in every message, or in none.",
+            Self::NotInLog { .. } => "Give one of these names, or the log of the other object.",
             Self::NoParquet => "Build it with the feature parquet, which is on by default.",
             Self::NoObjects => "Fill it with: palpate capture builtin -o DIR.",
             Self::OneObject { .. } => "Capture at least two objects into the directory.",
@@ -285,6 +389,18 @@ impl TouchesProblem {
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }
         .into()
+    }
+}
+
+fn channels_or_none(channels: &[String]) -> String {
+    const SHOWN: usize = 20;
+    match channels.len() {
+        0 => "it has no channel at all".into(),
+        count => {
+            let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+            let more = count.saturating_sub(SHOWN);
+            if more == 0 { format!("it has {shown}") } else { format!("it has {shown} and {more} more") }
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::checksum::checksum;
 use super::noise::Noise;
-use super::{Entry, Format, Listing, Origin, Recorded, recording};
+use super::{Entry, Format, Listing, Log, Origin, Recorded, is_log, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
 use palpate_shared::Touch;
@@ -44,6 +44,14 @@ pub enum Warning {
         /// The file.
         path: PathBuf,
     },
+    /// A log has channels without touches and verdicts.
+    #[error("{}: skipped {}", path.display(), channels_said(channels))]
+    SkippedChannels {
+        /// The log.
+        path: PathBuf,
+        /// The channels: topics, with the names of their schemas.
+        channels: Vec<String>,
+    },
     /// The last line of a recorded file is not whole.
     #[error("{}: its last line is not whole and was not read: a recording was interrupted", path.display())]
     HalfLine {
@@ -69,7 +77,9 @@ impl Dataset {
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
-    /// `<object>.txt` and `<object>.parquet`.
+    /// `<object>.txt`, `<object>.parquet` and log (`<name>.mcap`, see [`Log::by_object`]; its content decides that a file
+    /// is one). Touches of one object in several logs are joined in the order of the logs' names. The path of a log is a data
+    /// set too.
     ///
     /// A text file that was changed since its capture but has as many touches as stated is a [`Warning`].
     ///
@@ -90,9 +100,15 @@ impl Dataset {
     /// # Errors
     /// As [`read`](Self::read), but for the number of objects: at least one.
     pub fn read_any(directory: &Path) -> Result<Self> {
-        let dataset = match Listing::read(directory)? {
-            Some(listing) => Self::listed(directory, listing)?,
-            None => Self::found(directory)?,
+        let dataset = match is_log(directory) {
+            true => {
+                let (objects, warnings) = found_in(&[directory.into()])?;
+                Self { warnings, ..Self::new(objects_of(objects)) }
+            }
+            false => match Listing::read(directory)? {
+                Some(listing) => Self::listed(directory, listing)?,
+                None => Self::found(directory)?,
+            },
         };
         match dataset.objects.is_empty() {
             true => Err(Error::at(Place::file(directory), TouchesProblem::NoObjects)),
@@ -152,9 +168,24 @@ impl Dataset {
                 TouchesProblem::TwoFiles { name: first.0.clone(), file, other },
             ));
         }
-        let read =
-            |(name, path, format): (String, PathBuf, Format)| Ok(ObjectTouches { name, touches: format.read(&path)? });
-        Ok(Self::new(files.into_iter().map(read).collect::<Result<_>>()?))
+        let mut logs = logs(directory)?;
+        let mut objects = BTreeMap::new();
+        for (name, path, format) in files {
+            match is_log(&path) {
+                true => logs.push(path),
+                false => _ = objects.insert(name, Found { touches: format.read(&path)?, file: path }),
+            }
+        }
+        logs.sort();
+        let (logged, warnings) = found_in(&logs)?;
+        for (name, found) in logged {
+            if let Some(Found { file, .. }) = objects.get(&name) {
+                let (file, other) = (file.clone(), found.file);
+                return Err(Error::at(Place::file(directory), TouchesProblem::TwoFiles { name, file, other }));
+            }
+            objects.insert(name, found);
+        }
+        Ok(Self { warnings, ..Self::new(objects_of(objects)) })
     }
 
     /// The probe that made the touches, where that is known.
@@ -244,6 +275,57 @@ pub(crate) fn files(directory: &Path) -> Result<Vec<(String, PathBuf, Format)>> 
     }
     files.sort();
     Ok(files)
+}
+
+/// Touches of an object, and the file that has them, or the first of several.
+struct Found {
+    touches: Vec<Touch>,
+    file: PathBuf,
+}
+
+/// What logs hold by object, one log after the other, and what was skipped.
+fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)> {
+    let (mut objects, mut warnings) = (BTreeMap::new(), Vec::new());
+    for file in logs {
+        let log = Log::read(file)?;
+        for ObjectTouches { name, touches } in log.by_object(&name_of(file))? {
+            let found = objects.entry(name).or_insert_with(|| Found { touches: Vec::new(), file: file.clone() });
+            found.touches.extend(touches);
+        }
+        warnings.extend(log.skipped());
+    }
+    Ok((objects, warnings))
+}
+
+fn objects_of(found: BTreeMap<String, Found>) -> Vec<ObjectTouches> {
+    found.into_iter().map(|(name, Found { touches, .. })| ObjectTouches { name, touches }).collect()
+}
+
+/// The logs in a directory by their names, which end in `.mcap`, sorted.
+pub(crate) fn logs(directory: &Path) -> Result<Vec<PathBuf>> {
+    let io = |source| Error::io(directory, "read the data set", source);
+    let entries = std::fs::read_dir(directory).map_err(io)?;
+    let mut paths = entries.map(|entry| Ok(entry.map_err(io)?.path())).collect::<Result<Vec<_>>>()?;
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == Log::EXTENSION));
+    paths.sort();
+    Ok(paths)
+}
+
+/// The object that a file is called like.
+pub(super) fn name_of(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Some channels by name, and how many others.
+pub(super) fn channels_said(channels: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let count = match channels.len() {
+        1 => "1 other channel".to_owned(),
+        count => format!("{count} other channels"),
+    };
+    let more = if channels.len() > SHOWN { ", …" } else { "" };
+    format!("{count}: {shown}{more}")
 }
 
 #[cfg(test)]

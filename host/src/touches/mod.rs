@@ -3,7 +3,9 @@
 //! A data set is a directory with one file per object: `<object>.txt`, one line per touch ([`text`]), or
 //! `<object>.parquet` (`parquet`). A directory that [`capture`](crate::capture) wrote also holds `dataset.json`, its
 //! [`Listing`]: which objects there are, how many touches of each, their files' checksums, and how the touches were made
-//! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe.
+//! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe; it
+//! may also hold logs of robots (`<object>.mcap`, or of any objects that their messages name), and a log is a data set by
+//! itself ([`Log`]).
 //!
 //! [`Recording`] adds the touches of a real probe to such a directory, one by one as they come; its listing says when, from
 //! where and by which firmware ([`Recorded`]).
@@ -36,6 +38,12 @@ mod dataset;
 pub mod folds;
 mod format;
 mod listing;
+mod log;
+#[cfg(feature = "mcap")]
+pub mod mcap;
+#[cfg(not(feature = "mcap"))]
+#[path = "no_mcap.rs"]
+mod mcap;
 pub mod noise;
 mod origin;
 #[cfg(feature = "parquet")]
@@ -49,10 +57,11 @@ pub(crate) mod synthetic;
 pub mod text;
 
 pub(crate) use checksum::checksum;
-pub(crate) use dataset::files;
 pub use dataset::{Dataset, ObjectTouches, Warning};
+pub(crate) use dataset::{files, logs};
 pub use format::Format;
 pub use listing::{Entry, Listing};
+pub use log::{Channels, Log, LogWriter, Logged, LoggedVerdict, Message, Said, begins_log, is_log, read_touches};
 pub use origin::Origin;
 pub(crate) use origin::{tenth, unit};
 pub use recording::{Recorded, Recording};

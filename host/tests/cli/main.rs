@@ -9,6 +9,8 @@ mod design;
 mod fit;
 mod formats;
 mod help;
+#[cfg(feature = "mcap")]
+mod mcap;
 mod mesh;
 mod models;
 mod objects;

@@ -15,9 +15,10 @@ Every line that cannot be read is named, and what reads well but would train bad
 Examples:
   palpate data check touches
   palpate data check recorded --json
+  palpate data check monday.mcap
   palpate data check touches && palpate train touches -o ensemble.json")]
 pub(crate) struct Arguments {
-    /// A directory with a file of touches for each object
+    /// A directory with a file of touches for each object, or a robot's log (MCAP)
     #[arg(value_name = "DIR")]
     directory: PathBuf,
     /// Print findings and summary as JSON

@@ -8,7 +8,8 @@ mod summary;
 pub use summary::{ObjectSummary, Quantiles, Summary};
 
 use super::checksum::{Checked, checksum};
-use super::{Entry, Format, Listing, Origin, text};
+use super::dataset::{channels_said, name_of};
+use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Warning, is_log, logs, text};
 use crate::error::{Error, Place, Problem, Result, TouchesProblem};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
@@ -50,12 +51,20 @@ impl Check {
         self.findings.iter().filter(|finding| finding.is_wrong).count()
     }
 
-    /// Checks the data set in a directory. Memory: that of its touches.
+    /// Checks the data set in a directory, or a log. Memory: that of its touches.
     ///
     /// # Errors
     /// When the directory cannot be read. What is wrong in it is a [`Finding`].
     pub fn of(directory: &Path) -> Result<Self> {
         let mut findings = Findings(Vec::new());
+        if is_log(directory) {
+            let mut objects = Vec::new();
+            logged(directory, &mut objects, &mut findings)?;
+            return Ok(match objects.is_empty() {
+                true => Self { findings: findings.0, summary: Summary::of(&[], None) },
+                false => Self::of_objects(directory, &objects, None, findings),
+            });
+        }
         let listing = match Listing::read(directory) {
             Ok(listing) => listing,
             Err(error @ Error::Io { .. }) => return Err(error),
@@ -69,14 +78,19 @@ impl Check {
             Some(listing) => listed(directory, listing, &mut findings)?,
             None => found(directory, &mut findings)?,
         };
-        match objects.as_slice() {
+        Ok(Self::of_objects(directory, &objects, origin, findings))
+    }
+
+    /// What is wrong with objects beside what was when they were read.
+    fn of_objects(directory: &Path, objects: &[Read], origin: Option<Origin>, mut findings: Findings) -> Self {
+        match objects {
             [] => findings.problem(directory, TouchesProblem::NoObjects),
             [one] => findings.problem(directory, TouchesProblem::OneObject { name: one.name.clone() }),
             _ => {}
         }
         objects.iter().for_each(|object| findings.object(object, origin.as_ref()));
-        findings.together(directory, &objects);
-        Ok(Self { findings: findings.0, summary: Summary::of(&objects, origin) })
+        findings.together(directory, objects);
+        Self { findings: findings.0, summary: Summary::of(objects, origin) }
     }
 }
 
@@ -86,6 +100,8 @@ struct Read {
     path: PathBuf,
     touches: Vec<Touch>,
     approaches: Option<u64>,
+    /// Whether a log has them.
+    is_logged: bool,
 }
 
 /// The objects that a listing names.
@@ -113,7 +129,11 @@ fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result
                 }
             }
         }
-        objects.push(Read { name, path, touches, approaches: Some(approaches) });
+        objects.push(Read { name, path, touches, approaches: Some(approaches), is_logged: false });
+    }
+    for path in logs(directory)? {
+        let what = format!("a log, which is not read beside {}", Listing::FILE);
+        findings.note(&path, &what, "Record its touches with `palpate data record`, or move it away.");
     }
     for (name, path, _) in super::files(directory)? {
         if !objects.iter().any(|object| object.path == path)
@@ -129,16 +149,59 @@ fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result
 /// Every object that has a file.
 fn found(directory: &Path, findings: &mut Findings) -> Result<Vec<Read>> {
     let mut objects: Vec<Read> = Vec::new();
+    let mut logs = logs(directory)?;
     for (name, path, format) in super::files(directory)? {
+        if is_log(&path) {
+            logs.push(path);
+            continue;
+        }
         if let Some(other) = objects.iter().find(|object| object.name == name) {
             let (file, other) = (path, other.path.clone());
             findings.problem(directory, TouchesProblem::TwoFiles { name, file, other });
             continue;
         }
         let (touches, _) = read(&path, format, findings)?;
-        objects.push(Read { name, path, touches, approaches: None });
+        objects.push(Read { name, path, touches, approaches: None, is_logged: false });
     }
+    logs.sort();
+    for path in logs {
+        let mut more = Vec::new();
+        logged(&path, &mut more, findings)?;
+        for object in more {
+            match objects.iter_mut().find(|other| other.name == object.name) {
+                Some(other) if other.is_logged => other.touches.extend(object.touches),
+                Some(other) => {
+                    let (file, other) = (other.path.clone(), object.path);
+                    findings.problem(directory, TouchesProblem::TwoFiles { name: object.name, file, other });
+                }
+                None => objects.push(object),
+            }
+        }
+    }
+    objects.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(objects)
+}
+
+/// The objects of a log.
+fn logged(path: &Path, objects: &mut Vec<Read>, findings: &mut Findings) -> Result<()> {
+    let read = Log::read(path).and_then(|log| Ok((log.by_object(&name_of(path))?, log.skipped())));
+    let (found, skipped) = match read {
+        Err(error @ Error::Io { .. }) => return Err(error),
+        Err(error) => {
+            findings.error(error);
+            return Ok(());
+        }
+        Ok(read) => read,
+    };
+    if let Some(Warning::SkippedChannels { channels, .. }) = skipped {
+        findings.note(path, &format!("skipped {}", channels_said(&channels)), "Nothing needs to be done about them.");
+    }
+    for ObjectTouches { name, touches } in found {
+        // Findings name the object beside the log, where the log is not called like it.
+        let path = if name == name_of(path) { path.into() } else { path.join(&name) };
+        objects.push(Read { name, path, touches, approaches: None, is_logged: true });
+    }
+    Ok(())
 }
 
 /// The touches of a file that can be read, and the file's checksum.

@@ -1,0 +1,282 @@
+//! Touches out of a robot's log, which is an MCAP file: `docs/mcap.md` says what belongs in it.
+
+use super::{ObjectTouches, Warning, mcap, text};
+use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::output;
+use palpate_shared::Touch;
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::{BufWriter, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// The first byte of an MCAP file. No text in UTF-8 begins with it.
+const FIRST: u8 = 0x89;
+/// More touches than this are refused: a probe that touches every second takes four months for them.
+const MOST: usize = 10_000_000;
+/// How many bytes all names of objects may take.
+const NAMES: usize = 16 << 20;
+
+/// The touches of a log, in the order of their log times.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    path: PathBuf,
+    touches: Vec<Logged>,
+    objects: Vec<String>,
+    channels: Channels,
+}
+
+/// A touch in a log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Logged {
+    /// When it was logged, in nanoseconds on the log's clock.
+    pub time: u64,
+    /// The touch.
+    pub touch: Touch,
+    /// Where in the file it stands: the byte at which its message, or the chunk with it, begins.
+    pub offset: u64,
+    /// The object's number among the log's.
+    object: Option<u32>,
+}
+
+/// The channels of a log: topics, with the names of their schemas.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Channels {
+    /// Those with touches.
+    pub touches: Vec<String>,
+    /// Those with verdicts.
+    pub verdicts: Vec<String>,
+    /// Those that were skipped.
+    pub others: Vec<String>,
+}
+
+/// A message of a log that was understood.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    /// When it was logged, in nanoseconds on the log's clock.
+    pub time: u64,
+    /// The byte at which the message, or the chunk with it, begins.
+    pub offset: u64,
+    /// What it says.
+    pub said: Said,
+}
+
+/// What a message of a log says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Said {
+    /// A touch, and of which object, where that is known.
+    Touch(Touch, Option<String>),
+    /// A verdict.
+    Verdict(LoggedVerdict),
+}
+
+/// A verdict as logs hold it: the fields of `palpate recognize --json`, and the posterior of every object.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoggedVerdict {
+    /// How many touches it rests on.
+    pub touch: u32,
+    /// One of [`VERDICTS`](Self::VERDICTS).
+    pub verdict: String,
+    /// The likeliest object; empty before the first touch.
+    pub object: String,
+    /// Its posterior, from 0 to 1.
+    pub posterior: f64,
+    /// Why the touch was not counted.
+    pub refused: Option<String>,
+    /// The posterior of every object.
+    pub posteriors: Vec<(String, f64)>,
+}
+
+impl LoggedVerdict {
+    /// What a verdict can be.
+    pub const VERDICTS: [&'static str; 4] = ["undecided", "recognized", "unknown", "gave-up"];
+}
+
+/// Whether a file, or a stream, is a log, by how it begins.
+pub fn begins_log(bytes: &[u8]) -> bool {
+    bytes.first() == Some(&FIRST)
+}
+
+/// Whether the file at `path` is a log, by how it begins; a file that cannot be read is none.
+pub fn is_log(path: &Path) -> bool {
+    let mut first = [0];
+    path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut first)).is_ok() && begins_log(&first)
+}
+
+/// The touches of a file: of a log, whichever objects they are of, or of lines of text.
+///
+/// # Errors
+/// As [`Log::read`] and [`text::read`].
+pub fn read_touches(path: &Path) -> Result<Vec<Touch>> {
+    match is_log(path) {
+        true => Ok(Log::read(path)?.touches.iter().map(|logged| logged.touch).collect()),
+        false => text::read(path),
+    }
+}
+
+impl Log {
+    /// How the names of logs end.
+    pub const EXTENSION: &'static str = "mcap";
+
+    /// Reads a log.
+    ///
+    /// Memory: 48 bytes for each touch, up to ten million of them, and that of the largest chunk, at most 256 MiB.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is damaged or ends early, has no channel of touches, no touch, or a message on such a
+    /// channel that is none.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::of(File::open(path).map_err(|error| Error::io(path, "read the touches", error))?, path)
+    }
+
+    /// Reads a log from anywhere; errors name `path`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn of(bytes: impl Read, path: &Path) -> Result<Self> {
+        let (mut touches, mut objects, mut numbers, mut size) = (Vec::new(), Vec::new(), HashMap::new(), 0);
+        let channels = mcap::read(bytes, path, |Message { time, offset, said }| {
+            let Said::Touch(touch, object) = said else { return Ok(()) };
+            let wrong = |problem| Err(Error::at(Place::byte(path, offset), problem));
+            if touches.len() == MOST {
+                return wrong(TouchesProblem::TooMany { most: MOST });
+            }
+            let object = match object {
+                None => None,
+                Some(name) => Some(match numbers.get(&name) {
+                    Some(&number) => number,
+                    None => {
+                        size += name.len();
+                        if size > NAMES {
+                            let (what, bytes, most) = ("names of objects".into(), size as u64, NAMES as u64);
+                            return wrong(TouchesProblem::TooLarge { what, bytes, most });
+                        }
+                        let number = objects.len() as u32;
+                        objects.push(name.clone());
+                        numbers.insert(name, number);
+                        number
+                    }
+                }),
+            };
+            touches.push(Logged { time, touch, offset, object });
+            Ok(())
+        })?;
+        if touches.is_empty() {
+            return Err(Error::at(Place::file(path), TouchesProblem::NoTouches));
+        }
+        // Messages of one time stay in the order of the file.
+        touches.sort_by_key(|logged| logged.time);
+        Ok(Self { path: path.into(), touches, objects, channels })
+    }
+
+    /// The touches, in the order of their times.
+    pub fn touches(&self) -> &[Logged] {
+        &self.touches
+    }
+
+    /// The object of a touch of this log, where its message names one.
+    pub fn object(&self, logged: &Logged) -> Option<&str> {
+        self.objects.get(logged.object? as usize).map(String::as_str)
+    }
+
+    /// The channels that the log has.
+    pub fn channels(&self) -> &Channels {
+        &self.channels
+    }
+
+    /// What there is to say about what was skipped.
+    pub fn skipped(&self) -> Option<Warning> {
+        let channels = &self.channels.others;
+        (!channels.is_empty()).then(|| Warning::SkippedChannels { path: self.path.clone(), channels: channels.clone() })
+    }
+
+    /// The touches by object, sorted by name; all are of the object `otherwise` if no message names one.
+    ///
+    /// # Errors
+    /// [`TouchesProblem::NamelessTouch`] if some name an object and others do not.
+    pub fn by_object(&self, otherwise: &str) -> Result<Vec<ObjectTouches>> {
+        self.all_or_none_named()?;
+        let mut objects: BTreeMap<&str, Vec<Touch>> = BTreeMap::new();
+        for logged in &self.touches {
+            objects.entry(self.object(logged).unwrap_or(otherwise)).or_default().push(logged.touch);
+        }
+        Ok(objects.into_iter().map(|(name, touches)| ObjectTouches { name: name.into(), touches }).collect())
+    }
+
+    /// The touches of one object: those that name it, or all if none names any; and how many others there are.
+    ///
+    /// # Errors
+    /// [`TouchesProblem::NamelessTouch`] as [`by_object`](Self::by_object), and [`TouchesProblem::NotInLog`] if there is
+    /// none.
+    pub fn of_object(&self, object: &str) -> Result<(Vec<Touch>, usize)> {
+        self.all_or_none_named()?;
+        let is_it = |logged: &&Logged| self.object(logged).is_none_or(|name| name == object);
+        let touches: Vec<Touch> = self.touches.iter().filter(is_it).map(|logged| logged.touch).collect();
+        if touches.is_empty() {
+            let problem = TouchesProblem::NotInLog { object: object.into(), objects: self.objects.join(", ") };
+            return Err(Error::at(Place::file(&self.path), problem));
+        }
+        let others = self.touches.len() - touches.len();
+        Ok((touches, others))
+    }
+
+    fn all_or_none_named(&self) -> Result<()> {
+        match self.touches.iter().find(|logged| logged.object.is_none()) {
+            Some(nameless) if !self.objects.is_empty() => {
+                Err(Error::at(Place::byte(&self.path, nameless.offset), TouchesProblem::NamelessTouch))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A log that is being written: touches and verdicts, as JSON, in chunks with an index, uncompressed.
+///
+/// The same touches and verdicts give the same bytes. What is written is kept in a temporary file until
+/// [`finish`](Self::finish).
+pub struct LogWriter {
+    writer: mcap::Writer<BufWriter<File>>,
+}
+
+impl LogWriter {
+    /// Begins a log with verdicts about these objects.
+    ///
+    /// # Errors
+    /// When there is no place for temporary files, or this build has no MCAP.
+    pub fn new(objects: &[String]) -> Result<Self> {
+        let file = tempfile::tempfile().map_err(temporary)?;
+        Ok(Self { writer: mcap::Writer::new(BufWriter::new(file), objects)? })
+    }
+
+    /// Adds a touch, with the time of the log that it is from, where it is from one; others are a second apart. The time
+    /// is moved on where it is not after that of the message before.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn touch(&mut self, touch: &Touch, object: Option<&str>, time: Option<u64>) -> Result<()> {
+        self.writer.touch(touch, object, time)
+    }
+
+    /// Adds the verdict about the touches so far, a microsecond after the last touch.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn verdict(&mut self, verdict: &LoggedVerdict) -> Result<()> {
+        self.writer.verdict(verdict)
+    }
+
+    /// Writes the log to `path`, whole or not at all.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn finish(self, path: &Path) -> Result<()> {
+        let file = self.writer.finish()?.into_inner().map_err(|error| temporary(error.into_error()));
+        let mut file = file?;
+        file.seek(SeekFrom::Start(0)).map_err(temporary)?;
+        output::write_whole(path, |out| std::io::copy(&mut file, out).map(drop))
+    }
+}
+
+/// An error about a file without a name.
+fn temporary(error: std::io::Error) -> Error {
+    Error::io(std::env::temp_dir(), "write a temporary file", error)
+}

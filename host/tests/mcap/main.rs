@@ -1,0 +1,474 @@
+//! Robots' logs: what is read out of them, what is refused and how, and what is written.
+
+mod files;
+
+use files::{channel, chunk, file, message, python, record, schema, touches};
+use palpate::chip::{Step, Steps};
+use palpate::error::{Error, Place, Problem, TouchesProblem};
+use palpate::touches::check::Check;
+use palpate::touches::mcap::{self, TOUCH, VERDICT, Writer};
+use palpate::touches::{
+    Dataset, Log, LoggedVerdict, Message, Said, is_log, parse_touch, read_touches, touch_of_seconds,
+};
+use palpate_shared::Touch;
+use std::io::Cursor;
+use std::path::Path;
+
+fn read(bytes: &[u8]) -> Result<Log, Error> {
+    Log::of(bytes, Path::new("robot.mcap"))
+}
+
+/// The text of the error that these bytes end in.
+#[track_caller]
+fn error(bytes: &[u8]) -> String {
+    read(bytes).map(|log| log.touches().len()).unwrap_err().to_string()
+}
+
+/// What is wrong with these bytes, and at which of them.
+#[track_caller]
+fn problem(bytes: &[u8]) -> (TouchesProblem, Place) {
+    match read(bytes).map(|log| log.touches().len()).unwrap_err() {
+        Error::At { problem: Problem::Touches(problem), place } => (problem, place),
+        other => panic!("{other}"),
+    }
+}
+
+/// The touches that make.py wrote, with and without their poses.
+fn expected(pose: bool) -> Vec<(Touch, &'static str)> {
+    let touch = |i: usize| {
+        let (name, late) = if i.is_multiple_of(2) { ("bowl", 0.010) } else { ("mug", 0.060) };
+        let middle = (i % 10 != 7).then_some(0.0015 * i as f64);
+        let (sin, cos) = (i as f64 / 7.0).sin_cos();
+        let vectors = pose.then_some(([cos, sin, 0.0], [-sin, cos, 0.0]));
+        let times = [Some(0.0), middle, Some(late + i as f64 * 1e-4)];
+        let (direction, alignment) = vectors.unzip();
+        (touch_of_seconds(times, direction, alignment).unwrap(), name)
+    };
+    (0..40).map(touch).collect()
+}
+
+#[test]
+fn logs_of_the_usual_library_are_read_however_they_are_compressed() {
+    for name in ["json.mcap", "json-lz4.mcap", "json-zstd.mcap", "ros2.mcap"] {
+        let log = Log::read(&python(name)).unwrap();
+        let found: Vec<_> = log.touches().iter().map(|logged| (logged.touch, log.object(logged).unwrap())).collect();
+        assert_eq!(found, expected(true), "{name}");
+        assert!(log.touches().is_sorted_by(|a, b| a.time + 1_000_000_000 == b.time), "{name}");
+        let channels = log.channels();
+        let (topic, schema) = match name {
+            "ros2.mcap" => ("/touch", "palpate_msgs/msg/Touch"),
+            _ => ("/probe/touch", "palpate.Touch"),
+        };
+        assert_eq!(channels.touches, [format!("{topic} ({schema})")]);
+        assert_eq!(channels.others.len(), 1);
+        let said = log.skipped().unwrap().to_string();
+        assert!(said.ends_with(&format!("{name}: skipped 1 other channel: {}", channels.others[0])), "{said}");
+    }
+}
+
+#[test]
+fn touches_come_in_the_order_of_their_log_times_from_any_clock() {
+    let path = python("plain.mcap");
+    let log = Log::read(&path).unwrap();
+    let found: Vec<_> = log.touches().iter().map(|logged| logged.touch).collect();
+    assert_eq!(found, expected(false).into_iter().map(|(touch, _)| touch).collect::<Vec<_>>());
+    // No message names an object: that is for the log's name to say.
+    let objects = log.by_object("plain").unwrap();
+    assert_eq!((objects.len(), objects[0].name.as_str(), objects[0].touches.len()), (1, "plain", 40));
+    assert_eq!(read_touches(&path).unwrap(), found);
+}
+
+#[test]
+fn verdicts_of_a_robot_are_read_too() {
+    let mut verdicts = Vec::new();
+    let bytes = std::fs::read(python("ros2.mcap")).unwrap();
+    mcap::read(bytes.as_slice(), Path::new("ros2.mcap"), |message| {
+        if let Message { said: Said::Verdict(verdict), .. } = message {
+            verdicts.push(verdict);
+        }
+        Ok(())
+    })
+    .unwrap();
+    let verdict = |touch, object: &str, refused: Option<&str>, posteriors: [f64; 2]| LoggedVerdict {
+        touch,
+        verdict: "undecided".into(),
+        object: object.into(),
+        posterior: 0.75,
+        refused: refused.map(String::from),
+        posteriors: ["bowl", "mug"].map(String::from).into_iter().zip(posteriors).collect(),
+    };
+    assert_eq!(verdicts.len(), 40);
+    assert_eq!(verdicts[0], verdict(1, "bowl", Some("too soon"), [0.75, 0.25]));
+    assert_eq!(verdicts[39], verdict(40, "mug", None, [0.25, 0.75]));
+}
+
+/// A CDR message from hexadecimal digits.
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits: Vec<u8> = hex.bytes().filter(u8::is_ascii_hexdigit).collect();
+    digits.chunks(2).map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
+}
+
+const LITTLE: &str = "00010000 0000000000000000 000000000000d03f 000000000000f87f 01 00000000000000
+    000000000000f03f 0000000000000000 0000000000000000 0000000000000000 000000000000f03f 0000000000000000
+    05000000 626f776c00";
+const BIG: &str = "00000000 0000000000000000 3fd0000000000000 7ff8000000000000 01 00000000000000
+    3ff0000000000000 0000000000000000 0000000000000000 0000000000000000 3ff0000000000000 0000000000000000
+    00000005 626f776c00";
+
+/// A log with one touch in CDR.
+fn cdr(message_bytes: &[u8]) -> Vec<u8> {
+    file(&[
+        schema(1, "palpate_msgs/msg/Touch", "ros2msg", TOUCH),
+        channel(1, 1, "/touch", "cdr"),
+        message(1, 5, message_bytes),
+    ])
+}
+
+#[test]
+fn cdr_is_read_in_both_orders_of_bytes() {
+    let expected = parse_touch("0 0.25 - 1 0 0 0 1 0").unwrap();
+    for hex in [LITTLE, BIG] {
+        let whole = bytes(hex);
+        // What fills the last word belongs to it.
+        for fill in 0..4 {
+            let log = read(&cdr(&[&whole[..], &vec![0; fill]].concat())).unwrap();
+            let [logged] = log.touches() else { panic!("{}", log.touches().len()) };
+            assert_eq!((logged.touch, logged.time, log.object(logged)), (expected, 5, Some("bowl")));
+        }
+        for cut in 0..whole.len() {
+            assert!(error(&cdr(&whole[..cut])).contains("message 1 on /touch: no touch in CDR: "), "{cut}");
+        }
+        assert!(error(&cdr(&[&whole[..], &[0; 4]].concat())).contains("4 bytes more than the definition has"));
+    }
+    let wrong = |at: usize, value: u8| {
+        let mut message = bytes(LITTLE);
+        message[at] = value;
+        error(&cdr(&message))
+    };
+    assert!(wrong(1, 7).contains("the header 00 07, where plain CDR has 00 00 or 00 01"));
+    assert!(wrong(28, 2).contains("as Boolean, got: 2"), "{}", wrong(28, 2));
+    assert!(wrong(84, 0xff).contains("unexpected end of input"), "{}", wrong(84, 0xff));
+    assert!(wrong(88, 0xff).contains("UTF-8 error"), "{}", wrong(88, 0xff));
+    let mut infinite = bytes(LITTLE);
+    infinite[12..20].copy_from_slice(&f64::INFINITY.to_le_bytes());
+    assert!(error(&cdr(&infinite)).contains("message 1 on /touch: the time inf is not finite"));
+    // No pose: what stands in its place is not looked at.
+    let mut without = bytes(LITTLE);
+    without[28..84].fill(0);
+    assert_eq!(read(&cdr(&without)).unwrap().touches()[0].touch, parse_touch("0 0.25 -").unwrap());
+}
+
+#[test]
+fn a_definition_counts_without_its_comments_and_another_one_is_refused() {
+    let log = |definition: &str| {
+        let schema = schema(1, "palpate_msgs/msg/Touch", "ros2msg", definition);
+        file(&[schema, channel(1, 1, "/touch", "cdr"), message(1, 5, &bytes(LITTLE))])
+    };
+    let bare = "float64[3]   times\nbool has_pose\r\nfloat64[3] direction\nfloat64[3] alignment\nstring object\n\
+                ====\nMSG: another\nint8 x\n";
+    assert_eq!(read(&log(bare)).unwrap().touches().len(), 1);
+    let said = error(&log(&TOUCH.replace("float64[3] times", "float32[3] times")));
+    assert!(said.contains("/touch (palpate_msgs/msg/Touch) is defined as \"float32[3] times; bool"), "{said}");
+    assert!(said.contains("where Palpate has \"float64[3] times; bool has_pose;"), "{said}");
+    assert!(VERDICT.contains("float64[] posteriors"));
+}
+
+#[test]
+fn a_message_that_is_no_touch_is_named_with_file_byte_number_topic_and_what_is_wrong() {
+    let good = r#"{"times": [0, 0.25, null], "pose": null, "more": [1, {"x": 2}]}"#;
+    assert_eq!(read(&touches(&[good])).unwrap().touches()[0].touch, parse_touch("0 0.25 -").unwrap());
+    for (text, what) in [
+        ("", "no touch in JSON: EOF while parsing"),
+        ("{\"times\": [0, 1", "no touch in JSON: EOF"),
+        ("{}", "missing field `times`"),
+        (r#"{"times": [0, 1]}"#, "invalid length 2"),
+        (r#"{"times": [0, 1, 2, 3]}"#, "no touch in JSON: "),
+        (r#"{"times": [0, NaN, 1]}"#, "no touch in JSON: expected value"),
+        (r#"{"times": [0, 1e999, 1]}"#, "number out of range"),
+        (r#"{"times": [0, "1", 1]}"#, "invalid type: string"),
+        (r#"{"times": [0, -1, 1]}"#, "the time -1 is negative"),
+        (r#"{"times": [0, 5000, 1]}"#, "the time 5000 is longer than"),
+        (r#"{"times": [0, 1, 1], "pose": {"direction": [1, 0, 0]}}"#, "missing field `alignment`"),
+        (
+            r#"{"times": [0, 1, 1], "pose": {"direction": [1, 0, 0], "alignment": [1, 1, 0]}}"#,
+            "the alignment has length 1.414",
+        ),
+        (r#"{"times": [0, 1, 1], "object": "../../bowl"}"#, "no file can be called after the object"),
+    ] {
+        let log = touches(&[good, good, text]);
+        let found = error(&log);
+        let place = log.windows(9).rposition(|window| window == record_head(text)).unwrap();
+        let begin = format!("robot.mcap: byte {place}: message 3 on /touch: ");
+        assert!(found.starts_with(&begin) && found.contains(what), "{text}: {found}");
+        assert!(found.ends_with("Correct what logged it: docs/mcap.md says what belongs in a message."), "{found}");
+    }
+    let late = file(&[
+        schema(1, "palpate.Touch", "jsonschema", ""),
+        channel(1, 1, "/touch", "json"),
+        message(1, u64::MAX, good.as_bytes()),
+    ]);
+    assert!(error(&late).contains("no log time: 18446744073709551615 ns, after 2262"));
+}
+
+/// How the record of a message with this text begins.
+fn record_head(text: &str) -> Vec<u8> {
+    record(files::MESSAGE, &vec![0; 22 + text.len()])[..9].to_vec()
+}
+
+#[test]
+fn a_verdict_that_is_none_is_refused_as_a_touch_is() {
+    let log = |text: &str| {
+        file(&[
+            schema(1, "palpate.Touch", "jsonschema", ""),
+            schema(2, "palpate.Verdict", "jsonschema", ""),
+            channel(1, 1, "/touch", "json"),
+            channel(2, 2, "/verdict", "json"),
+            message(1, 1, br#"{"times": [0, 0, 0]}"#),
+            message(2, 2, text.as_bytes()),
+        ])
+    };
+    let good = r#"{"touch": 1, "verdict": "undecided", "object": "bowl", "posterior": 0.5}"#;
+    assert_eq!(read(&log(good)).unwrap().channels().verdicts, ["/verdict (palpate.Verdict)"]);
+    let said = error(&log(&good.replace("undecided", "certain")));
+    assert!(
+        said.contains("message 1 on /verdict: no verdict: \"certain\", where undecided, recognized, unknown, gave-up")
+    );
+    assert!(error(&log(&good.replace("0.5", "1.5"))).contains("no verdict: a posterior of 1.5"));
+    assert!(error(&log("[]")).contains("no verdict in JSON: "));
+}
+
+#[test]
+fn a_log_without_touches_says_which_channels_there_are() {
+    let tf =
+        [schema(1, "tf2_msgs/msg/TFMessage", "ros2msg", ""), channel(1, 1, "/tf", "cdr"), channel(2, 0, "/raw", "")];
+    let (problem, place) = problem(&file(&tf));
+    assert_eq!(place, Place::file("robot.mcap"));
+    let said = problem.to_string();
+    assert_eq!(said, "no channel of touches in this log: it has /tf (tf2_msgs/msg/TFMessage), /raw (no schema)");
+    assert!(problem.fix().contains("palpate_msgs/msg/Touch"));
+    assert!(error(&file(&[])).contains("it has no channel at all"));
+    assert!(error(&touches(&[])).contains("robot.mcap: no touches in it"));
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_by_name_with_the_way_round() {
+    let plain = |schema_encoding: &str, encoding: &str| {
+        let schema = schema(1, "palpate_msgs/msg/Touch", schema_encoding, TOUCH);
+        file(&[schema, channel(1, 1, "/touch", encoding), message(1, 5, &bytes(LITTLE))])
+    };
+    for (schema_encoding, encoding) in [("ros2idl", "cdr"), ("protobuf", "protobuf")] {
+        let said = error(&plain(schema_encoding, encoding));
+        assert!(said.contains(&format!("in the encoding {encoding:?} with a schema in {schema_encoding:?}")), "{said}");
+        assert!(said.contains("Log them as docs/mcap.md says"), "{said}");
+    }
+    let said = error(&file(&[chunk("brotli", 4, 0, b"1234")]));
+    assert!(
+        said.contains("a chunk is compressed as \"brotli\", where zstd and lz4 are known. Compress it anew: "),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_file_that_contradicts_itself_is_refused() {
+    let touch = || schema(1, "palpate.Touch", "jsonschema", "");
+    let says = |records: &[Vec<u8>], what: &str| {
+        let said = error(&file(records));
+        assert!(said.starts_with("robot.mcap: byte ") && said.contains(what), "{said}");
+    };
+    says(&[channel(1, 9, "/touch", "json")], "/touch has the schema 9, which is missing");
+    says(&[message(3, 1, b"{}")], "a message of channel 3, which is missing");
+    says(&[touch(), schema(1, "other", "", "")], "schema 1 is defined twice, and differently");
+    says(&[touch(), channel(1, 1, "/a", "json"), channel(1, 1, "/b", "json")], "channel 1 is defined twice");
+    says(&[record(files::SCHEMA, &[1, 0, 255, 255, 255, 255])], "not a usable MCAP file: ");
+    // A chunk whose last record is longer than it.
+    let mut cut = touch();
+    cut.pop();
+    says(&[chunk("", cut.len() as u64, 0, &cut)], "a record is longer than the chunk");
+    says(&[chunk("", 5, 0, b"1234")], "a chunk holds 4 bytes where it states 5");
+    // Repeated, as every chunk of some writers does.
+    let twice = [touch(), touch(), channel(1, 1, "/a", "json"), channel(1, 1, "/a", "json")];
+    let twice = [&twice[..], &[message(1, 1, br#"{"times": [0, 0, 0]}"#)]].concat();
+    assert_eq!(read(&file(&twice)).unwrap().touches().len(), 1);
+}
+
+#[test]
+fn damage_is_found_by_checksums_and_a_file_that_ends_early_is_no_log() {
+    for name in ["json.mcap", "json-lz4.mcap", "json-zstd.mcap", "ros2.mcap", "plain.mcap"] {
+        let whole = std::fs::read(python(name)).unwrap();
+        for end in (0..whole.len()).step_by(13).chain(whole.len() - 9..whole.len()) {
+            let said = error(&whole[..end]);
+            assert!(said.starts_with("robot.mcap: ") && said.contains("it ends early. Repair it with `mcap"), "{said}");
+        }
+    }
+    let whole = std::fs::read(python("json.mcap")).unwrap();
+    let mut damaged = whole.clone();
+    let digit = damaged.windows(6).position(|window| window == b"0.0015").unwrap();
+    damaged[digit + 5] = b'6';
+    let said = error(&damaged);
+    assert!(said.contains("a chunk is damaged: its checksum is ") && said.contains(" where it states "), "{said}");
+    // Without chunks, the checksum of all data tells.
+    let mut damaged = std::fs::read(python("plain.mcap")).unwrap();
+    let digit = damaged.windows(11).position(|window| window == b"1767225603.").unwrap();
+    damaged[digit + 9] = b'4';
+    assert!(error(&damaged).contains("not a usable MCAP file: "), "{}", error(&damaged));
+    // One log behind another.
+    let said = error(&[&whole[..], &whole].concat());
+    assert!(said.contains("not a usable MCAP file: "), "{said}");
+    for (begin, what) in [
+        (&b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"[..], "it does not begin or end as one"),
+        (b"\x89MCAP", "early"),
+        (b"0 0 0\n", "does not begin"),
+    ] {
+        assert!(error(begin).starts_with("robot.mcap: ") && error(begin).contains(what), "{}", error(begin));
+    }
+}
+
+#[test]
+fn touches_are_of_the_objects_that_their_messages_name_all_or_none() {
+    let [bowl, mug] = ["bowl", "mug"].map(|name| format!(r#"{{"times": [0, 0, 0], "object": "{name}"}}"#));
+    let log = read(&touches(&[&mug, &bowl, &mug])).unwrap();
+    let objects: Vec<_> =
+        log.by_object("-").unwrap().into_iter().map(|object| (object.name, object.touches.len())).collect();
+    assert_eq!(objects, [("bowl".to_owned(), 1), ("mug".to_owned(), 2)]);
+    let (touches_of, others) = log.of_object("mug").unwrap();
+    assert_eq!((touches_of.len(), others), (2, 1));
+    let said = log.of_object("fork").unwrap_err().to_string();
+    assert!(said.contains("robot.mcap: no touch of fork in this log, only of mug, bowl"), "{said}");
+    let mixed = read(&touches(&[&mug, r#"{"times": [0, 0, 0], "object": ""}"#])).unwrap();
+    for said in [mixed.by_object("-").unwrap_err(), mixed.of_object("mug").unwrap_err()] {
+        let said = said.to_string();
+        assert!(
+            said.contains(": byte ") && said.contains("this touch names no object, and others of the log do"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn a_directory_holds_logs_beside_text_and_the_content_says_which_is_which() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let plain = touches(&[r#"{"times": [0, 0.5, 0]}"#]);
+    std::fs::write(path("fork.mcap"), &plain).unwrap();
+    // A log by its content.
+    std::fs::write(path("spoon.txt"), &plain).unwrap();
+    std::fs::write(path("cup.txt"), "0 0 0\n0 0 -\n").unwrap();
+    // Two more of bowl and mug, which are joined.
+    std::fs::copy(python("json.mcap"), path("monday.mcap")).unwrap();
+    std::fs::copy(python("ros2.mcap"), path("tuesday.mcap")).unwrap();
+    let dataset = Dataset::read(directory.path()).unwrap();
+    let found: Vec<_> = dataset.objects.iter().map(|object| (object.name.as_str(), object.touches.len())).collect();
+    assert_eq!(found, [("bowl", 40), ("cup", 2), ("fork", 1), ("mug", 40), ("spoon", 1)]);
+    assert_eq!(dataset.warnings.len(), 2);
+    let check = Check::of(directory.path()).unwrap();
+    assert_eq!(check.summary.objects.len(), 5);
+    assert!(check.findings.iter().any(|finding| finding.what.contains("mug: every touch stands in it twice")));
+    // A log is a data set by itself.
+    assert!(is_log(&python("ros2.mcap")) && is_log(&path("spoon.txt")) && !is_log(&path("cup.txt")));
+    assert!(!is_log(directory.path()) && !is_log(&path("nowhere")));
+    let alone = Dataset::read(&python("ros2.mcap")).unwrap();
+    assert_eq!((alone.names(), alone.len()), (vec!["bowl".to_owned(), "mug".to_owned()], 40));
+    assert_eq!(Check::of(&python("ros2.mcap")).unwrap().summary.objects.len(), 2);
+    // The same object in a log and in a file of lines.
+    std::fs::write(path("mug.txt"), "0 0 0\n").unwrap();
+    let said = Dataset::read(directory.path()).unwrap_err().to_string();
+    assert!(said.contains("two files of the object mug: ") && said.contains("mug.txt and "), "{said}");
+    assert!(said.contains("monday.mcap"), "{said}");
+    assert!(Check::of(directory.path()).unwrap().findings.iter().any(|finding| finding.what.contains("two files of")));
+    // What is called a log and is none.
+    std::fs::write(path("mug.txt"), "").unwrap();
+    std::fs::write(path("monday.mcap"), "0 0 0\n").unwrap();
+    std::fs::remove_file(path("mug.txt")).unwrap();
+    let said = Dataset::read(directory.path()).unwrap_err().to_string();
+    assert!(said.contains("monday.mcap: not a usable MCAP file: it does not begin or end as one"), "{said}");
+    let finding = Check::of(&path("fork.mcap")).unwrap();
+    assert!(finding.wrong() == 1 && finding.findings.iter().any(|finding| finding.what.contains("only one object")));
+}
+
+fn verdict(touch: u32) -> LoggedVerdict {
+    LoggedVerdict {
+        touch,
+        verdict: if touch < 9 { "undecided" } else { "recognized" }.into(),
+        object: "mug".into(),
+        posterior: 0.5 + f64::from(touch) / 40.0,
+        refused: (touch == 3).then(|| "no".into()),
+        posteriors: vec![("mug".into(), 0.75), ("big bowl".into(), 0.25)],
+    }
+}
+
+/// A log with ten touches and their verdicts.
+fn written() -> Vec<u8> {
+    let objects = ["mug", "big bowl"].map(String::from);
+    let mut writer = Writer::new(Cursor::new(Vec::new()), &objects).unwrap();
+    for (i, (touch, name)) in expected(true).into_iter().take(10).enumerate() {
+        // Half of them with times, two of which are the same, and one of which is before the others.
+        let time = [None, Some(1_767_225_600_000_000_000), Some(1_767_225_600_000_000_000), Some(7)]
+            .get(i % 5)
+            .copied()
+            .flatten();
+        writer.touch(&touch, (i % 2 == 0).then_some(name), time).unwrap();
+        writer.verdict(&verdict(i as u32)).unwrap();
+    }
+    writer.finish().unwrap().into_inner()
+}
+
+#[test]
+fn what_is_written_is_read_back_and_the_same_to_the_byte_each_time() {
+    let bytes = written();
+    assert_eq!(bytes, written());
+    let (mut said, mut times) = (Vec::new(), Vec::new());
+    let channels = mcap::read(bytes.as_slice(), Path::new("robot.mcap"), |message| {
+        times.push(message.time);
+        said.push(message.said);
+        Ok(())
+    });
+    assert!(times.is_sorted_by(|a, b| a < b), "{times:?}");
+    assert_eq!((times[0], times[1]), (1_000_000_000, 1_000_001_000));
+    assert_eq!(channels.unwrap().others.len(), 0);
+    let expected: Vec<Said> = expected(true)
+        .into_iter()
+        .take(10)
+        .zip(0..)
+        .flat_map(|((touch, name), i)| {
+            let mut verdict = verdict(i);
+            verdict.posteriors.sort_by(|a, b| a.0.cmp(&b.0));
+            [Said::Touch(touch, (i % 2 == 0).then(|| name.into())), Said::Verdict(verdict)]
+        })
+        .collect();
+    assert_eq!(said, expected);
+}
+
+#[test]
+fn what_is_written_satisfies_the_reader_of_the_mcap_crate_with_its_index() {
+    let bytes = written();
+    let messages = ::mcap::MessageStream::new(&bytes).unwrap().collect::<Result<Vec<_>, _>>().unwrap();
+    assert_eq!(messages.len(), 20);
+    let first = &messages[0];
+    let schema = first.channel.schema.as_ref().unwrap();
+    assert_eq!((first.channel.topic.as_str(), schema.name.as_str()), ("/touch", "palpate.Touch"));
+    assert_eq!((first.channel.message_encoding.as_str(), schema.encoding.as_str()), ("json", "jsonschema"));
+    let text: serde_json::Value = serde_json::from_slice(&messages[1].data).unwrap();
+    assert_eq!(text["posteriors"]["big bowl"], 0.25);
+    let schema: serde_json::Value = serde_json::from_slice(&messages[1].channel.schema.as_ref().unwrap().data).unwrap();
+    assert_eq!(schema["properties"]["posteriors"]["properties"]["big bowl"]["type"], "number");
+    let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+    let statistics = summary.stats.as_ref().unwrap();
+    assert_eq!((statistics.message_count, statistics.channel_count), (20, 2));
+    assert_eq!(statistics.message_start_time, 1_000_000_000);
+    let [index] = summary.chunk_indexes.as_slice() else { panic!("{}", summary.chunk_indexes.len()) };
+    assert!(index.compression.is_empty());
+    assert_eq!(summary.stream_chunk(&bytes, index).unwrap().count(), 20);
+}
+
+#[test]
+fn a_log_is_streamed_to_a_chip_with_the_names_of_its_objects() {
+    let [fork, bowl] = ["fork", "bowl"].map(|name| format!(r#"{{"times": [0, 0, 0], "object": "{name}"}}"#));
+    let mut steps = Steps::logged(&read(&touches(&[&fork, &fork, &bowl])).unwrap());
+    assert_eq!(steps.count(), Some(3));
+    let touch = Step::Touch(parse_touch("0 0 0").unwrap());
+    let object = |name: &str| Step::Object(Some(name.into()));
+    for expected in [object("fork"), touch.clone(), touch.clone(), object("bowl"), touch] {
+        assert_eq!(steps.next_step().unwrap(), Some(expected));
+    }
+    assert_eq!((steps.next_step().unwrap(), steps.count()), (None, Some(0)));
+}
