@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use numpy::ndarray::Ix2;
 use palpate::compile::{self as library, CompiledModel, Core, Goal, Layout, Leaf, Settings};
 use palpate::error::{CompileProblem, Error, RowsProblem, TouchesProblem};
+use palpate::evaluate::together::{AT_ONCE, Together};
 use palpate::onboard;
 use palpate::output;
 use palpate::rows::{Encoder, feature_names};
@@ -79,43 +80,35 @@ const FEW: usize = 256;
 const BATCH: usize = 1 << 20;
 
 impl Model {
-    /// The margins of some rows, one after the other.
-    fn fill<R: Sync>(&self, py: Python<'_>, rows: &[R], margins: impl Fn(&R, &mut [f64]) + Sync) -> PyResult<Vec<f64>> {
+    /// The margins of rows of `width` values each.
+    fn fill<V: Sync>(
+        &self,
+        py: Python<'_>,
+        values: &[V],
+        width: usize,
+        margins: impl Fn(&mut Together, &[V], &mut [f64]) + Sync,
+    ) -> PyResult<Vec<f64>> {
         let objects = self.model().object_count();
-        let mut all = vec![0.0; rows.len() * objects];
-        if rows.len() < FEW {
-            rows.iter().zip(all.chunks_exact_mut(objects)).for_each(|(row, slot)| margins(row, slot));
+        let rows = values.len() / width;
+        let mut all = vec![0.0; rows * objects];
+        if rows < FEW {
+            margins(&mut Together::new(), values, &mut all);
             return Ok(all);
         }
-        for (rows, slots) in rows.chunks(BATCH).zip(all.chunks_mut(BATCH * objects)) {
+        for (values, slots) in values.chunks(BATCH * width).zip(all.chunks_mut(BATCH * objects)) {
             py.check_signals()?;
             py.detach(|| {
-                let slots = slots.par_chunks_exact_mut(objects).with_min_len(64);
-                rows.par_iter().with_min_len(64).zip(slots).for_each(|(row, slot)| margins(row, slot));
+                let slots = slots.par_chunks_mut(AT_ONCE * objects);
+                let tasks = values.par_chunks(AT_ONCE * width).zip(slots);
+                tasks.for_each_init(Together::new, |together, (values, slots)| margins(together, values, slots));
             });
         }
         Ok(all)
     }
 
-    fn of_touch(&self, touch: &Touch, slot: &mut [f64]) {
+    fn of_touches(&self, py: Python<'_>, touches: &[Touch]) -> PyResult<Vec<f64>> {
         let model = self.model();
-        let mut margins = [0; 256];
-        model.margins(touch, &mut margins);
-        let unit = f64::from(model.unit());
-        slot.iter_mut().zip(margins).for_each(|(slot, margin)| *slot = f64::from(margin) * unit);
-    }
-
-    fn of_row(&self, row: &[f32], slot: &mut [f64]) {
-        let (model, row) = (self.model(), self.encoder.row(row));
-        let mut exact = [0.0; 256];
-        if model.f32_margins_of(&row, &mut exact[..slot.len()]) {
-            slot.iter_mut().zip(exact).for_each(|(slot, margin)| *slot = margin.into());
-            return;
-        }
-        let mut margins = [0; 256];
-        model.margins_of(&row, &mut margins);
-        let unit = f64::from(model.unit());
-        slot.iter_mut().zip(margins).for_each(|(slot, margin)| *slot = f64::from(margin) * unit);
+        self.fill(py, touches, 1, |together, touches, slots| together.touches_in_nats(model, touches, slots))
     }
 }
 
@@ -211,13 +204,13 @@ impl Model {
             (Rows::Data(_), None) => return Err(Error::from(palpate::error::EvaluateProblem::RawFeatures).into()),
             (Rows::Data(data), Some(_)) => {
                 let touches: Vec<Touch> = data.get().touches().copied().collect();
-                self.fill(py, &touches, |touch, slot| self.of_touch(touch, slot))?
+                self.of_touches(py, &touches)?
             }
             (Rows::Array(array), Some(_)) => {
                 let array: Input<'_, f64, Ix2> = array.extract()?;
                 let (values, columns) = array.rows()?;
                 let touches = touches(values, columns)?;
-                self.fill(py, &touches, |touch, slot| self.of_touch(touch, slot))?
+                self.of_touches(py, &touches)?
             }
             (Rows::Array(array), None) => {
                 let array: Input<'_, f32, Ix2> = array.extract()?;
@@ -226,8 +219,10 @@ impl Model {
                 if found != wanted {
                     return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
                 }
-                let rows: Vec<&[f32]> = values.chunks_exact(wanted).collect();
-                self.fill(py, &rows, |row, slot| self.of_row(row, slot))?
+                let model = self.model();
+                self.fill(py, values, wanted, |together, values, slots| {
+                    together.rows(model, &self.encoder, values, slots)
+                })?
             }
         };
         Ok(two(py, margins, objects)?)

@@ -1,7 +1,9 @@
 //! One temperature, so that the posterior that is shown is one to believe (Guo and others, 2017, arXiv 1706.04599).
 
+use crate::evaluate::together::margins_of_touches;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
+use palpate_shared::Touch;
 use rayon::prelude::*;
 
 /// The most touches of each object that the temperature is fitted on.
@@ -15,14 +17,13 @@ const HALVINGS: usize = 24;
 pub(crate) fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
     let rows = |(touched, &object): (&ObjectTouches, &usize)| {
         let evidence = touched.touches.iter().filter(|touch| model.accepts(touch).is_ok());
-        let row = |touch| {
-            let mut margins = vec![0; model.object_count()];
-            model.margins(touch, &mut margins);
+        let evidence: Vec<&Touch> = evidence.take(MOST).collect();
+        let row = |margins: &[i32]| {
             let own = margins.get(object).copied().unwrap_or(0);
             // Ahead of the right object, in nats.
             margins.iter().map(|margin| f64::from(margin - own) * f64::from(model.unit())).collect::<Vec<_>>()
         };
-        evidence.take(MOST).map(row).collect::<Vec<_>>()
+        margins_of_touches(model, &evidence).chunks_exact(model.object_count()).map(row).collect::<Vec<_>>()
     };
     let rows: Vec<Vec<Vec<f64>>> = dataset.objects.par_iter().zip(known).map(rows).collect();
     if rows.iter().all(Vec::is_empty) {

@@ -1,5 +1,6 @@
 //! A model's margins for every test touch, computed once.
 
+use super::together::margins_of_touches;
 use crate::compile;
 use crate::ensemble::{Ensemble, StatedProbe, feature_row};
 use crate::error::{Error, EvaluateProblem, Result};
@@ -177,7 +178,7 @@ impl<'m> Margins<'m> {
                 instances: dataset.instances.get(&touched.name).copied().unwrap_or(1).max(1),
                 turns: 1,
                 evidence: Vec::new(),
-                values: values(candidate, descriptor, &evidence, objects.len()),
+                values: values(candidate, descriptor, &evidence),
             }
         });
         let tested = tested.collect();
@@ -394,20 +395,13 @@ pub(super) fn row(touch: usize, objects: usize) -> Range<usize> {
     touch * objects..(touch + 1) * objects
 }
 
-fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touch], objects: usize) -> Values<'m> {
+fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touch]) -> Values<'m> {
     match candidate {
         Candidate::Full(ensemble) => {
             let margins = |touch: &&Touch| ensemble.margins_of_features(&feature_row(descriptor, touch));
             Values::Full(touches.par_iter().flat_map_iter(margins).collect())
         }
-        Candidate::Compiled(model) => {
-            let margins = |touch: &&Touch| {
-                let mut margins = vec![0; objects];
-                model.margins(touch, &mut margins);
-                margins
-            };
-            Values::Compiled(model, touches.par_iter().flat_map_iter(margins).collect())
-        }
+        Candidate::Compiled(model) => Values::Compiled(model, margins_of_touches(model, touches)),
     }
 }
 

@@ -57,6 +57,7 @@ mod strangers;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+pub mod together;
 mod under_plan;
 pub mod verify;
 

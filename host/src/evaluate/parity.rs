@@ -2,6 +2,7 @@
 
 use super::full::FullRecognizer;
 use super::margins::best;
+use super::together::margins_of_touches;
 use crate::ensemble::Ensemble;
 use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
@@ -54,7 +55,9 @@ pub fn parity(
     let touches: Vec<&Touch> = dataset.objects.iter().flat_map(|object| &object.touches).collect();
     check(ensemble, model)?;
     let full = FullMargins::new(ensemble, &touches, progress)?;
-    let margins = touches.par_iter().enumerate().map(|(index, touch)| compare_margins(full.of(index), model, touch));
+    let compiled = margins_of_touches(model, &touches);
+    let compiled = compiled.par_chunks_exact(model.object_count());
+    let margins = compiled.enumerate().map(|(index, compiled)| compare_margins(full.of(index), model, compiled));
     let Difference { max_margin_error, best_differs } = margins.reduce(Difference::default, Difference::worse);
     let firsts: Vec<usize> = dataset
         .objects
@@ -141,9 +144,11 @@ pub fn difference(
 ) -> Result<Difference> {
     check(ensemble, model)?;
     progress.begin("margins", Some(touches.len() as u64));
-    let compared = touches.par_iter().map(|touch| -> Result<_> {
+    let compiled = margins_of_touches(model, touches);
+    let compiled = compiled.par_chunks_exact(model.object_count());
+    let compared = touches.par_iter().zip(compiled).map(|(touch, compiled)| -> Result<_> {
         progress::advance(progress, 1)?;
-        Ok(compare_margins(&ensemble.margins(touch), model, touch))
+        Ok(compare_margins(&ensemble.margins(touch), model, compiled))
     });
     compared.try_reduce(Difference::default, |a, b| Ok(a.worse(b)))
 }
@@ -159,10 +164,7 @@ fn check(ensemble: &Ensemble, model: &Model<'_>) -> Result<()> {
     Ok(())
 }
 
-fn compare_margins(full: &[f32], model: &Model<'_>, touch: &Touch) -> Difference {
-    let mut margins = [0; CAPACITY];
-    model.margins(touch, &mut margins);
-    let compiled = &margins[..full.len()];
+fn compare_margins(full: &[f32], model: &Model<'_>, compiled: &[i32]) -> Difference {
     let unit = f64::from(model.unit());
     let errors = full.iter().zip(compiled).map(|(full, &int)| (f64::from(*full) - f64::from(int) * unit).abs());
     let best_differs = usize::from(best(full) != best(compiled));

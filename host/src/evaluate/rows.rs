@@ -3,7 +3,7 @@
 use super::Candidate;
 use super::estimate::Estimate;
 use super::margins::best;
-use super::verify::margins;
+use super::together::margins_of_rows;
 use crate::error::{Result, RowsProblem};
 use crate::rows::{Encoder, Rows};
 use rayon::prelude::*;
@@ -69,8 +69,8 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
             .map(|row| ensemble.margins_of_features(row).into_iter().map(f64::from).collect())
             .collect(),
         Candidate::Compiled(model) => {
-            let encoder = Encoder::of(model);
-            rows.values.par_chunks_exact(features).map(|row| margins(model, &encoder.row(row))).collect()
+            let margins = margins_of_rows(model, &Encoder::of(model), &rows.values);
+            margins.chunks_exact(names.len()).map(<[f64]>::to_vec).collect()
         }
     };
     let label = |row: usize| rows.labels.get(row).map_or("", String::as_str);

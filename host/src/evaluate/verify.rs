@@ -5,6 +5,7 @@ use super::isolated::first_different_tree;
 pub(crate) use super::margins::best;
 use super::reference::Reference;
 pub use super::reference::margins;
+use super::together::margins_of_rows;
 use crate::ensemble::{Ensemble, Output};
 use crate::error::{Result, RowsProblem};
 use crate::progress::{self, Progress};
@@ -169,14 +170,15 @@ fn compare_all(
     progress: &dyn Progress,
 ) -> Result<Difference> {
     let bound = f64::from(model.margin_error());
-    let rows = values.par_chunks_exact(model.feature_count()).enumerate();
-    let compared = rows.map(|(index, row)| -> Result<_> {
+    let own = margins_of_rows(model, &reference.encoder, values);
+    let own = own.par_chunks_exact(model.object_count());
+    let rows = values.par_chunks_exact(model.feature_count()).zip(own).enumerate();
+    let compared = rows.map(|(index, (row, own))| -> Result<_> {
         progress::advance(progress, 1)?;
         let encoded = reference.encoder.row(row);
-        let own = margins(model, &encoded);
         let full: Vec<f64> = reference.margins(row, &encoded).into_iter().map(f64::from).collect();
-        let margin_error = largest_difference(&own, &full);
-        let class_differs = usize::from(best(&own) != best(&full));
+        let margin_error = largest_difference(own, &full);
+        let class_differs = usize::from(best(own) != best(&full));
         let example = (margin_error > bound).then(|| (first + index, row.to_vec()));
         Ok(Difference { margin_error, class_differs, example })
     });

@@ -35,6 +35,7 @@ use crate::calibrate::{allowed, needed};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::Candidate;
+use crate::evaluate::together::margins_of_touches;
 use crate::touches::Dataset;
 use fit::Moments;
 use follow::{Policy, Sequence};
@@ -196,7 +197,7 @@ fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Suppl
         let touched = dataset.objects.iter().find(|object| object.name == *name).ok_or_else(missing)?;
         let mut touches: Vec<&Touch> = evidence(model, &touched.touches);
         follow::shuffle(&mut touches, name, seed);
-        Ok(Supply { rows: rows(model, &touches) })
+        Ok(Supply { rows: margins_of_touches(model, &touches) })
     };
     known.iter().map(supply).collect()
 }
@@ -207,21 +208,11 @@ fn evidence<'d>(model: &Model<'_>, touches: &'d [Touch]) -> Vec<&'d Touch> {
     touches.iter().filter(|touch| Refused::check(&trained, touch).is_ok()).collect()
 }
 
-/// The margins of touches, one row for each.
-fn rows(model: &Model<'_>, touches: &[&Touch]) -> Vec<i32> {
-    let margins = |touch: &&Touch| {
-        let mut margins = vec![0; model.object_count()];
-        model.margins(touch, &mut margins);
-        margins
-    };
-    touches.par_iter().flat_map_iter(margins).collect()
-}
-
 /// The mean margins of each shape that has evidence, in units.
 fn of_shapes(model: &Model<'_>, shapes: &[Shapes]) -> Vec<Vec<f64>> {
     let objects = model.object_count();
     let mean = |touches: Vec<&Touch>| {
-        let rows = rows(model, &touches);
+        let rows = margins_of_touches(model, &touches);
         let mut mean = vec![0.0; objects];
         for row in rows.chunks(objects) {
             mean.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += f64::from(margin));

@@ -1,9 +1,11 @@
 //! The kinds of trees and tables. Each checks its own bytes once, when a model is opened, and then walks them.
 
+pub(crate) mod batch;
 pub(crate) mod built_in;
 pub(crate) mod complete;
 pub(crate) mod grid;
 pub(crate) mod leaves;
+mod masks;
 pub(crate) mod patterns;
 pub(crate) mod preorder;
 pub(crate) mod ranks;

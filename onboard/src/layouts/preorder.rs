@@ -95,14 +95,7 @@ pub(crate) fn add_wide(
     let (cuts, _) = cuts.as_chunks();
     let mut numbers = Numbers { numbers: reached, count: 0 };
     for _ in 0..group.trees {
-        let Some((leaf, splits)) = tree(nodes, |[feature, missing_left, a, b, c, d]: [u8; 6]| {
-            let value = at_or_missing(features, feature);
-            let cut = cuts.get(usize::from(u16::from_le_bytes([a, b]))).map_or(0, |cut| i32::from_le_bytes(*cut));
-            let right = if value == MISSING_FEATURE { missing_left == 0 } else { value >= cut };
-            (right, usize::from(u16::from_le_bytes([c, d])))
-        }) else {
-            return;
-        };
+        let Some((leaf, splits)) = tree(nodes, |split| wide_split(split, cuts, features)) else { return };
         add_leaf(leaf, splits, leaves, sum, &mut numbers);
     }
     if built_in::SHARED_LEAVES {
@@ -110,9 +103,35 @@ pub(crate) fn add_wide(
     }
 }
 
+/// Whether a wide split goes right, and how many splits are in its left subtree.
+#[inline(always)]
+pub(super) fn wide_split(
+    [feature, missing_left, a, b, c, d]: [u8; 6],
+    cuts: &[[u8; 4]],
+    features: &[i32],
+) -> (bool, usize) {
+    let value = at_or_missing(features, feature);
+    let cut = cuts.get(usize::from(u16::from_le_bytes([a, b]))).map_or(0, |cut| i32::from_le_bytes(*cut));
+    let right = if value == MISSING_FEATURE { missing_left == 0 } else { value >= cut };
+    (right, usize::from(u16::from_le_bytes([c, d])))
+}
+
+/// Splits the next tree off: all of its bytes, and its splits.
+pub(super) fn split_off<'m, const SIZE: usize>(nodes: &mut &'m [u8]) -> Option<(&'m [u8], &'m [[u8; SIZE]])> {
+    let (&count, rest) = nodes.split_first_chunk()?;
+    let length = usize::from(u16::from_le_bytes(count)) * SIZE;
+    let (splits, rest) = rest.split_at_checked(length)?;
+    let tree = nodes.get(..2 + length)?;
+    *nodes = rest;
+    Some((tree, splits.as_chunks().0))
+}
+
 /// Walks the next tree; `split` says whether a split goes right, and how many splits are in its left subtree. Gives the
 /// leaf and the number of splits.
-fn tree<const SIZE: usize>(nodes: &mut &[u8], split: impl Fn([u8; SIZE]) -> (bool, usize)) -> Option<(usize, usize)> {
+pub(super) fn tree<const SIZE: usize>(
+    nodes: &mut &[u8],
+    split: impl Fn([u8; SIZE]) -> (bool, usize),
+) -> Option<(usize, usize)> {
     let (&count, rest) = nodes.split_first_chunk()?;
     let count = usize::from(u16::from_le_bytes(count));
     let (mut splits, rest) = rest.split_at_checked(count * SIZE)?;

@@ -1,7 +1,7 @@
 //! Features to ranks: where each value stands among the thresholds, looked up once per touch.
 
 use super::Sections;
-use crate::bytes::{Wrong, take};
+use crate::bytes::{Wrong, at, take};
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Axis, Layout};
 
@@ -52,6 +52,65 @@ pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
             put(rank.unwrap_or(u8::MAX));
         }
     }
+}
+
+/// Ranks of many rows of `width` features: column by column, `stride` ranks each, which is a multiple of [`ABREAST`].
+pub(crate) fn rank_rows(model: &Sections<'_>, features: &[i32], width: usize, stride: usize, ranks: &mut [u8]) {
+    let (axes, cuts) = model.axes_and_cuts();
+    let mut cuts = Cuts(cuts);
+    let mut columns = ranks.chunks_exact_mut(stride.max(1));
+    for &[feature, kinds, size, count] in axes {
+        // Of the largest number there are all that there is room for: only that number passes them, and it is held down.
+        let mut table = [i32::MAX; 256];
+        let of_axis = cuts.next(size, count).chunks_exact(usize::from(size).max(1));
+        table.iter_mut().zip(of_axis).for_each(|(entry, cut)| *entry = number(cut));
+        let mut put = |missing: u8| {
+            let Some(column) = columns.next() else { return };
+            let rows = features.chunks(ABREAST * width.max(1)).zip(column.as_chunks_mut().0);
+            for (rows, ranks) in rows {
+                let mut values = [MISSING_FEATURE; ABREAST];
+                let rows = rows.chunks_exact(width.max(1));
+                values.iter_mut().zip(rows).for_each(|(value, row)| *value = at_or_missing(row, feature));
+                *ranks = ranks_among(&table, count, &values);
+                for (rank, value) in ranks.iter_mut().zip(values) {
+                    *rank = if value == MISSING_FEATURE { missing } else { *rank };
+                }
+            }
+        };
+        if kinds & 1 != 0 {
+            put(0);
+        }
+        if kinds & 2 != 0 {
+            put(u8::MAX);
+        }
+    }
+}
+
+/// Values whose ranks are searched in step: a search takes the same steps for every value, none of them a branch, and none
+/// waits for another's loads.
+const ABREAST: usize = 8;
+
+/// How many of an axis's `count` thresholds are at or below each value.
+fn ranks_among(table: &[i32; 256], count: u8, values: &[i32; ABREAST]) -> [u8; ABREAST] {
+    let mut passed = [0_usize; ABREAST];
+    let steps = count.checked_ilog2().map_or(0, |steps| steps + 1);
+    for step in (0..steps).rev() {
+        for (passed, value) in passed.iter_mut().zip(values) {
+            let next = (*passed + (1 << step)).wrapping_sub(1) & 255;
+            *passed += usize::from(at(table, next) <= *value) << step;
+        }
+    }
+    passed.map(|passed| {
+        let [passed, ..] = passed.to_le_bytes();
+        passed.min(count)
+    })
+}
+
+/// A threshold.
+#[inline(always)]
+fn number(cut: &[u8]) -> i32 {
+    let sign = cut.last().map_or(0, |last| -i32::from(last >> 7));
+    cut.iter().rfold(sign, |sum, byte| sum << 8 | i32::from(*byte))
 }
 
 /// The feature's value, or missing beyond the end of a row.
@@ -133,9 +192,7 @@ fn search_bytes(cuts: &[u8], width: usize, value: i32) -> u8 {
     let (mut rank, mut step) = (0_u8, 128_u8);
     while step > 0 {
         let end = usize::from(rank | step) * width;
-        let number =
-            |cut: &[u8]| Some(cut.iter().rfold(-i32::from(cut.last()? >> 7), |sum, byte| sum << 8 | i32::from(*byte)));
-        if cuts.get(end.wrapping_sub(width)..end).and_then(number).is_some_and(|number| number <= value) {
+        if cuts.get(end.wrapping_sub(width)..end).is_some_and(|cut| number(cut) <= value) {
             rank |= step;
         }
         step >>= 1;

@@ -49,7 +49,7 @@ impl Model<'_> {
     }
 
     /// Whether margins are added up; those of a table are set.
-    fn has_trees(&self) -> bool {
+    pub(super) fn has_trees(&self) -> bool {
         built_in::TREES && !matches!(self.layout(), Layout::Grid | Layout::Patterns)
     }
 
@@ -69,7 +69,7 @@ impl Model<'_> {
     }
 
     /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits.
-    fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
+    pub(super) fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
         let margins = margins.get_mut(..self.object_count())?;
         if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
             grid::look_up(&self.sections, features, margins);

@@ -6,6 +6,7 @@ mod header;
 mod margins;
 mod optional;
 mod refused;
+mod rows;
 
 pub use refused::Refused;
 

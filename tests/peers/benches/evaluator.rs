@@ -16,7 +16,8 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train;
 use palpate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
 use palpate::touches::Dataset;
-use palpate_onboard::Model;
+use palpate_onboard::{Batch, Model};
+use palpate_peers::{QUICK, paired};
 use palpate_shared::Touch;
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -27,8 +28,7 @@ use std::time::Instant;
 const ROWS: usize = 2000;
 
 /// Runs of which the fastest counts: the others were disturbed.
-static RUNS: LazyLock<usize> =
-    LazyLock::new(|| if std::env::args().any(|argument| argument == "--quick") { 1 } else { 7 });
+static RUNS: LazyLock<usize> = LazyLock::new(|| if *QUICK { 1 } else { 7 });
 
 fn main() {
     let data = std::env::var_os("PALPATE_BENCH_DATA").map(|data| Dataset::read(data.as_ref()).expect("touches"));
@@ -85,9 +85,7 @@ fn compare(name: &str, ensemble: &Ensemble, touches: &[Touch]) {
     let time =
         nanoseconds(&rows, |row| hessboost.predict_margin_row_into(row, Iterations::Best, black_box(&mut out)).is_ok());
     report("hessboost, row by row", time, ours);
-    let flat: Vec<f32> = rows.concat();
-    let time = best(|| drop(black_box(hessboost.predict_margin_rows(&flat, Iterations::Best)))) / rows.len() as f64;
-    report("hessboost, all at once", time, ours);
+    all_at_once(ensemble, touches, &rows, &hessboost);
 
     let single = taken_apart(ensemble);
     let bytes: Vec<Words> = (0..ensemble.objects.len()).map(|object| irithyll(&single, object)).collect();
@@ -108,6 +106,60 @@ fn compare(name: &str, ensemble: &Ensemble, touches: &[Touch]) {
     let time = best(|| gbdts.iter().for_each(|gbdt| drop(black_box(gbdt.predict(&data))))) / rows.len() as f64;
     report("gbdt, all at once", time, ours);
 }
+
+/// All rows at once, in paired rounds of one thread: Palpate, Palpate row by row, and hessboost.
+fn all_at_once(ensemble: &Ensemble, touches: &[Touch], rows: &[Vec<f32>], hessboost: &BoostedModel) {
+    let flat: Vec<f32> = rows.concat();
+    let descriptor = ensemble.descriptor().expect("a descriptor");
+    let (objects, mut batch) = (ensemble.objects.len(), Batch::new());
+    println!("  all at once, one thread, medians of {PAIRED} paired rounds:");
+    for (leaf, layout) in [
+        (Leaf::I16, Layout::Complete),
+        (Leaf::I8, Layout::Complete),
+        (Leaf::F32, Layout::Complete),
+        (Leaf::I16, Layout::Compact),
+    ] {
+        let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+        let Ok(compiled) = compile(ensemble, &settings) else { continue };
+        let model = Model::new(&compiled.bytes).expect("a valid model");
+        let mut singly = vec![0; objects * touches.len()];
+        let mut row_by_row = |margins: &mut [i32]| {
+            for (touch, margins) in touches.iter().zip(margins.chunks_exact_mut(objects)) {
+                model.margins(touch, margins);
+            }
+        };
+        row_by_row(&mut singly);
+        let mut together = vec![0; objects * touches.len()];
+        let mut features = Vec::new();
+        let mut batched = |margins: &mut [i32]| {
+            features.clear();
+            touches.iter().for_each(|touch| features.extend(descriptor.features(touch).as_slice()));
+            assert!(model.margins_of_rows(&features, margins, &mut batch));
+        };
+        batched(&mut together);
+        assert!(singly == together, "rows at once give other margins");
+        let mut ours = |items: usize| (0..items).for_each(|_| batched(black_box(&mut together)));
+        let mut one_by_one = |items: usize| (0..items).for_each(|_| row_by_row(black_box(&mut singly)));
+        let mut theirs = |items: usize| {
+            let predict = || drop(black_box(hessboost.predict_margin_rows(black_box(&flat), Iterations::Best)));
+            POOL.install(|| (0..items).for_each(|_| predict()));
+        };
+        let paired = paired(PAIRED, 0.02, &mut [&mut ours, &mut one_by_one, &mut theirs]);
+        let names = ["palpate", "palpate, row by row", "hessboost"];
+        for ((name, seconds), ratio) in names.iter().zip(&paired.seconds).zip(&paired.ratios) {
+            let label = format!("{} {}", layout.name(), leaf.name());
+            println!("    {label:14} {name:20} {:9.1} ns {ratio:6.2} ×", 1e9 * seconds / touches.len() as f64);
+        }
+    }
+}
+
+/// This thread alone: hessboost's blocks of rows are tasks of the pool that it is called in.
+static POOL: LazyLock<rayon::ThreadPool> = LazyLock::new(|| {
+    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().expect("a pool of this thread")
+});
+
+/// Rounds in which all take turns.
+const PAIRED: usize = 31;
 
 fn check(name: &str, rows: &[Vec<f32>], expected: &[Vec<f32>], mut margins: impl FnMut(&[f32]) -> Vec<f32>) {
     for (row, expected) in rows.iter().zip(expected) {

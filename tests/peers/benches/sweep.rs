@@ -1,15 +1,19 @@
-//! First contacts of a swept sphere: Palpate and parry3d, on the same casts in the same run; speed against error; how the
-//! cost grows with the mesh; and the ten real objects, where `PALPATE_SHARED` leads to them.
+//! First contacts of a swept sphere: Palpate, a plain loop over obvhs's tree, and parry3d, on the same casts in the same run;
+//! speed against error; how the cost grows with the mesh; and the ten real objects, where `PALPATE_SHARED` leads to them.
 //!
 //! ```text
 //! cargo bench --manifest-path tests/peers/Cargo.toml --bench sweep
+//! cargo bench --manifest-path tests/peers/Cargo.toml --bench sweep -- --peers     only the comparison
 //! cargo bench --manifest-path tests/peers/Cargo.toml --bench sweep -- --quick     a few seconds, no rates to rely on
 //! ```
 //!
-//! Rates are the best of three rounds of one thread (one for parry3d), in processor time where the system reports it, so
-//! that other processes do not count, except where it says otherwise.
+//! Rates are of one thread, in processor time where the system reports it, so that other processes do not count: medians of
+//! paired rounds against others, elsewhere the best of three rounds, except where it says otherwise.
 
 use glam::DVec3;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::builder::build_bvh2;
 use palpate::capture::{self, Settings};
 use palpate::mesh::Mesh;
 use palpate::probe::approach::{Approach, Probe};
@@ -19,11 +23,10 @@ use palpate::probe::sweep::narrow::{self, Motion, Triangle};
 use palpate::probe::sweep::precision::{self, DoubleWithoutReject, SingleAfterReject};
 use palpate::probe::sweep::{Surface, budget};
 use palpate::touches::Origin;
+use palpate_peers::{QUICK, clock, paired};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-use std::time::Instant;
 
 const RADIUS: f64 = 0.15;
 
@@ -32,14 +35,14 @@ struct Cast {
     direction: DVec3,
 }
 
-/// Whether this run only shows that everything works.
-static QUICK: LazyLock<bool> = LazyLock::new(|| std::env::args().any(|argument| argument == "--quick"));
-
 fn main() {
     if *QUICK {
         println!("A quick run: its rates mean nothing.\n");
     }
     peers();
+    if std::env::args().any(|argument| argument == "--peers") {
+        return;
+    }
     speed_against_error();
     growth();
     real_objects();
@@ -72,16 +75,6 @@ fn casts(scene: &Scene, count: usize) -> Vec<Cast> {
     (0..count).map(cast).collect()
 }
 
-/// The processor time that this thread has had, in seconds; elsewhere than on Linux the time of day.
-fn clock() -> f64 {
-    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-    let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    match schedule.split(' ').next().and_then(|nanoseconds| nanoseconds.parse::<f64>().ok()) {
-        Some(nanoseconds) => nanoseconds * 1e-9,
-        None => START.get_or_init(Instant::now).elapsed().as_secs_f64(),
-    }
-}
-
 /// The best rate of `rounds`, each of at least a quarter of a second unless the run is quick, and the times found.
 fn measure<T>(casts: &[T], rounds: usize, contact: impl Fn(&T) -> Option<f64>) -> (f64, Vec<Option<f64>>) {
     let mut best = 0.0_f64;
@@ -97,9 +90,12 @@ fn measure<T>(casts: &[T], rounds: usize, contact: impl Fn(&T) -> Option<f64>) -
     (best, times)
 }
 
-/// The parry3d of one precision: mesh, casts and rate, converted outside the clock.
+/// Whoever finds first contacts.
+type Engine<'a> = Box<dyn Fn(usize) -> Option<f64> + 'a>;
+
+/// The parry3d of one precision: mesh and casts are converted here, outside the clock.
 macro_rules! parry {
-    ($parry:ident, $real:ident, $mesh:expr, $scene:expr, $casts:expr) => {{
+    ($parry:ident, $real:ident, $mesh:expr, $casts:expr) => {{
         use $parry::math::{Pose, Vector};
         use $parry::query::{ShapeCastOptions, cast_shapes};
         use $parry::shape::{Ball, TriMesh};
@@ -111,7 +107,8 @@ macro_rules! parry {
         let ball = Ball::new(RADIUS as $real);
         let casts: Vec<_> = $casts.iter().map(|cast| (vector(cast.origin), vector(cast.direction))).collect();
         let options = ShapeCastOptions { compute_impact_geometry_on_penetration: false, ..Default::default() };
-        measure(&casts, 1, |&(origin, direction)| {
+        Box::new(move |index: usize| {
+            let (origin, direction) = casts[index];
             let pose = Pose::from_translation(origin);
             let hit = cast_shapes(&Pose::IDENTITY, Vector::ZERO, &shape, &pose, direction, &ball, options);
             hit.unwrap().map(|hit| f64::from(hit.time_of_impact))
@@ -119,29 +116,67 @@ macro_rules! parry {
     }};
 }
 
+/// A triangle's box, wide enough for a sphere's center.
+struct Inflated(Aabb);
+
+impl obvhs::Boundable for Inflated {
+    fn aabb(&self) -> Aabb {
+        self.0
+    }
+}
+
+/// How far rounding in f32 moves a box or a ray.
+const SLACK: f64 = 1e-5;
+
+/// What anyone would write first: the binary tree of obvhs over inflated boxes, up to eight triangles in a leaf, its own
+/// loop, and the exact test of every triangle in the leaves that it comes to.
+fn plain<'a>(scene: &Scene, casts: &'a [Cast]) -> Engine<'a> {
+    let triangles: Vec<Triangle> = scene.triangles().collect();
+    let inflated = |triangle: &Triangle| {
+        let [a, b, c] = *triangle;
+        let reach = DVec3::splat(RADIUS + SLACK);
+        let (min, max) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
+        Inflated(Aabb { min: min.as_vec3a(), max: max.as_vec3a() })
+    };
+    let boxes: Vec<Inflated> = triangles.iter().map(inflated).collect();
+    let settings = BvhBuildParams { max_prims_per_leaf: 8, ..BvhBuildParams::medium_build() };
+    let tree = build_bvh2(&boxes, settings, &mut std::time::Duration::ZERO);
+    let triangles: Vec<Triangle> = tree.primitive_indices.iter().map(|&index| triangles[index as usize]).collect();
+    Box::new(move |index| {
+        let Cast { origin, direction } = casts[index];
+        let motion = Motion { origin, direction, radius: RADIUS };
+        let mut first = f64::INFINITY;
+        let ray = obvhs::ray::Ray::new(origin.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
+        tree.ray_traverse(ray, &mut obvhs::ray::RayHit::none(), |_, triangle| {
+            match narrow::first_contact(&motion, &triangles[triangle], first) {
+                Some(distance) => {
+                    first = distance;
+                    (distance + SLACK) as f32
+                }
+                None => f32::INFINITY,
+            }
+        });
+        (first < f64::INFINITY).then_some(first)
+    })
+}
+
 fn peers() {
-    println!("Against parry3d 0.31: casts of a sphere of radius {RADIUS}, one thread, a sixth of them grazing\n");
     println!(
-        "{:>9}  {:12} {:>12} {:>9} {:>7} {:>7} {:>12}",
-        "triangles", "engine", "casts/s", "ratio", "missed", "false", "worst time"
+        "Against a plain loop over obvhs's tree and parry3d 0.31: casts of a sphere of radius {RADIUS}, one thread, a"
     );
-    let (sizes, count): (&[f64], usize) = if *QUICK { (&[1e3], 600) } else { (&[1e3, 1e4, 1e5], 12_000) };
+    println!("sixth of them grazing; medians of {ROUNDS} rounds in which all take turns\n");
+    println!(
+        "{:12} {:>9}  {:12} {:>12} {:>9} {:>7} {:>7} {:>12}",
+        "mesh", "triangles", "engine", "casts/s", "ratio", "missed", "false", "worst time"
+    );
+    let sizes: &[f64] = if *QUICK { &[1e3] } else { &[1e3, 1e4, 1e5, 1e6] };
     for &triangles in sizes {
-        let mesh = mesh_of(triangles);
-        let scene = Scene::new(&mesh, 10.0).unwrap();
-        let casts = casts(&scene, count);
-        let (our_rate, ours) = measure(&casts, 3, |cast| scene.first_contact(cast.origin, cast.direction, RADIUS));
-        let (single_rate, single) = parry!(parry3d, f32, &mesh, &scene, casts);
-        let (double_rate, double) = parry!(parry3d_f64, f64, &mesh, &scene, casts);
-        let truth = truth(&scene, &casts, [&ours, &single, &double]);
-        let rows =
-            [("palpate", our_rate, ours), ("parry3d f32", single_rate, single), ("parry3d f64", double_rate, double)];
-        for (engine, rate, times) in rows {
-            let [missed, false_contacts, worst] = compare(&truth, &times);
-            let (count, ratio) = (mesh.triangles.len(), our_rate / rate);
-            println!(
-                "{count:>9}  {engine:12} {rate:>12.0} {ratio:>8.1}x {missed:>7} {false_contacts:>7} {worst:>12.1e}"
-            );
+        engines("globe", &mesh_of(triangles));
+    }
+    if let Some(directory) = shared("objects") {
+        let real: &[&str] = if *QUICK { &["bowl"] } else { &["bowl", "wristwatch"] };
+        for name in real {
+            engines(name, &palpate::mesh::obj::read(&directory.join(format!("{name}.obj"))).unwrap());
         }
     }
     println!(
@@ -150,21 +185,58 @@ fn peers() {
     println!("error of a contact's time. Wherever the engines disagree, f64 over all triangles decides.\n");
 }
 
-/// What is right: ours where all agree on whether and, to 1e-9, when; else the earliest contact over all triangles.
-fn truth(scene: &Scene, casts: &[Cast], engines: [&[Option<f64>]; 3]) -> Vec<Option<f64>> {
+/// Rounds in which all engines take turns.
+const ROUNDS: usize = 21;
+
+fn engines(name: &str, mesh: &Mesh) {
+    let scene = Scene::new(mesh, 10.0).unwrap();
+    let casts = casts(&scene, if *QUICK { 600 } else { 12_000 });
+    let ours = |index: usize| scene.first_contact(casts[index].origin, casts[index].direction, RADIUS);
+    let engines: [(&str, Engine<'_>); 4] = [
+        ("palpate", Box::new(ours)),
+        ("plain obvhs", plain(&scene, &casts)),
+        ("parry3d f32", parry!(parry3d, f32, mesh, casts)),
+        ("parry3d f64", parry!(parry3d_f64, f64, mesh, casts)),
+    ];
+    let times: [Vec<Option<f64>>; 4] = engines.each_ref().map(|(_, engine)| (0..casts.len()).map(engine).collect());
+    let mut turns = engines.each_ref().map(|(_, engine)| {
+        let mut next = 0;
+        let (engine, casts) = (engine, casts.len());
+        move |items: usize| {
+            for _ in 0..items {
+                next = (next + 1) % casts;
+                black_box(engine(black_box(next)));
+            }
+        }
+    });
+    let paired = paired(ROUNDS, 0.03, &mut turns.each_mut().map(|turn| turn as &mut dyn FnMut(usize)));
+    let truth = truth(&scene, &casts, times.each_ref().map(Vec::as_slice));
+    for (index, (engine, _)) in engines.iter().enumerate() {
+        let [missed, false_contacts, worst] = compare(&truth, &times[index]);
+        let (count, rate, ratio) = (mesh.triangles.len(), 1.0 / paired.seconds[index], paired.ratios[index]);
+        println!(
+            "{name:12} {count:>9}  {engine:12} {rate:>12.0} {ratio:>8.2}x {missed:>7} {false_contacts:>7} {worst:>12.1e}"
+        );
+    }
+}
+
+/// What is right: ours where all agree on whether and, to 1e-9, when (parry3d f32 only on whether); else the earliest
+/// contact over all triangles.
+fn truth(scene: &Scene, casts: &[Cast], engines: [&[Option<f64>]; 4]) -> Vec<Option<f64>> {
     let triangles: Vec<Triangle> = scene.triangles().collect();
     let brute = |cast: &Cast| {
         let motion = Motion { origin: cast.origin, direction: cast.direction, radius: RADIUS };
         let contact = |triangle| narrow::first_contact(&motion, triangle, f64::INFINITY);
         triangles.iter().filter_map(contact).min_by(f64::total_cmp)
     };
+    let agree = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() < 1e-9,
+        (a, b) => a == b,
+    };
     let decide = |(index, cast): (usize, &Cast)| {
-        let [ours, single, double] = engines.map(|times| times[index]);
-        let agree = match (ours, double) {
-            (Some(ours), Some(double)) => (ours - double).abs() < 1e-9,
-            (ours, double) => ours == double,
-        };
-        if agree && single.is_some() == ours.is_some() { ours } else { brute(cast) }
+        let [ours, plain, single, double] = engines.map(|times| times[index]);
+        let all = agree(ours, plain) && agree(ours, double) && single.is_some() == ours.is_some();
+        if all { ours } else { brute(cast) }
     };
     casts.iter().enumerate().map(decide).collect()
 }

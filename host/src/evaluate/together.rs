@@ -1,0 +1,120 @@
+//! A compiled model's margins of many touches or rows at once, on all threads.
+
+use super::reference;
+use crate::rows::Encoder;
+use palpate_onboard::{Batch, Model};
+use palpate_shared::format::LeafType;
+use palpate_shared::{MISSING_FEATURE, Touch};
+use rayon::prelude::*;
+use std::borrow::Borrow;
+
+/// Touches or rows of a task: as many as go down a tree together.
+pub const AT_ONCE: usize = 1024;
+
+/// Fewer than this go one after the other.
+const FEW: usize = 16;
+
+/// Room for the margins of many touches or rows at once: the same as one after the other, to the bit, and faster; see
+/// [`Model::margins_of_rows`]. For one thread.
+#[derive(Debug)]
+pub struct Together {
+    /// None as long as there were only a few at once.
+    batch: Option<Box<Batch>>,
+    features: Vec<i32>,
+    units: Vec<i32>,
+    exact: Vec<f32>,
+}
+
+impl Default for Together {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Together {
+    /// Empty room.
+    pub fn new() -> Self {
+        Self { batch: None, features: Vec::new(), units: Vec::new(), exact: Vec::new() }
+    }
+
+    /// The margins of touches in the model's units, as [`Model::margins`] gives them: one row for each touch, one number for
+    /// each object. `margins` is as long as that.
+    pub fn touches<T: Borrow<Touch>>(&mut self, model: &Model<'_>, touches: &[T], margins: &mut [i32]) {
+        if touches.len() < FEW {
+            let margins = margins.chunks_exact_mut(model.object_count());
+            margins.zip(touches).for_each(|(margins, touch)| _ = model.margins(touch.borrow(), margins));
+            return;
+        }
+        self.features.clear();
+        match model.descriptor() {
+            Some(descriptor) => {
+                let features = touches.iter().map(|touch| descriptor.features(touch.borrow()));
+                features.for_each(|features| self.features.extend_from_slice(features.as_slice()));
+            }
+            None => self.features.resize(touches.len() * model.feature_count(), MISSING_FEATURE),
+        }
+        let batch = self.batch.get_or_insert_with(Box::default);
+        let is_whole = model.margins_of_rows(&self.features, margins, batch);
+        debug_assert!(is_whole, "a row of margins for each touch");
+    }
+
+    /// The same in nats.
+    pub fn touches_in_nats<T: Borrow<Touch>>(&mut self, model: &Model<'_>, touches: &[T], margins: &mut [f64]) {
+        let mut units = std::mem::take(&mut self.units);
+        units.resize(margins.len(), 0);
+        self.touches(model, touches, &mut units);
+        in_nats(model, &units, margins);
+        self.units = units;
+    }
+
+    /// The margins of rows of features in nats, the trainer's own f32 if the model adds those: one row for each row of
+    /// `values`, which has as many as the model has features. `margins` is as long as that.
+    pub fn rows(&mut self, model: &Model<'_>, encoder: &Encoder, values: &[f32], margins: &mut [f64]) {
+        let values = values.chunks_exact(model.feature_count());
+        if values.len() < FEW {
+            let margins = margins.chunks_exact_mut(model.object_count());
+            margins
+                .zip(values)
+                .for_each(|(slot, row)| slot.copy_from_slice(&reference::margins(model, &encoder.row(row))));
+            return;
+        }
+        self.features.clear();
+        values.for_each(|row| self.features.extend(encoder.row(row)));
+        let batch = self.batch.get_or_insert_with(Box::default);
+        let is_whole = if model.leaf_type() == LeafType::F32 {
+            self.exact.resize(margins.len(), 0.0);
+            let is_whole = model.f32_margins_of_rows(&self.features, &mut self.exact, batch);
+            margins.iter_mut().zip(&self.exact).for_each(|(margin, exact)| *margin = f64::from(*exact));
+            is_whole
+        } else {
+            self.units.resize(margins.len(), 0);
+            let is_whole = model.margins_of_rows(&self.features, &mut self.units, batch);
+            in_nats(model, &self.units, margins);
+            is_whole
+        };
+        debug_assert!(is_whole, "a row of margins for each row");
+    }
+}
+
+fn in_nats(model: &Model<'_>, units: &[i32], margins: &mut [f64]) {
+    let unit = f64::from(model.unit());
+    margins.iter_mut().zip(units).for_each(|(margin, units)| *margin = f64::from(*units) * unit);
+}
+
+/// The margins of touches in the model's units, one row for each touch, on all threads.
+pub fn margins_of_touches<T: Borrow<Touch> + Sync>(model: &Model<'_>, touches: &[T]) -> Vec<i32> {
+    let objects = model.object_count();
+    let mut margins = vec![0; touches.len() * objects];
+    let tasks = margins.par_chunks_mut(AT_ONCE * objects).zip(touches.par_chunks(AT_ONCE));
+    tasks.for_each_init(Together::new, |together, (margins, touches)| together.touches(model, touches, margins));
+    margins
+}
+
+/// The margins of rows of features in nats (see [`Together::rows`]), one row for each, on all threads.
+pub fn margins_of_rows(model: &Model<'_>, encoder: &Encoder, values: &[f32]) -> Vec<f64> {
+    let (objects, width) = (model.object_count(), model.feature_count());
+    let mut margins = vec![0.0; values.len() / width * objects];
+    let tasks = margins.par_chunks_mut(AT_ONCE * objects).zip(values.par_chunks(AT_ONCE * width));
+    tasks.for_each_init(Together::new, |together, (margins, values)| together.rows(model, encoder, values, margins));
+    margins
+}

@@ -1,0 +1,172 @@
+//! Rows that go through a model together have the margins that each has by itself, to the bit.
+
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate_onboard::{Batch, Model};
+use palpate_shared::format::{Header, checksum};
+use palpate_shared::{Descriptor, MISSING_FEATURE};
+use palpate_tests::random::{self, Shape};
+use proptest::prelude::*;
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+/// Numbers of rows around those where the work is divided in another way.
+const COUNTS: [usize; 12] = [0, 1, 7, 8, 9, 15, 16, 17, 127, 128, 2001, MOST];
+
+/// More than one block.
+const MOST: usize = 2100;
+
+fn shapes() -> impl Strategy<Value = Shape> {
+    let descriptors = prop::sample::select(Descriptor::ALL.to_vec());
+    (descriptors, 1..20_usize, 1..=60_usize, 0..=9_usize, any::<bool>(), 0..900_usize, 0.01..30.0_f32).prop_map(
+        |(descriptor, objects, trees, depth, each, thresholds, leaf)| {
+            let trees = if depth > 6 { 1 + trees / 10 } else { trees };
+            Shape { descriptor, objects, trees, depth, each, thresholds, leaf }
+        },
+    )
+}
+
+fn models(ensemble: &Ensemble) -> Vec<Vec<u8>> {
+    let layouts = || std::iter::once(None).chain(Layout::ALL.iter().copied().map(Some));
+    let settings = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
+    let compiled = settings.filter_map(|(leaf, layout)| {
+        let settings = Settings { leaf, layout, ..Settings::default() };
+        compile(ensemble, &settings).ok()
+    });
+    compiled.map(|compiled| compiled.bytes).collect()
+}
+
+/// Rows near what trees compare with, every seventh value missing.
+fn rows(ensemble: &Ensemble, model: &Model<'_>, seed: u64) -> Vec<i32> {
+    let mut random = SmallRng::seed_from_u64(seed);
+    let width = model.feature_count();
+    let mut features: Vec<i32> = match ensemble.descriptor() {
+        Some(descriptor) => {
+            let touches = random::touches(MOST, seed);
+            touches.iter().flat_map(|touch| descriptor.features(touch).as_slice().to_vec()).collect()
+        }
+        None => (0..MOST * width).map(|_| random.random_range(-300_000..300_000)).collect(),
+    };
+    let special = [i32::MAX, -i32::MAX, 0, -1];
+    for value in &mut features {
+        match random.random_range(0..28) {
+            0..4 => *value = MISSING_FEATURE,
+            4 => *value = special[random.random_range(0..special.len())],
+            _ => {}
+        }
+    }
+    features
+}
+
+/// Compares with one row after the other, for every number of rows.
+fn compare(model: &Model<'_>, features: &[i32], batch: &mut Batch) -> Result<(), TestCaseError> {
+    let (width, objects) = (model.feature_count(), model.object_count());
+    let mut one_by_one = vec![0; MOST * objects];
+    let mut exact = vec![0.0_f32; MOST * objects];
+    let mut is_float = true;
+    for (index, row) in features.chunks_exact(width).enumerate() {
+        let place = index * objects..(index + 1) * objects;
+        prop_assert!(model.margins_of(row, &mut one_by_one[place.clone()]));
+        is_float &= model.f32_margins_of(row, &mut exact[place]);
+    }
+    for count in COUNTS {
+        let rows = &features[..count * width];
+        let mut together = vec![-1; count * objects];
+        prop_assert!(model.margins_of_rows(rows, &mut together, batch));
+        prop_assert!(together == one_by_one[..count * objects], "{count} rows, {:?}", model.layout());
+        let mut together = vec![-1.0_f32; count * objects];
+        prop_assert_eq!(model.f32_margins_of_rows(rows, &mut together, batch), is_float);
+        let bits = |margins: &[f32]| margins.iter().map(|margin| margin.to_bits()).collect::<Vec<_>>();
+        prop_assert!(!is_float || bits(&together) == bits(&exact[..count * objects]), "{count} rows in f32");
+    }
+    Ok(())
+}
+
+/// The same trees over this many features.
+fn spread(mut ensemble: Ensemble, features: usize) -> Ensemble {
+    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
+        for (index, node) in tree.nodes.iter_mut().enumerate() {
+            if let Node::Split { feature, .. } = node {
+                *feature = (*feature * 37 + number * 11 + index) % features;
+            }
+        }
+    }
+    Ensemble { inputs: Inputs::unnamed(features), ..ensemble }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    #[test]
+    fn rows_at_once_have_the_margins_of_each_row_in_every_layout_and_leaf_type(shape in shapes(), seed: u64) {
+        let ensemble = random::ensemble(shape, seed);
+        let mut batch = Box::new(Batch::new());
+        let models = models(&ensemble);
+        prop_assert!(models.len() >= 6, "{} models", models.len());
+        for bytes in models {
+            let model = Model::new(&bytes).unwrap();
+            compare(&model, &rows(&ensemble, &model, seed), &mut batch)?;
+        }
+    }
+
+    #[test]
+    fn rows_of_up_to_256_features_at_once_have_the_margins_of_each(shape in shapes(), features in 1..=256_usize, seed: u64) {
+        let ensemble = spread(random::ensemble(shape, seed), features);
+        let mut batch = Box::new(Batch::new());
+        for bytes in models(&ensemble) {
+            let model = Model::new(&bytes).unwrap();
+            compare(&model, &rows(&ensemble, &model, seed), &mut batch)?;
+        }
+    }
+
+    #[test]
+    fn whatever_bytes_pass_as_a_model_give_rows_at_once_the_margins_of_each(shape in shapes(), seed: u64) {
+        let shape = Shape { trees: shape.trees.min(12), ..shape };
+        let ensemble = random::ensemble(shape, seed);
+        let mut random = SmallRng::seed_from_u64(seed);
+        let mut batch = Box::new(Batch::new());
+        let mut passed = 0;
+        for bytes in models(&ensemble) {
+            for _ in 0..4 {
+                let mut changed = bytes.clone();
+                let body = changed.len() - 4;
+                let header = Header::of(&bytes);
+                let sections = (header.nodes_length() + header.leaves_length()) as usize;
+                for _ in 0..random.random_range(1..30) {
+                    // Thresholds, splits and leaves: what is not checked when a model is opened.
+                    changed[random.random_range(body - sections..body)] = random.random();
+                }
+                let sum = checksum(&changed[..body]);
+                changed[body..].copy_from_slice(&sum.to_le_bytes());
+                if let Ok(model) = Model::new(&changed) {
+                    passed += 1;
+                    compare(&model, &rows(&ensemble, &model, seed), &mut batch)?;
+                }
+            }
+        }
+        prop_assert!(passed > 0);
+    }
+}
+
+#[test]
+fn rows_that_are_not_whole_are_refused() {
+    let shape = Shape {
+        descriptor: Descriptor::Curvature,
+        objects: 3,
+        trees: 4,
+        depth: 3,
+        each: true,
+        thresholds: 6,
+        leaf: 1.0,
+    };
+    let bytes = compile(&random::ensemble(shape, 5), &Settings::default()).unwrap().bytes;
+    let model = Model::new(&bytes).unwrap();
+    let mut batch = Box::new(Batch::new());
+    let mut margins = [7; 12];
+    for (features, margin_count) in [(2 * 4, 9), (2 * 4, 11), (2 * 3, 12), (2 * 4 + 1, 12), (0, 3)] {
+        let wrong = model.margins_of_rows(&vec![0; features], &mut margins[..margin_count], &mut batch);
+        assert!(!wrong && margins == [7; 12], "{features} features, {margin_count} margins");
+    }
+    assert!(!model.f32_margins_of_rows(&[0; 8], &mut [0.0; 12], &mut batch));
+    assert!(model.margins_of_rows(&[0; 8], &mut margins, &mut batch) && margins != [7; 12]);
+}
