@@ -1,7 +1,7 @@
 //! What more objects cost, and what helps: models of 20 to 256 objects, trained in different ways on the same approaches.
 //!
 //! ```text
-//! cargo run --release --example growth -- 100 4000 30x6 30x6:i8 8x6:eta=0.5:i8 30x6:stages=10 30x6:factors=16
+//! cargo run --release --example growth -- 100 4000 30x6 30x6:i8 8x6:eta=0.5:i8 30x6:stages=10
 //! ```
 //!
 //! The arguments are the numbers of objects ([`builtin::many`]; `20,50,100`), the approaches to each, half as many more of
@@ -16,10 +16,9 @@
 //! | `size` | the smallest layout instead of the balanced one |
 //! | `patterns` | tables instead of trees |
 //! | `stages=10` | two stages: ten groups of objects that touches mix up, then a model for each group |
-//! | `factors=16`, `factors=auto` | leaves that share a table: each holds 16 numbers of one byte, or as few as will do |
 
 use palpate::capture;
-use palpate::compile::{self, Compiled, Goal, Layout, Leaf, Sharing};
+use palpate::compile::{self, Compiled, Goal, Layout, Leaf};
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
@@ -43,7 +42,7 @@ const SEQUENCES: usize = 5_000;
 fn main() -> Result<(), Failed> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     // Small enough for a test of this program.
-    let usual = ["12", "300", "4x3", "4x3:i8", "4x3:stages=3", "4x3:factors=4"].map(String::from);
+    let usual = ["12", "300", "4x3", "4x3:i8", "4x3:stages=3"].map(String::from);
     let arguments = if arguments.is_empty() { usual.to_vec() } else { arguments };
     let [counts, approaches, ways @ ..] = &arguments[..] else {
         return Err("give objects, approaches and ways".into());
@@ -80,14 +79,13 @@ fn main() -> Result<(), Failed> {
 /// Measures every way on the same approaches.
 fn compare(ways: &[String], data: &Dataset, test: &Dataset) -> Result<(), Failed> {
     println!(
-        "\n{} objects\n{:34} {:>9} {:>9} {:>8} {:>7} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        "\n{} objects\n{:34} {:>9} {:>9} {:>8} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7}",
         data.objects.len(),
         "way",
         "bytes",
         "M4F",
         "layout",
         "leaves",
-        "factors",
         "error",
         "train",
         "at 20",
@@ -99,23 +97,11 @@ fn compare(ways: &[String], data: &Dataset, test: &Dataset) -> Result<(), Failed
     );
     let mut before = None;
     for way in ways {
-        let Measured {
-            bytes,
-            instructions,
-            leaves,
-            factors,
-            margin_error,
-            layout,
-            seconds,
-            accuracy,
-            stops,
-            wrong,
-            undecided,
-        } = Way::new(way)?.measure(data, test, &mut before)?;
-        let factors = factors.map_or_else(|| "-".into(), |factors| factors.to_string());
+        let Measured { bytes, instructions, leaves, margin_error, layout, seconds, accuracy, stops, wrong, undecided } =
+            Way::new(way)?.measure(data, test, &mut before)?;
         let [at_20, at_60, at_200] = accuracy.map(|share| 100.0 * share);
         println!(
-            "{way:34} {bytes:>9} {instructions:>9} {layout:>8} {leaves:>7} {factors:>7} {margin_error:>7.4} {seconds:>6.1} \
+            "{way:34} {bytes:>9} {instructions:>9} {layout:>8} {leaves:>7} {margin_error:>7.4} {seconds:>6.1} \
              {at_20:>6.1} {at_60:>6.1} {at_200:>6.1} {stops:>6.1} {:>6.2} {:>7.2}",
             100.0 * wrong,
             100.0 * undecided
@@ -139,7 +125,6 @@ struct Measured {
     bytes: usize,
     instructions: u64,
     leaves: usize,
-    factors: Option<usize>,
     margin_error: f32,
     layout: &'static str,
     seconds: f64,
@@ -167,10 +152,6 @@ impl Way {
                 ("size", "") => compile.goal = Goal::Size,
                 ("patterns", "") => compile.layout = Some(Layout::Patterns),
                 ("stages", value) => stages = Some(value.parse()?),
-                ("factors", value) => {
-                    compile.sharing = if value == "auto" { Sharing::Auto } else { Sharing::Factors(value.parse()?) };
-                    compile.leaf = Leaf::I8;
-                }
                 _ => return Err(format!("{part}: not a part of a way").into()),
             }
         }
@@ -204,7 +185,6 @@ impl Way {
         Ok(Measured {
             bytes: compiled.bytes.len(),
             instructions: compiled.instructions.m4f,
-            factors: compiled.factors,
             margin_error: compiled.margin_error,
             layout: compiled.layout.name(),
             leaves: compiled.leaves,
@@ -314,7 +294,6 @@ impl Way {
             // Both stages see every touch.
             instructions: coarse.instructions.m4f
                 + all().map(|fine| fine.instructions.m4f).sum::<u64>() / all().count().max(1) as u64,
-            factors: coarse.factors,
             margin_error: coarse.margin_error,
             layout: coarse.layout.name(),
             leaves: coarse.leaves + all().map(|fine| fine.leaves).sum::<usize>(),

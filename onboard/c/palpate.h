@@ -21,7 +21,6 @@
  *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
  *   PALPATE_SHARED       0: a model whose equal leaves stand once, in a table, is refused
  *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
- *   PALPATE_FACTORS      0: a model whose leaves hold factors instead of a value for each object is refused
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default. 8 bytes of state, and 4 of stack, for each
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
  *   PALPATE_API          instead of `static inline`
@@ -54,9 +53,6 @@
 #endif
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 1
-#endif
-#ifndef PALPATE_FACTORS
-#define PALPATE_FACTORS 1
 #endif
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 32
@@ -152,13 +148,11 @@ typedef struct {
     const uint8_t *odds_;    /* thresholds by object, or NULL */
     const uint8_t *strangers_; /* what it states of objects that it does not know, or NULL */
     const uint8_t *table_; /* values of the leaves that are shared, or NULL; before them the length of their numbers */
-    const uint8_t *factors_;   /* what makes margins of factors, or NULL */
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
     uint16_t known;          /* that can be named: all, or all but the last, a background */
     uint16_t features;       /* of a row, 1 to 256 */
-    uint16_t values_;        /* of a leaf: one for each object, or factors */
     uint8_t layout_;
     uint8_t leaf_;
     uint8_t descriptor; /* 255: rows of features */
@@ -181,9 +175,6 @@ typedef struct {
 
 /* Parts of a model. */
 enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPATE_GROUPS_, PALPATE_SPLITS_, PALPATE_LEAVES_, PALPATE_END_ };
-
-/* Whether a model's leaves hold factors. */
-#define PALPATE_HAS_FACTORS_(model) (PALPATE_FACTORS && (model)->factors_ != NULL)
 
 /* Whether a model has this layout, or type of leaf: without a question where only one is built in. */
 #define PALPATE_IS_LAYOUT_(model, bit, code) \
@@ -399,14 +390,6 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                     return PALPATE_FIELD;
                 }
                 model->table_ = content + 4;
-            } else if (PALPATE_FACTORS && last == 13) {
-                if (length < 4 || (PALPATE_BYTE(content) & 3) != 0 || PALPATE_BYTE(content) - 1u > 63 ||
-                    PALPATE_BYTE(content + 1) > 30) {
-                    return PALPATE_FIELD;
-                }
-                model->factors_ = content;
-                model->values_ = PALPATE_BYTE(content);
-                least = 4 + (uint32_t)model->objects * model->values_;
             } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
@@ -472,11 +455,8 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
     uint32_t range = (uint32_t)1 << 20, most = 0;
     uint_fast16_t object;
     uint_fast8_t shift = 24;
-    if (PALPATE_HAS_FACTORS_(model) && !PALPATE_IS_I8_(model)) {
-        return palpate_wrong_(model, PALPATE_FIELD, model->bytes + 7);
-    }
     if (PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
-        uint32_t size = palpate_cells_(model) * model->values_ * (uint32_t)palpate_leaf_size_(model);
+        uint32_t size = palpate_cells_(model) * model->objects * (uint32_t)palpate_leaf_size_(model);
         if (size == 0) {
             return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_AXES_]);
         }
@@ -493,7 +473,7 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         const uint8_t *number = leaves;
         uint8_t depth = PALPATE_BYTE(group), one = PALPATE_BYTE(group + 2);
         int fits = 1;
-        if (PALPATE_BYTE(group + 1) > shift || one > 1 || (one != 0 && PALPATE_BYTE(group + 3) >= model->values_) ||
+        if (PALPATE_BYTE(group + 1) > shift || one > 1 || (one != 0 && PALPATE_BYTE(group + 3) >= model->objects) ||
             (PALPATE_IS_F32_(model) && PALPATE_BYTE(group + 1) != 0)) {
             return palpate_wrong_(model, PALPATE_FIELD, group);
         }
@@ -506,7 +486,7 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
             range = range > limit ? limit + 1 : range;
         }
         if (one == 0) {
-            leaf *= model->values_;
+            leaf *= model->objects;
         }
         length = leaf;
         if (PALPATE_IS_SHARED_(model)) {
@@ -555,15 +535,6 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
     }
     if (leaves != end) {
         return palpate_wrong_(model, PALPATE_SECTION, leaves);
-    }
-    if (PALPATE_HAS_FACTORS_(model)) {
-        /* What the leaves add up to, or one of a table, times as many weights of at most 128: it has to fit as well. */
-        const uint32_t sum = range - ((uint32_t)1 << 20);
-        const uint64_t products = (uint64_t)(sum < 128 ? 128 : sum) * 128 * model->values_;
-        if (products > limit) {
-            return palpate_wrong_(model, PALPATE_MARGIN_RANGE, model->bytes + 8);
-        }
-        range = ((uint32_t)1 << 20) + ((uint32_t)products >> PALPATE_BYTE(model->factors_ + 1));
     }
     for (object = 0; !PALPATE_IS_F32_(model) && object < model->objects; object++) {
         uint32_t base = palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (size_t)object);
@@ -692,9 +663,9 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     }
     model->odds_ = NULL;
     model->strangers_ = NULL;
-    model->table_ = NULL;
-    model->factors_ = NULL;
-    model->values_ = model->objects;
+    if (PALPATE_SHARED) {
+        model->table_ = NULL;
+    }
     model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
@@ -996,12 +967,12 @@ static inline const uint8_t *palpate_values_(const palpate_model *model, const u
 static inline void palpate_shift_(const palpate_model *model, uint32_t *sums, uint_fast8_t shift)
 {
     uint_fast16_t i;
-    for (i = 0; shift != 0 && i < model->values_; i++) {
+    for (i = 0; shift != 0 && i < model->objects; i++) {
         sums[i] <<= shift;
     }
 }
 
-/* The sums of a row of features, in units or as the bits of f32 values: one for each value of a leaf. */
+/* The sums of a row of features, in units or as the bits of f32 values. */
 static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
 {
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
@@ -1013,7 +984,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     uint8_t *ranks = (uint8_t *)words;
     uint_fast16_t i;
     uint_fast8_t last;
-    for (i = 0; i < model->values_; i++) {
+    for (i = 0; i < model->objects; i++) {
         /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
         sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * (size_t)i);
     }
@@ -1070,8 +1041,8 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 cell = 0;
             }
         }
-        palpate_add_leaf_(model, sums, model->values_, leaves + (size_t)cell * model->values_ * size);
-        for (i = 0; PALPATE_IS_I8_(model) && i < model->values_; i++) {
+        palpate_add_leaf_(model, sums, model->objects, leaves + (size_t)cell * model->objects * size);
+        for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
             sums[i] -= 128;
         }
         return;
@@ -1080,7 +1051,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
         const uint8_t depth = PALPATE_BYTE(group), shift = PALPATE_BYTE(group + 1);
         const int one = PALPATE_BYTE(group + 2) != 0;
-        const uint16_t values = one ? 1 : model->values_;
+        const uint16_t values = one ? 1 : model->objects;
         const size_t length = size * values;
         const size_t stored = PALPATE_IS_SHARED_(model) ? PALPATE_BYTE(model->table_ - 4) : length;
         uint32_t *first = one ? sums + PALPATE_BYTE(group + 3) : sums;
@@ -1121,30 +1092,9 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     }
     if (!PALPATE_IS_F32_(model)) {
         palpate_shift_(model, sums, last);
-        for (i = 0; !PALPATE_HAS_FACTORS_(model) && i < model->objects; i++) {
+        for (i = 0; i < model->objects; i++) {
             sums[i] += palpate_u32_(base + 4 * (size_t)i);
         }
-    }
-}
-
-/* The sums of a row of features whose leaves hold factors: one for each object. */
-PALPATE_APART_ void palpate_sum_factors_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *margins)
-{
-    const uint8_t *base = model->part_[PALPATE_MARGINS_], *weight = model->factors_ + 4;
-    const uint8_t shift = PALPATE_BYTE(model->factors_ + 1);
-    uint32_t sums[64];
-    uint_fast16_t object;
-    palpate_sum_(model, features, count, sums);
-    for (object = 0; object < model->objects; object++) {
-        uint32_t sum = 0;
-        uint_fast8_t i;
-        for (i = 0; i < model->values_; i++) {
-            /* A byte with its sign; products modulo 2^32, as what they add up to fits. */
-            sum += sums[i] * ((PALPATE_BYTE(weight) ^ 0x80u) - 0x80u);
-            weight++;
-        }
-        /* Rounded down. */
-        margins[object] = (sum >> 31 != 0 ? ~(~sum >> shift) : sum >> shift) + palpate_u32_(base + 4 * (size_t)object);
     }
 }
 
@@ -1171,10 +1121,6 @@ static inline int32_t palpate_q16_(uint32_t bits)
 PALPATE_API void palpate_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
 {
     uint_fast16_t i;
-    if (PALPATE_HAS_FACTORS_(model)) {
-        palpate_sum_factors_(model, features, count, (uint32_t *)margins);
-        return;
-    }
     palpate_sum_(model, features, count, (uint32_t *)margins);
     for (i = 0; PALPATE_IS_F32_(model) && i < model->objects; i++) {
         margins[i] = palpate_q16_((uint32_t)margins[i]);

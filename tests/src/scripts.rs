@@ -1,15 +1,13 @@
 //! Models, touches and rows that the C header is compared on.
 
-use crate::random::{self, Shape};
 use crate::replay::Script;
 use crate::sections::with_sections;
 use crate::vectors;
-use palpate::compile::{Layout, Leaf, Settings, Sharing, compile};
 use palpate_onboard::Model;
 use palpate_shared::format::{
     FitTerms, Held, ObjectFit, OddsByObject, Plan, Section, Strangers, Tag, Temperature, f32_key, write_section,
 };
-use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Pose, Poses, Touch};
+use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
 use rand::rngs::SmallRng;
 use std::path::Path;
@@ -26,28 +24,8 @@ pub fn models() -> Vec<Vec<u8>> {
     let models = words.map(|words| vectors::bytes(words.split(' ').next().expect("bytes")));
     let mut models: Vec<Vec<u8>> = models.collect();
     assert!(models.len() > 60, "{} models", models.len());
-    models.extend(of_factors());
     models.push(std::fs::read(Path::new(ROOT).join("models/household.palpate")).expect("the committed model"));
     models
-}
-
-/// Models whose leaves hold factors: of few objects and of many, walked and in preorder.
-///
-/// # Panics
-/// If an ensemble does not compile.
-pub fn of_factors() -> Vec<Vec<u8>> {
-    let of = |descriptor, objects, count, layout| {
-        let shape = Shape { descriptor, objects, trees: 12, depth: 5, each: true, thresholds: 60, leaf: 0.8 };
-        let sharing = Sharing::Factors(count);
-        let settings = Settings { leaf: Leaf::I8, layout: Some(layout), sharing, ..Settings::default() };
-        compile(&random::ensemble(shape, objects as u64), &settings).expect("a model").bytes
-    };
-    vec![
-        of(Descriptor::Curvature, 6, 4, Layout::Complete),
-        of(Descriptor::ContactsCurvature, 30, 12, Layout::Compact),
-        of(Descriptor::Oriented, 11, 8, Layout::Complete),
-        of(Descriptor::Times, 3, 16, Layout::Compact),
-    ]
 }
 
 /// The model with sections that the header has to understand or to leave alone.
@@ -72,8 +50,7 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         write_section(Tag::Plan, false, &plan, &mut put);
     }
     write_section(Tag::Temperature, false, &temperature.to_bytes(), &mut put);
-    let tags = [Tag::SharedLeaves, Tag::Factors].map(Tag::code);
-    let own = model.optional_sections().filter(|section| tags.contains(&section.tag));
+    let own = model.optional_sections().filter(|section| section.tag == Tag::SharedLeaves.code());
     own.for_each(|section| section.write(&mut put));
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
     with_sections(bytes, &sections)

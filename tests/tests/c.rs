@@ -65,7 +65,7 @@ fn touches_and_rows_give_the_bits_of_the_crate() {
     let program = here(&[], directory.path()).unwrap();
     let mut rng = SmallRng::seed_from_u64(1);
     let models = all_models(&mut rng);
-    let script = script(&models, 120_000, 100_000, &mut rng);
+    let script = script(&models, 150_000, 100_000, &mut rng);
     compare(&run(&mut Command::new(&program), &script.commands), &script);
     let counted = [count(&script, "touch"), count(&script, "features"), count(&script, "verdict")];
     println!("{counted:?} touches, features, verdicts; {} sums in f32", count(&script, "sums"));

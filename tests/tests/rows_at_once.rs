@@ -11,9 +11,10 @@ use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
 /// Numbers of rows around those where the work is divided in another way.
-const COUNTS: [usize; 12] = [0, 1, 7, 8, 9, 15, 16, 17, 127, 128, 1025, MOST];
+const COUNTS: [usize; 12] = [0, 1, 7, 8, 9, 15, 16, 17, 127, 128, 2001, MOST];
 
-const MOST: usize = 2001;
+/// More than one block.
+const MOST: usize = 2100;
 
 fn shapes() -> impl Strategy<Value = Shape> {
     let descriptors = prop::sample::select(Descriptor::ALL.to_vec());

@@ -321,7 +321,6 @@ pub(crate) fn compile(
         max_touches,
         priors,
         scales,
-        ..Settings::default()
     };
     let compiled = py.detach(|| match max_bytes {
         None => library::compile(ensemble, &settings),

@@ -19,10 +19,9 @@ pub(super) fn instructions(instructions: Instructions) -> String {
 }
 
 /// The line that names the cargo features that a chip needs.
-pub(super) fn features(layout: &str, leaf: &str, is_shared: bool, has_factors: bool) -> String {
+pub(super) fn features(layout: &str, leaf: &str, is_shared: bool) -> String {
     let shared = if is_shared { ", shared-leaves" } else { "" };
-    let factors = if has_factors { ", factors" } else { "" };
     format!(
-        "A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves{shared}{factors}\n"
+        "A chip that reads no other models needs these features of palpate-onboard: {layout}, {leaf}-leaves{shared}\n"
     )
 }

@@ -2,7 +2,7 @@ use super::chips::{features, instructions};
 use super::expected::PriorArguments;
 use super::numbers::share;
 use crate::Result;
-use crate::compile::{self, Candidate, Goal, Instructions, Language, Layout, Leaf, Settings, Sharing};
+use crate::compile::{self, Candidate, Goal, Instructions, Language, Layout, Leaf, Settings};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Error;
 use crate::output;
@@ -16,11 +16,9 @@ use std::path::{Path, PathBuf};
 ENSEMBLE is what `palpate train` saved, or a model of another library over features of any kind: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). Its content says which. `palpate verify` compares the model with it, and with the library.
 
 Leaves:
-  i16  two bytes per value: verdicts as the full model's (the default)
-  i8   one byte per value: half the size, margins within hundredths of a nat
+  i16  two bytes per value: verdicts as the full model's (the default for up to 50 objects, and for rows of features)
+  i8   one byte per value: half the size, margins within hundredths of a nat (the default for touches of more objects)
   f32  four bytes per value, added as the trainer adds them: the same margins
-
-Many objects: nearly all of a model is then leaves, and they resemble each other. With --factors a leaf holds a few numbers of one byte, and one matrix in the model makes a value for each object of what they add up to: a model of 256 objects takes a small part of the bytes. Margins are no longer those of the trees, but near: how near is printed.
 
 Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
 
@@ -33,7 +31,6 @@ Whole numbers: --scale says in which units a chip without a float unit measures 
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
-  palpate export many.json -o many.palpate --factors 16
   palpate export ensemble.json -o strict.palpate --error-rate 0.1%
   palpate export ensemble.json -o kitchen.palpate --prior fork=0.3,spoon=0.3
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
@@ -51,12 +48,9 @@ pub(crate) struct Arguments {
     /// The classes' names, in the order of the labels, or a file with one per line [default: the file's own, or 0, 1, …]
     #[arg(long, value_name = "A,B,…|FILE")]
     names: Option<String>,
-    /// What leaves are stored as [default: i16; i8 with --factors]
+    /// What leaves are stored as [default: i16; i8 for touches of more than 50 objects]
     #[arg(long, value_parser = leaf, value_name = "i8|i16|f32")]
     leaf: Option<Leaf>,
-    /// How many numbers a leaf holds, from which one matrix makes a value for each object; auto takes as few as leave out at most 0.05 nats of a margin [default: auto with more than 50 objects that are touched, unless --leaf says otherwise; else none]
-    #[arg(long, value_parser = sharing, value_name = "auto|none|4|8|…|64")]
-    factors: Option<Sharing>,
     /// How trees are laid out; auto lets --for decide
     #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid|wide|patterns")]
     layout: LayoutChoice,
@@ -71,8 +65,8 @@ pub(crate) struct Arguments {
     goal: Goal,
     /// Whether equal leaves stand once, in a table that a leaf is a number of: `auto` where that is smaller, and better
     /// for what --for says
-    #[arg(long, value_parser = shared_leaves, default_value = "auto", value_name = "auto|yes|no")]
-    shared_leaves: SharedLeaves,
+    #[arg(long, value_parser = sharing, default_value = "auto", value_name = "auto|yes|no")]
+    shared_leaves: Sharing,
     /// Compare whole numbers: how many units of a feature make up 1
     #[arg(long, value_name = "FEATURE=UNITS,…", value_delimiter = ',', value_parser = scale)]
     scale: Vec<(String, f32)>,
@@ -101,7 +95,7 @@ struct LayoutChoice(Option<Layout>);
 
 /// Whether leaves are shared; `None` leaves it open.
 #[derive(Clone)]
-struct SharedLeaves(Option<bool>);
+struct Sharing(Option<bool>);
 
 /// What is written beside the model.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -129,9 +123,6 @@ struct Exported {
     /// How many different leaves there are, if equal ones stand once.
     #[serde(skip_serializing_if = "Option::is_none")]
     shared_leaves: Option<usize>,
-    /// Numbers in a leaf, if it does not hold a value for each object.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    factors: Option<usize>,
     trees: usize,
     splits: usize,
     leaves: usize,
@@ -169,14 +160,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let names = arguments.names.as_deref().map(names).transpose()?;
     let ensemble = Ensemble::load_named(&arguments.ensemble, names.as_deref())?;
     let scales = scales(&arguments, &ensemble)?;
-    let sharing = arguments.factors.unwrap_or_else(|| match arguments.leaf {
-        None if ensemble.descriptor().is_some() => Sharing::usual(ensemble.objects.len()),
-        _ => Sharing::None,
-    });
-    let usual = if sharing == Sharing::None { Leaf::I16 } else { Leaf::I8 };
-    let mut settings = Settings {
-        leaf: arguments.leaf.unwrap_or(usual),
-        sharing,
+    let usual = match ensemble.inputs {
+        Inputs::Touches(_) => Settings::for_touches(ensemble.objects.len()),
+        Inputs::Rows(_) => Settings::default(),
+    };
+    let settings = Settings {
+        leaf: arguments.leaf.unwrap_or(usual.leaf),
         layout: arguments.layout.0,
         goal: arguments.goal,
         shared_leaves: arguments.shared_leaves.0,
@@ -185,10 +174,6 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         scales,
         priors: arguments.prior.of(&ensemble.objects)?,
     };
-    // Where no few factors will do, leaves are what they are without.
-    if arguments.leaf.is_none() && sharing == Sharing::Auto && compile::factors_of(&ensemble, &settings)?.is_none() {
-        settings.leaf = Leaf::I16;
-    }
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
         1 => error.in_file(&arguments.ensemble),
         _ => error,
@@ -201,7 +186,6 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         layout: compiled.layout.name(),
         leaf: settings.leaf.name(),
         shared_leaves: compiled.shared_leaves,
-        factors: compiled.factors,
         trees: ensemble.trees.len(),
         splits: compiled.splits,
         leaves: compiled.leaves,
@@ -321,7 +305,7 @@ fn text(path: &Path, exported: &Exported) -> String {
     let shared = exported.shared_leaves.map_or(String::new(), |count| format!(", {count} different"));
     _ = writeln!(
         text,
-        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}{}{shared}), margins within {:.2e} nats",
+        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}{shared}), margins within {:.2e} nats",
         path.display(),
         exported.bytes,
         exported.trees,
@@ -329,7 +313,6 @@ fn text(path: &Path, exported: &Exported) -> String {
         exported.leaves,
         exported.layout,
         exported.leaf,
-        exported.factors.map_or_else(String::new, |factors| format!(", {factors} factors")),
         exported.margin_error,
     );
     if exported.candidates.len() > 1 {
@@ -360,7 +343,7 @@ fn text(path: &Path, exported: &Exported) -> String {
     for note in &exported.notes {
         _ = writeln!(text, "Note: {note}");
     }
-    text + &features(exported.layout, exported.leaf, exported.shared_leaves.is_some(), exported.factors.is_some())
+    text + &features(exported.layout, exported.leaf, exported.shared_leaves.is_some())
 }
 
 fn classes(names: &[String]) -> String {
@@ -374,15 +357,6 @@ fn leaf(name: &str) -> Result<Leaf, String> {
     Leaf::ALL.iter().copied().find(|leaf| leaf.name() == name).ok_or_else(|| "use one of i8, i16, f32".to_owned())
 }
 
-fn sharing(text: &str) -> Result<Sharing, String> {
-    match (text, text.parse()) {
-        ("auto", _) => Ok(Sharing::Auto),
-        ("none", _) => Ok(Sharing::None),
-        (_, Ok(count)) => Ok(Sharing::Factors(count)),
-        (_, Err(_)) => Err("use auto, none, or a multiple of 4 up to 64".to_owned()),
-    }
-}
-
 fn layout(name: &str) -> Result<LayoutChoice, String> {
     if name == "auto" {
         return Ok(LayoutChoice(None));
@@ -393,11 +367,11 @@ fn layout(name: &str) -> Result<LayoutChoice, String> {
         .ok_or_else(|| "use one of auto, compact, complete, grid, wide, patterns".to_owned())
 }
 
-fn shared_leaves(name: &str) -> Result<SharedLeaves, String> {
+fn sharing(name: &str) -> Result<Sharing, String> {
     match name {
-        "auto" => Ok(SharedLeaves(None)),
-        "yes" => Ok(SharedLeaves(Some(true))),
-        "no" => Ok(SharedLeaves(Some(false))),
+        "auto" => Ok(Sharing(None)),
+        "yes" => Ok(Sharing(Some(true))),
+        "no" => Ok(Sharing(Some(false))),
         _ => Err("use one of auto, yes, no".into()),
     }
 }

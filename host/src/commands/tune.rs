@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     }
     let mut text = table(&tuned);
     let chosen = &tuned.rows[tuned.chosen];
-    text += &features(chosen.layout.unwrap_or_default(), chosen.leaf.unwrap_or_default(), false, false);
+    text += &features(chosen.layout.unwrap_or_default(), chosen.leaf.unwrap_or_default(), false);
     for (what, path) in [("model", &arguments.output), ("ensemble", &arguments.ensemble)] {
         if let Some(path) = path {
             // Writing to a string cannot fail.

@@ -7,7 +7,7 @@
 //! RAM and stack are those that `evaluator` prints. All figures are of the firmware's profile (`opt-level = "s"`).
 
 use palpate_onboard::Model;
-use palpate_shared::format::{Axis, Factors, Group, HEADER_LENGTH, Layout, LeafType};
+use palpate_shared::format::{Axis, Group, HEADER_LENGTH, Layout, LeafType};
 use serde::Serialize;
 
 /// A processor that costs are known for.
@@ -75,27 +75,12 @@ impl Instructions {
         let nodes = bytes.get(groups_end..groups_end + length(header.nodes_length())).unwrap_or_default();
         let is_shared = model.shared_leaves().is_some();
         let (layout, leaf) = (model.layout(), model.leaf_type());
-        let shape = |objects| Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared };
-        match model.factors() {
-            Some(factors) => Self::new(&shape(factors.count())).mixed(objects, factors.count()),
-            None => Self::new(&shape(objects)),
-        }
+        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared })
     }
 
     pub(super) fn new(shape: &Shape<'_>) -> Self {
         let m0_plus = (shape.leaf != LeafType::F32).then(|| M0_PLUS.touch(shape));
         Self { m4f: M4F.touch(shape), m0_plus }
-    }
-
-    /// The same where leaves hold so many factors, and margins of so many objects are made of them: by the instructions of
-    /// the loops that do it.
-    pub(super) fn mixed(self, objects: usize, factors: usize) -> Self {
-        let products = (objects * factors) as u64;
-        let objects = objects as u64;
-        Self {
-            m4f: self.m4f + 4 * products + 16 * objects,
-            m0_plus: self.m0_plus.map(|number| number + 15 * products / 2 + 30 * objects),
-        }
     }
 
     /// On a processor.
@@ -115,7 +100,6 @@ impl Memory {
         let ram = 8 * objects + 32 + 64;
         // The most that was seen for ten objects, less their margins.
         let stack = 4 * objects
-            + model.factors().map_or(0, |_| 4 * Factors::MOST)
             + match model.layout() {
                 Layout::Grid => 276,
                 Layout::Patterns => 380,

@@ -52,7 +52,6 @@ fn c(model: &Model<'_>, name: &str) -> String {
     let leaf = model.leaf_type().name().to_uppercase();
     let strangers = u8::from(model.strangers().is_some());
     let shared = u8::from(model.shared_leaves().is_some());
-    let factors = u8::from(model.factors().is_some());
     let (objects, length) = (model.object_count(), model.bytes().len());
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
@@ -62,12 +61,11 @@ fn c(model: &Model<'_>, name: &str) -> String {
          #ifndef PALPATE_LEAVES\n#define PALPATE_LEAVES PALPATE_{leaf}\n#endif\n\
          #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
-         #ifndef PALPATE_FACTORS\n#define PALPATE_FACTORS {factors}\n#endif\n\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
-         #if (PALPATE_LAYOUTS & PALPATE_{layout}) == 0 || (PALPATE_LEAVES & PALPATE_{leaf}) == 0 || \\\n    PALPATE_STRANGERS < {strangers} || PALPATE_SHARED < {shared} || PALPATE_FACTORS < {factors} || \\\n    PALPATE_MAX_OBJECTS < {objects}\n\
-         #error \"this model needs PALPATE_{layout} in PALPATE_LAYOUTS, PALPATE_{leaf} in PALPATE_LEAVES, PALPATE_STRANGERS {strangers}, PALPATE_SHARED {shared} and PALPATE_FACTORS {factors} or more, and room for {objects} objects\"\n\
+         #if (PALPATE_LAYOUTS & PALPATE_{layout}) == 0 || (PALPATE_LEAVES & PALPATE_{leaf}) == 0 || \\\n    PALPATE_STRANGERS < {strangers} || PALPATE_SHARED < {shared} || PALPATE_MAX_OBJECTS < {objects}\n\
+         #error \"this model needs PALPATE_{layout} in PALPATE_LAYOUTS, PALPATE_{leaf} in PALPATE_LEAVES, PALPATE_STRANGERS {strangers} or more, PALPATE_SHARED {shared} or more, and room for {objects} objects\"\n\
          #endif\n\n\
          /* palpate_open(&model, {name}_model, sizeof {name}_model) */\n\
          static const uint8_t {name}_model[{length}]\n\
@@ -80,7 +78,7 @@ fn c(model: &Model<'_>, name: &str) -> String {
 
 fn rust(model: &Model<'_>, name: &str) -> String {
     format!(
-        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{factors}.\n\n\
+        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}.\n\n\
          /// The model: `Model::new(&{constant}.0)`.\n\
          #[rustfmt::skip]\n\
          pub static {constant}: palpate_onboard::Aligned<[u8; {length}]> = palpate_onboard::Aligned([\n\
@@ -89,7 +87,6 @@ fn rust(model: &Model<'_>, name: &str) -> String {
         layout = model.layout().name(),
         leaf = model.leaf_type().name(),
         shared = if model.shared_leaves().is_some() { ", shared-leaves" } else { "" },
-        factors = if model.factors().is_some() { ", factors" } else { "" },
         constant = name.to_uppercase(),
         length = model.bytes().len(),
         array = array(model.bytes()),

@@ -83,20 +83,19 @@ fn walked(
     }
     let base = forest.base.iter().map(|&base| base_bits(base, leaf, scale)).collect();
     let (unit, margin_error) = (scale.unit, margin_error());
-    let leaves = leaves.into_bytes();
+    let leaves_bytes = leaves.into_bytes();
     let none = Instructions { m4f: 0, m0_plus: None };
     let mut parts = Parts {
         axes,
         cuts,
         groups,
         nodes,
-        leaves,
+        leaves: leaves_bytes,
         shared: None,
         base,
         unit,
         margin_error,
         instructions: none,
-        factors: Vec::new(),
     };
     parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
     Some(parts)

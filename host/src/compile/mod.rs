@@ -39,7 +39,6 @@ mod axes;
 mod cells;
 mod cost;
 mod emit;
-mod factors;
 mod fit;
 mod forest;
 mod layout;
@@ -91,57 +90,7 @@ pub struct Settings {
     /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
     /// feature's scale; `None` compares f32 values.
     pub scales: Option<Vec<f32>>,
-    /// How many numbers a leaf holds, where it does not hold a value for each object.
-    pub sharing: Sharing,
 }
-
-impl Settings {
-    /// What `palpate export` takes for models of touches of so many objects: leaves that share a table with more than 50,
-    /// which are of one byte then; otherwise the default.
-    pub fn for_touches(objects: usize) -> Self {
-        match Sharing::usual(objects) {
-            Sharing::None => Self::default(),
-            sharing => Self { sharing, leaf: Leaf::I8, ..Self::default() },
-        }
-    }
-}
-
-/// Compiles an ensemble with settings of [`Settings::for_touches`]: where the leaves cannot share a table, or not without
-/// leaving out too much, with leaves of two bytes.
-///
-/// # Errors
-/// As [`compile`].
-pub fn compile_usual(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
-    if settings.sharing == Sharing::Auto && factors_of(ensemble, settings)?.is_none() {
-        return compile(ensemble, &Settings { sharing: Sharing::None, leaf: Leaf::I16, ..settings.clone() });
-    }
-    compile(ensemble, settings)
-}
-
-/// Whether leaves share a table: each then holds a few *factors*, from which one matrix in the model makes a value for each
-/// object. With many objects nearly all of a model is leaves, which resemble each other. Only for leaves of one byte, and
-/// trees whose leaves have a value for each object.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Sharing {
-    /// A leaf holds a value for each object.
-    #[default]
-    None,
-    /// The fewest factors that leave out at most [`LEFT_OUT`] nats of a margin (the root of the mean square); no sharing
-    /// where none are so few that the model would be smaller.
-    Auto,
-    /// So many factors: a multiple of 4 up to 64.
-    Factors(usize),
-}
-
-impl Sharing {
-    /// What is usual for models of touches: [`Sharing::Auto`] with more than 50 objects, otherwise a value for each.
-    pub const fn usual(objects: usize) -> Self {
-        if objects > 50 { Self::Auto } else { Self::None }
-    }
-}
-
-/// What factors that are chosen by [`Sharing::Auto`] may leave out of a margin, in nats: the root of the mean square.
-pub const LEFT_OUT: f64 = 0.05;
 
 impl Default for Settings {
     fn default() -> Self {
@@ -154,10 +103,22 @@ impl Default for Settings {
             max_touches: 200,
             priors: None,
             scales: None,
-            sharing: Sharing::None,
         }
     }
 }
+
+impl Settings {
+    /// What is usual for a model of touches of so many objects: leaves of one byte with more than
+    /// [`MANY`], where nearly all of a model is leaves; otherwise the default.
+    pub fn for_touches(objects: usize) -> Self {
+        let leaf = if objects > MANY { Leaf::I8 } else { Leaf::I16 };
+        Self { leaf, ..Self::default() }
+    }
+}
+
+/// Models of more objects than this are usually compiled with leaves of one byte: `docs/growth.md` has what that saves and
+/// what it costs.
+pub const MANY: usize = 50;
 
 /// What a layout is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -209,8 +170,6 @@ pub struct Compiled {
     pub instructions: Instructions,
     /// All layouts that were tried.
     pub candidates: Vec<Candidate>,
-    /// How many numbers a leaf holds, if it does not hold a value for each object.
-    pub factors: Option<usize>,
 }
 
 /// When recognizers stop.
@@ -236,14 +195,8 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
-    let factors = factors_of(ensemble, settings)?;
-    let made = match factors {
-        Some(count) => factored(ensemble, settings, &forest, cells.as_ref(), count)?,
-        None => {
-            let shared = settings.shared_leaves;
-            layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout, shared)?
-        }
-    };
+    let made =
+        layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout, settings.shared_leaves)?;
     let overhead = write::overhead(ensemble, settings, &forest)?;
     let candidate = |(layout, parts): &(Layout, parts::Parts)| Candidate {
         layout: *layout,
@@ -263,45 +216,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts, margin_error)?;
     let (splits, leaves) = (forest.splits(), forest.leaves());
     let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
-    Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates, factors })
-}
-
-/// How many factors the leaves of a compiled model hold, if they share a table; see [`Settings::sharing`].
-///
-/// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) `factors` or `leaf` if the leaves cannot share one.
-pub fn factors_of(ensemble: &Ensemble, settings: &Settings) -> Result<Option<usize>> {
-    match settings.sharing {
-        Sharing::None => Ok(None),
-        Sharing::Factors(count) => factors::check(ensemble, count, settings.leaf).map(|()| Some(count)),
-        Sharing::Auto if factors::check(ensemble, 4, settings.leaf).is_err() => Ok(None),
-        // Two thirds of the values: a matrix takes room as well.
-        Sharing::Auto => {
-            Ok(factors::fewest(ensemble, LEFT_OUT).filter(|count| 3 * count <= 2 * ensemble.objects.len()))
-        }
-    }
-}
-
-/// What the layouts make of an ensemble whose leaves share a table.
-fn factored(
-    ensemble: &Ensemble,
-    settings: &Settings,
-    forest: &Forest<'_>,
-    cells: Option<&Cells>,
-    count: usize,
-) -> Result<Vec<(Layout, parts::Parts)>> {
-    // Leaves of factors are short, and hardly any are equal.
-    if settings.shared_leaves == Some(true) {
-        return Err(Error::setting("shared_leaves", true, "false where leaves hold factors"));
-    }
-    let factored = factors::Factored::new(ensemble, count);
-    let scales = settings.scales.as_deref();
-    let small = Forest::new(&factored.small, scales)?;
-    let axes = Axes::new(&small);
-    let full = factors::Full { ensemble, forest, cells, scales };
-    // No table: cells of factors would be as many.
-    let made = layout::candidates(&small, &axes, None, settings.leaf, settings.layout, Some(false))?;
-    made.into_iter().map(|(layout, parts)| Ok((layout, factored.parts(&full, parts)?))).collect()
+    Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates })
 }
 
 /// The best of the candidates.

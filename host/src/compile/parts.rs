@@ -18,19 +18,14 @@ pub(super) struct Parts {
     pub(super) unit: f32,
     pub(super) margin_error: f32,
     pub(super) instructions: Instructions,
-    /// The content of the section that makes margins of factors; empty where a leaf has a value for each object.
-    pub(super) factors: Vec<u8>,
 }
 
 impl Parts {
-    /// The optional sections with the values of leaves and with what makes margins of factors, as far as there are any.
-    pub(super) fn sections(&self) -> Vec<u8> {
+    /// The optional section with the values of leaves; nothing if there is none.
+    pub(super) fn section(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         if let Some(content) = &self.shared {
             write_section(Tag::SharedLeaves, true, content, &mut |part| bytes.extend_from_slice(part));
-        }
-        if !self.factors.is_empty() {
-            write_section(Tag::Factors, true, &self.factors, &mut |part| bytes.extend_from_slice(part));
         }
         bytes
     }
@@ -38,6 +33,6 @@ impl Parts {
     /// Bytes of the model, but for its text and what is the same in all layouts.
     pub(super) fn bytes(&self) -> usize {
         let records = Axis::LENGTH * self.axes.len() + Group::LENGTH * self.groups.len() + 8 * self.base.len();
-        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + self.sections().len()
+        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + self.section().len()
     }
 }

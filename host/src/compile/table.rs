@@ -65,7 +65,6 @@ fn table(
         base: vec![0; objects],
         unit: scale.unit,
         margin_error: round_up(worst),
-        factors: Vec::new(),
     })
 }
 

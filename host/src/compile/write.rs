@@ -26,8 +26,8 @@ pub(super) fn write(
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
     // Where nothing is known, the published probe.
     let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
-    // Their tags are the largest of those that are written.
-    let optional = [optional(ensemble, settings, forest)?, parts.sections()].concat();
+    // Its tag is the largest of those that are written.
+    let optional = [optional(ensemble, settings, forest)?, parts.section()].concat();
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);

@@ -72,14 +72,6 @@ pub enum CompileProblem {
     /// The ensemble fits no layout.
     #[error("the ensemble fits no layout of the model format")]
     FitsNoLayout,
-    /// Sums of so many factors could overflow on a chip.
-    #[error("{trees} trees of {factors} factors each can add up to more than a chip's 32 bits hold")]
-    FactorRange {
-        /// Trees.
-        trees: usize,
-        /// Factors of a leaf.
-        factors: usize,
-    },
     /// A name is too long.
     #[error("the name {name:?} is too long for a model")]
     NameTooLong {
@@ -133,7 +125,6 @@ impl CompileProblem {
             }
             Self::DoesNotFit { .. } => "Choose another layout, or leave the choice to the compiler (auto).",
             Self::FitsNoLayout | Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",
-            Self::FactorRange { .. } => "Take fewer factors, or train fewer trees.",
             Self::NameTooLong { .. } => "Use names of at most 255 bytes.",
         }
         .into()

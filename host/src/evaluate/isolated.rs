@@ -9,17 +9,13 @@ use palpate_shared::format::{Axis, CHECKSUM_LENGTH, Group, HEADER_LENGTH, Layout
 use std::ops::Range;
 
 /// The first tree, in the ensemble's order, of which the model adds another leaf for this row than the ensemble does.
-/// `None` if there is none, or the model is a table and has no trees, or leaves of factors.
+/// `None` if there is none, or the model is a table and has no trees.
 pub(super) fn first_different_tree(
     model: &Model<'_>,
     reference: &Reference<'_>,
     ensemble: &Ensemble,
     row: &[f32],
 ) -> Option<usize> {
-    // No tree of a model of factors has the ensemble's leaves.
-    if model.factors().is_some() {
-        return None;
-    }
     // Each leaf's values where the leaf is, so that those of one tree alone can be changed.
     let plain = compile::unshared(model).ok()?;
     let plain = plain.as_deref().map(Model::new).transpose().ok()?;

@@ -3,7 +3,7 @@
 use super::context::{Context, touch};
 use super::instructions::Instructions;
 use crate::capture;
-use crate::compile;
+use crate::compile::{self, Leaf};
 use crate::error::Result;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
 use crate::mesh::{Mesh, Object, builtin};
@@ -38,12 +38,10 @@ pub(super) struct Objects {
     pub(super) capture: f64,
     /// Seconds of training.
     pub(super) train: f64,
-    /// Bytes of a model whose leaves hold a value for each object.
-    pub(super) each: usize,
+    /// Bytes of the model with leaves of two bytes.
+    pub(super) two_bytes: usize,
     /// Bytes of the model that is usual for so many objects; the rest is about this one.
     pub(super) bytes: usize,
-    /// How many numbers its leaves hold, if not a value for each object.
-    pub(super) factors: Option<usize>,
     /// Instructions per touch on the chips.
     pub(super) instructions: Instructions,
     /// Accuracy after each of [`AT`] approaches; none where an object has fewer to test.
@@ -121,10 +119,10 @@ fn objects_cost(context: &Context, touched: &[Touched]) -> Result<Objects> {
     let ensemble = context.train(&train, &context.ours())?;
     let seconds = began.elapsed().as_secs_f64();
     let usual = compile::Settings { max_touches: MAX_TOUCHES, ..compile::Settings::for_touches(touched.len()) };
-    let compiled = compile::compile_usual(&ensemble, &usual)?;
-    let each = match compiled.factors {
-        Some(_) => compile::compile(&ensemble, &compile::Settings::default())?.bytes.len(),
-        None => compiled.bytes.len(),
+    let compiled = compile::compile(&ensemble, &usual)?;
+    let two_bytes = match usual.leaf {
+        Leaf::I16 => compiled.bytes.len(),
+        Leaf::I8 | Leaf::F32 => compile::compile(&ensemble, &compile::Settings::default())?.bytes.len(),
     };
     let model = compile::open(&compiled.bytes)?;
     let touches: Vec<Touch> = test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
@@ -139,9 +137,8 @@ fn objects_cost(context: &Context, touched: &[Touched]) -> Result<Objects> {
         count: touched.len(),
         capture: touched.iter().map(|touched| touched.seconds).sum(),
         train: seconds,
-        each,
+        two_bytes,
         bytes: compiled.bytes.len(),
-        factors: compiled.factors,
         instructions: Instructions::new(&compiled, &touches)?,
         accuracy: AT.iter().map(|at| measured.accuracy.get(at).copied()).collect(),
         approaches: measured.sequential.mean_approaches,
@@ -180,10 +177,10 @@ pub(super) fn section(context: &Context, growth: &Growth) -> Result<Section> {
     section.text(format!(
         "More objects: the ten built-in ones, then in turn ten shapes of no kind and ten others of the same kinds with \
          varied proportions, which are harder to distinguish; {} approaches to each train our method on every contact, a \
-         quarter as many test it. With more than 50 objects leaves share a table: each holds a few factors instead of a \
-         value for each object. Finer meshes: the same bumpy globe, cut into more and more triangles. Times are of this \
-         machine, all threads.",
-        context.settings.growth_approaches
+         quarter as many test it. With more than {} objects leaves are of one byte, as is usual then. Finer meshes: the \
+         same bumpy globe, cut into more and more triangles. Times are of this machine, all threads.",
+        context.settings.growth_approaches,
+        compile::MANY
     ));
     section.figure(objects_figure(context, growth)?);
     section.table(objects_table(context, growth));
@@ -223,7 +220,7 @@ fn objects_figure(context: &Context, growth: &Growth) -> Result<Figure> {
             "Size",
             "bytes",
             &[
-                ("a value for each object", color::GREEN, Shape::Triangle, of(|o| o.each as f64)),
+                ("leaves of two bytes", color::GREEN, Shape::Triangle, of(|o| o.two_bytes as f64)),
                 ("usual", color::OURS, Shape::Disc, of(|o| o.bytes as f64)),
             ],
         )?,
@@ -254,9 +251,8 @@ fn objects_data(growth: &Growth) -> Records {
         "objects",
         "capture (s)",
         "training (s)",
-        "bytes, a value for each",
+        "bytes, i16 leaves",
         "bytes, usual",
-        "factors",
         &format!("instructions, M4F ({})", source(growth)),
         &format!("accuracy at {}", AT[0]),
         &format!("accuracy at {}", AT[1]),
@@ -274,9 +270,8 @@ fn objects_data(growth: &Growth) -> Records {
             Cell::count(objects.count),
             Cell::Number(objects.capture, 2),
             Cell::Number(objects.train, 2),
-            Cell::count(objects.each),
+            Cell::count(objects.two_bytes),
             Cell::count(objects.bytes),
-            objects.factors.map_or(Cell::Missing, Cell::count),
             Cell::count(objects.instructions.m4f.number),
             at(0),
             at(1),

@@ -436,44 +436,26 @@ fn export_emits_sources_beside_the_model_and_refuses_a_name_that_leaves_no_room_
     assert!(!place.path("model.h").exists() && !place.path("palpate.palpate").exists());
 }
 
-/// The ensemble of [`ensemble`] for many objects, each a mixture of bowl and fork.
-fn many(objects: usize) -> Ensemble {
-    let mut many = ensemble();
-    let part = |object: usize| object as f32 / objects as f32;
-    for node in many.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
-        if let Node::Leaf(values) = node {
-            *values = (0..objects).map(|object| part(object) * values[0] + (1.0 - part(object)) * values[1]).collect();
-        }
-    }
-    many.objects = (0..objects).map(|object| format!("object-{object:03}")).collect();
-    many.base_margins = vec![0.5; objects];
-    many
-}
-
 #[test]
-fn leaves_of_more_than_fifty_objects_share_a_table_unless_told_otherwise() {
+fn leaves_of_touches_of_more_than_fifty_objects_take_a_byte_unless_told_otherwise() {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
-    let (few, most, model) = (path("few.json"), path("most.json"), path("model.palpate"));
-    many(50).save(&few).unwrap();
-    many(51).save(&most).unwrap();
-    let factors = |ensemble: &str, more: &[&str]| {
-        let exported = json(&[&["export", ensemble, "-o", &model, "--json"], more].concat());
-        (exported["factors"].as_u64(), exported["leaf"].as_str().unwrap().to_owned())
+    let leaf = |objects: usize, more: &[&str]| {
+        let mut many = ensemble();
+        for node in many.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+            if let Node::Leaf(values) = node {
+                *values = (0..objects).map(|object| values[object % 2]).collect();
+            }
+        }
+        many.objects = (0..objects).map(|object| format!("object-{object:03}")).collect();
+        many.base_margins = vec![0.5; objects];
+        many.save(path("many.json")).unwrap();
+        let (from, to) = (path("many.json"), path("many.palpate"));
+        let exported = json(&[&["export", &from, "-o", &to, "--json"], more].concat());
+        exported["leaf"].as_str().unwrap().to_owned()
     };
-    assert_eq!(factors(&few, &[]), (None, "i16".into()));
-    assert_eq!(factors(&most, &[]), (Some(4), "i8".into()));
-    assert_eq!(factors(&most, &["--leaf", "i16"]), (None, "i16".into()));
-    assert_eq!(factors(&most, &["--factors", "none"]), (None, "i16".into()));
-    assert_eq!(factors(&few, &["--factors", "8"]), (Some(8), "i8".into()));
-    let (code, said) = refusal(&["export", &most, "-o", &model, "--factors", "7"]);
-    assert_eq!(code, 2);
-    assert!(said.contains("a multiple of 4 up to 64"), "{said}");
-    let (code, said) = refusal(&["export", &most, "-o", &model, "--factors", "8", "--leaf", "f32"]);
-    assert_eq!(code, 2);
-    assert!(said.contains("i8 with factors"), "{said}");
-    let source = palpate(&["export", &most, "-o", &model, "--emit", "rust"]);
-    assert!(source.status.success());
-    let source = std::fs::read_to_string(path("model.rs")).unwrap();
-    assert!(source.contains("i8-leaves, factors."), "{}", &source[..300]);
+    assert_eq!(leaf(50, &[]), "i16");
+    assert_eq!(leaf(51, &[]), "i8");
+    assert_eq!(leaf(51, &["--leaf", "i16"]), "i16");
+    assert_eq!(leaf(50, &["--leaf", "i8"]), "i8");
 }

@@ -1,14 +1,12 @@
 //! What is checked when a model is opened, so that no later step can fail.
 
-use super::{HAS_FACTORS, HAS_SHARED_LEAVES, Stated, optional};
+use super::{HAS_SHARED_LEAVES, Stated, optional};
 use crate::bytes::{Wrong, take};
 use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
 use palpate_shared::format::{
-    Factors, Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, SharedLeaves, Tag,
+    Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, SharedLeaves, Tag,
 };
 
-/// What margins may be beyond the leaves and the base.
-const ROOM: u32 = 1 << 20;
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
 
@@ -29,17 +27,8 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     }
     optional::check(model, optional, stated)?;
     ranks::check(model, header.last_feature())?;
-    // Where leaves hold factors they are bytes: then products of their sums stay small.
-    let factors = if cfg!(feature = "factors") && stated.by_object & HAS_FACTORS != 0 {
-        Factors::from_bytes(optional::find(optional, Tag::Factors), model.objects())
-    } else {
-        None
-    };
-    if factors.is_some() && model.leaf != LeafType::I8 {
-        return Err(Wrong::Field(7));
-    }
     let section = |ok: bool, part: &[u8]| if ok { Ok(()) } else { Err(Wrong::Section(model.offset(part))) };
-    let values = factors.map_or(model.objects(), |factors| factors.count());
+    let values = model.objects();
     let mut shared = None;
     if built_in::SHARED_LEAVES && stated.by_object & HAS_SHARED_LEAVES != 0 {
         shared = SharedLeaves::from_bytes(optional::find(optional, Tag::SharedLeaves));
@@ -63,7 +52,7 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
         LeafType::F32 => 0,
     };
     let limit = MARGIN_LIMIT.unsigned_abs();
-    let (mut range, mut largest_base) = (ROOM, 0);
+    let (mut range, mut largest_base) = (1_u32 << 20, 0);
     let mut shift = MAX_SHIFT;
     for bytes in model.groups.as_chunks().0 {
         let wrong = Wrong::Field(model.offset(bytes));
@@ -108,16 +97,6 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     }
     section(nodes.is_empty(), nodes)?;
     section(leaves.is_empty(), leaves)?;
-    if let Some(factors) = factors {
-        // What the leaves add up to, or one of a table, times as many weights of at most 128: before it is shifted, it has
-        // to fit as well.
-        let sum = range.wrapping_sub(ROOM).max(128);
-        let products = u64::from(sum) * 128 * factors.count() as u64;
-        if products > u64::from(limit) {
-            return Err(Wrong::MarginRange);
-        }
-        range = ROOM + ((products as u32) >> (factors.shift() & 31));
-    }
     if model.leaf != LeafType::F32 {
         for &base in model.base_and_priors().0.as_chunks().0 {
             largest_base = largest_base.max(i32::from_le_bytes(base).unsigned_abs());

@@ -5,7 +5,7 @@ use crate::bytes::AlignedTo8;
 use crate::layouts::leaves::{BLOCK, Sum};
 use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
 use palpate_shared::Touch;
-use palpate_shared::format::{Factors, Group, Layout};
+use palpate_shared::format::{Group, Layout};
 
 impl Model<'_> {
     /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
@@ -70,53 +70,16 @@ impl Model<'_> {
 
     /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits.
     pub(super) fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
-        let Some(factors) = self.factors() else {
-            return self.sum_values(features, margins.get_mut(..self.object_count())?);
-        };
-        self.sum_factors(&factors, features, margins.get_mut(..self.object_count())?)
-    }
-
-    /// The same of leaves that hold factors.
-    #[inline(never)]
-    fn sum_factors<'m>(
-        &self,
-        factors: &Factors<'_>,
-        features: &[i32],
-        margins: &'m mut [i32],
-    ) -> Option<&'m mut [i32]> {
-        let mut sums = [0; Factors::MOST];
-        let sums = sums.get_mut(..factors.count())?;
-        if self.has_trees() {
-            let shared = self.shared_leaves();
-            let bias =
-                self.add_trees(features, &mut Sum { margins: sums, leaf: self.sections.leaf, object: None, shared });
-            sums.iter_mut().for_each(|sum| *sum = sum.wrapping_sub(bias));
-        } else {
-            self.look_up(features, sums);
-        }
-        factors.mix(sums, margins);
-        let (base, _) = self.sections.base_and_priors();
-        let bases = base.as_chunks().0.iter().map(|base| i32::from_le_bytes(*base));
-        margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base));
-        Some(margins)
-    }
-
-    /// Reads the values of a cell, if the layout is a table.
-    fn look_up(&self, features: &[i32], values: &mut [i32]) -> bool {
+        let margins = margins.get_mut(..self.object_count())?;
         if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
-            grid::look_up(&self.sections, features, values);
-            return true;
+            grid::look_up(&self.sections, features, margins);
+            return Some(margins);
         }
         if built_in::layout(Layout::Patterns) && self.layout() == Layout::Patterns {
-            patterns::look_up(&self.sections, features, values);
-            return true;
+            patterns::look_up(&self.sections, features, margins);
+            return Some(margins);
         }
-        false
-    }
-
-    /// The same of leaves that hold a value for each object.
-    fn sum_values<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
-        if self.look_up(features, margins) || !built_in::TREES {
+        if !built_in::TREES {
             return Some(margins);
         }
         let shared = self.shared_leaves();

@@ -13,9 +13,9 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, Factors, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan,
-    Promise, Section, SharedLeaves, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches,
-    take_feature, take_section,
+    Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
+    Section, SharedLeaves, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature,
+    take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -38,8 +38,8 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. The three highest bits: whether there are sections about
-    /// strangers, of shared leaves, and of factors.
+    /// Where thresholds by object stand; 0 if there are none. The two highest bits: whether there are
+    /// sections about strangers and of shared leaves.
     by_object: u32,
 }
 
@@ -47,10 +47,8 @@ pub(crate) struct Stated {
 const HAS_STRANGERS: u32 = 1 << 31;
 /// The same.
 const HAS_SHARED_LEAVES: u32 = 1 << 30;
-/// The same.
-const HAS_FACTORS: u32 = 1 << 29;
 /// What is no place in [`Stated::by_object`].
-const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_FACTORS;
+const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES;
 
 impl Stated {
     /// What a model without optional sections states.
@@ -152,16 +150,6 @@ impl<'a> Model<'a> {
             return None;
         }
         SharedLeaves::from_bytes(optional::find(self.optional(), Tag::SharedLeaves))
-    }
-
-    /// How factors become margins, if the leaves hold factors instead of a value for each object.
-    ///
-    /// Cost: about 30 instructions for each optional section. Cannot fail.
-    pub fn factors(&self) -> Option<Factors<'a>> {
-        if !cfg!(feature = "factors") || self.stated.by_object & HAS_FACTORS == 0 {
-            return None;
-        }
-        Factors::from_bytes(optional::find(self.optional(), Tag::Factors), self.object_count())
     }
 
     /// How many features a row has: 1 to 256.

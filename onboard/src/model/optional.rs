@@ -1,11 +1,11 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_FACTORS, HAS_SHARED_LEAVES, HAS_STRANGERS, MARKS, Stated};
+use super::{HAS_SHARED_LEAVES, HAS_STRANGERS, MARKS, Stated};
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Factors, Layout, OddsByObject, Plan, Section, SharedLeaves, Strangers, Tag, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_section,
+    Layout, OddsByObject, Plan, Section, SharedLeaves, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
+    take_section,
 };
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
@@ -47,11 +47,6 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if built_in::SHARED_LEAVES && tag == Tag::SharedLeaves.code() => {
                 stated.by_object |= HAS_SHARED_LEAVES;
                 SharedLeaves::from_bytes(content).is_some() && !matches!(model.layout, Layout::Grid | Layout::Patterns)
-            }
-            // Nor this one.
-            _ if cfg!(feature = "factors") && tag == Tag::Factors.code() => {
-                stated.by_object |= HAS_FACTORS;
-                Factors::from_bytes(content, model.objects()).is_some()
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

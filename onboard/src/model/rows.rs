@@ -42,9 +42,9 @@ impl Model<'_> {
         if rows.checked_mul(objects) != Some(margins.len()) || rows.checked_mul(width) != Some(features.len()) {
             return false;
         }
-        // Leaves that are numbers, or factors, are not made ready.
-        let is_plain = self.shared_leaves().is_none() && self.factors().is_none();
-        if rows < FEW || !self.has_trees() || !is_plain || !batch::is_regular(&self.sections) {
+        // Leaves that are numbers are not made ready.
+        let is_shared = self.shared_leaves().is_some();
+        if rows < FEW || !self.has_trees() || is_shared || !batch::is_regular(&self.sections) {
             for (row, margins) in features.chunks_exact(width).zip(margins.chunks_exact_mut(objects)) {
                 margins.fill(0);
                 self.sum(row, margins);

@@ -5,7 +5,6 @@
 //! ```
 
 mod codes;
-mod factors;
 mod header;
 mod key;
 mod leaves;
@@ -17,7 +16,6 @@ mod trained;
 
 pub use crate::checksum::checksum;
 pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
-pub use factors::Factors;
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
 pub use leaves::SharedLeaves;

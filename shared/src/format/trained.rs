@@ -32,8 +32,6 @@ pub enum Tag {
     Temperature,
     /// The values of leaves that stand for many: [`SharedLeaves`](super::SharedLeaves).
     SharedLeaves,
-    /// [`Factors`](super::Factors).
-    Factors,
 }
 
 impl Tag {
@@ -52,7 +50,6 @@ impl Tag {
             Self::Promise => 10,
             Self::Temperature => 11,
             Self::SharedLeaves => 12,
-            Self::Factors => 13,
         }
     }
 }

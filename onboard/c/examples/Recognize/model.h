@@ -13,6 +13,9 @@
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 0
 #endif
+#ifndef PALPATE_SHARED
+#define PALPATE_SHARED 0
+#endif
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 2
 #endif
@@ -23,8 +26,8 @@
 #include "palpate.h"
 
 #if (PALPATE_LAYOUTS & PALPATE_COMPLETE) == 0 || (PALPATE_LEAVES & PALPATE_I8) == 0 || \
-    PALPATE_STRANGERS < 0 || PALPATE_MAX_OBJECTS < 2
-#error "this model needs PALPATE_COMPLETE in PALPATE_LAYOUTS, PALPATE_I8 in PALPATE_LEAVES, PALPATE_STRANGERS 0 or more, and room for 2 objects"
+    PALPATE_STRANGERS < 0 || PALPATE_SHARED < 0 || PALPATE_MAX_OBJECTS < 2
+#error "this model needs PALPATE_COMPLETE in PALPATE_LAYOUTS, PALPATE_I8 in PALPATE_LEAVES, PALPATE_STRANGERS 0 or more, PALPATE_SHARED 0 or more, and room for 2 objects"
 #endif
 
 /* palpate_open(&model, model_model, sizeof model_model) */
