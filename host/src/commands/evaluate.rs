@@ -15,6 +15,7 @@ use crate::rows::feature_names;
 use crate::touches::Dataset;
 use crate::touches::noise::Noise;
 use crate::{Error, Result};
+use palpate_shared::format::Counted;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -104,12 +105,25 @@ pub(crate) struct Arguments {
     noise: NoiseArguments,
 }
 
+/// Whether which fingers touch is evidence to the model.
+fn counts_patterns(file: &ModelFile) -> bool {
+    let counted = match file {
+        ModelFile::Full(ensemble) => ensemble.origin.trained.map_or(Counted::Full, |trained| trained.touches.counted),
+        ModelFile::Compiled(compiled) => compiled.model().trained_touches().counted,
+    };
+    counted != Counted::Full
+}
+
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
     if let Some(label) = &arguments.label {
         return rows(&arguments, &file, label);
     }
     let mut dataset = super::dataset(&arguments.directory)?;
+    let touches = || dataset.objects.iter().flat_map(|object| &object.touches);
+    if counts_patterns(&file) {
+        super::warn_of_full(touches().count(), touches().any(|touch| !touch.is_full()));
+    }
     let trained_on: Vec<String> = match &file {
         ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
         ModelFile::Compiled(_) => Vec::new(),

@@ -228,6 +228,19 @@ fn say(warning: &Warning) {
     }
 }
 
+/// Of fewer touches it is no surprise if all are full.
+const MANY: usize = 30;
+
+/// Warns where a model to which it is evidence which fingers touch gets full touches alone: those that were left out speak
+/// for other objects.
+fn warn_of_full(touches: usize, is_any_partial: bool) {
+    if touches >= MANY && !is_any_partial {
+        eprintln!(
+            "palpate: warning: all {touches} touches are full, and to this model it is evidence which fingers touch: if others were left out, its verdicts are wrong. Keep every approach (palpate capture --approaches), or train for full touches (palpate train --touches full)."
+        );
+    }
+}
+
 /// The files that a data set consists of, as far as they can be found: what a command that reads it must not write.
 fn files_of(directory: &Path) -> Vec<PathBuf> {
     if directory.is_file() {

@@ -8,6 +8,7 @@ use crate::output;
 use crate::touches::{Log, LogWriter, Logged, LoggedVerdict, begins_log, parse_touch};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
+use palpate_shared::format::Counted;
 use palpate_shared::link::ApproachMessage;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -127,7 +128,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let longest = compile::longest_time(&model);
     let (active, json) = (arguments.active, arguments.json);
     let log = arguments.mcap.as_deref().map(|log| log_to(log, &arguments, &compiled.names())).transpose()?;
-    let mut stream = Stream { recognizer, model: &model, weights, longest, active, json, log };
+    let mut stream =
+        Stream { recognizer, model: &model, weights, longest, active, json, log, touches: 0, is_any_partial: false };
     stream.reset();
     let path = &arguments.file;
     if path.as_os_str() == "-" {
@@ -135,6 +137,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     } else {
         let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
         stream.run(touches, path)?;
+    }
+    if model.trained_touches().counted != Counted::Full {
+        super::warn_of_full(stream.touches, stream.is_any_partial);
     }
     match (stream.log, &arguments.mcap) {
         (Some(log), Some(path)) => log.finish(path),
@@ -163,6 +168,9 @@ struct Stream<'m> {
     json: bool,
     /// Where touches and verdicts are written too.
     log: Option<LogWriter>,
+    /// How many touches there were, and whether a finger was missing in any of them.
+    touches: usize,
+    is_any_partial: bool,
 }
 
 impl<'m> Stream<'m> {
@@ -212,6 +220,8 @@ impl<'m> Stream<'m> {
 
     /// Takes a touch, with what a log says of it.
     fn push(&mut self, touch: &Touch, object: Option<&str>, time: Option<u64>) -> Result<()> {
+        self.touches += 1;
+        self.is_any_partial |= !touch.is_full();
         let refused = self.recognizer.push(touch).err().map(|refused| refused.to_string());
         let line = self.line(refused);
         line.print(self.json)?;

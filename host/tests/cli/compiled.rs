@@ -459,3 +459,25 @@ fn leaves_of_touches_of_more_than_fifty_objects_take_a_byte_unless_told_otherwis
     assert_eq!(leaf(51, &["--leaf", "i16"]), "i16");
     assert_eq!(leaf(50, &["--leaf", "i8"]), "i8");
 }
+
+#[test]
+fn full_touches_alone_are_warned_of_where_it_is_evidence_which_fingers_touch() {
+    let place = Place::new();
+    let household = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/household.palpate");
+    let full = "0 0.031 0.012\n".repeat(40);
+    let said = |model: &str, touches: &str| {
+        std::fs::write(place.path("touches.txt"), touches).unwrap();
+        let finished = palpate(&["recognize", model, &place.text("touches.txt")]);
+        assert_eq!(finished.status.code(), Some(0));
+        String::from_utf8(finished.stderr).unwrap()
+    };
+    assert!(said(household, &full).contains("all 40 touches are full, and to this model it is evidence which fingers"));
+    assert_eq!(said(household, &format!("{full}0 - 0.2\n")), "");
+    assert_eq!(said(household, "0 0.031 0.012\n"), "");
+    assert_eq!(said(&place.text("model.palpate"), &full), "");
+    std::fs::create_dir(place.path("full")).unwrap();
+    ["bowl", "fork"].iter().for_each(|name| std::fs::write(place.path(&format!("full/{name}.txt")), &full).unwrap());
+    let finished = palpate(&["evaluate", household, &place.text("full"), "--at", "5", "--groups", "10"]);
+    let said = String::from_utf8(finished.stderr).unwrap();
+    assert!(said.contains("all 80 touches are full"), "{said}");
+}
