@@ -144,7 +144,7 @@ fn all_at_once(ensemble: &Ensemble, touches: &[Touch], rows: &[Vec<f32>], hessbo
             let predict = || drop(black_box(hessboost.predict_margin_rows(black_box(&flat), Iterations::Best)));
             POOL.install(|| (0..items).for_each(|_| predict()));
         };
-        let paired = paired(PAIRED, 0.02, &mut [&mut ours, &mut one_by_one, &mut theirs]);
+        let paired = paired(PAIRED, 0.1, &mut [&mut ours, &mut one_by_one, &mut theirs]);
         let names = ["palpate", "palpate, row by row", "hessboost"];
         for ((name, seconds), ratio) in names.iter().zip(&paired.seconds).zip(&paired.ratios) {
             let label = format!("{} {}", layout.name(), leaf.name());

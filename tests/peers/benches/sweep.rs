@@ -209,7 +209,7 @@ fn engines(name: &str, mesh: &Mesh) {
             }
         }
     });
-    let paired = paired(ROUNDS, 0.03, &mut turns.each_mut().map(|turn| turn as &mut dyn FnMut(usize)));
+    let paired = paired(ROUNDS, 0.1, &mut turns.each_mut().map(|turn| turn as &mut dyn FnMut(usize)));
     let truth = truth(&scene, &casts, times.each_ref().map(Vec::as_slice));
     for (index, (engine, _)) in engines.iter().enumerate() {
         let [missed, false_contacts, worst] = compare(&truth, &times[index]);

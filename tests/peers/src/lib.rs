@@ -6,7 +6,8 @@ use std::time::Instant;
 /// Whether this run only shows that everything works.
 pub static QUICK: LazyLock<bool> = LazyLock::new(|| std::env::args().any(|argument| argument == "--quick"));
 
-/// The processor time that this thread has had, in seconds; elsewhere than on Linux the time of day.
+/// The processor time that this thread has had, in seconds; elsewhere than on Linux the time of day. Linux may count it only
+/// every few milliseconds: what is timed has to take many of them.
 pub fn clock() -> f64 {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
