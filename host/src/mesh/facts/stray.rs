@@ -2,7 +2,7 @@
 
 use super::Part;
 use crate::mesh::Mesh;
-use glam::{IVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 
 /// How many cells the longest side of the box is divided into: a piece floats if a layer of cells around it is empty.
 const CELLS: i32 = 64;
@@ -40,14 +40,18 @@ pub(super) fn pieces(mesh: &Mesh) -> Vec<Piece> {
     if length <= 0.0 || !length.is_finite() {
         return Vec::new();
     }
-    let step = length / CELLS as f32;
-    let cell = |place: Vec3| ((place - low) / step).as_ivec3().clamp(IVec3::ZERO, IVec3::splat(CELLS - 1));
+    let step = f64::from(length) / f64::from(CELLS);
+    // In cells, and in f64: squares of coordinates that f32 holds may be more than it holds.
+    let place = |vertex: Vec3| (vertex.as_dvec3() - low.as_dvec3()) / step;
+    let cell = |place: DVec3| place.as_ivec3().clamp(IVec3::ZERO, IVec3::splat(CELLS - 1));
     let number = |cell: IVec3| ((cell.z * CELLS + cell.y) * CELLS + cell.x) as usize;
     let corners = |triangle: &[u32; 3]| triangle.map(|i| Vec3::from(mesh.vertices[i as usize]));
     let mut cells = vec![EMPTY; (CELLS * CELLS * CELLS) as usize];
     let mut places = MOST_PLACES;
     for triangle in &mesh.triangles {
-        let [mut a, mut b, mut c] = corners(triangle);
+        let [mut a, mut b, mut c] = corners(triangle).map(place);
+        // Looked up later, so exactly here, however the places below are rounded.
+        [a, b, c].into_iter().for_each(|corner| cells[number(cell(corner))] = FULL);
         // The longest side is a to b.
         for _ in 0..2 {
             if a.distance_squared(b) < b.distance_squared(c).max(c.distance_squared(a)) {
@@ -55,14 +59,14 @@ pub(super) fn pieces(mesh: &Mesh) -> Vec<Piece> {
             }
         }
         // Two places to a cell, along the longest side and across it, so that no cell between them is left out.
-        let height = (b - a).cross(c - a).length() / a.distance(b).max(f32::MIN_POSITIVE);
-        let [columns, rows] = [a.distance(b), height].map(|side| (2.0 * side / step).ceil().clamp(1.0, 256.0) as usize);
+        let height = (b - a).cross(c - a).length() / a.distance(b).max(f64::MIN_POSITIVE);
+        let [columns, rows] = [a.distance(b), height].map(|side| (2.0 * side).ceil().clamp(1.0, 256.0) as usize);
         let Some(left) = places.checked_sub(columns * rows) else { return Vec::new() };
         places = left;
         for row in 0..=rows {
-            let v = row as f32 / rows as f32;
+            let v = row as f64 / rows as f64;
             for column in 0..=columns {
-                let u = (1.0 - v) * column as f32 / columns as f32;
+                let u = (1.0 - v) * column as f64 / columns as f64;
                 cells[number(cell(a + u * (b - a) + v * (c - a)))] = FULL;
             }
         }
@@ -72,7 +76,7 @@ pub(super) fn pieces(mesh: &Mesh) -> Vec<Piece> {
         vec![Piece { triangles: 0, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, area: 0.0 }; count as usize];
     for triangle in &mesh.triangles {
         let [a, b, c] = corners(triangle);
-        let piece = &mut pieces[cells[number(cell(a))] as usize];
+        let piece = &mut pieces[cells[number(cell(place(a)))] as usize];
         piece.triangles += 1;
         piece.low = piece.low.min(a).min(b).min(c);
         piece.high = piece.high.max(a).max(b).max(c);

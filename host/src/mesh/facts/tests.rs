@@ -141,3 +141,20 @@ fn a_size_that_is_neither_one_in_meters_nor_in_millimeters_is_said() {
         assert!(said.len() == 1 && said[0].contains("a size that can"), "{size} {millimeters:?}: {said:?}");
     }
 }
+
+#[test]
+fn coordinates_whose_squares_are_too_large_and_corners_on_edges_of_cells_are_in_a_piece() {
+    // Found by the fuzzer: f32 holds the coordinates and not their squares.
+    let vertices = vec![[20.0, 0.0, 0.0], [4.0, 7.8e22, 1.0], [2.0, 1.0, 0.0], [0.0, 3.0e23, 0.0], [3.0, 0.0, 0.0]];
+    let mesh = Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3], [0, 2, 4]] };
+    assert_eq!(Facts::of(&mesh).triangles, 3);
+    // A long thin triangle, whose far corner is rounded when it is reached along its side.
+    for index in 0..200_u16 {
+        let far = 1.0 + f32::from(index) * 1e-3;
+        let mesh = Mesh {
+            vertices: vec![[0.1, 0.3, 0.7], [far, 0.9, -far], [0.2, far, 0.0]],
+            triangles: vec![[0, 1, 2], [2, 1, 0]],
+        };
+        assert!(Facts::of(&mesh).stray.is_empty());
+    }
+}
