@@ -24,6 +24,7 @@ use crate::touches::{Dataset, Listing, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::format::Counted;
 use serde::Serialize;
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -248,7 +249,8 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
     evaluate::add_noise(&mut approaches.test, &settings.noise, seed.wrapping_add(1))?;
     let probe = Some(StatedProbe::from(&settings.capture.origin));
-    let job = Job { settings, objects, approaches: &approaches.test, robots, out, progress };
+    let kept = RefCell::new(calibrate::Fresh::default());
+    let job = Job { settings, objects, approaches: &approaches.test, robots, kept: &kept, out, progress };
     stages.end("reading and dividing touches");
     let mut method = |name, files, preset, split| Trial::new(name, files, preset, split, job, &mut stages);
     let compact = train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() };
@@ -325,6 +327,8 @@ struct Job<'d> {
     approaches: &'d Dataset,
     /// How many robots made the test touches, in turn.
     robots: usize,
+    /// Touches on which an earlier method was calibrated.
+    kept: &'d RefCell<calibrate::Fresh>,
     out: &'d Path,
     progress: &'d dyn Progress,
 }
@@ -418,7 +422,8 @@ fn calibrated(bytes: &[u8], split: &Split, job: &Job<'_>) -> Result<Result<Calib
         seed,
         ..calibrate::Settings::default()
     };
-    match calibrate::calibrate_fresh(&compile::open(bytes)?, job.objects, &origin, &terms, job.progress) {
+    let kept = &mut *job.kept.borrow_mut();
+    match calibrate::calibrate_fresh(&compile::open(bytes)?, job.objects, &origin, &terms, kept, job.progress) {
         Err(error) => match error.problem() {
             Some(Problem::Calibrate(problem)) => Ok(Err(problem.to_string())),
             _ => Err(error),

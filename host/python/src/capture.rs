@@ -179,6 +179,7 @@ pub(crate) fn capture(
         approaches,
         format: format.parse().map_err(Error::from)?,
         shard: shard.parse().map_err(Error::from)?,
+        ..Origin::default()
     };
     let settings = Settings { origin, resume, add, force, threads };
     settings.check()?;

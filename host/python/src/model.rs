@@ -321,6 +321,7 @@ pub(crate) fn compile(
         max_touches,
         priors,
         scales,
+        ..Settings::default()
     };
     let compiled = py.detach(|| match max_bytes {
         None => library::compile(ensemble, &settings),

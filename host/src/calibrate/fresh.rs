@@ -18,9 +18,32 @@ const MOST: u64 = 4_000_000;
 /// How much more is captured than is expected to be used.
 const SPARE: f64 = 1.15;
 
+/// Touches that were captured to calibrate on, kept for another model: of the same objects, touched in the same way, none is
+/// captured twice. Of others it begins anew.
+#[derive(Debug, Default)]
+pub struct Fresh {
+    origin: Option<Origin>,
+    /// From sample [`FIRST`] on.
+    objects: Vec<ObjectTouches>,
+}
+
+impl Fresh {
+    /// What is kept of these objects, touched like this, in their order.
+    fn of(&mut self, objects: &[(&str, &[Scene])], origin: &Origin) -> &mut [ObjectTouches] {
+        let names = self.objects.iter().map(|object| object.name.as_str());
+        if self.origin.as_ref() != Some(origin) || !names.eq(objects.iter().map(|(name, _)| *name)) {
+            self.origin = Some(origin.clone());
+            let none = |(name, _): &(&str, &[Scene])| ObjectTouches { name: (*name).into(), touches: Vec::new() };
+            self.objects = objects.iter().map(none).collect();
+        }
+        &mut self.objects
+    }
+}
+
 /// Captures touches of `objects` in memory, as many of each as about `settings.sequences` sequences take, and calibrates
 /// on them. `origin` says how objects are touched; its seed must be another than that of the training, and its number of
-/// touches does not matter.
+/// touches does not matter. What is `kept` of an earlier model is not captured again; what of the objects was kept must be
+/// of the same meshes.
 ///
 /// # Errors
 /// As [`calibrate`] and [`capture::capture`](fn@crate::capture::capture).
@@ -29,6 +52,7 @@ pub fn calibrate_fresh(
     objects: &[Object],
     origin: &Origin,
     settings: &Settings,
+    kept: &mut Fresh,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     let mut objects: Vec<&Object> = objects.iter().collect();
@@ -36,7 +60,7 @@ pub fn calibrate_fresh(
     let scenes = capture::scenes(&objects, origin, progress)?;
     let named: Vec<(&str, &[Scene])> =
         objects.iter().zip(&scenes).map(|(object, scenes)| (object.name.as_str(), scenes.as_slice())).collect();
-    let dataset = fresh(model, &named, origin, settings, progress)?;
+    let dataset = fresh(model, &named, origin, settings, kept, progress)?;
     calibrate(model, dataset, settings, progress)
 }
 
@@ -49,6 +73,7 @@ pub(crate) fn fresh(
     objects: &[(&str, &[Scene])],
     origin: &Origin,
     settings: &Settings,
+    kept: &mut Fresh,
     progress: &dyn Progress,
 ) -> Result<Dataset> {
     progress.begin("touching, to calibrate", None);
@@ -68,7 +93,15 @@ pub(crate) fn fresh(
         let count = SPARE * mean * (wanted + 3.0 * wanted.sqrt());
         (count.ceil() as u64).clamp(1, MOST)
     });
-    let more = objects.iter().zip(counts).map(|(object, count)| touch(object, FIRST..FIRST + count));
+    let more = objects.iter().zip(counts).zip(kept.of(objects, origin)).map(|((object, count), kept)| {
+        let has = kept.touches.len() as u64;
+        if has < count {
+            kept.touches.extend(touch(object, FIRST + has..FIRST + count)?.touches);
+        }
+        // As many as there are, if that is fewer than a machine counts.
+        let count = usize::try_from(count).unwrap_or(usize::MAX).min(kept.touches.len());
+        Ok(ObjectTouches { name: kept.name.clone(), touches: kept.touches[..count].to_vec() })
+    });
     Ok(Dataset { objects: more.collect::<Result<_>>()?, ..dataset })
 }
 

@@ -40,9 +40,9 @@ mod walk;
 
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
-pub use fresh::calibrate_fresh;
 #[cfg(feature = "cli")]
 pub(crate) use fresh::fresh;
+pub use fresh::{Fresh, calibrate_fresh};
 pub use model::{Calibrated, Settings, added_bytes, calibrate, calibrate_with};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};

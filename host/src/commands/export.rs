@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 ENSEMBLE is what `palpate train` saved, or a model of another library over features of any kind: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). Its content says which. `palpate verify` compares the model with it, and with the library.
 
 Leaves:
-  i16  two bytes per value: verdicts as the full model's (the default for up to 50 objects, and for rows of features)
-  i8   one byte per value: half the size, margins within hundredths of a nat (the default for touches of more objects)
+  i16  two bytes per value: verdicts as the full model's
+  i8   one byte per value: half the size, margins within hundredths of a nat
   f32  four bytes per value, added as the trainer adds them: the same margins
 
 Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.

@@ -150,7 +150,8 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64) -> Result<Vec<Sequ
         ..calibrate::Settings::default()
     };
     let origin = Origin { seed, approaches: false, ..context.settings.capture.clone() };
-    let dataset = calibrate::fresh(model, &objects, &origin, &settings, context.progress)?;
+    let dataset =
+        calibrate::fresh(model, &objects, &origin, &settings, &mut calibrate::Fresh::default(), context.progress)?;
     // The model's objects are the context's, in the same order.
     let mut supplies: Vec<Supply<'_>> = (0..names.len())
         .zip(&dataset.objects)

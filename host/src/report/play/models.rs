@@ -102,7 +102,7 @@ fn promising(
         seed: fresh.seed,
         ..calibrate::Settings::default()
     };
-    match calibrate_fresh(&compile::open(&bytes)?, objects, fresh, &terms, progress) {
+    match calibrate_fresh(&compile::open(&bytes)?, objects, fresh, &terms, &mut calibrate::Fresh::default(), progress) {
         Ok(calibrated) => Ok(calibrated.model),
         Err(error) if matches!(error.problem(), Some(Problem::Calibrate(_))) => Ok(bytes),
         Err(error) => Err(error),
