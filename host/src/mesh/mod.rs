@@ -1,7 +1,7 @@
 //! Triangle meshes: from files, or built in.
 //!
 //! - [`source`] finds objects by what a user names: `builtin`, a built-in object, a mesh file, a directory of them.
-//! - [`file`] reads one file: OBJ, STL, PLY, glTF or COLLADA, whichever its content says it is. [`obj`] writes one;
+//! - [`mod@file`] reads one file: OBJ, STL, PLY, glTF or COLLADA, whichever its content says it is. [`obj`] writes one;
 //!   [`builtin`] makes the ten objects that need no file.
 //! - [`Mesh`] is what comes out: vertices and triangles, in the file's own units. [`Object`] gives it a name.
 //! - [`facts`] says whether a mesh is closed and right side out, how large it is and what volume it encloses.

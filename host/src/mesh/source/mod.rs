@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 ///
 /// - `builtin`: the ten built-in objects;
 /// - `background`: one object of many different shapes, for a model's background column;
-/// - a mesh file of any of the kinds that [`file`] reads, or a directory, which is searched for files with one of the
+/// - a mesh file of any of the kinds that [`mod@file`] reads, or a directory, which is searched for files with one of the
 ///   extensions of [`file::EXTENSIONS`], subdirectories included; where a folder holds a name with several extensions, the
 ///   first of them is taken, and the object's notes say so;
 /// - the name of a built-in object, if there is no file of that name.
