@@ -76,6 +76,7 @@ pub use decide::{
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
+#[cfg(feature = "rows")]
 pub use layouts::batch::Batch;
 pub use model::{Model, Refused};
 pub use palpate_shared as shared;

@@ -117,6 +117,7 @@ pub(super) fn wide_split(
 }
 
 /// Splits the next tree off: all of its bytes, and its splits.
+#[cfg(feature = "rows")]
 pub(super) fn split_off<'m, const SIZE: usize>(nodes: &mut &'m [u8]) -> Option<(&'m [u8], &'m [[u8; SIZE]])> {
     let (&count, rest) = nodes.split_first_chunk()?;
     let length = usize::from(u16::from_le_bytes(count)) * SIZE;

@@ -1,7 +1,9 @@
 //! Features to ranks: where each value stands among the thresholds, looked up once per touch.
 
 use super::Sections;
-use crate::bytes::{Wrong, at, take};
+#[cfg(feature = "rows")]
+use crate::bytes::at;
+use crate::bytes::{Wrong, take};
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Axis, Layout};
 
@@ -55,6 +57,7 @@ pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
 }
 
 /// Ranks of many rows of `width` features: column by column, `stride` ranks each, which is a multiple of [`ABREAST`].
+#[cfg(feature = "rows")]
 pub(crate) fn rank_rows(model: &Sections<'_>, features: &[i32], width: usize, stride: usize, ranks: &mut [u8]) {
     let (axes, cuts) = model.axes_and_cuts();
     let mut cuts = Cuts(cuts);
@@ -88,9 +91,11 @@ pub(crate) fn rank_rows(model: &Sections<'_>, features: &[i32], width: usize, st
 
 /// Values whose ranks are searched in step: a search takes the same steps for every value, none of them a branch, and none
 /// waits for another's loads.
+#[cfg(feature = "rows")]
 const ABREAST: usize = 8;
 
 /// How many of an axis's `count` thresholds are at or below each value.
+#[cfg(feature = "rows")]
 fn ranks_among(table: &[i32; 256], count: u8, values: &[i32; ABREAST]) -> [u8; ABREAST] {
     let mut passed = [0_usize; ABREAST];
     let steps = count.checked_ilog2().map_or(0, |steps| steps + 1);

@@ -6,6 +6,7 @@ mod header;
 mod margins;
 mod optional;
 mod refused;
+#[cfg(feature = "rows")]
 mod rows;
 
 pub use refused::Refused;

@@ -123,7 +123,7 @@ fn all_at_once(ensemble: &Ensemble, touches: &[Touch], rows: &[Vec<f32>], hessbo
         let Ok(compiled) = compile(ensemble, &settings) else { continue };
         let model = Model::new(&compiled.bytes).expect("a valid model");
         let mut singly = vec![0; objects * touches.len()];
-        let mut row_by_row = |margins: &mut [i32]| {
+        let row_by_row = |margins: &mut [i32]| {
             for (touch, margins) in touches.iter().zip(margins.chunks_exact_mut(objects)) {
                 model.margins(touch, margins);
             }

@@ -140,7 +140,8 @@ fn plain<'a>(scene: &Scene, casts: &'a [Cast]) -> Engine<'a> {
     };
     let boxes: Vec<Inflated> = triangles.iter().map(inflated).collect();
     let settings = BvhBuildParams { max_prims_per_leaf: 8, ..BvhBuildParams::medium_build() };
-    let tree = build_bvh2(&boxes, settings, &mut std::time::Duration::ZERO);
+    let mut time = std::time::Duration::ZERO;
+    let tree = build_bvh2(&boxes, settings, &mut time);
     let triangles: Vec<Triangle> = tree.primitive_indices.iter().map(|&index| triangles[index as usize]).collect();
     Box::new(move |index| {
         let Cast { origin, direction } = casts[index];

@@ -77,10 +77,10 @@ class _Job:
     """What a worker needs to capture one shard."""
 
     name: str
-    mesh: str | Mesh
+    mesh: str | Mesh = field(compare=False)
     digest: str
-    """Of mesh, settings, version and target."""
-    options: dict[str, Any]
+    """Of mesh, settings, version and target: what jobs are compared by."""
+    options: dict[str, Any] = field(compare=False)
     part: int
     parts: int
     target: str
