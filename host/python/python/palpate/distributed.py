@@ -436,7 +436,7 @@ def train(
         **(parameters or {}),
     }
     booster = xgb.train(client, settings, matrix, num_boost_round=rounds)["booster"]
-    booster.set_attr(palpate_descriptor=descriptor, palpate_objects="\t".join(names))
+    booster.set_attr(palpate_descriptor=descriptor, palpate_objects=json.dumps(names))
     return Ensemble.from_bytes(bytes(booster.save_raw("json")))
 
 
