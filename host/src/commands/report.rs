@@ -13,7 +13,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate report                    the built-in objects, in about ten minutes
-  palpate report --quick -o quick   fewer touches, in half a minute
+  palpate report --quick -o quick   fewer touches, in a minute or two
   palpate report meshes/ -o report  your own meshes
   palpate report meshes/ --true-size --unit mm --probe probe.toml
                                     objects as large as they are, and your probe

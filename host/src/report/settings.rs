@@ -102,7 +102,7 @@ impl Settings {
         }
     }
 
-    /// The same figures in half a minute.
+    /// The same figures in a minute or two.
     pub fn quick(sources: Vec<String>, seed: u64) -> Self {
         Self {
             quick: true,
