@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _thread
 import pickle
+import signal
 import threading
 import time
 from pathlib import Path
@@ -92,9 +93,14 @@ def test_control_c_stops_a_long_call_and_other_threads_run_meanwhile() -> None:
 
     counter = threading.Thread(target=count)
     counter.start()
-    threading.Timer(0.3, _thread.interrupt_main).start()
-    with pytest.raises(KeyboardInterrupt):
-        palpate.capture("bowl", touches=10**9)
-    running = False
-    counter.join()
+    # A program in the background of a shell ignores Ctrl-C, and hands that on.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.3, _thread.interrupt_main).start()
+        with pytest.raises(KeyboardInterrupt):
+            palpate.capture("bowl", touches=10**9)
+    finally:
+        signal.signal(signal.SIGINT, before)
+        running = False
+        counter.join()
     assert counted > 1
