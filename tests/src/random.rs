@@ -24,6 +24,19 @@ pub struct Shape {
     pub leaf: f32,
 }
 
+impl Shape {
+    /// Four trees of depth 3 over curvature, for three objects.
+    pub const SMALL: Self = Self {
+        descriptor: Descriptor::Curvature,
+        objects: 3,
+        trees: 4,
+        depth: 3,
+        each: true,
+        thresholds: 6,
+        leaf: 1.0,
+    };
+}
+
 /// A random ensemble; thresholds repeat, stand next to whole numbers, and lie between them.
 pub fn ensemble(shape: Shape, seed: u64) -> Ensemble {
     let mut rng = SmallRng::seed_from_u64(seed);

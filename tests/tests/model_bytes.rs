@@ -22,15 +22,7 @@ const TRAINED: Trained = Trained {
 
 /// A small model in each layout and leaf type, of either version.
 fn models() -> Vec<Vec<u8>> {
-    let shape = Shape {
-        descriptor: Descriptor::Curvature,
-        objects: 3,
-        trees: 4,
-        depth: 3,
-        each: true,
-        thresholds: 6,
-        leaf: 1.0,
-    };
+    let shape = Shape::SMALL;
     let mut models = Vec::new();
     for each in [true, false] {
         for &leaf in Leaf::ALL {

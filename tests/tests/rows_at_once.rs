@@ -150,16 +150,7 @@ proptest! {
 
 #[test]
 fn rows_that_are_not_whole_are_refused() {
-    let shape = Shape {
-        descriptor: Descriptor::Curvature,
-        objects: 3,
-        trees: 4,
-        depth: 3,
-        each: true,
-        thresholds: 6,
-        leaf: 1.0,
-    };
-    let bytes = compile(&random::ensemble(shape, 5), &Settings::default()).unwrap().bytes;
+    let bytes = compile(&random::ensemble(Shape::SMALL, 5), &Settings::default()).unwrap().bytes;
     let model = Model::new(&bytes).unwrap();
     let mut batch = Box::new(Batch::new());
     let mut margins = [7; 12];

@@ -2,6 +2,7 @@
 
 use crate::arrays::{Input, Output, one, triples, two};
 use crate::failure::Failure;
+use crate::named::{descriptor_of, noise_of};
 use crate::objects::{DataFrame, Probe};
 use crate::work::long;
 use numpy::ndarray::{Ix1, Ix2};
@@ -9,7 +10,6 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use palpate::ensemble::feature_row;
 use palpate::error::Error;
 use palpate::shared::{Q15_ONE, Touch};
-use palpate::touches::noise::{Noise, quantity};
 use palpate::touches::{Dataset, Format, Listing, ObjectTouches, Origin, folds, touch_of_seconds};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -254,7 +254,7 @@ impl DataSet {
     /// 32767), NaN where one is missing: for training with another library. The code is the chip's.
     #[pyo3(signature = (descriptor="curvature"))]
     fn features<'py>(&self, py: Python<'py>, descriptor: &str) -> Result<Output<'py, f32, Ix2>, Failure> {
-        let descriptor = crate::ensemble::descriptor_of(descriptor)?;
+        let descriptor = descriptor_of(descriptor)?;
         let rows = py.detach(|| self.touches().flat_map(|touch| feature_row(descriptor, touch)).collect());
         Ok(two(py, rows, descriptor.feature_count())?)
     }
@@ -303,16 +303,4 @@ impl DataSet {
     fn write(&self, py: Python<'_>, directory: PathBuf, format: Format) -> Result<(), Failure> {
         long(py, None, |_| self.dataset.write(&directory, format, self.approaches.as_deref()))
     }
-}
-
-/// Noise as users write it.
-pub(crate) fn noise_of(deviation: &str, timer: &str) -> Result<Noise, Failure> {
-    let mut noise = Noise::default();
-    if !deviation.is_empty() {
-        noise.deviation = deviation.parse().map_err(Error::from)?;
-    }
-    if !timer.is_empty() {
-        noise.timer = quantity::duration(timer).map_err(Error::from)?;
-    }
-    Ok(noise)
 }

@@ -1,8 +1,9 @@
 //! Full models: trained here, or by other libraries.
 
 use crate::arrays::{Input, Output, two};
-use crate::data::{DataSet, noise_of};
+use crate::data::DataSet;
 use crate::failure::Failure;
+use crate::named::{descriptor_of, noise_of};
 use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{self, PartTree, Parts};
@@ -235,10 +236,4 @@ pub(crate) fn train(
         Some(background) => library::train_with_background(dataset, background, &settings, progress),
     })?;
     Ok(Ensemble { ensemble: Arc::new(ensemble) })
-}
-
-/// The descriptor with this name.
-pub(crate) fn descriptor_of(name: &str) -> palpate::Result<Descriptor> {
-    let all = || Descriptor::ALL.map(Descriptor::name).join(", ");
-    Descriptor::from_name(name).ok_or_else(|| Error::setting("descriptor", name, format!("one of {}", all())))
 }

@@ -1,10 +1,11 @@
 //! How often a model is right; how far it is from its ensemble. What is found comes as JSON, which `palpate` turns into
 //! values of its own classes.
 
-use crate::data::{DataSet, noise_of};
+use crate::data::DataSet;
 use crate::ensemble::Ensemble;
 use crate::failure::Failure;
 use crate::model::Model;
+use crate::named::noise_of;
 use crate::work::{Callback, long};
 use palpate::ensemble::StatedProbe;
 use palpate::error::Error;

@@ -8,6 +8,7 @@ mod ensemble;
 mod evaluate;
 mod failure;
 mod model;
+mod named;
 mod objects;
 mod recognizer;
 mod surface;

@@ -19,7 +19,7 @@ const MOST: u64 = 4_000_000;
 const SPARE: f64 = 1.15;
 
 /// Touches that were captured to calibrate on, kept for another model: of the same objects, touched in the same way, none is
-/// captured twice. Of others it begins anew.
+/// captured twice. Touches of other objects replace what was kept.
 #[derive(Debug, Default)]
 pub struct Fresh {
     origin: Option<Origin>,

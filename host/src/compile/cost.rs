@@ -6,8 +6,9 @@
 //! (`onboard/README.md` lists them), within 10 % of each. Flash of the code is that of the firmware's `verdict` image,
 //! RAM and stack are those that `evaluator` prints. All figures are of the firmware's profile (`opt-level = "s"`).
 
+use super::groups::groups_and_splits;
 use palpate_onboard::Model;
-use palpate_shared::format::{Axis, Group, HEADER_LENGTH, Layout, LeafType};
+use palpate_shared::format::{Group, Layout, LeafType};
 use serde::Serialize;
 
 /// A processor that costs are known for.
@@ -57,22 +58,9 @@ impl Core {
 impl Instructions {
     /// What a touch costs in a compiled model.
     pub fn of_model(model: &Model<'_>) -> Self {
-        let header = model.header();
         let objects = model.object_count();
-        let axes = usize::from(header.axes());
-        let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-        // The order of sections that FORMAT.md gives.
-        let groups_start = HEADER_LENGTH
-            + length(header.text_length())
-            + length(header.optional_length())
-            + 8 * objects
-            + Axis::LENGTH * axes
-            + length(header.cuts_length());
-        let groups_end = groups_start + Group::LENGTH * usize::from(header.groups());
-        let bytes = model.bytes();
-        let records = bytes.get(groups_start..groups_end).unwrap_or_default();
-        let groups: Vec<Group> = records.as_chunks().0.iter().filter_map(|record| Group::from_bytes(*record)).collect();
-        let nodes = bytes.get(groups_end..groups_end + length(header.nodes_length())).unwrap_or_default();
+        let axes = usize::from(model.header().axes());
+        let (groups, nodes) = groups_and_splits(model);
         let is_shared = model.shared_leaves().is_some();
         let (layout, leaf) = (model.layout(), model.leaf_type());
         Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared })

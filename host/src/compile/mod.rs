@@ -41,6 +41,7 @@ mod cost;
 mod emit;
 mod fit;
 mod forest;
+mod groups;
 mod layout;
 mod model;
 mod parts;
@@ -57,6 +58,7 @@ mod write;
 pub use cost::{Core, Instructions, Memory};
 pub use emit::{Language, emit};
 pub use fit::compile_within;
+pub(crate) use groups::leaves_of_trees;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
@@ -108,8 +110,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What is usual for a model of touches of so many objects: leaves of one byte with more than
-    /// [`MANY`], where nearly all of a model is leaves; otherwise the default.
+    /// The defaults for a model of touches of this number of objects: leaves of one byte for more than [`MANY`] objects,
+    /// where nearly all of a model is leaves, and two bytes for fewer.
     pub fn for_touches(objects: usize) -> Self {
         let leaf = if objects > MANY { Leaf::I8 } else { Leaf::I16 };
         Self { leaf, ..Self::default() }

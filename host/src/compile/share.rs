@@ -1,10 +1,11 @@
 //! Equal leaves once: what stands for a leaf is its number in a table.
 
+use super::groups::leaves_of_trees;
 use super::parts::Parts;
 use crate::error::Result;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    Axis, CHECKSUM_LENGTH, Group, HEADER_LENGTH, HeaderBuilder, Layout, LeafType, SharedLeaves, Tag, checksum,
+    CHECKSUM_LENGTH, Group, HEADER_LENGTH, HeaderBuilder, LeafType, SharedLeaves, Tag, checksum,
 };
 use std::collections::HashMap;
 
@@ -58,10 +59,10 @@ pub fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
     let numbers = &bytes[end - length(header.leaves_length())..end];
     let mut leaves = Vec::new();
     let mut index = 0;
-    for (group, count) in leaves_of_groups(model) {
+    for (group, trees) in leaves_of_trees(model) {
         let values = if group.object.is_some() { 1 } else { model.object_count() };
         let length = values * model.leaf_type().size();
-        for _ in 0..count {
+        for _ in 0..trees.into_iter().sum() {
             let start = usize::from(shared.number(numbers, index)) * length;
             leaves.extend_from_slice(&shared.values()[start..start + length]);
             index += 1;
@@ -87,37 +88,6 @@ pub fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
 /// one for each object, how many values.
 pub fn different_leaves(model: &Model<'_>) -> Option<usize> {
     let values = model.shared_leaves()?.values().len() / model.leaf_type().size();
-    let has_one_for_each = leaves_of_groups(model).iter().all(|(group, _)| group.object.is_none());
+    let has_one_for_each = leaves_of_trees(model).iter().all(|(group, _)| group.object.is_none());
     Some(if has_one_for_each { values / model.object_count() } else { values })
-}
-
-/// The groups of a model, and how many leaves the trees of each have.
-fn leaves_of_groups(model: &Model<'_>) -> Vec<(Group, usize)> {
-    let (bytes, header) = (model.bytes(), model.header());
-    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-    let groups = HEADER_LENGTH
-        + length(header.text_length())
-        + length(header.optional_length())
-        + 8 * model.object_count()
-        + Axis::LENGTH * usize::from(header.axes())
-        + length(header.cuts_length());
-    let nodes = groups + Group::LENGTH * usize::from(header.groups());
-    let mut rest = &bytes[nodes..];
-    let records = bytes[groups..nodes].as_chunks().0;
-    let mut found = Vec::new();
-    for group in records.iter().filter_map(|record| Group::from_bytes(*record)) {
-        let mut count = 0;
-        for _ in 0..group.trees {
-            count += match model.layout() {
-                Layout::Complete => 1_usize << group.depth,
-                layout => {
-                    let splits = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
-                    rest = &rest[2 + splits * if layout == Layout::Wide { 6 } else { 3 }..];
-                    splits + 1
-                }
-            };
-        }
-        found.push((group, count));
-    }
-    found
 }

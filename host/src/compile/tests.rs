@@ -447,7 +447,7 @@ fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
     assert_eq!(problem, Some(crate::error::Problem::Compile(over)));
 }
 
-/// Trees of three splits over the oriented touch's features, whose leaves are the first so many of a sequence.
+/// Trees of three splits over the oriented touch's features, whose leaves are taken from the start of a sequence.
 fn few_leaves(trees: usize, different: usize) -> Ensemble {
     let values = |number: usize| leaf(&[(number % different) as f32 / 1024.0, -((number % different) as f32) / 2048.0]);
     let tree = |tree: usize| {

@@ -350,7 +350,7 @@ impl TouchesProblem {
                 "If it is meant, keep the touches alone: mcap filter LOG -o TOUCHES.mcap -y TOPIC."
             }
             Self::TooMany { .. } => "Divide the log: mcap filter LOG -o PART.mcap --start TIME --end TIME.",
-            Self::OtherCompression { .. } => "Compress it anew: mcap compress LOG -o OTHER.mcap --compression zstd.",
+            Self::OtherCompression { .. } => "Compress it again: mcap compress LOG -o OTHER.mcap --compression zstd.",
             Self::OtherEncoding { .. } | Self::OtherDefinition { .. } => {
                 "Log them as docs/mcap.md says: JSON, or CDR by the definitions in host/msg."
             }

@@ -5,7 +5,7 @@ use super::reference::{self, Reference};
 use crate::compile;
 use crate::ensemble::{Ensemble, Output};
 use palpate_onboard::Model;
-use palpate_shared::format::{Axis, CHECKSUM_LENGTH, Group, HEADER_LENGTH, Layout, LeafType, checksum};
+use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Layout, LeafType, checksum};
 use std::ops::Range;
 
 /// The first tree, in the ensemble's order, of which the model adds another leaf for this row than the ensemble does.
@@ -64,31 +64,12 @@ fn leaves(model: &Model<'_>) -> Option<Vec<Leaves>> {
     if matches!(model.layout(), Layout::Grid | Layout::Patterns) {
         return None;
     }
-    let header = model.header();
-    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-    let groups = HEADER_LENGTH
-        + length(header.text_length())
-        + length(header.optional_length())
-        + 8 * model.object_count()
-        + Axis::LENGTH * usize::from(header.axes())
-        + length(header.cuts_length());
-    let nodes = groups + Group::LENGTH * usize::from(header.groups());
-    let mut rest = model.bytes().get(nodes..nodes + length(header.nodes_length()))?;
-    let mut at = nodes + rest.len();
+    let length = usize::try_from(model.header().leaves_length()).ok()?;
+    let mut at = model.bytes().len() - CHECKSUM_LENGTH - length;
     let mut found = Vec::new();
-    for bytes in model.bytes().get(groups..nodes)?.as_chunks().0 {
-        let group = Group::from_bytes(*bytes)?;
+    for (group, trees) in compile::leaves_of_trees(model) {
         let values = if group.object.is_some() { 1 } else { model.object_count() };
-        for _ in 0..group.trees {
-            let leaves = match model.layout() {
-                Layout::Complete => 1_usize << group.depth,
-                layout => {
-                    let (splits, after) = rest.split_first_chunk()?;
-                    let splits = usize::from(u16::from_le_bytes(*splits));
-                    rest = after.get(splits * if layout == Layout::Wide { 6 } else { 3 }..)?;
-                    splits + 1
-                }
-            };
+        for leaves in trees {
             let end = at + leaves * values * model.leaf_type().size();
             found.push(Leaves { bytes: at..end, shift: group.shift });
             at = end;

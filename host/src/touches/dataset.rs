@@ -1,7 +1,9 @@
 //! A data set: a directory with one file per object.
 
 use super::checksum::checksum;
+use super::files::files;
 use super::noise::Noise;
+use super::warning::Warning;
 use super::{Entry, Format, Listing, Log, Origin, Recorded, is_log, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
@@ -32,32 +34,6 @@ pub struct ObjectTouches {
     pub name: String,
     /// Its touches, in the order of the file; at least one.
     pub touches: Vec<Touch>,
-}
-
-/// What looks wrong about a data set, and may be meant.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Warning {
-    /// A text file has as many touches as `dataset.json` states, but was changed since its capture.
-    #[error("{}: changed since its capture: its checksum is not the one in {}", path.display(), Listing::FILE)]
-    Changed {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A log has channels without touches and verdicts.
-    #[error("{}: skipped {}", path.display(), channels_said(channels))]
-    SkippedChannels {
-        /// The log.
-        path: PathBuf,
-        /// The channels: topics, with the names of their schemas.
-        channels: Vec<String>,
-    },
-    /// The last line of a recorded file is not whole.
-    #[error("{}: its last line is not whole and was not read: a recording was interrupted", path.display())]
-    HalfLine {
-        /// The file.
-        path: PathBuf,
-    },
 }
 
 impl Dataset {
@@ -260,23 +236,6 @@ fn read_listed(entry: &Entry, format: Format, path: &Path, warnings: &mut Vec<Wa
     Ok(touches)
 }
 
-/// The objects' names and files in a directory, sorted by name, whatever a listing says.
-pub(crate) fn files(directory: &Path) -> Result<Vec<(String, PathBuf, Format)>> {
-    let io = |source| Error::io(directory, "read the data set", source);
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(directory).map_err(io)? {
-        let path = entry.map_err(io)?.path();
-        let is_in = |format: &Format| path.extension().is_some_and(|extension| extension == format.extension());
-        if let Some(format) = Format::ALL.into_iter().find(is_in)
-            && let Some(name) = path.file_stem().and_then(|stem| stem.to_str())
-        {
-            files.push((name.to_owned(), path, format));
-        }
-    }
-    files.sort();
-    Ok(files)
-}
-
 /// Touches of an object, and the file that has them, or the first of several.
 struct Found {
     touches: Vec<Touch>,
@@ -314,18 +273,6 @@ pub(crate) fn logs(directory: &Path) -> Result<Vec<PathBuf>> {
 /// The object that a file is called like.
 pub(super) fn name_of(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// Some channels by name, and how many others.
-pub(super) fn channels_said(channels: &[String]) -> String {
-    const SHOWN: usize = 8;
-    let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
-    let count = match channels.len() {
-        1 => "1 other channel".to_owned(),
-        count => format!("{count} other channels"),
-    };
-    let more = if channels.len() > SHOWN { ", …" } else { "" };
-    format!("{count}: {shown}{more}")
 }
 
 #[cfg(test)]

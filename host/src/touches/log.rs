@@ -1,5 +1,6 @@
 //! Touches out of a robot's log, which is an MCAP file: `docs/mcap.md` says what belongs in it.
 
+use super::logged::{Channels, LoggedVerdict, Message, Said};
 use super::{ObjectTouches, Warning, mcap, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
@@ -36,59 +37,6 @@ pub struct Logged {
     pub offset: u64,
     /// The object's number among the log's.
     object: Option<u32>,
-}
-
-/// The channels of a log: topics, with the names of their schemas.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Channels {
-    /// Those with touches.
-    pub touches: Vec<String>,
-    /// Those with verdicts.
-    pub verdicts: Vec<String>,
-    /// Those that were skipped.
-    pub others: Vec<String>,
-}
-
-/// A message of a log that was understood.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Message {
-    /// When it was logged, in nanoseconds on the log's clock.
-    pub time: u64,
-    /// The byte at which the message, or the chunk with it, begins.
-    pub offset: u64,
-    /// What it says.
-    pub said: Said,
-}
-
-/// What a message of a log says.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Said {
-    /// A touch, and of which object, where that is known.
-    Touch(Touch, Option<String>),
-    /// A verdict.
-    Verdict(LoggedVerdict),
-}
-
-/// A verdict as logs hold it: the fields of `palpate recognize --json`, and the posterior of every object.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LoggedVerdict {
-    /// How many touches it rests on.
-    pub touch: u32,
-    /// One of [`VERDICTS`](Self::VERDICTS).
-    pub verdict: String,
-    /// The likeliest object; empty before the first touch.
-    pub object: String,
-    /// Its posterior, from 0 to 1.
-    pub posterior: f64,
-    /// Why the touch was not counted.
-    pub refused: Option<String>,
-    /// The posterior of every object.
-    pub posteriors: Vec<(String, f64)>,
-}
-
-impl LoggedVerdict {
-    /// What a verdict can be.
-    pub const VERDICTS: [&'static str; 4] = ["undecided", "recognized", "unknown", "gave-up"];
 }
 
 /// Whether a file, or a stream, is a log, by how it begins.

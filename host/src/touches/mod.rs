@@ -35,10 +35,12 @@
 pub mod check;
 mod checksum;
 mod dataset;
+mod files;
 pub mod folds;
 mod format;
 mod listing;
 mod log;
+mod logged;
 #[cfg(feature = "mcap")]
 pub mod mcap;
 #[cfg(not(feature = "mcap"))]
@@ -55,16 +57,20 @@ mod shard;
 #[cfg(all(test, feature = "train"))]
 pub(crate) mod synthetic;
 pub mod text;
+mod warning;
 
 pub(crate) use checksum::checksum;
-pub use dataset::{Dataset, ObjectTouches, Warning};
-pub(crate) use dataset::{files, logs};
+pub(crate) use dataset::logs;
+pub use dataset::{Dataset, ObjectTouches};
+pub(crate) use files::files;
 pub use format::Format;
 pub use listing::{Entry, Listing};
-pub use log::{Channels, Log, LogWriter, Logged, LoggedVerdict, Message, Said, begins_log, is_log, read_touches};
+pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};
+pub use logged::{Channels, LoggedVerdict, Message, Said};
 pub use origin::Origin;
 pub(crate) use origin::{tenth, unit};
 pub use recording::{Recorded, Recording};
 pub use seconds::touch_of_seconds;
 pub use shard::Shard;
 pub use text::{parse_touch, write_touch};
+pub use warning::Warning;

@@ -1,6 +1,6 @@
 //! In place of what reads and writes logs where the feature `mcap` is off: an error that says so.
 
-use super::log::{Channels, LoggedVerdict, Message};
+use super::logged::{Channels, LoggedVerdict, Message};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use palpate_shared::Touch;
 use std::convert::Infallible;

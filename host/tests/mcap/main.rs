@@ -263,7 +263,7 @@ fn what_cannot_be_read_is_refused_by_name_with_the_way_round() {
     }
     let said = error(&file(&[chunk("brotli", 4, 0, b"1234")]));
     assert!(
-        said.contains("a chunk is compressed as \"brotli\", where zstd and lz4 are known. Compress it anew: "),
+        said.contains("a chunk is compressed as \"brotli\", where zstd and lz4 are known. Compress it again: "),
         "{said}"
     );
 }

@@ -8,7 +8,8 @@ mod summary;
 pub use summary::{ObjectSummary, Quantiles, Summary};
 
 use super::checksum::{Checked, checksum};
-use super::dataset::{channels_said, name_of};
+use super::dataset::name_of;
+use super::warning::channels_said;
 use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Warning, is_log, logs, text};
 use crate::error::{Error, Place, Problem, Result, TouchesProblem};
 use palpate_shared::Touch;

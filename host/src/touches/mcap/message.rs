@@ -3,7 +3,7 @@
 use super::Kind;
 use crate::error::TouchesProblem;
 use crate::touches::listing::is_file_name;
-use crate::touches::log::{LoggedVerdict, Said};
+use crate::touches::logged::{LoggedVerdict, Said};
 use crate::touches::touch_of_seconds;
 use byteorder::{BigEndian, LittleEndian};
 use palpate_shared::{Q15_ONE, Touch};

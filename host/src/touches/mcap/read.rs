@@ -4,7 +4,7 @@ use super::message::Encoding;
 use super::records::{self, Chunk};
 use super::{Kind, LARGEST, chunk};
 use crate::error::{Error, Place, Result, TouchesProblem};
-use crate::touches::log::{Channels, Message};
+use crate::touches::logged::{Channels, Message};
 use ::mcap::records::op;
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use ::mcap::{MAGIC, McapError};

@@ -3,7 +3,7 @@
 use super::Kind;
 use super::message::{touch_json, verdict_json};
 use crate::error::{Error, Result};
-use crate::touches::log::LoggedVerdict;
+use crate::touches::logged::LoggedVerdict;
 use ::mcap::records::MessageHeader;
 use ::mcap::{McapError, WriteOptions};
 use palpate_shared::Touch;

@@ -9,9 +9,9 @@
 mod tests;
 
 use super::checksum::CRC;
-use super::dataset::{Warning, files};
+use super::files::files;
 use super::listing::is_file_name;
-use super::{Entry, Format, Listing, Origin, text, write_touch};
+use super::{Entry, Format, Listing, Origin, Warning, text, write_touch};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use crc::{Digest, Table};

@@ -1,26 +1,7 @@
 //! What recordings cannot tell, and what to record next.
 
-use super::outcome::{Estimate, Fit};
+use super::outcome::{Estimate, Fit, Warning};
 use super::timer::Timer;
-use serde::Serialize;
-use std::fmt;
-
-/// Something that the recordings tell badly or not at all.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Warning {
-    /// What: "the speed's factor".
-    pub what: String,
-    /// How well it is told: "0.90 to 1.12".
-    pub told: String,
-    /// What to record, a sentence.
-    pub record: String,
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({}). {}", self.what, self.told, self.record)
-    }
-}
 
 /// How wide an interval may be before there is a warning: of the speed, of offsets in milliseconds, of the noise as a share
 /// of it, of shares of missed contacts.

@@ -9,7 +9,7 @@
 //! faces (κ = 0 but for the noise) and the farthest edges. Tables are made for steps of σ as they are needed, and read with
 //! interpolation; what a candidate probe does to times (factor, offsets) is undone before a table is read.
 
-use super::likelihood::{Candidate, Kept};
+use super::candidate::{Candidate, Kept, NOISE};
 use crate::random::{self, Purpose};
 use palpate_shared::Touch;
 use rand::RngExt;
@@ -17,9 +17,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Standard deviations of the tables, in milliseconds: the least, how much each is larger than the one before, and how
+/// Standard deviations of the tables begin at the least of [`NOISE`]: how much larger each is than the one before, and how
 /// many there are.
-const LEAST: f64 = 0.1;
 const RATIO: f64 = 1.3;
 const LEVELS: usize = 22;
 /// By how much of its distance from 0 a simulated touch is smoothed.
@@ -33,9 +32,6 @@ const REACH: f64 = 3.0;
 
 /// Simulated approaches that are kept as they are.
 const SOME: usize = 4_000;
-
-/// The largest and least noise that tables exist for, in milliseconds.
-pub(super) const NOISE: [f64; 2] = [LEAST, 25.0];
 
 /// What was observed of a touch: which fingers touched, and how far apart in time, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -297,7 +293,7 @@ impl Densities {
 
     fn level(&self, level: usize) -> &Level {
         self.levels[level].get_or_init(|| {
-            let deviation = LEAST * RATIO.powi(i32::try_from(level).unwrap_or(0));
+            let deviation = NOISE[0] * RATIO.powi(i32::try_from(level).unwrap_or(0));
             let pair = 2.0_f64.sqrt() * deviation;
             let lines = |samples: &[Vec<f32>; 2]| [0, 1].map(|which: usize| Line::new(&samples[which], pair));
             Level {
@@ -310,7 +306,7 @@ impl Densities {
 
     /// The densities under this noise, in milliseconds; noise that no table exists for counts as the nearest.
     pub(super) fn under(&self, noise: f64) -> Smoothed<'_> {
-        let position = ((noise / LEAST).ln() / RATIO.ln()).clamp(0.0, (LEVELS - 1) as f64);
+        let position = ((noise / NOISE[0]).ln() / RATIO.ln()).clamp(0.0, (LEVELS - 1) as f64);
         let level = (position.floor() as usize).min(LEVELS - 2);
         Smoothed { levels: [self.level(level), self.level(level + 1)], share: position - level as f64 }
     }

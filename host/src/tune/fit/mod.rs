@@ -31,20 +31,21 @@
 //! ```
 
 mod advice;
+mod candidate;
 mod density;
 mod likelihood;
 mod outcome;
 mod posed;
+mod recording;
 mod search;
 mod suspects;
 #[cfg(all(test, feature = "objects"))]
 mod tests;
 mod timer;
 
-pub use advice::Warning;
 #[cfg(feature = "cli")]
 pub(crate) use outcome::between;
-pub use outcome::{Estimate, Fit};
+pub use outcome::{Estimate, Fit, Warning};
 pub use suspects::Suspect;
 
 use crate::capture;
@@ -53,10 +54,12 @@ use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Origin};
+use candidate::{Candidate, Kept};
 use density::{Densities, FULL, Observed};
-use likelihood::{Candidate, Explained, Kept, Plate, Recording};
+use likelihood::{Explained, Plate};
 use palpate_shared::Touch;
 use rayon::prelude::*;
+use recording::Recording;
 use search::Best;
 use timer::Timer;
 
@@ -97,7 +100,7 @@ impl Evidence<'_> {
         let of = |index: usize| {
             let recording = &self.recordings[index];
             let explained = Explained::new(candidate, &self.objects[self.of[index]], recording.kept);
-            explained.of_recording(recording)
+            recording.log_likelihood(&explained)
         };
         let plate = self.plate.as_ref().map_or(0.0, |plate| plate.log_likelihood(candidate));
         (0..self.recordings.len()).filter(|index| which(*index)).map(of).sum::<f64>() + plate + candidate.usual()
@@ -147,7 +150,9 @@ pub fn fit(
     let (best, ends) = searched(&evidence, progress)?;
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
-    Ok(outcome::outcome(&evidence, &best, &ends, timer, suspects, settings))
+    let mut fit = outcome::outcome(&evidence, &best, &ends, timer, suspects, settings);
+    fit.warnings = advice::warnings(&fit, timer);
+    Ok(fit)
 }
 
 /// The place of the object with this name.
@@ -203,7 +208,7 @@ fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, V
     for _ in 0..4 {
         progress::check(progress)?;
         let interval = |index: usize| search::interval(&likelihood, &best, index);
-        let ends: Vec<search::Ends> = (0..likelihood::NUMBERS).into_par_iter().map(interval).collect();
+        let ends: Vec<search::Ends> = (0..candidate::NUMBERS).into_par_iter().map(interval).collect();
         let better = ends.iter().filter_map(|end| end.better);
         let Some(better) = better.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)) else {
             return Ok((best, ends));
@@ -212,7 +217,7 @@ fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, V
     }
     progress::check(progress)?;
     let ends =
-        (0..likelihood::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
+        (0..candidate::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
     Ok((best, ends))
 }
 

@@ -1,7 +1,6 @@
 //! What a fit found, and the probe file that states it.
 
-use super::advice::{self, Warning};
-use super::likelihood::{Candidate, Kept};
+use super::candidate::{Candidate, Kept};
 use super::search::{Best, Ends};
 use super::suspects::Suspect;
 use super::{Evidence, Settings, Timer};
@@ -9,7 +8,7 @@ use crate::probe::approach::{FINGERS, Probe};
 use crate::touches::noise::Noise;
 use palpate_shared::format::Length;
 use serde::Serialize;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 
 /// A value, and between what it is with a probability of 95 %; an end is none where the recordings do not tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -31,6 +30,23 @@ impl Estimate {
     /// Whether the interval holds a value.
     pub fn holds(&self, value: f64) -> bool {
         self.low.is_none_or(|low| low <= value) && self.high.is_none_or(|high| value <= high)
+    }
+}
+
+/// Something that the recordings tell badly or not at all.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Warning {
+    /// What: "the speed's factor".
+    pub what: String,
+    /// How well it is told: "0.90 to 1.12".
+    pub told: String,
+    /// What to record, a sentence.
+    pub record: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}). {}", self.what, self.told, self.record)
     }
 }
 
@@ -66,7 +82,7 @@ pub struct Fit {
     pub suspects: Vec<Suspect>,
 }
 
-/// Gathers what was found.
+/// Gathers what was found; warnings are still to come.
 pub(super) fn outcome(
     evidence: &Evidence<'_>,
     best: &Best,
@@ -92,7 +108,7 @@ pub(super) fn outcome(
     let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Kept::Full);
     let missed =
         [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
-    let mut fit = Fit {
+    Fit {
         probe: settings.origin.probe,
         unit: settings.origin.unit,
         speed_factor: estimate(0, true, &|candidate: &Candidate| 1.0 / candidate.factor),
@@ -106,9 +122,7 @@ pub(super) fn outcome(
         objects: evidence.recordings.iter().map(|own| own.name.to_owned()).collect(),
         warnings: Vec::new(),
         suspects,
-    };
-    fit.warnings = advice::warnings(&fit, timer);
-    fit
+    }
 }
 
 impl Fit {

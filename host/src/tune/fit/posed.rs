@@ -5,8 +5,9 @@
 //! so a share of the density stays that of all poses.
 
 use super::Settings;
+use super::candidate::{Candidate, Kept};
 use super::density::{FULL, Observed};
-use super::likelihood::{Candidate, Explained, Kept, product};
+use super::likelihood::{Explained, product};
 use crate::probe::approach::Approach;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};

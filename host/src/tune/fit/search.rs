@@ -1,6 +1,6 @@
 //! The candidate that explains recorded touches best, and how far from it one still may be.
 
-use super::likelihood::{Candidate, NUMBERS};
+use super::candidate::{Candidate, NUMBERS};
 use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
 

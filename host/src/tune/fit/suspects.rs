@@ -6,8 +6,9 @@
 //! alarm once in a thousand recordings.
 
 use super::Evidence;
+use super::candidate::Candidate;
 use super::density::Observed;
-use super::likelihood::{Candidate, Explained};
+use super::likelihood::Explained;
 use super::search::{self, Best};
 use crate::error::Result;
 use crate::progress::{self, Progress};
