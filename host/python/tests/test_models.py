@@ -139,3 +139,13 @@ def test_the_same_seed_trains_the_same_model(touches: palpate.DataSet) -> None:
     assert one.to_bytes() == two.to_bytes()
     other = palpate.compile(palpate.train(touches, **{**options, "seed": 8}))
     assert other.to_bytes() != one.to_bytes()
+
+
+def test_few_different_leaves_make_a_smaller_model(touches: palpate.DataSet) -> None:
+    options = {"rounds": 30, "depth": 5, "min_child_weight": 1.0}
+    plain = palpate.compile(palpate.train(touches, **options), leaf="i8", goal="size")
+    few = palpate.train(touches, leaf_bits=8, different_leaves=16, threshold_cost=1e-4, **options)
+    small = palpate.compile(few, leaf="i8", goal="size")
+    assert len(small.to_bytes()) < len(plain.to_bytes())
+    with pytest.raises(palpate.SettingError, match="threshold_cost"):
+        palpate.train(touches, threshold_cost=1e-4)

@@ -1,5 +1,6 @@
 //! Sequences of a data set's touches: whole ones, no touch in two of them.
 
+use super::ahead::Ahead;
 use super::sequence::{Sequence, odds_of};
 use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
@@ -105,23 +106,20 @@ impl<'d> Supply<'d> {
         // Models have at most 256 objects, and the caller makes room for as many.
         let never = Stopping::from_odds(0, u32::MAX);
         let Ok(mut recognizer) = Recognizer::<N>::new(model, never) else { return Ok(Vec::new()) };
+        let mut ahead = Ahead::new(model, self.pools.len(), self.is_once);
         let mut sequences = Vec::new();
         while sequences.len() < wanted {
             progress::advance(progress, 1)?;
             let Some(pool) = self.pools.get_mut(self.next) else { break };
-            let (touches, candidates) = (self.touches, &self.candidates);
-            let mut rest = pool.order[pool.used..].iter();
-            let by_pose = &mut pool.by_pose;
-            let next = |recognizer: &Recognizer<'_, N>| {
-                let touch = if by_pose.is_empty() {
-                    rest.next().copied()
-                } else {
-                    let pose = recognizer.next_approach(candidates.iter().copied())?.pose;
-                    by_pose.get_mut(usize::from(pose))?.pop()
-                };
-                touch.map(|touch| &touches[touch as usize])
+            let mut order = Order {
+                touches: self.touches,
+                candidates: &self.candidates,
+                ahead: &mut ahead,
+                turn: self.next,
+                next: pool.used,
+                pool,
             };
-            let (sequence, is_whole) = one(self.object, &mut recognizer, next, until, gate());
+            let (sequence, is_whole) = one(self.object, &mut recognizer, &mut order, until, gate());
             if !is_whole && (!self.is_once || pool.order.is_empty()) {
                 break;
             }
@@ -133,6 +131,36 @@ impl<'d> Supply<'d> {
             }
         }
         Ok(sequences)
+    }
+}
+
+/// A pool's touches, one after the other, as they are pushed.
+struct Order<'o, 'd, 'm> {
+    touches: &'d [Touch],
+    candidates: &'o [u16],
+    ahead: &'o mut Ahead<'m>,
+    pool: &'o mut Pool,
+    /// Which pool it is.
+    turn: usize,
+    /// Position of the next touch in the pool's order.
+    next: usize,
+}
+
+impl<'d> Order<'_, 'd, '_> {
+    /// Pushes the next touch, if there is one; it, and whether it is evidence.
+    fn push<const N: usize>(&mut self, recognizer: &mut Recognizer<'_, N>) -> Option<(&'d Touch, bool)> {
+        if !self.pool.by_pose.is_empty() {
+            let pose = recognizer.next_approach(self.candidates.iter().copied())?.pose;
+            let touch = &self.touches[self.pool.by_pose.get_mut(usize::from(pose))?.pop()? as usize];
+            return Some((touch, recognizer.push(touch).is_ok()));
+        }
+        let touch = &self.touches[*self.pool.order.get(self.next)? as usize];
+        let margins = self.ahead.margins(self.turn, self.next, &self.pool.order, self.touches);
+        self.next += 1;
+        if let Some(margins) = margins {
+            recognizer.push_margins(margins);
+        }
+        Some((touch, margins.is_some()))
     }
 }
 
@@ -164,10 +192,10 @@ pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_
 }
 
 /// Follows one sequence; whether it came to its end before the touches did.
-fn one<'s, const N: usize>(
+fn one<const N: usize>(
     object: usize,
     recognizer: &mut Recognizer<'_, N>,
-    mut next: impl FnMut(&Recognizer<'_, N>) -> Option<&'s Touch>,
+    order: &mut Order<'_, '_, '_>,
     until: Until,
     mut gate: impl FnMut(&Moment<'_>) -> bool,
 ) -> (Sequence, bool) {
@@ -175,8 +203,8 @@ fn one<'s, const N: usize>(
     let mut sequence = Sequence::new(object);
     recognizer.reset();
     for approaches in 1_u32.. {
-        let Some(touch) = next(recognizer) else { break };
-        if recognizer.push(touch).is_err() {
+        let Some((touch, is_evidence)) = order.push(recognizer) else { break };
+        if !is_evidence {
             // No evidence: it cost an approach.
             sequence.end(approaches);
             continue;

@@ -28,6 +28,7 @@
 //! # }
 //! ```
 
+mod ahead;
 mod choose;
 mod draw;
 mod fresh;

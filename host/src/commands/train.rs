@@ -3,7 +3,7 @@ use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::teach::TeachArguments;
 use crate::ensemble::Ensemble;
-use crate::ensemble::train::{self, Engine, Settings};
+use crate::ensemble::train::{self, Engine, Settings, Small};
 use crate::evaluate::{self, CostOfNoise};
 use crate::mesh::BACKGROUND;
 use crate::output;
@@ -42,6 +42,7 @@ Examples:
   palpate capture background -o shapes --approaches --touches 60000
   palpate train approaches -o wary.json --background shapes
   palpate train data -o table.json --bins 64,16  for a small, very fast table
+  palpate train data -o tiny.json --different-leaves 128 --leaf-bits 8
   palpate train data -o robust.json --noise 0..10ms --timer 1ms
   palpate train data -o real.json --probe probe.toml
   palpate train approaches -o taught.json --teach pot.txt
@@ -91,6 +92,12 @@ pub(crate) struct Arguments {
     /// Round leaves to multiples of a power of two that fit this many bits, so that a compiled model with leaves of that width is exact; 0 leaves them as they are [default: the preset's; compact 16, paper 0]
     #[arg(long, value_name = "BITS")]
     leaf_bits: Option<u32>,
+    /// Grow trees for little flash: the leaves of all trees share at most this many lists of values, and thresholds cost. Up to 256 a leaf takes one byte of the exported model; with --leaf-bits 8 models with i8 leaves are exact
+    #[arg(long, value_name = "COUNT")]
+    different_leaves: Option<usize>,
+    /// With --different-leaves: what a threshold that no tree had before has to save, as loss of a touch in nats [default: 2e-5]
+    #[arg(long, value_name = "NATS", requires = "different_leaves")]
+    threshold_cost: Option<f64>,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
@@ -330,6 +337,10 @@ impl Arguments {
             bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
             feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
             leaf_bits: self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
+            small: self.different_leaves.map(|leaves| {
+                let threshold_cost = self.threshold_cost.unwrap_or(Small::default().threshold_cost);
+                Small { leaves, threshold_cost }
+            }),
             noise: preset.noise,
             seed: self.seed,
             threads: self.threads,

@@ -1,14 +1,14 @@
 //! A compiled model compared with its ensemble: margins touch by touch, verdicts sequence by sequence.
 
 use super::full::FullRecognizer;
-use super::margins::best;
+use super::margins::{best, row};
 use super::together::margins_of_touches;
 use crate::ensemble::Ensemble;
 use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::Dataset;
-use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
 use rand::RngExt;
 use rayon::prelude::*;
@@ -56,9 +56,13 @@ pub fn parity(
     check(ensemble, model)?;
     let full = FullMargins::new(ensemble, &touches, progress)?;
     let compiled = margins_of_touches(model, &touches);
-    let compiled = compiled.par_chunks_exact(model.object_count());
-    let margins = compiled.enumerate().map(|(index, compiled)| compare_margins(full.of(index), model, compiled));
+    let objects = model.object_count();
+    let rows = compiled.par_chunks_exact(objects).enumerate();
+    let margins = rows.map(|(index, compiled)| compare_margins(full.of(index), model, compiled));
     let Difference { max_margin_error, best_differs } = margins.reduce(Difference::default, Difference::worse);
+    // Sequences draw the same touches again and again: whether each is evidence, and its margins, are found once.
+    let trained = model.trained_touches();
+    let is_evidence: Vec<bool> = touches.iter().map(|touch| Refused::check(&trained, touch).is_ok()).collect();
     let firsts: Vec<usize> = dataset
         .objects
         .iter()
@@ -71,7 +75,7 @@ pub fn parity(
         let object = rng.random_range(0..dataset.objects.len());
         let draw = std::iter::repeat_with(|| {
             let index = firsts[object] + rng.random_range(0..dataset.objects[object].touches.len());
-            (touches[index], full.of(index))
+            is_evidence[index].then(|| (full.of(index), &compiled[row(index, objects)]))
         });
         compare_verdicts::<CAPACITY>(ensemble, model, draw)
     });
@@ -171,15 +175,15 @@ fn compare_margins(full: &[f32], model: &Model<'_>, compiled: &[i32]) -> Differe
     Difference { max_margin_error: errors.fold(0.0, f64::max), best_differs }
 }
 
-/// Whether the verdicts differ (1, 0), or only the numbers of touches (0, 1). `draw` gives touches, each with the full
-/// model's margins.
+/// Whether the verdicts differ (1, 0), or only the numbers of touches (0, 1). `draw` gives each touch's margins by the full
+/// and by the compiled model, and nothing for a touch that the model was not trained for: it is not counted by either.
 ///
 /// # Errors
 /// [`EvaluateProblem::TooManyObjects`] if the model has more than `N` objects.
 fn compare_verdicts<'t, const N: usize>(
     ensemble: &Ensemble,
     model: &Model<'_>,
-    mut draw: impl Iterator<Item = (&'t Touch, &'t [f32])>,
+    mut draw: impl Iterator<Item = Option<(&'t [f32], &'t [i32])>>,
 ) -> Result<(usize, usize)> {
     let stopping = Stopping::from_model(model);
     let mut compiled = Recognizer::<N>::new(model, stopping)
@@ -190,15 +194,14 @@ fn compare_verdicts<'t, const N: usize>(
     // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict. Where hardly
     // any touch is one that the model was trained for, there may never be a verdict.
     let mut draws = 100 * u64::from(stopping.max_touches());
-    while let Some((touch, margins)) = draw.next()
+    while let Some(margins) = draw.next()
         && draws > 0
         && (compiled.verdict() == Verdict::Undecided || full.verdict() == Verdict::Undecided)
     {
         draws -= 1;
-        // What the model was not trained for is not counted by either.
-        let accepted = compiled.push(touch).is_ok();
-        if accepted && full.verdict() == Verdict::Undecided {
-            full.push(margins);
+        if let Some((of_full, of_compiled)) = margins {
+            compiled.push_margins(of_compiled);
+            full.push(of_full);
         }
     }
     Ok(match (compiled.verdict(), full.verdict()) {
@@ -238,7 +241,9 @@ mod tests {
         let model = compile::open(&bytes).unwrap();
         let touch = Touch::from_micros([0, 0, 9]);
         let margins = ensemble.margins(&touch);
-        let touches = || std::iter::repeat((&touch, &margins[..]));
+        let mut compiled = [0; 3];
+        model.margins(&touch, &mut compiled);
+        let touches = || std::iter::repeat(Some((&margins[..], &compiled[..])));
         let error = problem(compare_verdicts::<2>(&ensemble, &model, touches()));
         assert_eq!(error, EvaluateProblem::TooManyObjects { objects: 3, capacity: 2 });
         assert_eq!(compare_verdicts::<3>(&ensemble, &model, touches()).unwrap(), (0, 0));

@@ -26,7 +26,11 @@ impl Scene {
             return Err(MeshProblem::NoExtent.into());
         }
         let (center, scale) = ((low + high) / 2.0, length / longest);
-        triangles.iter_mut().flatten().for_each(|corner| *corner = (*corner - center) * scale);
+        for triangle in &mut triangles {
+            for corner in triangle {
+                *corner = (*corner - center) * scale;
+            }
+        }
         Ok(Self::of(triangles))
     }
 
@@ -39,8 +43,8 @@ impl Scene {
     }
 
     fn of(triangles: Vec<Triangle>) -> Self {
-        let bounds = bounds(&triangles);
-        Self { surface: Surface::new(triangles), bounds }
+        let (surface, bounds) = Surface::with_bounds(triangles);
+        Self { surface, bounds }
     }
 
     /// The surface itself.
@@ -92,7 +96,11 @@ fn corners(mesh: &Mesh) -> Result<Vec<Triangle>, MeshProblem> {
     if mesh.triangles.is_empty() {
         return Err(MeshProblem::NoFaces);
     }
-    mesh.triangles.iter().map(|&[a, b, c]| Ok([corner(a)?, corner(b)?, corner(c)?])).collect()
+    let mut triangles = Vec::with_capacity(mesh.triangles.len());
+    for &[a, b, c] in &mesh.triangles {
+        triangles.push([corner(a)?, corner(b)?, corner(c)?]);
+    }
+    Ok(triangles)
 }
 
 fn bounds(triangles: &[Triangle]) -> [DVec3; 2] {

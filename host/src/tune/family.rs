@@ -21,6 +21,33 @@ const TREES: [(usize, f64, &[usize]); 6] = [
 const TABLES: [[usize; 2]; 9] =
     [[24, 8], [32, 12], [48, 12], [48, 24], [64, 16], [64, 24], [96, 24], [96, 48], [128, 32]];
 
+/// A training of trees for little flash.
+struct Small {
+    depth: usize,
+    eta: f64,
+    threshold_cost: f64,
+    /// The numbers of trees and of different leaves after which to stop.
+    stops: &'static [(usize, usize)],
+}
+
+const SMALL: [Small; 3] = [
+    Small { depth: 4, eta: 0.5, threshold_cost: 5e-5, stops: &[(8, 24), (12, 40), (18, 48)] },
+    Small { depth: 5, eta: 0.4, threshold_cost: 4e-5, stops: &[(9, 56), (12, 72), (14, 80), (16, 88)] },
+    Small {
+        depth: 6,
+        eta: 0.3,
+        threshold_cost: 2e-5,
+        stops: &[(9, 96), (11, 112), (13, 144), (15, 160), (16, 176), (24, 224), (32, 256)],
+    },
+];
+
+/// With more objects than this, they are not tried: the fit takes time and memory for each object in each bin, and such a model
+/// needs more than a few kilobytes anyway.
+const MOST_OBJECTS: usize = 50;
+
+/// Bins of each feature that these trees choose thresholds from: few are used, so they may be fine.
+const FINE: usize = 512;
+
 /// Trains the family; the first is the large one that all are compared with.
 pub(super) fn train(
     dataset: &Dataset,
@@ -34,7 +61,8 @@ pub(super) fn train(
         ..train::Settings::compact()
     };
     let tables: &[[usize; 2]] = if settings.descriptor.feature_count() == 2 { &TABLES } else { &[] };
-    progress.begin("trainings", Some((1 + TREES.len() + tables.len()) as u64));
+    let small: &[Small] = if dataset.objects.len() <= MOST_OBJECTS { &SMALL } else { &[] };
+    progress.begin("trainings", Some((1 + TREES.len() + tables.len() + small.len()) as u64));
     let mut family = Vec::new();
     let mut add = |depth: usize, eta: f64, bins: Option<[usize; 2]>, stops: &[usize]| -> Result<()> {
         let rounds = stops.iter().copied().max().unwrap_or(1);
@@ -44,7 +72,7 @@ pub(super) fn train(
         for &trees in stops {
             let bins = bins.map_or_else(|| vec![base.bins], Vec::from);
             let first = Ensemble { trees: ensemble.trees[..trees].to_vec(), ..ensemble.clone() };
-            family.push((Recipe { trees, depth, eta, bins }, first));
+            family.push((Recipe { trees, depth, eta, bins, different_leaves: None }, first));
         }
         progress::advance(progress, 1)
     };
@@ -54,6 +82,14 @@ pub(super) fn train(
     }
     for &bins in tables {
         add(6, 0.3, Some(bins), &[40])?;
+    }
+    for &Small { depth, eta, threshold_cost, stops } in small {
+        let how = train::Settings { depth, eta, bins: FINE, leaf_bits: Some(8), ..base.clone() };
+        let ensembles = train::train_small(dataset, &how, threshold_cost, stops, &())?;
+        for (&(trees, leaves), ensemble) in stops.iter().zip(ensembles) {
+            family.push((Recipe { trees, depth, eta, bins: vec![FINE], different_leaves: Some(leaves) }, ensemble));
+        }
+        progress::advance(progress, 1)?;
     }
     Ok(family)
 }

@@ -2,7 +2,8 @@
 //! one that recorded touches came from ([`fit`]).
 //!
 //! A family of ensembles is trained (trees, depth, eta; for the table layout bins of each feature), each compiled with
-//! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Kept is the model
+//! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Among them are trees for
+//! little flash ([`crate::ensemble::train::Small`]), with the 8-bit leaves that they share. Kept is the model
 //! that stops after the fewest touches at the wanted error rate, of those within the limits. It is calibrated to that rate
 //! on a third share of the touches, and its own figures come from a fourth.
 //!
@@ -89,6 +90,8 @@ pub struct Recipe {
     pub eta: f64,
     /// Bins of each feature's histogram: one number, or one for each feature.
     pub bins: Vec<usize>,
+    /// The most different leaves that all trees share, for trees of little flash ([`crate::ensemble::train::Small`]).
+    pub different_leaves: Option<usize>,
 }
 
 /// A compiled model of the family, and what it achieves on held-out touches.
@@ -239,13 +242,15 @@ fn compiled_models<'e>(
         Layout::Grid
     };
     let layouts: &[Layout] = if recipe.bins.len() > 1 { &[table] } else { &[Layout::Compact, Layout::Complete] };
-    for leaf in [Leaf::I8, Leaf::I16] {
+    // Trees for little flash are trained for leaves of a byte, and exact with them.
+    let is_small = recipe.different_leaves.is_some();
+    for &leaf in if is_small { &[Leaf::I8][..] } else { &[Leaf::I8, Leaf::I16] } {
         let mut measured: Option<Row> = None;
         for &layout in layouts {
             let how = compile::Settings {
                 leaf,
                 layout: Some(layout),
-                shared_leaves: Some(false),
+                shared_leaves: Some(is_small),
                 error_rate: settings.error_rate,
                 ..compile::Settings::default()
             };

@@ -352,7 +352,7 @@ fn export_and_inspect_state_instructions_for_both_processors() {
     let exported = json(&["export", &place.text("ensemble.json"), "-o", &place.text("model.palpate"), "--json"]);
     let instructions = &exported["instructions"];
     assert!(
-        instructions["m4f"].as_u64() > Some(300) && instructions["m0_plus"].as_u64() > instructions["m4f"].as_u64()
+        instructions["m4f"].as_u64() > Some(200) && instructions["m0_plus"].as_u64() > instructions["m4f"].as_u64()
     );
     let inspected = json(&["inspect", &place.text("model.palpate"), "--json"]);
     assert_eq!(&inspected["instructions"], instructions);

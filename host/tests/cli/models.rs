@@ -149,6 +149,31 @@ fn training_twice_writes_the_same_bytes_whatever_the_threads() {
 }
 
 #[test]
+fn trees_of_few_different_leaves_make_a_smaller_model_that_is_exact() {
+    let directory = set_up();
+    let at = directory.path();
+    let export = |options: &[&str]| -> Value {
+        succeeds(
+            at,
+            &[&["train", "data", "-o", "ensemble.json", "--rounds", "10", "--leaf-bits", "8"], options].concat(),
+        );
+        let export = ["export", "ensemble.json", "-o", "model.palpate", "--leaf", "i8", "--for", "size", "--json"];
+        serde_json::from_str(&succeeds(at, &export)).unwrap()
+    };
+    let usual = export(&[]);
+    let small = export(&["--different-leaves", "16"]);
+    let dear = export(&["--different-leaves", "16", "--threshold-cost", "0.01"]);
+    let number = |exported: &Value, key: &str| exported[key].as_f64().unwrap();
+    assert!(number(&small, "shared_leaves") <= 16.0 && number(&small, "margin_error") == 0.0, "{small:#}");
+    let bytes = [&usual, &small, &dear].map(|exported| number(exported, "bytes"));
+    assert!(bytes[0] > bytes[1] && bytes[1] > bytes[2], "{bytes:?}");
+    fails(at, &["train", "data", "-o", "x.json", "--different-leaves", "0"], 2, "--different-leaves");
+    fails(at, &["train", "data", "-o", "x.json", "--threshold-cost", "1"], 2, "--different-leaves");
+    let one = ["train", "data", "-o", "x.json", "--different-leaves", "8", "--leaves", "one"];
+    fails(at, &one, 2, "--leaves");
+}
+
+#[test]
 fn tuning_writes_a_model_within_the_limit() {
     let directory = set_up();
     let tune =

@@ -3,6 +3,7 @@
 //! The same bytes, the same sums: integers add up in any order, and f32 leaves are added in the trees' order. What is
 //! made ready for a tree (see [`masks`](super::masks), and its leaves as words) is for all rows of the block.
 
+use super::block::{Block, LANES, Leaves, ROWS, TREES};
 use super::leaves::BIAS;
 use super::masks::{LEAVES, Masks};
 use super::preorder;
@@ -11,23 +12,11 @@ use super::{Sections, built_in};
 use crate::bytes::at;
 use palpate_shared::format::{Group, Layout, LeafType};
 
-/// The most rows of a block.
-const ROWS: usize = 2048;
-
-/// Rows between two checks that there are more.
-pub(super) const LANES: usize = 16;
-
 /// Blocks with fewer rows are not worth what is made ready for a tree.
 const ENOUGH: usize = 128;
 
 /// The most values of a leaf that is made ready.
 const VALUES: usize = 16;
-
-/// Trees whose leaves are added together.
-pub(super) const TREES: usize = 4;
-
-/// The leaf that each row reaches.
-pub(super) type Leaves = [u8; ROWS];
 
 /// A tree's leaves as words: with their shift, without their bias.
 type Words = [i32; LEAVES * VALUES];
@@ -53,33 +42,6 @@ impl Default for Batch {
 impl core::fmt::Debug for Batch {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Batch")
-    }
-}
-
-/// Rows that go through a model together.
-pub(super) struct Block<'a> {
-    /// Column by column.
-    ranks: &'a [u8],
-    /// How many columns.
-    pub(super) columns: usize,
-    /// Ranks of a column, those of no row at its end: a multiple of [`LANES`].
-    pub(super) stride: usize,
-    /// Row by row.
-    features: &'a [i32],
-    /// Features of a row.
-    width: usize,
-}
-
-impl Block<'_> {
-    /// The ranks of a column.
-    pub(super) fn column(&self, column: u8) -> &[[u8; LANES]] {
-        let ranks = self.ranks.get(usize::from(column) * self.stride..).unwrap_or_default();
-        ranks.get(..self.stride).unwrap_or_default().as_chunks().0
-    }
-
-    /// The rank of a row; 0 beyond the columns.
-    fn rank(&self, column: u8, row: usize) -> u8 {
-        at(self.ranks, usize::from(column) * self.stride + row)
     }
 }
 

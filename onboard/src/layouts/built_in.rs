@@ -16,6 +16,9 @@ pub(crate) const fn layout(layout: Layout) -> bool {
 /// Whether models with trees are read, and not only tables.
 pub(crate) const TREES: bool = layout(Layout::Compact) || layout(Layout::Complete) || layout(Layout::Wide);
 
+/// Whether tables are read, of which a search for a rank is a large part: it is written out then.
+pub(crate) const TABLES: bool = layout(Layout::Grid) || layout(Layout::Patterns);
+
 /// Whether trees with leaves in a table are read.
 pub(crate) const SHARED_LEAVES: bool = TREES && cfg!(feature = "shared-leaves");
 

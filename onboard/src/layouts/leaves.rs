@@ -49,7 +49,7 @@ impl<'a> Sum<'a> {
             LeafType::I8 if built_in::leaf(LeafType::I8) => add_values(margins, leaf, add_i8),
             LeafType::I16 if built_in::leaf(LeafType::I16) => add_values(margins, leaf, add_i16),
             LeafType::F32 if built_in::leaf(LeafType::F32) => {
-                let length = leaf.len();
+                let length = short(leaf.len());
                 add_f32_leaves(margins, &Reached { leaves: leaf, reached: &[0], length });
             }
             // Refused when the model was opened.
@@ -63,7 +63,7 @@ impl<'a> Sum<'a> {
     pub(crate) fn add_reached(&mut self, leaves: &[u8], reached: &[u16], length: usize) {
         let leaf_type = self.leaf;
         let margins = self.of_group();
-        let reached = Reached { leaves, reached, length };
+        let reached = Reached { leaves, reached, length: short(length) };
         match leaf_type {
             LeafType::I8 if built_in::leaf(LeafType::I8) => add_i8_leaves(margins, &reached),
             LeafType::I16 if built_in::leaf(LeafType::I16) => add_i16_leaves(margins, &reached),
@@ -112,7 +112,14 @@ struct Reached<'a, T = u8> {
     /// Numbers of leaves.
     reached: &'a [u16],
     /// Bytes, or values, of a leaf.
-    length: usize,
+    length: u16,
+}
+
+/// The length of a leaf, which is no more than 1,024 bytes.
+#[inline(always)]
+fn short(length: usize) -> u16 {
+    let [a, b, ..] = length.to_le_bytes();
+    u16::from_le_bytes([a, b])
 }
 
 impl<'a, T> Reached<'a, T> {
@@ -129,8 +136,7 @@ impl<'a, T> Reached<'a, T> {
     #[inline(always)]
     fn values<const SIZE: usize>(&self, leaves: &'a [T], leaf: u16) -> Option<&'a [T; SIZE]> {
         // As two bytes: then the compiler sees that ends of leaves cannot overflow.
-        let length = usize::from(u16::try_from(self.length).unwrap_or(0));
-        let start = usize::from(leaf) * length;
+        let start = usize::from(leaf) * usize::from(self.length);
         leaves.get(start..start + SIZE)?.first_chunk()
     }
 }
@@ -173,7 +179,8 @@ fn add_last<T: Copy, const SIZE: usize>(
     }
 }
 
-#[inline(never)]
+#[cfg_attr(target_has_atomic = "32", inline(always))]
+#[cfg_attr(not(target_has_atomic = "32"), inline(never))]
 fn add_i8_leaves(margins: &mut [i32], reached: &Reached<'_>) {
     if WORDS {
         add_leaves::<_, 1, 10, 10>(margins, reached, add_i8, |ten, from| add_ten_i8(ten, reached, from));
@@ -189,22 +196,44 @@ fn add_i8_in_memory(margins: &mut [i32], reached: &Reached<'_>) {
     });
 }
 
-/// Adds bytes in lanes of 16 bits, which hold a block of trees.
+/// Adds ten bytes of each leaf, from number `from` of a leaf on.
 #[inline(always)]
 fn add_ten_i8(margins: &mut [i32; 10], reached: &Reached<'_>, from: usize) {
+    if reached.length == 10 {
+        let (leaves, _) = reached.leaves.as_chunks();
+        return add_whole_i8(margins, leaves, reached.reached);
+    }
+    let leaves = reached.leaves.get(from..).unwrap_or_default();
+    add_lanes(margins, reached.reached.iter().map_while(|&leaf| reached.values(leaves, leaf)));
+}
+
+/// The same of leaves that have no more: their numbers are indices, which takes fewer instructions.
+#[inline(never)]
+fn add_whole_i8(margins: &mut [i32; 10], leaves: &[[u8; 10]], reached: &[u16]) {
+    add_lanes(margins, reached.iter().map_while(|&leaf| leaves.get(usize::from(leaf))));
+}
+
+/// Adds bytes in lanes of 16 bits, which hold a block of trees.
+///
+/// Of a word every second byte has a lane, which takes an instruction to cut out. The others are what is left of the sum of
+/// whole words without those lanes.
+#[inline(always)]
+fn add_lanes<'v>(margins: &mut [i32; 10], leaves: impl Iterator<Item = &'v [u8; 10]>) {
     const { assert!(BLOCK <= 256) };
     const LANES: u32 = 0x00ff_00ff;
     let (mut a, mut b, mut c, mut d, mut e) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
-    reached.each(from, |values: &[u8; 10]| {
-        let (&[first, second], &[q, r]) = values.as_chunks() else { return };
+    for values in leaves {
+        let (&[first, second], third) = values.as_chunks() else { return };
         let (first, second) = (u32::from_le_bytes(first), u32::from_le_bytes(second));
-        let third = u32::from(u16::from_le_bytes([q, r]));
-        a = a.wrapping_add(first & LANES);
+        // As a number at once: two bytes would take a register more.
+        let third = third.first_chunk().map_or(0, |third| u16::from_le_bytes(*third).into());
+        a = a.wrapping_add(first);
         b = b.wrapping_add(first >> 8 & LANES);
-        c = c.wrapping_add(second & LANES);
+        c = c.wrapping_add(second);
         d = d.wrapping_add(second >> 8 & LANES);
         e = e.wrapping_add((third | third << 8) & LANES);
-    });
+    }
+    let (a, c) = (a.wrapping_sub(b << 8), c.wrapping_sub(d << 8));
     let [f, g, h, i, j, k, l, m, n, o] = margins;
     let add = |low: &mut i32, high: &mut i32, lanes: u32| {
         *low = low.wrapping_add((lanes & 0xffff).cast_signed());
@@ -249,7 +278,7 @@ fn add_i16_leaves(margins: &mut [i32], reached: &Reached<'_>) {
 #[inline(always)]
 fn add_i16_in_memory(margins: &mut [i32], reached: &Reached<'_>) {
     if let Ok(leaves) = bytemuck::try_cast_slice(reached.leaves) {
-        let reached = Reached { leaves, reached: reached.reached, length: margins.len() };
+        let reached = Reached { leaves, reached: reached.reached, length: short(margins.len()) };
         let add = |sum: i32, [value]: [i16; 1]| sum.wrapping_add(i16::from_le(value).into());
         add_leaves::<_, 1, 10, 10>(margins, &reached, add, |ten, from| {
             reached.each(from, |values: &[i16; 10]| add_each(ten, values));
@@ -320,7 +349,7 @@ mod tests {
             let values: std::vec::Vec<i16> = (0..4 * objects + 1).map(|i| (i * 7919 % 65_521) as i16).collect();
             let bytes: std::vec::Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
             let shifted = [&[0; 1], &*bytes].concat();
-            let reached = |leaves, length| Reached { leaves, reached: &[2, 0, 3, 3], length };
+            let reached = |leaves, length| Reached { leaves, reached: &[2, 0, 3, 3], length: short(length) };
             let sums = |add: &dyn Fn(&mut [i32])| {
                 let mut margins = std::vec![7; objects];
                 add(&mut margins);

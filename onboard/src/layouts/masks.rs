@@ -4,7 +4,7 @@
 //! set of leaves for each rank, one bit each; of the leaves that all columns leave, a row reaches the first. The sets are made
 //! once for a tree, and cost a row one load per column then, instead of a chain of loads per step.
 
-use super::batch::{Block, LANES, Leaves, TREES};
+use super::block::{Block, LANES, Leaves, TREES};
 use crate::bytes::at;
 
 /// Leaves of the largest tree that is looked up.

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "rows")]
 pub(crate) mod batch;
+#[cfg(feature = "rows")]
+mod block;
 pub(crate) mod built_in;
 pub(crate) mod complete;
 pub(crate) mod grid;

@@ -1,6 +1,6 @@
 //! Features to ranks: where each value stands among the thresholds, looked up once per touch.
 
-use super::Sections;
+use super::{Sections, built_in};
 #[cfg(feature = "rows")]
 use crate::bytes::at;
 use crate::bytes::{Wrong, take};
@@ -32,7 +32,8 @@ pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), Wrong>
 /// Ranks of a row of features in all of the model's columns.
 ///
 /// Cost: 9 instructions per step of a binary search in each axis's thresholds on a Cortex-M4, 11 on a Cortex-M0+, and 50 an
-/// axis; about 30 per step where thresholds are not aligned.
+/// axis; with tables built in, four a step where an axis has 63 thresholds or more, of four bytes each; about 30 per step
+/// where thresholds are not aligned.
 pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
     let mut column = 0_u8;
     let mut put = |rank: u8| {
@@ -62,10 +63,11 @@ pub(crate) fn rank_rows(model: &Sections<'_>, features: &[i32], width: usize, st
     let (axes, cuts) = model.axes_and_cuts();
     let mut cuts = Cuts(cuts);
     let mut columns = ranks.chunks_exact_mut(stride.max(1));
-    for &[feature, kinds, size, count] in axes {
+    for axis in axes {
+        let &[feature, kinds, size, count] = axis;
         // Of the largest number there are all that there is room for: only that number passes them, and it is held down.
         let mut table = [i32::MAX; 256];
-        let of_axis = cuts.next(size, count).chunks_exact(usize::from(size).max(1));
+        let of_axis = cuts.of(axis).chunks_exact(usize::from(size).max(1));
         table.iter_mut().zip(of_axis).for_each(|(entry, cut)| *entry = number(cut));
         let mut put = |missing: u8| {
             let Some(column) = columns.next() else { return };
@@ -136,14 +138,15 @@ impl<'m> Cuts<'m> {
     }
 
     /// The rank of a value among the thresholds of the next axis; a missing one is the least number.
-    #[inline(never)]
-    pub(crate) fn rank_of(&mut self, &[_, _, width, count]: &[u8; Axis::LENGTH], value: i32) -> u8 {
-        rank_in(self.next(width, count), width, value)
+    #[inline(always)]
+    pub(crate) fn rank_of(&mut self, axis: &[u8; Axis::LENGTH], value: i32) -> u8 {
+        let &[_, _, width, _] = axis;
+        rank_in(self.of(axis), width, value)
     }
 
-    /// The thresholds of the next axis, which has `count` of them of `width` bytes.
+    /// The thresholds of the next axis.
     #[inline(always)]
-    fn next(&mut self, width: u8, count: u8) -> &'m [u8] {
+    pub(crate) fn of(&mut self, &[_, _, width, count]: &[u8; Axis::LENGTH]) -> &'m [u8] {
         let length = usize::from(width) * usize::from(count);
         let Some((cuts, rest)) = self.0.split_at_checked(length) else { return &[] };
         self.0 = rest;
@@ -154,8 +157,9 @@ impl<'m> Cuts<'m> {
 /// How many of an axis's thresholds, of `width` bytes each, are at or below `value`.
 ///
 /// Those of two or four bytes are loaded at once where they are aligned, which the exporter ensures if the model is aligned.
-#[inline(always)]
-fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
+// By itself, so that all that it needs is in registers on a Cortex-M0+.
+#[inline(never)]
+pub(crate) fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
     if width == 2
         && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
     {
@@ -163,16 +167,18 @@ fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
     } else if width == 4
         && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
     {
-        search(cuts, value, |cut: i32| i32::from_le(cut))
+        let number = |cut: i32| i32::from_le(cut);
+        // Where there are many, they nearly always have four bytes.
+        let rank = if built_in::TABLES { search_many(cuts, value, number) } else { None };
+        rank.unwrap_or_else(|| search(cuts, value, number))
     } else {
         search_bytes(cuts, width.into(), value)
     }
 }
 
 /// A binary search.
-// By itself, so that all that it needs is in registers on a Cortex-M0+.
-#[inline(never)]
-fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32) -> u8 {
+#[inline(always)]
+fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> u8 {
     // Most axes of small ensembles have a few.
     let mut step = if cuts.len() < 16 { 8 } else { 128 };
     while step > cuts.len() {
@@ -189,6 +195,37 @@ fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32) -> u8 {
     }
     let [rank, ..] = passed.wrapping_add(1).to_le_bytes();
     rank
+}
+
+/// The same among 63 to 255 thresholds, written out: a load, a comparison and an addition for each step. `None` for fewer.
+#[inline(always)]
+fn search_many<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> Option<u8> {
+    // 63 thresholds among which or at an end of which the rank is: after each 64 that are passed.
+    let last = cuts.len().checked_sub(63)?;
+    let mut start = 0;
+    while cuts.get(start + 63).is_some_and(|cut| number(*cut) <= value) {
+        start += 64;
+    }
+    let few: &[T; 63] = cuts.get(start.min(last)..)?.first_chunk()?;
+    let few: &[T; 31] = half(few, value, number)?;
+    let few: &[T; 15] = half(few, value, number)?;
+    let few: &[T; 7] = half(few, value, number)?;
+    let few: &[T; 3] = half(few, value, number)?;
+    let [last]: &[T; 1] = half(few, value, number)?;
+    let before = core::ptr::from_ref(last).addr().wrapping_sub(cuts.as_ptr().addr()) / size_of::<T>();
+    let [rank, ..] = (before + usize::from(number(*last) <= value)).to_le_bytes();
+    Some(rank)
+}
+
+/// Of 2`HALF` + 1 thresholds, those among which or at an end of which a value's rank is.
+#[inline(always)]
+fn half<T: Copy, const N: usize, const HALF: usize>(
+    cuts: &[T; N],
+    value: i32,
+    number: impl Fn(T) -> i32,
+) -> Option<&[T; HALF]> {
+    const { assert!(N == 2 * HALF + 1) };
+    if number(*cuts.get(HALF)?) <= value { cuts.last_chunk() } else { cuts.first_chunk() }
 }
 
 /// The same for thresholds of any width that stand anywhere.
@@ -213,7 +250,7 @@ mod tests {
     fn rank(cuts: &[u8], width: u8, value: i32) -> u8 {
         let mut axes = Cuts(cuts);
         let count = u8::try_from(cuts.len() / usize::from(width)).unwrap();
-        rank_in(axes.next(width, count), width, value)
+        rank_in(axes.of(&[0, 0, width, count]), width, value)
     }
 
     #[test]
@@ -224,6 +261,20 @@ mod tests {
             assert_eq!(rank(&cuts, 1, value), expected, "{value}");
         }
         assert_eq!(rank(&[], 2, 5), 0);
+    }
+
+    #[test]
+    fn a_rank_is_right_for_every_number_of_thresholds_an_axis_can_have() {
+        for count in 0..=255_i32 {
+            // Aligned.
+            let cuts: std::vec::Vec<i32> = (0..count).map(|i| 10 * (i / 2 + i)).collect();
+            for value in (-5..10 * (count + count / 2) + 10).step_by(5) {
+                let expected = cuts.iter().filter(|&&cut| cut <= value).count();
+                assert_eq!(usize::from(rank(bytemuck::cast_slice(&cuts), 4, value)), expected, "{value} of {count}");
+                let many = search_many(&cuts, value, |cut| cut);
+                assert_eq!(many.map(usize::from), (count >= 63).then_some(expected));
+            }
+        }
     }
 
     #[test]

@@ -4,8 +4,8 @@ use super::{Model, fixed};
 use crate::bytes::AlignedTo8;
 use crate::layouts::leaves::{BLOCK, Sum};
 use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
-use palpate_shared::Touch;
 use palpate_shared::format::{Group, Layout};
+use palpate_shared::{Descriptor, Touch};
 
 impl Model<'_> {
     /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
@@ -15,7 +15,7 @@ impl Model<'_> {
     /// of a touch as missing.
     pub fn margins(&self, touch: &Touch, margins: &mut [i32]) -> bool {
         match self.descriptor() {
-            Some(descriptor) => self.margins_of(descriptor.features(touch).as_slice(), margins),
+            Some(descriptor) => with_features(descriptor, touch, |features| self.margins_of(features, margins)),
             None => self.margins_of(&[], margins),
         }
     }
@@ -28,29 +28,36 @@ impl Model<'_> {
         if self.has_trees() {
             margins.fill(0);
         }
-        self.margins_in_zeros(features, margins)
+        self.margins_in_zeros(features, margins);
+        true
     }
 
     /// [`Model::margins`] where zeros are already, of a model over touches.
     pub(crate) fn touch_in_zeros(&self, touch: &Touch, zeros: &mut [i32]) {
         if let Some(descriptor) = self.descriptor() {
-            self.margins_in_zeros(descriptor.features(touch).as_slice(), zeros);
+            with_features(descriptor, touch, |features| self.margins_in_zeros(features, zeros));
         }
     }
 
-    fn margins_in_zeros(&self, features: &[i32], zeros: &mut [i32]) -> bool {
-        let Some(margins) = self.sum(features, zeros) else { return false };
-        if self.is_float() {
-            for margin in margins {
-                *margin = fixed::q16_from_f32_bits(margin.cast_unsigned());
-            }
+    /// The margins where zeros are already.
+    fn margins_in_zeros(&self, features: &[i32], zeros: &mut [i32]) {
+        if let Some(zeros) = zeros.get_mut(..self.object_count()) {
+            self.sum(features, zeros);
+            self.make_fixed(zeros);
         }
-        true
     }
 
-    /// Whether margins are added up; those of a table are set.
+    /// Whether margins are added up; those of a table are read.
     pub(super) fn has_trees(&self) -> bool {
         built_in::TREES && !matches!(self.layout(), Layout::Grid | Layout::Patterns)
+    }
+
+    /// Makes Q16 of f32 values' bits.
+    #[inline(always)]
+    fn make_fixed(&self, margins: &mut [i32]) {
+        if self.is_float() {
+            fixed::make_q16(margins);
+        }
     }
 
     /// The margins of a row of features as the trainer's own f32 values, bit for bit; `false`, and nothing written,
@@ -61,26 +68,38 @@ impl Model<'_> {
         if !self.is_float() || margins.len() != self.object_count() {
             return false;
         }
-        let Some(bits) = self.sum(features, &mut bits) else { return false };
+        let Some(bits) = bits.get_mut(..margins.len()) else { return false };
+        self.sum(features, bits);
         for (margin, bits) in margins.iter_mut().zip(bits) {
             *margin = f32::from_bits(bits.cast_unsigned());
         }
         true
     }
 
-    /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits.
-    pub(super) fn sum<'m>(&self, features: &[i32], margins: &'m mut [i32]) -> Option<&'m mut [i32]> {
-        let margins = margins.get_mut(..self.object_count())?;
-        if built_in::layout(Layout::Grid) && self.layout() == Layout::Grid {
-            grid::look_up(&self.sections, features, margins);
-            return Some(margins);
+    /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits. There are as
+    /// many margins as objects.
+    pub(super) fn sum(&self, features: &[i32], margins: &mut [i32]) {
+        if !self.read_table(features, margins) {
+            self.sum_trees(features, margins);
         }
-        if built_in::layout(Layout::Patterns) && self.layout() == Layout::Patterns {
-            patterns::look_up(&self.sections, features, margins);
-            return Some(margins);
-        }
+    }
+
+    /// Reads margins from a table, in the same way; `false` if the model has none.
+    #[inline(always)]
+    fn read_table(&self, features: &[i32], margins: &mut [i32]) -> bool {
+        let cell = match self.layout() {
+            Layout::Grid if built_in::layout(Layout::Grid) => grid::cell(&self.sections, features),
+            Layout::Patterns if built_in::layout(Layout::Patterns) => patterns::cell(&self.sections, features),
+            _ => return false,
+        };
+        grid::read(&self.sections, cell, margins);
+        true
+    }
+
+    /// Adds up all trees.
+    fn sum_trees(&self, features: &[i32], margins: &mut [i32]) {
         if !built_in::TREES {
-            return Some(margins);
+            return;
         }
         let shared = self.shared_leaves();
         let (base, _) = self.sections.base_and_priors();
@@ -89,11 +108,10 @@ impl Model<'_> {
             // Added in this order: the base, then the trees.
             margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = base);
             self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None, shared });
-            return Some(margins);
+            return;
         }
         let bias = self.add_trees(features, &mut Sum { margins, leaf: self.sections.leaf, object: None, shared });
         margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base).wrapping_sub(bias));
-        Some(margins)
     }
 
     /// Adds the leaves of all groups, and says how far every margin is too large. Groups come with the largest shift
@@ -135,4 +153,17 @@ impl Model<'_> {
         shift_all(sum.margins, &mut bias, shift);
         bias
     }
+}
+
+/// Hands a touch's features to `then`. The two of a descriptor for tables are put together apart:
+/// [`Descriptor::features`] writes all ten that there can be.
+#[inline(always)]
+fn with_features<T>(descriptor: Descriptor, touch: &Touch, then: impl FnOnce(&[i32]) -> T) -> T {
+    if built_in::layout(Layout::Grid)
+        && descriptor == Descriptor::Curvature
+        && let Some(features) = Descriptor::short_curvature(touch)
+    {
+        return then(&features);
+    }
+    then(descriptor.features(touch).as_slice())
 }

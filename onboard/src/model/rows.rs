@@ -18,9 +18,7 @@ impl Model<'_> {
             return false;
         }
         if self.is_float() {
-            for margin in margins {
-                *margin = fixed::q16_from_f32_bits(margin.cast_unsigned());
-            }
+            fixed::make_q16(margins);
         }
         true
     }

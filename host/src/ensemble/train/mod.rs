@@ -26,8 +26,12 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 
+mod small;
 #[cfg(feature = "xgboost")]
 mod xgboost;
+
+pub use small::Small;
+pub(crate) use small::train_each as train_small;
 
 /// What every margin starts from; the same for all objects, so it changes no verdict. XGBoost's default.
 pub const BASE_MARGIN: f32 = 0.5;
@@ -71,6 +75,10 @@ pub struct Settings {
     /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
     /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
     pub leaf_bits: Option<u32>,
+    /// Grows trees with few thresholds and few different leaves, for models of a few KB; `None` grows them for accuracy alone.
+    /// Needs [`multi_output`](Self::multi_output). With [`leaf_bits`](Self::leaf_bits) of 8 a model with leaves of one byte is
+    /// exact.
+    pub small: Option<Small>,
     /// What is added to the touches before training, every touch made by a robot of its own; on top of what the data set
     /// states that they have already ([`Dataset::real`]).
     pub noise: Noise,
@@ -98,6 +106,7 @@ impl Settings {
             bins: 256,
             feature_bins: None,
             leaf_bits: None,
+            small: None,
             noise: Noise::default(),
             seed: 1,
             threads: None,
@@ -152,6 +161,11 @@ impl Settings {
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
+    if let Some(Small { leaves, threshold_cost }) = settings.small {
+        let stop = (settings.rounds, leaves);
+        let mut ensembles = train_small(dataset, settings, threshold_cost, &[stop], progress)?;
+        return Ok(ensembles.remove(0));
+    }
     check(dataset, settings.descriptor)?;
     let settings = &settings.resolved(dataset);
     let parameters = parameters(settings, dataset.objects.len())?;
@@ -164,10 +178,15 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     if let Some(bits) = settings.leaf_bits {
         round_leaves(&mut ensemble, bits);
     }
+    ensemble.origin = origin(dataset, settings, &evidence);
+    Ok(ensemble)
+}
+
+/// What an ensemble states that was trained so.
+fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Origin {
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
-    ensemble.origin = Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) };
-    Ok(ensemble)
+    Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) }
 }
 
 /// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,

@@ -1,10 +1,10 @@
 //! From an implicit shape to a triangle mesh.
 
 use super::shape::Shape;
+use super::slices;
 use crate::mesh::Mesh;
 use fidget_core::context::Tree;
 use fidget_core::types::Grad;
-use fidget_core::vm::VmShape;
 use glam::Vec3;
 
 /// An implicit shape, the box that it is in, and the resolution at which it is meshed.
@@ -48,7 +48,7 @@ fn contour(form: &Form, cells: f32) -> Mesh {
     let reach = side / cells * f32::from(1_u16 << DEPTH) / 2.0;
     let (x, y, z) = Tree::axes();
     let tree = form.shape.0.remap_xyz(x * reach + center.x, y * reach + center.y, z * reach + center.z) / reach;
-    let shape = VmShape::from(tree);
+    let shape = slices::Shape::from(tree);
     let settings = fidget_mesh::Settings { depth: DEPTH, threads: None, ..Default::default() };
     // Neither fails: the shapes have no variables but x, y and z, and nothing cancels. If they did, the mesh would be
     // empty, which `mesh` refuses.
@@ -63,9 +63,9 @@ fn contour(form: &Form, cells: f32) -> Mesh {
 }
 
 /// The shape's value and gradient at each of `points`.
-fn values(shape: &VmShape, points: &[Vec3]) -> Vec<(f32, Vec3)> {
+fn values(shape: &slices::Shape, points: &[Vec3]) -> Vec<(f32, Vec3)> {
     let tape = shape.grad_slice_tape(Default::default());
-    let mut evaluator = VmShape::new_grad_slice_eval();
+    let mut evaluator = slices::Shape::new_grad_slice_eval();
     let mut values = Vec::with_capacity(points.len());
     // In pieces small enough for their intermediate results to stay in the cache.
     for points in points.chunks(512) {
@@ -83,7 +83,7 @@ fn values(shape: &VmShape, points: &[Vec3]) -> Vec<(f32, Vec3)> {
 /// Straightens the folds that dual contouring leaves where small cells meet large ones: where a triangle faces against
 /// the shape's gradient, its corners are moved to the mean of their neighbors and back onto the surface, a few times.
 /// Each time, the way back onto the surface is limited to `cell`.
-fn unfold(points: &mut [Vec3], triangles: &[[u32; 3]], shape: &VmShape, cell: f32) {
+fn unfold(points: &mut [Vec3], triangles: &[[u32; 3]], shape: &slices::Shape, cell: f32) {
     const PASSES: usize = 12;
     /// A triangle counts as folded if the cosine between its normal and the gradient is below this.
     const FOLDED: f32 = 0.1;

@@ -23,6 +23,7 @@ mod paperclip;
 mod proportions;
 mod scissors;
 mod shape;
+mod slices;
 mod spoon;
 mod winebottle;
 mod wristwatch;

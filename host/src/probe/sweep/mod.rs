@@ -17,7 +17,6 @@ mod tests;
 
 use glam::DVec3;
 use narrow::{Motion, Triangle};
-use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use tree::Tree;
 
 /// A triangle mesh, ready for casting spheres at it.
@@ -42,22 +41,34 @@ impl Surface {
     ///
     /// # Panics
     /// If there are no triangles, or a coordinate is not finite. [`Scene`](crate::probe::Scene) returns an error instead.
-    pub fn new(mut triangles: Vec<Triangle>) -> Self {
+    pub fn new(triangles: Vec<Triangle>) -> Self {
+        Self::with_bounds(triangles).0
+    }
+
+    /// The same, and the triangles' bounding box: its lowest and highest corner, not rounded as [`bounds`](Self::bounds).
+    pub(super) fn with_bounds(mut triangles: Vec<Triangle>) -> (Self, [DVec3; 2]) {
         assert!(!triangles.is_empty(), "a surface needs a triangle");
-        assert!(triangles.iter().flatten().all(|corner| corner.is_finite()), "a surface needs finite corners");
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &corner in triangles.iter().flatten() {
-            (low, high) = (low.min(corner), high.max(corner));
+        let (mut low, mut high, mut is_finite) = (DVec3::INFINITY, DVec3::NEG_INFINITY, true);
+        // Millions of triangles do not fit a cache: one pass.
+        for triangle in &triangles {
+            for &corner in triangle {
+                is_finite &= corner.is_finite();
+                (low, high) = (low.min(corner), high.max(corner));
+            }
         }
+        assert!(is_finite, "a surface needs finite corners");
         let center = (low + high) / 2.0;
         let longest = (high - low).max_element();
         // Not so small that one over it is out of range.
         let unit = if longest > 0.0 { libm::ldexp(1.0, libm::ilogb(longest).max(-1000)) } else { 1.0 };
-        for corner in triangles.iter_mut().flatten() {
-            *corner = (*corner - center) / unit;
+        for triangle in &mut triangles {
+            for corner in triangle {
+                *corner = (*corner - center) / unit;
+            }
         }
         let (triangles, tree) = Tree::new(without_repeats(triangles));
-        Self { center, unit, per_unit: 1.0 / unit, half: (high - low) / (2.0 * unit), triangles, tree }
+        let half = (high - low) / (2.0 * unit);
+        (Self { center, unit, per_unit: 1.0 / unit, half, triangles, tree }, [low, high])
     }
 
     /// The triangles, in the order of the tree; repeated ones only once.
@@ -136,27 +147,66 @@ struct Start {
 /// Leaves out triangles that have the same corners as an earlier one. They change no contact, but the time to build the
 /// tree grows with the square of the number of boxes that coincide.
 fn without_repeats(mut triangles: Vec<Triangle>) -> Vec<Triangle> {
-    let corners = |triangle: &Triangle| {
-        let mut corners = triangle.map(|corner| corner.to_array().map(|value| (value + 0.0).to_bits()));
-        corners.sort_unstable();
-        corners
+    // A bitmap with 32 bits or more per triangle: few share a bit by chance, and only those that share one are compared.
+    let bits = (32 * triangles.len()).next_power_of_two().max(64);
+    let place = |triangle: &Triangle| {
+        let hash = hash_of(triangle) >> (64 - bits.ilog2());
+        (hash / 64, 1_u64 << (hash % 64))
     };
-    let hash = BuildHasherDefault::<DefaultHasher>::default();
-    let mut order: Vec<(u64, u32)> =
-        triangles.iter().zip(0..).map(|(triangle, index)| (hash.hash_one(corners(triangle)), index)).collect();
-    order.sort_unstable();
-    let mut repeats = vec![false; triangles.len()];
-    for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
-        let mut kept: Vec<[[u64; 3]; 3]> = Vec::new();
-        for &(_, index) in same {
-            let corners = corners(&triangles[index as usize]);
-            repeats[index as usize] = kept.contains(&corners);
-            if !repeats[index as usize] {
-                kept.push(corners);
-            }
+    let (mut met, mut met_again) = (vec![0_u64; bits / 64], Vec::new());
+    for triangle in &triangles {
+        let (word, bit) = place(triangle);
+        let word = word as usize;
+        if met[word] & bit != 0 {
+            met_again.resize(bits / 64, 0_u64);
+            met_again[word] |= bit;
         }
+        met[word] |= bit;
+    }
+    if met_again.is_empty() {
+        return triangles;
+    }
+    let shares = |triangle: &Triangle| {
+        let (word, bit) = place(triangle);
+        met_again[word as usize] & bit != 0
+    };
+    let mut suspects: Vec<([[u64; 3]; 3], usize)> = triangles
+        .iter()
+        .enumerate()
+        .filter(|(_, triangle)| shares(triangle))
+        .map(|(index, triangle)| {
+            let mut corners = triangle.map(bits_of);
+            corners.sort_unstable();
+            (corners, index)
+        })
+        .collect();
+    suspects.sort_unstable();
+    let mut repeats = vec![false; triangles.len()];
+    for pair in suspects.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        repeats[pair[1].1] = true;
     }
     let mut repeats = repeats.into_iter();
     triangles.retain(|_| repeats.next() == Some(false));
     triangles
+}
+
+/// A hash of a triangle's corners, in any order.
+fn hash_of(triangle: &Triangle) -> u64 {
+    // From the golden ratio and the square roots of 2 and 3.
+    const SEEDS: [u64; 3] = [0x9e37_79b9_7f4a_7c15, 0x6a09_e667_f3bc_c909, 0xbb67_ae85_84ca_a73b];
+    // Both halves of the product, so that each bit depends on all.
+    let mixed = |a: u64, b: u64| {
+        let product = u128::from(a) * u128::from(b);
+        (product >> 64) as u64 ^ product as u64
+    };
+    let corner = |corner: &DVec3| {
+        let [x, y, z] = bits_of(*corner);
+        mixed(mixed(x ^ SEEDS[0], y ^ SEEDS[1]) ^ z, SEEDS[2])
+    };
+    mixed(triangle.iter().map(corner).fold(0, u64::wrapping_add), SEEDS[0])
+}
+
+/// A point's bits, the same for both zeros.
+fn bits_of(point: DVec3) -> [u64; 3] {
+    point.to_array().map(|value| (value + 0.0).to_bits())
 }

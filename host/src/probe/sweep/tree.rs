@@ -6,7 +6,6 @@ use super::pack::{LANES, Pack, Ray, WIDTH};
 use glam::{BVec4A, DVec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
@@ -61,24 +60,28 @@ const MIDDLE_FROM: f32 = 0.6;
 /// The same from which on it is fine.
 const FINE_FROM: f32 = 2.0;
 
-struct Bounds(Aabb);
+/// A triangle, as the builder takes it.
+struct Bounded(Triangle);
 
-impl obvhs::Boundable for Bounds {
+impl obvhs::Boundable for Bounded {
     fn aabb(&self) -> Aabb {
-        self.0
+        let [a, b, c] = self.0.map(|corner| Vec3A::from(corner.as_vec3()));
+        Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
     }
 }
 
 impl Tree {
     /// The tree over these triangles, and the triangles in its order.
     pub(super) fn new(triangles: Vec<Triangle>) -> (Vec<Triangle>, Self) {
-        let bounds: Vec<Bounds> = triangles.iter().map(bounds).collect();
-        let bvh = build(&bounds);
-        drop(bounds);
+        // In place.
+        let triangles: Vec<Bounded> = triangles.into_iter().map(Bounded).collect();
+        let bvh = build(&triangles);
         let mut flattened = Flattened {
             bvh: &bvh,
+            packed: packed(&bvh),
             triangles: &triangles,
             ordered: Vec::with_capacity(triangles.len()),
+            open: Vec::new(),
             tree: Self { nodes: Vec::new(), discs: Vec::new(), packs: Vec::new(), grain: 0.0 },
         };
         flattened.add_node(0);
@@ -262,20 +265,53 @@ pub(super) fn limit_after(first: f64, motion: &Motion, ray: &Ray) -> f32 {
     first as f32 + 2.0 * (ray.margin - motion.radius as f32)
 }
 
-/// As the fast preset of obvhs, but with fewer, fuller packs.
-fn build(bounds: &[Bounds]) -> Bvh2 {
+/// As the fast preset of obvhs, without the collapse of its leaves.
+fn build(bounds: &[Bounded]) -> Bvh2 {
     let indices = (0..bounds.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(bounds.len());
     let mut bvh = builder.build(PlocSearchDistance::Low, bounds, indices, SortPrecision::U64, 2);
     ReinsertionOptimizer::default().run(&mut bvh, 0.02, None);
-    collapse(&mut bvh, LANES as u32, 8.0);
     bvh
+}
+
+/// What a step down costs, compared with testing one triangle of a pack: high, so that packs are few and full.
+const STEP: f32 = 8.0;
+
+/// For each node of the binary tree how many triangles a pack of all that is below it has; 0 where that is no pack. Decided
+/// from below by the surface area heuristic, as `obvhs::bvh2::leaf_collapser` does, but without making the tree again.
+fn packed(bvh: &Bvh2) -> Vec<u8> {
+    let mut packed = vec![0; bvh.nodes.len()];
+    pack_below(bvh, 0, &mut packed);
+    packed
+}
+
+/// Decides for a node and all below it; how many triangles its pack has, or 0.
+fn pack_below(bvh: &Bvh2, index: u32, packed: &mut [u8]) -> u8 {
+    let node = &bvh.nodes[index as usize];
+    let count = if node.is_leaf() {
+        1
+    } else {
+        let [left, right] = [node.first_index, node.first_index + 1].map(|child| {
+            let count = pack_below(bvh, child, packed);
+            (count, half_area(bvh.nodes[child as usize].aabb()) * f32::from(count))
+        });
+        let count = left.0 + right.0;
+        let may_be = left.0 > 0 && right.0 > 0 && usize::from(count) <= LANES;
+        let is_better = may_be && half_area(node.aabb()) * (f32::from(count) - STEP) <= left.1 + right.1;
+        if is_better { count } else { 0 }
+    };
+    packed[index as usize] = count;
+    count
 }
 
 struct Flattened<'a> {
     bvh: &'a Bvh2,
-    triangles: &'a [Triangle],
+    /// For each of its nodes how many triangles it has as a pack, if it is one.
+    packed: Vec<u8>,
+    triangles: &'a [Bounded],
     ordered: Vec<Triangle>,
+    /// Nodes of a pack that are still to be looked at.
+    open: Vec<u32>,
     tree: Tree,
 }
 
@@ -284,11 +320,12 @@ impl Flattened<'_> {
     fn add_node(&mut self, root: u32) -> u32 {
         let bvh = self.bvh;
         let node = |index: u32| &bvh.nodes[index as usize];
+        let is_pack = |flattened: &Self, index: u32| flattened.packed[index as usize] > 0;
         let mut members = vec![root];
         // Replace the member with the largest box by its children until there are enough.
         while members.len() < WIDTH {
             let largest = (0..members.len())
-                .filter(|&member| !node(members[member]).is_leaf())
+                .filter(|&member| !is_pack(self, members[member]))
                 .max_by(|&a, &b| half_area(node(members[a]).aabb()).total_cmp(&half_area(node(members[b]).aabb())));
             let Some(largest) = largest else { break };
             let first = node(members.swap_remove(largest)).first_index;
@@ -300,7 +337,7 @@ impl Flattened<'_> {
         for (child, member) in members.into_iter().enumerate() {
             let aabb = *node(member).aabb();
             let first = self.ordered.len();
-            let link = if node(member).is_leaf() { self.add_pack(member) } else { self.add_node(member) };
+            let link = if is_pack(self, member) { self.add_pack(member) } else { self.add_node(member) };
             let place = &mut self.tree.nodes[index];
             for axis in 0..3 {
                 let (low, high) = (aabb.min[axis], aabb.max[axis]);
@@ -315,22 +352,26 @@ impl Flattened<'_> {
         index as u32
     }
 
-    fn add_pack(&mut self, leaf: u32) -> u32 {
-        let leaf = &self.bvh.nodes[leaf as usize];
+    /// Adds a pack of all that is below the node `root` of the binary tree. Returns its link.
+    fn add_pack(&mut self, root: u32) -> u32 {
         let first = self.ordered.len();
-        for index in leaf.first_index..leaf.first_index + leaf.prim_count {
-            self.ordered.push(self.triangles[self.bvh.primitive_indices[index as usize] as usize]);
+        self.open.push(root);
+        while let Some(index) = self.open.pop() {
+            let node = &self.bvh.nodes[index as usize];
+            if node.is_leaf() {
+                // The builder puts a single triangle in a leaf.
+                let triangle = self.bvh.primitive_indices[node.first_index as usize];
+                self.ordered.push(self.triangles[triangle as usize].0);
+            } else {
+                self.open.extend([node.first_index + 1, node.first_index]);
+            }
         }
+        let leaf = &self.bvh.nodes[root as usize];
         let side = leaf.aabb().max - leaf.aabb().min;
         self.tree.grain += side.max_element() / 2.0;
         self.tree.packs.push(Pack::new(&self.ordered[first..], first as u32));
         (self.tree.packs.len() - 1) as u32 | PACK
     }
-}
-
-fn bounds(triangle: &Triangle) -> Bounds {
-    let [a, b, c] = triangle.map(|corner| Vec3A::from(corner.as_vec3()));
-    Bounds(Aabb { min: a.min(b).min(c), max: a.max(b).max(c) })
 }
 
 fn half_area(aabb: &Aabb) -> f32 {
