@@ -9,6 +9,7 @@ use palpate::touches::{Dataset, ObjectTouches, Origin};
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use palpate_tests::random;
+use std::sync::LazyLock;
 
 const TOUCHES: usize = 1_000_000;
 const SEQUENCES: usize = 10_000;
@@ -18,13 +19,24 @@ fn size(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> usize {
     compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap().bytes.len()
 }
 
-/// Touches of the built-in objects.
-fn captured(pose: bool) -> Dataset {
-    let directory = tempfile::tempdir().unwrap();
-    let settings = Origin { touches: 1_500, pose, ..Origin::default() }.into();
-    capture(&palpate::mesh::builtin::all().unwrap(), &settings, directory.path(), &()).unwrap();
-    Dataset::read(directory.path()).unwrap()
+/// Touches of the built-in objects, without poses and with them; captured only once, as all tests need them.
+static CAPTURED: LazyLock<[Dataset; 2]> = LazyLock::new(|| {
+    let objects = palpate::mesh::builtin::all().unwrap();
+    [false, true].map(|pose| {
+        let directory = tempfile::tempdir().unwrap();
+        let settings = Origin { touches: 1_500, pose, ..Origin::default() }.into();
+        capture(&objects, &settings, directory.path(), &()).unwrap();
+        Dataset::read(directory.path()).unwrap()
+    })
+});
+
+fn captured(pose: bool) -> &'static Dataset {
+    &CAPTURED[usize::from(pose)]
 }
+
+/// The published method.
+static PUBLISHED: LazyLock<Ensemble> =
+    LazyLock::new(|| train(captured(false), &train::Settings::paper(), &()).unwrap());
 
 /// A million touches, partial ones among them, spread far beyond what was trained on.
 fn million(dataset: &Dataset) -> Dataset {
@@ -48,8 +60,7 @@ fn hold(ensemble: &Ensemble, dataset: &Dataset) -> (Parity, Parity) {
 #[test]
 fn the_published_methods_margins_stay_within_a_bound_that_is_near_and_its_verdicts_are_equal() {
     let dataset = captured(false);
-    let ensemble = train(&dataset, &train::Settings::paper(), &()).unwrap();
-    let (touches, sequences) = hold(&ensemble, &dataset);
+    let (touches, sequences) = hold(&PUBLISHED, dataset);
     assert!(touches.max_margin_error > 0.0 && touches.max_margin_error <= touches.stated_bound);
     assert!(touches.stated_bound <= 4.0 * touches.max_margin_error);
     assert!(sequences.max_margin_error <= sequences.stated_bound);
@@ -60,8 +71,8 @@ fn the_published_methods_margins_stay_within_a_bound_that_is_near_and_its_verdic
 fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
     for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
         let dataset = captured(true);
-        let ensemble = train(&dataset, &train::Settings { descriptor, ..train::Settings::compact() }, &()).unwrap();
-        let (touches, sequences) = hold(&ensemble, &dataset);
+        let ensemble = train(dataset, &train::Settings { descriptor, ..train::Settings::compact() }, &()).unwrap();
+        let (touches, sequences) = hold(&ensemble, dataset);
         assert_eq!((touches.stated_bound, touches.max_margin_error, touches.best_differs), (0.0, 0.0, 0));
         assert_eq!((sequences.verdict_differs, sequences.touches_differ), (0, 0));
     }
@@ -71,7 +82,7 @@ fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
 fn leaves_that_were_not_rounded_in_training_stay_within_a_bound_that_is_near() {
     let dataset = captured(true);
     let settings = train::Settings { descriptor: Descriptor::Oriented, leaf_bits: None, ..train::Settings::compact() };
-    let (touches, sequences) = hold(&train(&dataset, &settings, &()).unwrap(), &dataset);
+    let (touches, sequences) = hold(&train(dataset, &settings, &()).unwrap(), dataset);
     assert!(touches.max_margin_error > 0.0 && touches.max_margin_error <= touches.stated_bound);
     assert!(touches.stated_bound <= 4.0 * touches.max_margin_error);
     assert_eq!(sequences.verdict_differs, 0);
@@ -80,11 +91,11 @@ fn leaves_that_were_not_rounded_in_training_stay_within_a_bound_that_is_near() {
 #[test]
 fn a_thousand_one_output_trees_take_six_bytes_a_split_and_forty_multi_output_trees_of_depth_five_17_kb() {
     let dataset = captured(false);
-    let one = train(&dataset, &train::Settings::paper(), &()).unwrap();
+    let one = &*PUBLISHED;
     let nodes = one.trees.iter().flat_map(|tree| &tree.nodes);
     let splits = nodes.filter(|node| matches!(node, Node::Split { .. })).count();
-    assert!(one.trees.len() == 1000 && size(&one, Leaf::I16, Layout::Compact) <= 6 * splits, "{splits} splits");
-    let each = train(&dataset, &train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() }, &()).unwrap();
+    assert!(one.trees.len() == 1000 && size(one, Leaf::I16, Layout::Compact) <= 6 * splits, "{splits} splits");
+    let each = train(dataset, &train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() }, &()).unwrap();
     let bytes = size(&each, Leaf::I8, Layout::Complete);
     assert!(each.trees.len() == 40 && bytes <= 17_000, "{bytes} bytes");
 }

@@ -3,6 +3,7 @@
 use super::progress::Bar;
 use crate::Result;
 use crate::compile;
+use crate::mesh::builtin::BACKGROUND_SHAPES;
 use crate::strangers::{self, Calibrated, Settings, Shapes};
 use crate::touches::Dataset;
 use crate::touches::noise::Noise;
@@ -82,7 +83,7 @@ impl StrangersArguments {
                 super::checked(read);
                 Ok(shapes)
             }
-            (None, Some(origin)) => Ok(vec![strangers::captured(origin, &Bar::new())?]),
+            (None, Some(origin)) => Ok(vec![strangers::captured(BACKGROUND_SHAPES, origin, &Bar::new())?]),
             (None, None) => Ok(Vec::new()),
         }
     }

@@ -1,5 +1,6 @@
 //! How much of everything a report measures.
 
+use crate::mesh::builtin::BACKGROUND_SHAPES;
 use crate::touches::Origin;
 use crate::touches::noise::Noise;
 use serde::{Deserialize, Serialize};
@@ -51,6 +52,10 @@ pub struct Settings {
     pub limit_touches: usize,
     /// Boosting rounds of the ensemble that estimates the limit.
     pub limit_rounds: usize,
+    /// Shapes that a background column is trained on.
+    pub background_shapes: usize,
+    /// Other shapes, which the test of whether touches fit any object learns from.
+    pub other_shapes: usize,
     /// Whether to measure growth and generalization, which use built-in objects no matter what the sources are.
     pub growth: bool,
     /// Numbers of objects in the growth figures.
@@ -93,6 +98,8 @@ impl Settings {
             approaches: 60_000,
             limit_touches: 300_000,
             limit_rounds: 80,
+            background_shapes: BACKGROUND_SHAPES,
+            other_shapes: BACKGROUND_SHAPES,
             growth_objects: vec![2, 5, 10, 20, 50, 100, 256],
             growth_triangles: vec![1_000, 10_000, 100_000, 1_000_000],
             growth_approaches: 4_000,
@@ -116,6 +123,7 @@ impl Settings {
             approaches: 8_000,
             limit_touches: 30_000,
             limit_rounds: 60,
+            background_shapes: BACKGROUND_SHAPES / 5,
             growth_objects: vec![2, 5, 10, 20],
             growth_triangles: vec![1_000, 10_000, 100_000],
             growth_approaches: 1_200,

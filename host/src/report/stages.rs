@@ -241,6 +241,8 @@ mod tests {
             approaches: 900,
             limit_touches: 1_000,
             limit_rounds: 3,
+            background_shapes: 10,
+            other_shapes: 20,
             growth: true,
             growth_objects: vec![2, 3],
             growth_triangles: vec![100, 1_000],

@@ -19,9 +19,8 @@ use serde::{Deserialize, Serialize};
 /// Touches of each object to train, calibrate and test on; and the same for a quick report.
 const TOUCHES: [usize; 3] = [21_000, 40_000, 10_000];
 const QUICK: [usize; 3] = [6_000, 10_000, 4_000];
-/// Shapes of the background, and touches of all together; a quick report has a fifth.
-const SHAPES: usize = 200;
-const OF_SHAPES: usize = 60_000;
+/// Touches for each shape of the background, on average.
+const PER_SHAPE: usize = 300;
 /// Touches up to which detection is shown.
 const MOST: usize = 120;
 
@@ -71,7 +70,7 @@ pub(super) fn measure(context: &Context) -> Result<Measured> {
     let sets = Sets { train: &train, calibrate: &calibrate, test: &test };
     let origin = Origin { seed: settings.seed, ..settings.capture.clone() };
     let background = background(context, &origin)?;
-    let shapes = [captured(&origin, context.progress)?];
+    let shapes = [captured(settings.other_shapes, &origin, context.progress)?];
     let columns = match [None, Some(&background)].map(|background| column(context, sets, background, &shapes)) {
         [Ok(without), Ok(with)] => Some([without, with]),
         [Err(error), _] | [_, Err(error)] if is_too_few(&error) => None,
@@ -87,7 +86,8 @@ fn is_too_few(error: &Error) -> bool {
 
 /// Touches of the shapes that a background column is trained on.
 fn background(context: &Context, origin: &Origin) -> Result<Dataset> {
-    let (shapes, touches) = if context.settings.quick { (SHAPES / 5, OF_SHAPES / 5) } else { (SHAPES, OF_SHAPES) };
+    let shapes = context.settings.background_shapes;
+    let touches = shapes * PER_SHAPE;
     let object = builtin::background(shapes, origin.seed)?;
     let scenes = capture::scenes(&[&object], origin, context.progress)?;
     let touches = scenes.iter().map(|scenes| capture::touches(scenes, &object.name, origin, 0..touches as u64));

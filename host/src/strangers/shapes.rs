@@ -45,20 +45,21 @@ pub fn of_dataset(directory: &Path) -> Result<(Dataset, Vec<Shapes>)> {
 #[cfg(feature = "objects")]
 const TOUCHES: u64 = 300;
 
-/// Captures the shapes of [`builtin::background`](crate::mesh::builtin::background) as a data set was captured: with its
-/// probe, aim and scale, with poses and with approaches where it holds them.
+/// Captures `count` shapes of [`builtin::background`](crate::mesh::builtin::background) as a data set was captured: with
+/// its probe, aim and scale, with poses and with approaches where it holds them. Usually
+/// [`BACKGROUND_SHAPES`](crate::mesh::builtin::BACKGROUND_SHAPES) of them.
 ///
 /// # Errors
 /// As a capture; none of the shapes cannot be touched at usual settings.
 #[cfg(feature = "objects")]
-pub fn captured(origin: &Origin, progress: &dyn crate::progress::Progress) -> Result<Shapes> {
+pub fn captured(count: usize, origin: &Origin, progress: &dyn crate::progress::Progress) -> Result<Shapes> {
     use crate::capture::Sampler;
-    use crate::mesh::builtin::{BACKGROUND_SHAPES, background};
+    use crate::mesh::builtin::background;
     use crate::probe::Scene;
     use rayon::prelude::*;
 
     // Other shapes than a background column is usually trained on.
-    let object = background(BACKGROUND_SHAPES, origin.seed.wrapping_add(1_000))?;
+    let object = background(count, origin.seed.wrapping_add(1_000))?;
     let instances: Vec<_> = object.instances().collect();
     progress.begin("touching other shapes", u64::try_from(instances.len()).ok());
     let of = |instance: &&crate::mesh::Instance| -> Result<Vec<Touch>> {

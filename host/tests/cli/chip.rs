@@ -14,22 +14,22 @@ const OBJECTS: usize = 2;
 struct Wire(TcpStream);
 
 impl embedded_io::ErrorType for Wire {
-    type Error = std::io::Error;
+    type Error = embedded_io::ErrorKind;
 }
 
 impl embedded_io::Read for Wire {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        self.0.read(buffer)
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
+        self.0.read(buffer).map_err(|_| embedded_io::ErrorKind::Other)
     }
 }
 
 impl embedded_io::Write for Wire {
-    fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
-        self.0.write(buffer)
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, Self::Error> {
+        self.0.write(buffer).map_err(|_| embedded_io::ErrorKind::Other)
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.0.flush()
+    fn flush(&mut self) -> Result<(), Self::Error> {
+        self.0.flush().map_err(|_| embedded_io::ErrorKind::Other)
     }
 }
 

@@ -9,6 +9,7 @@
 //! ```
 
 use palpate::ensemble::train::Settings as Training;
+use palpate::mesh::builtin::BACKGROUND_SHAPES;
 use palpate::shared::Descriptor;
 use palpate::shared::format::Held;
 use palpate::strangers::{LeftOut, Sets, Settings, captured, leave_one_out};
@@ -23,7 +24,7 @@ fn main() -> palpate::Result<()> {
     let read = |directory: &String| Dataset::read(directory.as_ref());
     let (train, calibrate, test) = (read(train)?, read(calibrate)?, read(test)?);
     let background = background.first().map(|directory| Dataset::read_any(directory.as_ref())).transpose()?;
-    let shapes = captured(&calibrate.origin.clone().unwrap_or_default(), &())?;
+    let shapes = captured(BACKGROUND_SHAPES, &calibrate.origin.clone().unwrap_or_default(), &())?;
     let descriptor = Descriptor::from_name(descriptor).unwrap_or(Descriptor::Curvature);
     let training = Training { descriptor, rounds: 40, depth: 5, ..Training::compact() };
     let sets = Sets { train: &train, calibrate: &calibrate, test: &test };

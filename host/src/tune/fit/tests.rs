@@ -5,6 +5,7 @@ use crate::error::Problem;
 use crate::mesh::builtin;
 use crate::touches::ObjectTouches;
 use palpate_shared::ContactTime;
+use std::sync::LazyLock;
 
 /// What is wrong with a probe. Times are in milliseconds.
 #[derive(Clone, Copy)]
@@ -50,9 +51,17 @@ fn record(times: [Option<f64>; 3], probe: &Crooked, numbers: &mut Numbers) -> To
     Touch::new(ticks.map(|tick| tick.map_or(ContactTime::MISSING, |tick| ContactTime::from_micros(tick as u32))))
 }
 
+/// The objects that were recorded, and two others; made only once.
+static OBJECTS: LazyLock<[Object; 5]> =
+    LazyLock::new(|| ["bowl", "mouse", "wristwatch", "fork", "spoon"].map(|name| builtin::one(name).unwrap()));
+
 /// The objects that were recorded.
 fn objects() -> Vec<Object> {
-    ["bowl", "mouse", "wristwatch"].map(|name| builtin::one(name).unwrap()).into()
+    OBJECTS[..3].to_vec()
+}
+
+fn other(name: &str) -> Object {
+    OBJECTS.iter().find(|object| object.name == name).unwrap().clone()
 }
 
 /// Approaches to an object, with what is wrong with the probe.
@@ -221,7 +230,7 @@ fn a_recorded_object_without_a_mesh_is_named() {
 #[test]
 fn a_recording_under_a_wrong_name_is_named_with_the_right_one() {
     let mut wrong = recorded(&objects(), 300, 14, &BENT);
-    let fork = builtin::one("fork").unwrap();
+    let fork = other("fork");
     wrong.objects[1].touches = approaches(&fork, 300, 14, &BENT);
     let all = [objects(), vec![fork]].concat();
     let found = fit(&wrong, &all, None, &settings(), &()).unwrap();
@@ -275,7 +284,7 @@ fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
 #[test]
 fn a_mesh_of_another_shape_is_like_no_recording() {
     let mut other = recorded(&objects(), 300, 18, &BENT);
-    other.objects[1].touches = approaches(&builtin::one("spoon").unwrap(), 300, 18, &BENT);
+    other.objects[1].touches = approaches(&self::other("spoon"), 300, 18, &BENT);
     let found = fitted(&other, None);
     assert!(found.suspects.iter().any(|suspect| suspect.to_string().starts_with("mouse: ")), "{:?}", found.suspects);
 }
