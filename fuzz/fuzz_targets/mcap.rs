@@ -48,7 +48,7 @@ fuzz_target!(|bytes: &[u8]| {
         Ok(log) => {
             assert!(!log.touches().is_empty() && log.touches().is_sorted_by_key(|logged| logged.time));
             if let Ok(objects) = log.by_object("fuzz") {
-                assert_eq!(objects.iter().map(|object| object.touches.len()).sum::<usize>(), log.touches().len());
+                assert_eq!(objects.iter().map(|object| object.len()).sum::<usize>(), log.touches().len());
             }
         }
     }

@@ -64,10 +64,7 @@ fn main() -> Result<(), Failed> {
         let names: Vec<&str> = objects[..count].iter().map(|object| object.name.as_str()).collect();
         let part = |from: usize, to: usize| {
             let known = data.objects.iter().filter(|object| names.contains(&object.name.as_str()));
-            let part = |object: &ObjectTouches| ObjectTouches {
-                name: object.name.clone(),
-                touches: object.touches[from.min(object.touches.len())..to.min(object.touches.len())].to_vec(),
-            };
+            let part = |object: &ObjectTouches| object.select(from..to.min(object.len()));
             Dataset { origin: data.origin.clone(), ..Dataset::new(known.map(part).collect()) }
         };
         let train = usize::try_from(approaches)?;
@@ -207,9 +204,9 @@ impl Way {
         let trained = |data: &Dataset| -> Result<Compiled, Failed> {
             Ok(compile::compile(&train(data, &self.settings, &())?, &self.compile)?)
         };
-        let pooled = members.iter().enumerate().map(|(group, members)| ObjectTouches {
-            name: format!("group-{group:03}"),
-            touches: members.iter().flat_map(|&object| data.objects[object].touches.iter().copied()).collect(),
+        let pooled = members.iter().enumerate().map(|(group, members)| {
+            let objects: Vec<ObjectTouches> = members.iter().map(|&object| data.objects[object].clone()).collect();
+            ObjectTouches::joined(format!("group-{group:03}"), &objects)
         });
         let coarse = trained(&Dataset { origin: data.origin.clone(), ..Dataset::new(pooled.collect()) })?;
         let fine = members.iter().map(|members| -> Result<Option<Compiled>, Failed> {
@@ -230,7 +227,7 @@ impl Way {
         let cases: Vec<(usize, usize)> =
             (0..test.objects.len()).flat_map(|object| (0..sequences).map(move |sequence| (object, sequence))).collect();
         let outcomes = cases.into_par_iter().map(|(object, sequence)| -> Result<_, Failed> {
-            let touches = shuffled(&test.objects[object].touches, sequence as u64);
+            let touches = shuffled(test.objects[object].touches(), sequence as u64);
             let mut first = Recognizer::<256>::new(&coarse_model, stopping)?;
             let mut all = Recognizer::<256>::new(&coarse_model, Stopping::new(1e-12, u32::MAX).ok_or("a rate")?)?;
             let mut kept: Vec<Touch> = Vec::new();
@@ -344,7 +341,7 @@ fn grouped(data: &Dataset, groups: usize) -> Result<Vec<usize>, Failed> {
     let trained = quick.trained_touches();
     let means: Vec<Vec<f64>> = (data.objects.par_iter())
         .map(|object| {
-            let used = object.touches.iter().filter(|touch| Refused::check(&trained, touch).is_ok()).take(500);
+            let used = object.touches().iter().filter(|touch| Refused::check(&trained, touch).is_ok()).take(500);
             let mut sum = vec![0.0; data.objects.len()];
             for touch in used {
                 let margins = quick.margins(touch);

@@ -57,7 +57,7 @@ fn simulated(names: &[&str]) -> palpate::Result<Vec<Touch>> {
     let mut all = Vec::new();
     for name in names {
         let scene = [Scene::new(builtin::one(name)?.mesh(), origin.length)?];
-        all.extend(capture::touches(&scene, name, &origin, 0..300)?);
+        all.extend(capture::touches(&scene, name, &origin, 0..300)?.touches());
     }
     Ok(all)
 }

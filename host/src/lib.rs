@@ -37,7 +37,7 @@
 //! let scene = [Scene::new(objects[0].mesh(), origin.length)?];
 //! let unseen = Origin { seed: 2, ..origin };
 //! let mut verdict = Verdict::Undecided;
-//! for touch in capture::touches(&scene, "disc", &unseen, 0..200)? {
+//! for touch in capture::touches(&scene, "disc", &unseen, 0..200)?.touches() {
 //!     verdict = recognizer.push(&touch)?;
 //!     if verdict != Verdict::Undecided {
 //!         break;
@@ -98,6 +98,8 @@ pub mod error;
 pub mod output;
 pub mod progress;
 mod random;
+#[cfg(all(test, feature = "train"))]
+mod repetitions;
 
 pub mod mesh;
 pub mod probe;
@@ -134,6 +136,9 @@ pub mod run;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod commands;
+
+#[cfg(all(test, feature = "cli"))]
+mod several_meshes;
 
 pub use error::{Error, Result};
 pub use glam;

@@ -20,7 +20,7 @@ use crate::report::run_page::{RunResults, run_page};
 use crate::report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use crate::touches::folds::{self, Split};
 use crate::touches::noise::Noise;
-use crate::touches::{Dataset, Listing, Origin};
+use crate::touches::{Dataset, Listing, ObjectTouches, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::format::Counted;
 use serde::Serialize;
@@ -246,11 +246,11 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     stages.end("capture of approaches");
     let mut approaches = folds::split(&Dataset::read(&directory)?, settings.test_share, seed)?;
     // Another seed than that of the training.
-    let robots = evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
+    evaluate::add_noise(&mut split.test, &settings.noise, seed.wrapping_add(1))?;
     evaluate::add_noise(&mut approaches.test, &settings.noise, seed.wrapping_add(1))?;
     let probe = Some(StatedProbe::from(&settings.capture.origin));
     let kept = RefCell::new(calibrate::Fresh::default());
-    let job = Job { settings, objects, approaches: &approaches.test, robots, kept: &kept, out, progress };
+    let job = Job { settings, objects, approaches: &approaches.test, kept: &kept, out, progress };
     stages.end("reading and dividing touches");
     let mut method = |name, files, preset, split| Trial::new(name, files, preset, split, job, &mut stages);
     let compact = train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() };
@@ -273,12 +273,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         approach_capture: approached,
         touches: Touches { train: split.train.len(), test: split.test.len() },
         approaches: Touches { train: approaches.train.len(), test: approaches.test.len() },
-        recognized: approaches
-            .test
-            .objects
-            .iter()
-            .map(|o| recognize(&model, &o.name, &o.touches))
-            .collect::<Result<_>>()?,
+        recognized: approaches.test.objects.iter().map(|object| recognize(&model, object)).collect::<Result<_>>()?,
         paper: paper.method.clone(),
         full: full.method.clone(),
         ours: ours.method.clone(),
@@ -325,8 +320,6 @@ struct Job<'d> {
     settings: &'d Settings,
     objects: &'d [Object],
     approaches: &'d Dataset,
-    /// How many robots made the test touches, in turn.
-    robots: usize,
     /// Touches on which an earlier method was calibrated.
     kept: &'d RefCell<calibrate::Fresh>,
     out: &'d Path,
@@ -351,7 +344,7 @@ impl Trial {
         job: Job<'_>,
         stages: &mut Stages,
     ) -> Result<Self> {
-        let Job { settings, approaches, robots, out, progress, .. } = job;
+        let Job { settings, approaches, out, progress, .. } = job;
         let ensemble = train::train(&split.train, &preset, progress)?;
         let train_seconds = stages.end(format!("{name}: training"));
         progress::check(progress)?;
@@ -367,7 +360,7 @@ impl Trial {
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
         let model = compile::open(&compiled.bytes)?;
-        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?.of_robots(robots);
+        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
         let mut evaluation = evaluate::evaluate(
@@ -382,7 +375,7 @@ impl Trial {
                 noise: settings.noise,
             },
         )?;
-        let approached = Margins::new(Candidate::Compiled(&model), approaches)?.of_robots(robots);
+        let approached = Margins::new(Candidate::Compiled(&model), approaches)?;
         let fewest_approaches = approached.fewest_approaches();
         let at: Vec<usize> = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect();
         let stopping = SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed };
@@ -436,8 +429,8 @@ fn model_path(out: &Path, stem: &str) -> PathBuf {
     out.join(if stem == "ensemble" { "model" } else { stem }).with_extension("palpate")
 }
 
-/// Pushes one object's test touches until the recognizer has its verdict.
-fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]) -> Result<Recognition> {
+/// Pushes one object's test touches, of one instance, until the recognizer has its verdict.
+fn recognize(model: &Model<'_>, touched: &ObjectTouches) -> Result<Recognition> {
     let mut recognizer = Recognizer::<256>::new(model, Stopping::from_model(model))
         .map_err(|_| ReportProblem::TooManyObjects { objects: model.object_count() })?;
     let mut approaches = 0;
@@ -445,11 +438,13 @@ fn recognize(model: &Model<'_>, touched: &str, touches: &[palpate_shared::Touch]
         approaches += 1;
         recognizer.push(touch).ok().filter(|verdict| *verdict != Verdict::Undecided)
     };
-    let verdict = touches.iter().find_map(&mut push);
+    let pools = touched.pools();
+    let order = pools.iter().take(1).flat_map(|pool| &pool.touches);
+    let verdict = order.filter_map(|&touch| touched.touches().get(touch as usize)).find_map(&mut push);
     let best = recognizer.best();
     let recognized = matches!(verdict, Some(Verdict::Recognized { .. })).then(|| model.object_name(best).into());
     let posterior = recognizer.posterior(best).to_f64();
-    Ok(Recognition { touched: touched.into(), recognized, touches: recognizer.touches(), approaches, posterior })
+    Ok(Recognition { touched: touched.name.clone(), recognized, touches: recognizer.touches(), approaches, posterior })
 }
 
 /// The page on which the objects can be touched, with all models.

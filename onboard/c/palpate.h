@@ -14,14 +14,17 @@
  *         ... recognizer.object ...
  *     }
  *
+ * Rows of features have a class or a value in one call: palpate_predict_class, palpate_predict_value.
+ *
  * Every function is `static inline`: include it in the one file that recognizes, and only what is called takes flash.
  *
  * Before the #include may be defined:
  *   PALPATE_LAYOUTS      which layouts are read, as PALPATE_COMPACT | PALPATE_COMPLETE; all of them by default
  *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
  *   PALPATE_SHARED       0: a model whose equal leaves stand once, in a table, is refused
+ *   PALPATE_SENTINEL     0: a model over rows in which a number stands for a missing value is refused
  *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
- *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default. 8 bytes of state, and 4 of stack, for each
+ *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default; each takes state and stack
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
  *   PALPATE_API          instead of `static inline`
  */
@@ -51,6 +54,9 @@
 #ifndef PALPATE_SHARED
 #define PALPATE_SHARED 1
 #endif
+#ifndef PALPATE_SENTINEL
+#define PALPATE_SENTINEL 1
+#endif
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 1
 #endif
@@ -69,6 +75,15 @@
 #else
 #define PALPATE_NEAR_ static inline
 #define PALPATE_APART_ static inline
+#endif
+/* A number as one of another type, and the same bytes as other numbers: C++ has a way of its own, with which -Wold-style-cast is
+ * silent. */
+#if defined(__cplusplus)
+#define PALPATE_AS_(type, value) static_cast<type>(value)
+#define PALPATE_AT_(type, place) reinterpret_cast<type>(place)
+#else
+#define PALPATE_AS_(type, value) ((type)(value))
+#define PALPATE_AT_(type, place) ((type)(place))
 #endif
 /* A number of four bytes is a single load on a chip that loads from any address, and a call on others. */
 #if defined(__ARM_FEATURE_UNALIGNED) || defined(__x86_64__) || defined(__aarch64__)
@@ -91,9 +106,9 @@
 /* The most features of a touch. */
 #define PALPATE_TOUCH_FEATURES 10
 /* 1 as a posterior. */
-#define PALPATE_ONE ((uint64_t)1 << 56)
+#define PALPATE_ONE (PALPATE_AS_(uint64_t, 1) << 56)
 /* Bytes that are enough for a snapshot. */
-#define PALPATE_SNAPSHOT_LENGTH(objects) (16 + 10 * (objects))
+#define PALPATE_SNAPSHOT_LENGTH(objects) (21 + 10 * (objects))
 
 /* Why bytes are no model, or a model is not used. The place of what is wrong is in `wrong` of the model. */
 typedef enum {
@@ -148,6 +163,7 @@ typedef struct {
     const uint8_t *odds_;    /* thresholds by object, or NULL */
     const uint8_t *strangers_; /* what it states of objects that it does not know, or NULL */
     const uint8_t *table_; /* values of the leaves that are shared, or NULL; before them the length of their numbers */
+    const uint8_t *sentinel_; /* features that stand for a missing value, or NULL */
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
@@ -170,6 +186,7 @@ typedef struct {
     uint8_t by_object;    /* 1: the model's thresholds by object come before `odds` */
     uint8_t verdict;      /* a palpate_verdict */
     uint8_t object;       /* the one that was recognized */
+    uint32_t forgotten;   /* of the touches, the first ones that are no longer part of the evidence: of some snapshots */
     int64_t evidence[PALPATE_MAX_OBJECTS];
 } palpate_recognizer;
 
@@ -196,13 +213,13 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 
 static inline uint32_t palpate_u16_(const uint8_t *p)
 {
-    return (uint32_t)PALPATE_BYTE(p) | (uint32_t)PALPATE_BYTE(p + 1) << 8;
+    return PALPATE_AS_(uint32_t, PALPATE_BYTE(p)) | PALPATE_AS_(uint32_t, PALPATE_BYTE(p + 1)) << 8;
 }
 
 PALPATE_U32_ uint32_t palpate_u32_(const uint8_t *p)
 {
-    return (uint32_t)PALPATE_BYTE(p) | (uint32_t)PALPATE_BYTE(p + 1) << 8 | (uint32_t)PALPATE_BYTE(p + 2) << 16 |
-           (uint32_t)PALPATE_BYTE(p + 3) << 24;
+    return PALPATE_AS_(uint32_t, PALPATE_BYTE(p)) | PALPATE_AS_(uint32_t, PALPATE_BYTE(p + 1)) << 8 |
+           PALPATE_AS_(uint32_t, PALPATE_BYTE(p + 2)) << 16 | PALPATE_AS_(uint32_t, PALPATE_BYTE(p + 3)) << 24;
 }
 
 /* The CRC-32 so far with one more byte; it begins with all ones, and ends inverted. */
@@ -221,18 +238,18 @@ static inline int32_t palpate_signed_(const uint8_t *p, uint_fast8_t width)
 {
     uint32_t number;
     if (width == 2) {
-        return (int16_t)(uint16_t)palpate_u16_(p);
+        return PALPATE_AS_(int16_t, PALPATE_AS_(uint16_t, palpate_u16_(p)));
     }
     if (width == 4) {
-        return (int32_t)palpate_u32_(p);
+        return PALPATE_AS_(int32_t, palpate_u32_(p));
     }
     p += width;
-    number = 0u - (uint32_t)(PALPATE_BYTE(p - 1) >> 7);
+    number = 0u - PALPATE_AS_(uint32_t, PALPATE_BYTE(p - 1) >> 7);
     do {
         p--;
         number = number << 8 | PALPATE_BYTE(p);
     } while (--width != 0);
-    return (int32_t)number;
+    return PALPATE_AS_(int32_t, number);
 }
 
 /* ---- Opening a model: after it nothing can fail ---- */
@@ -250,14 +267,14 @@ static inline size_t palpate_leaf_size_(const palpate_model *model)
 
 static inline palpate_error palpate_wrong_(palpate_model *model, palpate_error error, const uint8_t *place)
 {
-    model->wrong = (uint32_t)(place - model->bytes);
+    model->wrong = PALPATE_AS_(uint32_t, place - model->bytes);
     return error;
 }
 
 /* Bytes between two places. */
 static inline uint32_t palpate_between_(const uint8_t *start, const uint8_t *end)
 {
-    return (uint32_t)(end - start);
+    return PALPATE_AS_(uint32_t, end - start);
 }
 
 /* The next optional section of those that end at `end`: its tag as it stands there, 0x10000 if it is not whole. Its content
@@ -296,7 +313,7 @@ static inline int palpate_trained_(palpate_model *model, const uint8_t *content)
 /* Bytes of an object's record in a test of fit with so many rivals. */
 static inline uint32_t palpate_record_(uint32_t rivals)
 {
-    return (8 + rivals + (rivals & 1) + 4 * rivals + rivals * (rivals + 1) + 3) & ~(uint32_t)3;
+    return (8 + rivals + (rivals & 1) + 4 * rivals + rivals * (rivals + 1) + 3) & ~PALPATE_AS_(uint32_t, 3);
 }
 
 /* A background, and a test of fit; 0 if they make no sense. */
@@ -309,7 +326,7 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
         return 0;
     }
     model->strangers_ = content;
-    model->known = (uint16_t)(model->objects - PALPATE_BYTE(content));
+    model->known = PALPATE_AS_(uint16_t, model->objects - PALPATE_BYTE(content));
     if (PALPATE_BYTE(content + 1) == 0) {
         return 1;
     }
@@ -320,7 +337,8 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
     size = palpate_record_(rivals);
     first = palpate_u32_(content + 8);
     if (PALPATE_BYTE(content + 4) - 1u > 1 || rivals - 1 > 15 || first == 0 || palpate_u32_(content + 12) < first ||
-        (int32_t)palpate_u32_(content + 24) > (int32_t)palpate_u32_(content + 16) || palpate_u32_(content + 20) >> 31 != 0 ||
+        PALPATE_AS_(int32_t, palpate_u32_(content + 24)) > PALPATE_AS_(int32_t, palpate_u32_(content + 16)) ||
+        palpate_u32_(content + 20) >> 31 != 0 ||
         size * model->known > length - 44) {
         return 0;
     }
@@ -366,10 +384,10 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
             break;
         case 5:
             model->odds_ = content;
-            least = 4 * (uint32_t)model->objects;
+            least = 4 * PALPATE_AS_(uint32_t, model->objects);
             break;
         case 7: /* plan: pairs of objects, 26 directions with 1, 2 or 4 rolls */
-            pairs = (uint32_t)model->objects * (model->objects - 1u) / 2;
+            pairs = PALPATE_AS_(uint32_t, model->objects) * (model->objects - 1u) / 2;
             if (length < 4 || pairs == 0 || PALPATE_BYTE(content) != 0) {
                 return PALPATE_FIELD;
             }
@@ -390,6 +408,17 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                     return PALPATE_FIELD;
                 }
                 model->table_ = content + 4;
+            } else if (last == 13) {
+                /* What is predicted: a link, a rule for ties, a scale that is positive and finite. */
+                if (length < 8 || PALPATE_BYTE(content) > 4 || PALPATE_BYTE(content + 1) > 1 ||
+                    palpate_u32_(content + 4) - 1 >= 0x7f7fffffu) {
+                    return PALPATE_FIELD;
+                }
+            } else if (PALPATE_SENTINEL && last == 14) {
+                if (length < 8 || PALPATE_AS_(int32_t, palpate_u32_(content)) > PALPATE_AS_(int32_t, palpate_u32_(content + 4))) {
+                    return PALPATE_FIELD;
+                }
+                model->sentinel_ = content;
             } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
@@ -401,7 +430,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
     return PALPATE_OK;
 }
 
-/* Axes of features that exist, columns that a byte numbers, thresholds that fill their section. */
+/* Axes of features that exist, columns that a byte numbers, thresholds that ascend and fill their section. */
 static inline palpate_error palpate_check_axes_(palpate_model *model)
 {
     const uint8_t *axis = model->part_[PALPATE_AXES_], *end = model->part_[PALPATE_GROUPS_];
@@ -409,7 +438,8 @@ static inline palpate_error palpate_check_axes_(palpate_model *model)
     uint_fast16_t columns = 0;
     for (; axis != model->cuts_; axis += 4) {
         uint8_t kind = PALPATE_BYTE(axis + 1), width = PALPATE_BYTE(axis + 2);
-        uint32_t size = (uint32_t)width * PALPATE_BYTE(axis + 3);
+        uint32_t size = PALPATE_AS_(uint32_t, width) * PALPATE_BYTE(axis + 3);
+        int32_t last = INT32_MIN;
         columns += 1u + (kind == 3);
         if (kind - 1u > 2 || width - 1u > 3 || PALPATE_BYTE(axis) >= model->features || columns > 256) {
             return palpate_wrong_(model, PALPATE_FIELD, axis);
@@ -417,7 +447,14 @@ static inline palpate_error palpate_check_axes_(palpate_model *model)
         if (size > palpate_between_(cuts, end)) {
             return palpate_wrong_(model, PALPATE_SECTION, cuts);
         }
-        cuts += size;
+        for (; size != 0; size -= width) {
+            const int32_t next = palpate_signed_(cuts, width);
+            if (next < last) {
+                return palpate_wrong_(model, PALPATE_FIELD, axis);
+            }
+            last = next;
+            cuts += width;
+        }
     }
     if (PALPATE_IS_WIDE_(model) ? axis != model->part_[PALPATE_AXES_] || (palpate_between_(cuts, end) & 3) != 0 : cuts != end) {
         return palpate_wrong_(model, PALPATE_SECTION, cuts);
@@ -442,21 +479,21 @@ static inline uint32_t palpate_cells_(const palpate_model *model)
         model->descriptor != 4) {
         return 0;
     }
-    return 5 + (uint32_t)PALPATE_BYTE(axis + 11) + second + (first + 1) * (second + 1);
+    return 5 + PALPATE_AS_(uint32_t, PALPATE_BYTE(axis + 11)) + second + (first + 1) * (second + 1);
 }
 
 /* Groups whose splits and leaves fill their parts exactly, and whose margins stay within 2^30. */
 static inline palpate_error palpate_check_groups_(palpate_model *model)
 {
-    const uint32_t limit = (uint32_t)1 << 30;
+    const uint32_t limit = PALPATE_AS_(uint32_t, 1) << 30;
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
     const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *end = model->part_[PALPATE_END_];
     const uint8_t bits = PALPATE_IS_I8_(model) ? 7 : 15;
-    uint32_t range = (uint32_t)1 << 20, most = 0;
+    uint32_t range = PALPATE_AS_(uint32_t, 1) << 20, most = 0;
     uint_fast16_t object;
     uint_fast8_t shift = 24;
     if (PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
-        uint32_t size = palpate_cells_(model) * model->objects * (uint32_t)palpate_leaf_size_(model);
+        uint32_t size = palpate_cells_(model) * model->objects * PALPATE_AS_(uint32_t, palpate_leaf_size_(model));
         if (size == 0) {
             return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_AXES_]);
         }
@@ -469,7 +506,7 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         }
     }
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
-        uint32_t trees = palpate_u32_(group + 4), leaf = (uint32_t)palpate_leaf_size_(model), length, table = 0;
+        uint32_t trees = palpate_u32_(group + 4), leaf = PALPATE_AS_(uint32_t, palpate_leaf_size_(model)), length, table = 0;
         const uint8_t *number = leaves;
         uint8_t depth = PALPATE_BYTE(group), one = PALPATE_BYTE(group + 2);
         int fits = 1;
@@ -498,10 +535,10 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
                 return palpate_wrong_(model, PALPATE_FIELD, group);
             }
             fits = trees <= palpate_between_(splits, model->part_[PALPATE_LEAVES_]) >> 1 >> depth &&
-                   (uint64_t)(trees << depth) * leaf <= palpate_between_(leaves, end);
+                   PALPATE_AS_(uint64_t, trees << depth) * leaf <= palpate_between_(leaves, end);
             if (fits) {
-                splits += (size_t)(trees << depth) * 2;
-                leaves += (size_t)((trees << depth) * leaf);
+                splits += PALPATE_AS_(size_t, trees << depth) * 2;
+                leaves += PALPATE_AS_(size_t, (trees << depth) * leaf);
             }
         } else {
             const uint32_t node = PALPATE_IS_WIDE_(model) ? 6 : 3;
@@ -516,8 +553,8 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
                     fits = count * node <= rest - 2 && (count + 1) * leaf <= palpate_between_(leaves, end);
                 }
                 if (fits) {
-                    splits += (size_t)(count * node + 2);
-                    leaves += (size_t)((count + 1) * leaf);
+                    splits += PALPATE_AS_(size_t, count * node + 2);
+                    leaves += PALPATE_AS_(size_t, (count + 1) * leaf);
                 }
             }
         }
@@ -537,7 +574,7 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         return palpate_wrong_(model, PALPATE_SECTION, leaves);
     }
     for (object = 0; !PALPATE_IS_F32_(model) && object < model->objects; object++) {
-        uint32_t base = palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (size_t)object);
+        uint32_t base = palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * PALPATE_AS_(size_t, object));
         base = base >> 31 != 0 ? 0u - base : base;
         most = base > most ? base : most;
     }
@@ -548,7 +585,7 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
 static inline uint8_t palpate_wrong_number_(const uint8_t *bytes)
 {
     uint32_t unit = palpate_u32_(bytes + 32), shift, difference;
-    uint64_t bits = (uint64_t)((unit & 0x7fffff) | 0x800000) * 3098164010u; /* log2 e in Q31 */
+    uint64_t bits = PALPATE_AS_(uint64_t, (unit & 0x7fffff) | 0x800000) * 3098164010u; /* log2 e in Q31 */
     if (unit < 0x33800000u || unit > 0x3f000000u) { /* 2^-24 to 0.5 */
         return 32;
     }
@@ -557,8 +594,8 @@ static inline uint8_t palpate_wrong_number_(const uint8_t *bytes)
         return 40;
     }
     bits = (bits >> shift) + 2 - palpate_u32_(bytes + 36);
-    difference = (uint32_t)(bits >> 32);
-    if (difference != 0 || (uint32_t)bits > 4) {
+    difference = PALPATE_AS_(uint32_t, bits >> 32);
+    if (difference != 0 || PALPATE_AS_(uint32_t, bits) > 4) {
         return 36;
     }
     return PALPATE_BYTE(bytes + 55) != 0 ? 48 : palpate_u32_(bytes + 56) == 0 ? 56 : 0;
@@ -590,7 +627,7 @@ static inline uint8_t palpate_wrong_header_(palpate_model *model)
 }
 
 /* Opens a model, checking everything that is relied on later. `bytes` must stay as they are while it is used. On an error
- * `model->wrong` is its place, and the model must not be used. Cost: about 50 instructions per byte, for the checksum. */
+ * `model->wrong` is its place, and the model must not be used. Cost: in proportion to the bytes, for the checksum. */
 PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *bytes, size_t length)
 {
     uint32_t lengths[7], rest, i;
@@ -598,7 +635,7 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     palpate_error error;
     model->bytes = bytes;
     for (i = 0; i < 4 && i < length; i++) {
-        if (PALPATE_BYTE(bytes + i) != (uint8_t)(0x54504c50u >> 8 * i)) { /* PLPT */
+        if (PALPATE_BYTE(bytes + i) != PALPATE_AS_(uint8_t, 0x54504c50u >> 8 * i)) { /* PLPT */
             return palpate_wrong_(model, PALPATE_NOT_A_MODEL, bytes);
         }
     }
@@ -611,7 +648,7 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     }
     rest = palpate_u32_(bytes + 8);
     if (length != rest) {
-        return palpate_wrong_(model, PALPATE_LENGTH, bytes + (length < rest ? length : (size_t)rest));
+        return palpate_wrong_(model, PALPATE_LENGTH, bytes + (length < rest ? length : PALPATE_AS_(size_t, rest)));
     }
     rest = 0xffffffffu;
     for (p = bytes; p != bytes + (length - 4); p++) {
@@ -624,12 +661,12 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     model->leaf_ = PALPATE_BYTE(bytes + 7);
     model->descriptor = PALPATE_BYTE(bytes + 12);
     model->real = PALPATE_BYTE(bytes + 13);
-    model->objects = (uint16_t)(PALPATE_BYTE(bytes + 14) + 1);
-    model->features = (uint16_t)(PALPATE_BYTE(bytes + 15) + 1);
+    model->objects = PALPATE_AS_(uint16_t, PALPATE_BYTE(bytes + 14) + 1);
+    model->features = PALPATE_AS_(uint16_t, PALPATE_BYTE(bytes + 15) + 1);
     /* The parts follow each other. */
     lengths[PALPATE_TEXT_] = palpate_u32_(bytes + 68);
     lengths[PALPATE_OPTIONAL_] = i == 1 ? 0 : palpate_u32_(bytes + 92);
-    lengths[PALPATE_MARGINS_] = 8 * (uint32_t)model->objects;
+    lengths[PALPATE_MARGINS_] = 8 * PALPATE_AS_(uint32_t, model->objects);
     i = 4 * palpate_u16_(bytes + 16);
     rest = palpate_u32_(bytes + 80);
     lengths[PALPATE_AXES_] = rest + i < i ? UINT32_MAX : rest + i;
@@ -637,7 +674,7 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     lengths[PALPATE_SPLITS_] = palpate_u32_(bytes + 84);
     lengths[PALPATE_LEAVES_] = palpate_u32_(bytes + 88);
     p = bytes + 96;
-    rest = (uint32_t)length - 96;
+    rest = PALPATE_AS_(uint32_t, length) - 96;
     for (i = 0; i < 7; i++) {
         model->part_[i] = p;
         if (lengths[i] > rest) {
@@ -650,7 +687,7 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     if (rest != 4) {
         return palpate_wrong_(model, PALPATE_SECTION, p);
     }
-    model->cuts_ = model->part_[PALPATE_AXES_] + 4 * (size_t)palpate_u16_(bytes + 16);
+    model->cuts_ = model->part_[PALPATE_AXES_] + 4 * PALPATE_AS_(size_t, palpate_u16_(bytes + 16));
     model->wrong = palpate_wrong_header_(model);
     if (model->wrong != 0) {
         return PALPATE_FIELD;
@@ -666,10 +703,13 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     if (PALPATE_SHARED) {
         model->table_ = NULL;
     }
+    if (PALPATE_SENTINEL) {
+        model->sentinel_ = NULL;
+    }
     model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
-    model->needs_pose = (uint8_t)(model->descriptor < 7 && (0x6cu >> model->descriptor & 1) != 0);
+    model->needs_pose = PALPATE_AS_(uint8_t, model->descriptor < 7 && (0x6cu >> model->descriptor & 1) != 0);
     error = palpate_check_sections_(model);
     if (error == PALPATE_OK) {
         error = palpate_check_axes_(model);
@@ -690,7 +730,7 @@ PALPATE_API size_t palpate_object_name(const palpate_model *model, uint16_t obje
     for (skipped = 0; text != end; skipped++) {
         length = PALPATE_BYTE(text);
         text++;
-        if (length > (size_t)(end - text)) {
+        if (length > PALPATE_AS_(size_t, end - text)) {
             length = 0;
             break;
         }
@@ -703,7 +743,7 @@ PALPATE_API size_t palpate_object_name(const palpate_model *model, uint16_t obje
     if (room != 0) {
         length = length < room ? length : room - 1;
         for (i = 0; i < length; i++) {
-            name[i] = (char)PALPATE_BYTE(text + i);
+            name[i] = PALPATE_AS_(char, PALPATE_BYTE(text + i));
         }
         name[length] = 0;
     }
@@ -719,10 +759,10 @@ PALPATE_API int32_t palpate_key(uint32_t bits)
     if (magnitude > 0x7f800000u) {
         return PALPATE_MISSING_FEATURE;
     }
-    return bits >> 31 != 0 ? -(int32_t)magnitude : (int32_t)magnitude;
+    return bits >> 31 != 0 ? -PALPATE_AS_(int32_t, magnitude) : PALPATE_AS_(int32_t, magnitude);
 }
 
-/* The key of an f32 value. Cost: about six instructions, none of them in floating point. */
+/* The key of an f32 value. Cost: a few instructions, none of them in floating point. */
 PALPATE_API int32_t palpate_f32_key(float value)
 {
     union {
@@ -735,7 +775,7 @@ PALPATE_API int32_t palpate_f32_key(float value)
 
 static inline int32_t palpate_clamp_(int32_t value)
 {
-    const int32_t limit = ((int32_t)1 << 24) - 1;
+    const int32_t limit = (PALPATE_AS_(int32_t, 1) << 24) - 1;
     return value > limit ? limit : value < -limit && value != PALPATE_MISSING_FEATURE ? -limit : value;
 }
 
@@ -756,9 +796,9 @@ static inline void palpate_times_(const palpate_touch *touch, uint32_t *times)
 /* The code of a touch's contacts: 0 none, 1 one outer finger, 2 the middle one, 3 middle and outer, 4 both outer, 5 all. */
 static inline uint8_t palpate_pattern_(const uint32_t *times)
 {
-    uint8_t code = (uint8_t)((times[0] != PALPATE_MISSING) + (times[2] != PALPATE_MISSING));
-    code = (uint8_t)(2 * code + (times[1] != PALPATE_MISSING));
-    return code - 1u < 2 ? (uint8_t)(3 - code) : code;
+    uint8_t code = PALPATE_AS_(uint8_t, (times[0] != PALPATE_MISSING) + (times[2] != PALPATE_MISSING));
+    code = PALPATE_AS_(uint8_t, 2 * code + (times[1] != PALPATE_MISSING));
+    return code - 1u < 2 ? PALPATE_AS_(uint8_t, 3 - code) : code;
 }
 
 /* Why a model over touches does not count one, or PALPATE_COUNTED. */
@@ -787,8 +827,8 @@ static inline void palpate_features_(const palpate_model *model, const palpate_t
     int32_t at[3], curvature = none, slope = none, pair = none;
     uint_fast8_t i;
     for (i = 0; i < 3; i++) {
-        const uint32_t limit = (uint32_t)1 << 28;
-        at[i] = times[i] == PALPATE_MISSING ? none : (int32_t)(times[i] < limit ? times[i] : limit);
+        const uint32_t limit = PALPATE_AS_(uint32_t, 1) << 28;
+        at[i] = times[i] == PALPATE_MISSING ? none : PALPATE_AS_(int32_t, times[i] < limit ? times[i] : limit);
     }
     if (descriptor == 0) {
         for (i = 0; i < 3; i++) {
@@ -820,7 +860,7 @@ static inline void palpate_features_(const palpate_model *model, const palpate_t
         int flip = 0;
         if (at[0] != at[2]) {
             /* A missing contact is later than any other: the largest as a number without a sign. */
-            flip = (uint32_t)at[0] > (uint32_t)at[2];
+            flip = PALPATE_AS_(uint32_t, at[0]) > PALPATE_AS_(uint32_t, at[2]);
         } else {
             /* The first component that is not 0 decides; the last one with partial touches. */
             for (i = 0; i < 3; i++) {
@@ -852,16 +892,22 @@ PALPATE_APART_ uint8_t palpate_rank_(const uint8_t *cuts, uint_fast8_t width, ui
     }
     for (; step != 0; step >>= 1) {
         const uint_fast16_t next = rank + step;
-        if (next <= count && palpate_signed_(cuts + (size_t)width * next, width) <= value) {
+        if (next <= count && palpate_signed_(cuts + PALPATE_AS_(size_t, width) * next, width) <= value) {
             rank = next;
         }
     }
-    return (uint8_t)rank;
+    return PALPATE_AS_(uint8_t, rank);
 }
 
-static inline int32_t palpate_value_(const int32_t *features, uint16_t count, uint8_t feature)
+/* A feature of a row of `count`. */
+static inline int32_t palpate_value_(const palpate_model *model, const int32_t *features, uint16_t count, uint8_t feature)
 {
-    return feature < count ? features[feature] : PALPATE_MISSING_FEATURE;
+    const int32_t value = feature < count ? features[feature] : PALPATE_MISSING_FEATURE;
+    if (PALPATE_SENTINEL && model->sentinel_ != NULL && value >= PALPATE_AS_(int32_t, palpate_u32_(model->sentinel_)) &&
+        value <= PALPATE_AS_(int32_t, palpate_u32_(model->sentinel_ + 4))) {
+        return PALPATE_MISSING_FEATURE;
+    }
+    return value;
 }
 
 /* Adds a leaf with `values` values to as many sums; bytes with 128 more than they are. */
@@ -876,9 +922,9 @@ PALPATE_APART_ void palpate_add_leaf_(const palpate_model *model, uint32_t *sums
     } else if (PALPATE_IS_I16_(model)) {
         do {
             /* Within 2^30, as was checked. */
-            const int16_t value = (int16_t)palpate_u16_(leaf);
-            const int32_t sum = (int32_t)*sums + value;
-            *sums++ = (uint32_t)sum;
+            const int16_t value = PALPATE_AS_(int16_t, palpate_u16_(leaf));
+            const int32_t sum = PALPATE_AS_(int32_t, *sums) + value;
+            *sums++ = PALPATE_AS_(uint32_t, sum);
             leaf += 2;
         } while (sums != end);
     } else {
@@ -921,7 +967,7 @@ PALPATE_APART_ uint32_t palpate_walk_compact_(const uint8_t *ranks, const uint8_
         left = left < below ? left : below;
         if (goes_right) {
             leaf += left + 1;
-            split += (size_t)(left * 3);
+            split += PALPATE_AS_(size_t, left * 3);
             below -= left;
         } else {
             below = left;
@@ -937,19 +983,21 @@ PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int
     const uint32_t cuts = palpate_between_(model->cuts_, model->part_[PALPATE_GROUPS_]) / 4;
     uint32_t leaf = 0;
     while (below != 0) {
-        const int32_t value = palpate_value_(features, count, PALPATE_BYTE(split));
+        const int32_t value = palpate_value_(model, features, count, PALPATE_BYTE(split));
         const uint32_t number = palpate_u16_(split + 2);
         uint32_t left = palpate_u16_(split + 4);
         int goes_right = PALPATE_BYTE(split + 1) == 0;
         if (value != PALPATE_MISSING_FEATURE) {
-            goes_right = value >= (number < cuts ? (int32_t)palpate_u32_(model->cuts_ + 4 * (size_t)number) : 0);
+            /* A threshold that does not exist is 0. */
+            const uint32_t cut = number < cuts ? palpate_u32_(model->cuts_ + 4 * PALPATE_AS_(size_t, number)) : 0;
+            goes_right = value >= PALPATE_AS_(int32_t, cut);
         }
         split += 6;
         below--;
         left = left < below ? left : below;
         if (goes_right) {
             leaf += left + 1;
-            split += (size_t)(left * 6);
+            split += PALPATE_AS_(size_t, left * 6);
             below -= left;
         } else {
             below = left;
@@ -981,12 +1029,12 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     const int table = PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model);
     const size_t size = palpate_leaf_size_(model);
     uint32_t words[64], cell = 0;
-    uint8_t *ranks = (uint8_t *)words;
+    uint8_t *ranks = PALPATE_AT_(uint8_t *, words);
     uint_fast16_t i;
     uint_fast8_t last;
     for (i = 0; i < model->objects; i++) {
         /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
-        sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * (size_t)i);
+        sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
     }
     /* Columns beyond those that there are have rank 0. */
     for (i = 0; i < 64; i += 4) {
@@ -997,13 +1045,13 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     }
     for (; axis != model->cuts_; axis += 4) {
         const uint8_t columns = PALPATE_BYTE(axis + 1), width = PALPATE_BYTE(axis + 2), most = PALPATE_BYTE(axis + 3);
-        const int32_t value = palpate_value_(features, count, PALPATE_BYTE(axis));
+        const int32_t value = palpate_value_(model, features, count, PALPATE_BYTE(axis));
         uint8_t left = 0, right = 255;
         if (value != PALPATE_MISSING_FEATURE) {
             left = palpate_rank_(cuts, width, most, value);
             right = left;
         }
-        cuts += (size_t)width * most;
+        cuts += PALPATE_AS_(size_t, width) * most;
         if (PALPATE_IS_GRID_(model)) {
             cell = cell * (most + 2u) + (value == PALPATE_MISSING_FEATURE ? most + 1u : left);
         } else if (PALPATE_IS_PATTERNS_(model)) {
@@ -1017,11 +1065,11 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
             }
         }
     }
-    ranks = (uint8_t *)words;
+    ranks = PALPATE_AT_(uint8_t *, words);
     if (table) {
         if (PALPATE_IS_PATTERNS_(model)) {
             const uint32_t m = PALPATE_BYTE(model->part_[PALPATE_AXES_] + 7), l = PALPATE_BYTE(model->part_[PALPATE_AXES_] + 11);
-            switch (palpate_value_(features, count, 0)) {
+            switch (palpate_value_(model, features, count, 0)) {
             case 1:
                 cell = 1;
                 break;
@@ -1029,7 +1077,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 cell = 2;
                 break;
             case 3:
-                cell = 3 + (uint32_t)ranks[2];
+                cell = 3 + PALPATE_AS_(uint32_t, ranks[2]);
                 break;
             case 4:
                 cell = 4 + l + ranks[1];
@@ -1041,7 +1089,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 cell = 0;
             }
         }
-        palpate_add_leaf_(model, sums, model->objects, leaves + (size_t)cell * model->objects * size);
+        palpate_add_leaf_(model, sums, model->objects, leaves + PALPATE_AS_(size_t, cell) * model->objects * size);
         for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
             sums[i] -= 128;
         }
@@ -1057,14 +1105,14 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
         uint32_t *first = one ? sums + PALPATE_BYTE(group + 3) : sums;
         uint32_t trees = palpate_u32_(group + 4);
         /* Shifts get smaller: what was added before is shifted on the way. */
-        palpate_shift_(model, sums, (uint_fast8_t)(last - shift));
+        palpate_shift_(model, sums, PALPATE_AS_(uint_fast8_t, last - shift));
         last = shift;
         for (i = 0; PALPATE_IS_I8_(model) && i < values; i++) {
             first[i] -= trees << 7;
         }
         if (PALPATE_IS_COMPLETE_(model)) {
-            const size_t slots = (size_t)1 << depth;
-            const uint8_t *thresholds = splits + (size_t)(trees << depth);
+            const size_t slots = PALPATE_AS_(size_t, 1) << depth;
+            const uint8_t *thresholds = splits + PALPATE_AS_(size_t, trees << depth);
             for (; trees != 0; trees--) {
                 const size_t leaf = palpate_walk_complete_(ranks, splits, thresholds, slots);
                 palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + leaf * stored, length));
@@ -1080,20 +1128,20 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 splits += 2;
                 if (PALPATE_IS_WIDE_(model)) {
                     leaf = palpate_walk_wide_(model, features, count, splits, all);
-                    splits += (size_t)(all * 6);
+                    splits += PALPATE_AS_(size_t, all * 6);
                 } else {
                     leaf = palpate_walk_compact_(ranks, splits, all);
-                    splits += (size_t)(all * 3);
+                    splits += PALPATE_AS_(size_t, all * 3);
                 }
-                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + (size_t)leaf * stored, length));
-                leaves += (size_t)(all + 1) * stored;
+                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + PALPATE_AS_(size_t, leaf) * stored, length));
+                leaves += PALPATE_AS_(size_t, all + 1) * stored;
             }
         }
     }
     if (!PALPATE_IS_F32_(model)) {
         palpate_shift_(model, sums, last);
         for (i = 0; i < model->objects; i++) {
-            sums[i] += palpate_u32_(base + 4 * (size_t)i);
+            sums[i] += palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
         }
     }
 }
@@ -1101,19 +1149,19 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
 /* An f32 value, given by its bits, in units of 2^-16, rounded half away from zero, within 2^30. */
 static inline int32_t palpate_q16_(uint32_t bits)
 {
-    const uint32_t limit = (uint32_t)1 << 30;
-    const uint8_t exponent = (uint8_t)(bits >> 23);
+    const uint32_t limit = PALPATE_AS_(uint32_t, 1) << 30;
+    const uint8_t exponent = PALPATE_AS_(uint8_t, bits >> 23);
     uint32_t magnitude = (bits & 0x7fffff) | 0x800000;
     if (exponent < 110 || (exponent == 255 && magnitude != 0x800000)) {
         return 0;
     }
     if (exponent < 134) {
-        magnitude = (magnitude + ((uint32_t)1 << (133 - exponent))) >> (134 - exponent);
+        magnitude = (magnitude + (PALPATE_AS_(uint32_t, 1) << (133 - exponent))) >> (134 - exponent);
     } else {
         magnitude = exponent > 140 ? limit : magnitude << (exponent - 134);
         magnitude = magnitude > limit ? limit : magnitude;
     }
-    return bits >> 31 != 0 ? -(int32_t)magnitude : (int32_t)magnitude;
+    return bits >> 31 != 0 ? -PALPATE_AS_(int32_t, magnitude) : PALPATE_AS_(int32_t, magnitude);
 }
 
 /* The margins of a row of `count` features, in units: one for each object, within 2^30. Features are whole numbers, or keys
@@ -1121,9 +1169,9 @@ static inline int32_t palpate_q16_(uint32_t bits)
 PALPATE_API void palpate_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
 {
     uint_fast16_t i;
-    palpate_sum_(model, features, count, (uint32_t *)margins);
+    palpate_sum_(model, features, count, PALPATE_AT_(uint32_t *, margins));
     for (i = 0; PALPATE_IS_F32_(model) && i < model->objects; i++) {
-        margins[i] = palpate_q16_((uint32_t)margins[i]);
+        margins[i] = palpate_q16_(PALPATE_AS_(uint32_t, margins[i]));
     }
 }
 
@@ -1174,7 +1222,7 @@ PALPATE_API int palpate_f32_margins_of(const palpate_model *model, const int32_t
 /* The high half of a product. */
 static inline uint32_t palpate_high_(uint32_t a, uint32_t b)
 {
-    return (uint32_t)((uint64_t)a * b >> 32);
+    return PALPATE_AS_(uint32_t, PALPATE_AS_(uint64_t, a) * b >> 32);
 }
 
 /* 2^-u in Q56, for u in Q32. Error: at most 1e-8 of the result, and 2^-57. */
@@ -1184,23 +1232,23 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
         2147483648u, 2056437387u, 1969251188u, 1885761398u, 1805811301u, 1729250827u, 1655936265u, 1585730000u,
         1518500250u, 1454120821u, 1392470869u, 1333434672u, 1276901417u, 1222764986u, 1170923762u, 1121280436u,
     };
-    const uint32_t whole = (uint32_t)(u >> 32), rest = (uint32_t)u << 4;
-    uint32_t power = sixteenths[(uint32_t)u >> 28];
+    const uint32_t whole = PALPATE_AS_(uint32_t, u >> 32), rest = PALPATE_AS_(uint32_t, u) << 4;
+    uint32_t power = sixteenths[PALPATE_AS_(uint32_t, u) >> 28];
     uint32_t slope = 186065157u - palpate_high_(rest, 4029616u - palpate_high_(rest, 56985u));
     if (whole > 57) {
         return 0;
     }
     power -= palpate_high_(power, palpate_high_(rest, slope));
-    return (uint64_t)power << 25 >> whole;
+    return PALPATE_AS_(uint64_t, power) << 25 >> whole;
 }
 
-/* How many bits an object is behind the leader, in Q32. */
+/* How many bits an object is behind the leader, in Q32; the most there are where its weight is 0 at any temperature. */
 static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint_fast16_t leader, uint_fast16_t object)
 {
     const uint8_t *bytes = recognizer->model->bytes;
-    uint64_t units = (uint64_t)recognizer->evidence[leader] - (uint64_t)recognizer->evidence[object];
+    const uint64_t units = PALPATE_AS_(uint64_t, recognizer->evidence[leader]) - PALPATE_AS_(uint64_t, recognizer->evidence[object]);
     if (units >> 32 != 0) {
-        units = 0xffffffffu;
+        return UINT64_MAX;
     }
     return units * palpate_u32_(bytes + 36) >> (PALPATE_BYTE(bytes + 40) & 63);
 }
@@ -1220,13 +1268,13 @@ static inline uint_fast16_t palpate_leader_(const palpate_recognizer *recognizer
 /* Of the objects that can be named, the one with the most evidence; the first of several. */
 PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
 {
-    return (uint16_t)palpate_leader_(recognizer, recognizer->model->known);
+    return PALPATE_AS_(uint16_t, palpate_leader_(recognizer, recognizer->model->known));
 }
 
 /* The prior of an object, in units. */
 static inline int32_t palpate_prior_(const palpate_model *model, uint_fast16_t object)
 {
-    return (int32_t)palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * ((size_t)model->objects + object));
+    return PALPATE_AS_(int32_t, palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (PALPATE_AS_(size_t, model->objects) + object)));
 }
 
 /* A sum that stays within 64 bits. */
@@ -1245,6 +1293,7 @@ PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
     const palpate_model *model = recognizer->model;
     uint_fast16_t i;
     recognizer->touches = 0;
+    recognizer->forgotten = 0;
     recognizer->verdict = PALPATE_UNDECIDED;
     recognizer->object = 0;
     for (i = 0; i < model->objects; i++) {
@@ -1262,7 +1311,7 @@ PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_
         return palpate_wrong_(model, PALPATE_TOO_MANY_OBJECTS, bytes + 14);
     }
     recognizer->model = model;
-    recognizer->odds = palpate_u32_(bytes + 48) | (uint64_t)palpate_u32_(bytes + 52) << 32;
+    recognizer->odds = palpate_u32_(bytes + 48) | PALPATE_AS_(uint64_t, palpate_u32_(bytes + 52)) << 32;
     recognizer->max_touches = palpate_u32_(bytes + 56);
     recognizer->by_object = 1;
     palpate_reset(recognizer);
@@ -1281,7 +1330,7 @@ static inline int64_t palpate_subtract_(int64_t a, int64_t b)
 /* Within 2^31 - 1. */
 static inline int32_t palpate_held_(int64_t number)
 {
-    return number > INT32_MAX ? INT32_MAX : number < -INT32_MAX ? -INT32_MAX : (int32_t)number;
+    return number > INT32_MAX ? INT32_MAX : number < -INT32_MAX ? -INT32_MAX : PALPATE_AS_(int32_t, number);
 }
 
 /* Divided by a power of two, rounded down. */
@@ -1292,7 +1341,7 @@ static inline int64_t palpate_down_(int64_t number, uint8_t shift)
 
 static inline int32_t palpate_i16_(const uint8_t *p)
 {
-    const int16_t number = (int16_t)palpate_u16_(p);
+    const int16_t number = PALPATE_AS_(int16_t, palpate_u16_(p));
     return number;
 }
 
@@ -1305,12 +1354,13 @@ static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fa
     return palpate_subtract_(sum, palpate_prior_(recognizer->model, object));
 }
 
-/* How badly the touches fit the leader, in 2^-16 nats, by the model's test. */
+/* How badly the touches that the evidence is the sum of fit the leader, in 2^-16 nats, by the model's test. */
 static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const uint8_t *test = recognizer->model->strangers_;
+    const uint32_t touches = recognizer->touches - recognizer->forgotten;
     const uint_fast8_t rivals = PALPATE_BYTE(test + 5);
-    const uint8_t *record = test + 44 + (size_t)(palpate_record_(rivals) * leader);
+    const uint8_t *record = test + 44 + PALPATE_AS_(size_t, palpate_record_(rivals) * leader);
     const uint8_t *means = record + 8 + rivals + (rivals & 1), *slopes = means + 2 * rivals, *weights = slopes + 2 * rivals;
     int32_t ahead[16];
     uint64_t squares = 0;
@@ -1320,12 +1370,12 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
         int is_there = 1;
         const int64_t rival = palpate_own_(recognizer, PALPATE_BYTE(record + 8 + row), &is_there);
         const int64_t own = palpate_own_(recognizer, leader, &is_there);
-        int64_t mean = (int64_t)palpate_i16_(means + 2 * row) * ((int64_t)1 << PALPATE_BYTE(record));
-        const uint64_t size = mean < 0 ? 0u - (uint64_t)mean : (uint64_t)mean;
-        if (size > (uint64_t)INT64_MAX / recognizer->touches) {
+        int64_t mean = PALPATE_AS_(int64_t, palpate_i16_(means + 2 * row)) * (PALPATE_AS_(int64_t, 1) << PALPATE_BYTE(record));
+        const uint64_t size = mean < 0 ? 0u - PALPATE_AS_(uint64_t, mean) : PALPATE_AS_(uint64_t, mean);
+        if (size > PALPATE_AS_(uint64_t, INT64_MAX) / touches) {
             mean = mean < 0 ? INT64_MIN : INT64_MAX;
         } else {
-            mean *= recognizer->touches;
+            mean *= touches;
         }
         ahead[row] = is_there ? palpate_held_(palpate_subtract_(palpate_subtract_(rival, own), mean)) : 0;
     }
@@ -1333,17 +1383,18 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
         int64_t sum = 0;
         uint64_t square;
         for (column = 0; column <= row; column++) {
-            sum += (int64_t)palpate_i16_(weights) * ahead[column];
+            sum += PALPATE_AS_(int64_t, palpate_i16_(weights)) * ahead[column];
             weights += 2;
         }
         sum = palpate_held_(palpate_down_(sum, PALPATE_BYTE(record + 1)));
-        square = (uint64_t)(sum * sum);
+        square = PALPATE_AS_(uint64_t, sum * sum);
         squares = squares > UINT64_MAX - square ? UINT64_MAX : squares + square;
-        slope += (int64_t)palpate_i16_(slopes + 2 * row) * ahead[row];
+        slope += PALPATE_AS_(int64_t, palpate_i16_(slopes + 2 * row)) * ahead[row];
     }
-    squares /= recognizer->touches;
-    slope = palpate_add_(squares > INT64_MAX ? INT64_MAX : (int64_t)squares, palpate_down_(slope, PALPATE_BYTE(record + 2)));
-    return palpate_subtract_(slope, (int64_t)(int32_t)palpate_u32_(record + 4) * recognizer->touches);
+    squares /= touches;
+    squares = squares > INT64_MAX ? INT64_MAX : squares;
+    slope = palpate_add_(PALPATE_AS_(int64_t, squares), palpate_down_(slope, PALPATE_BYTE(record + 2)));
+    return palpate_subtract_(slope, PALPATE_AS_(int64_t, PALPATE_AS_(int32_t, palpate_u32_(record + 4))) * touches);
 }
 
 /* Whether the leader may be named by the model's test of fit: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
@@ -1351,7 +1402,8 @@ static inline palpate_verdict palpate_fit_(const palpate_recognizer *recognizer,
 {
     const palpate_model *model = recognizer->model;
     const uint8_t *test = model->strangers_;
-    const uint32_t touches = recognizer->touches;
+    const uint32_t touches = recognizer->touches - recognizer->forgotten;
+    uint64_t left;
     int64_t misfit;
     if (test == NULL) {
         return PALPATE_RECOGNIZED;
@@ -1361,12 +1413,13 @@ static inline palpate_verdict palpate_fit_(const palpate_recognizer *recognizer,
             return PALPATE_UNDECIDED;
         }
         /* Limits are higher at first. */
-        misfit = (int64_t)(palpate_u32_(test + 20) * (palpate_exp2((uint64_t)touches * palpate_u32_(test + 28)) >> 24) >> 32);
+        left = palpate_exp2(PALPATE_AS_(uint64_t, touches) * palpate_u32_(test + 28)) >> 24;
+        misfit = PALPATE_AS_(int64_t, palpate_u32_(test + 20) * left >> 32);
         misfit = palpate_subtract_(palpate_misfit_(recognizer, leader), misfit);
-        if (misfit > (int32_t)palpate_u32_(test + 16)) {
+        if (misfit > PALPATE_AS_(int32_t, palpate_u32_(test + 16))) {
             return PALPATE_UNKNOWN;
         }
-        if (touches < palpate_u32_(test + 12) || misfit > (int32_t)palpate_u32_(test + 24)) {
+        if (touches < palpate_u32_(test + 12) || misfit > PALPATE_AS_(int32_t, palpate_u32_(test + 24))) {
             return PALPATE_UNDECIDED;
         }
     }
@@ -1395,7 +1448,7 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
         verdict = palpate_fit_(recognizer, best);
     }
     if (recognizer->by_object != 0 && model->odds_ != NULL) {
-        left = (uint64_t)palpate_u32_(model->odds_ + 4 * (size_t)best) << 24;
+        left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;
     }
     for (i = 0; verdict == PALPATE_RECOGNIZED && i < model->objects; i++) {
         if (i != best) {
@@ -1409,11 +1462,11 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     if (verdict == PALPATE_UNDECIDED && recognizer->touches >= recognizer->max_touches) {
         verdict = PALPATE_GAVE_UP;
     }
-    recognizer->verdict = (uint8_t)verdict;
-    recognizer->object = (uint8_t)best;
+    recognizer->verdict = PALPATE_AS_(uint8_t, verdict);
+    recognizer->object = PALPATE_AS_(uint8_t, best);
 }
 
-/* Takes in a touch; after a decision nothing changes until the reset. Cost: the ensemble's margins, about 15 instructions for
+/* Takes in a touch; after a decision nothing changes until the reset. Cost: the ensemble's margins, a few instructions for
  * each object, and an exponential, rarely more. */
 PALPATE_API palpate_answer palpate_push(palpate_recognizer *recognizer, const palpate_touch *touch)
 {
@@ -1464,7 +1517,7 @@ static inline uint64_t palpate_ratio_(uint64_t part, uint64_t whole)
 }
 
 /* The posterior of an object in Q56 (PALPATE_ONE is 1), of the evidence divided by the model's temperature; 0 for an object
- * that the model does not know. Cost: an exponential for each object, and about 1,000 instructions. */
+ * that the model does not know. Cost: an exponential for each object, and a long division. */
 PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uint16_t object)
 {
     const palpate_model *model = recognizer->model;
@@ -1486,7 +1539,7 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     }
     for (i = 0; i < model->objects; i++) {
         if (i != best) {
-            const uint64_t most = (uint64_t)1 << 42; /* where a weight is 0 at any temperature */
+            const uint64_t most = PALPATE_AS_(uint64_t, 1) << 42; /* where a weight is 0 at any temperature */
             uint64_t bits = palpate_behind_(recognizer, best, i);
             bits = palpate_exp2((bits < most ? bits : most) * sharpness >> 16);
             others += bits;
@@ -1498,6 +1551,152 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     return object == best ? PALPATE_ONE - palpate_ratio_(others, all) : palpate_ratio_(own, all);
 }
 
+/* ---- Predictions for rows of features ---- */
+
+/* The section about what margins become; NULL if there is none. */
+static inline const uint8_t *palpate_prediction_(const palpate_model *model)
+{
+    const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
+    while (p != end) {
+        const uint8_t *content = p + 8;
+        uint32_t length = 0;
+        if ((palpate_section_(&p, end, &length) & 0x7fff) == 13) {
+            return content;
+        }
+    }
+    return NULL;
+}
+
+/* The class of a row of `count` features (see palpate_margins_of): that with the largest margin, and of several the first,
+ * or the last where the model says so. With f32 leaves their sums are compared as they are. `margins` has room for
+ * `model->objects` of them, and then holds the row's. */
+PALPATE_API uint16_t palpate_predict_class(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
+{
+    const uint8_t *prediction = palpate_prediction_(model);
+    const int last_of_ties = prediction != NULL && PALPATE_BYTE(prediction + 1) != 0;
+    int32_t most = INT32_MIN;
+    uint_fast16_t best = 0, i;
+    palpate_sum_(model, features, count, PALPATE_AT_(uint32_t *, margins));
+    for (i = 0; i < model->objects; i++) {
+        int32_t sum = margins[i];
+        if (PALPATE_IS_F32_(model)) {
+            margins[i] = palpate_q16_(PALPATE_AS_(uint32_t, sum));
+            sum = palpate_key(PALPATE_AS_(uint32_t, sum));
+        }
+        if (i < model->known && (sum > most || (last_of_ties && sum == most))) {
+            best = i;
+            most = sum;
+        }
+    }
+    return PALPATE_AS_(uint16_t, best);
+}
+
+/* The f32 value with these bits. */
+static inline float palpate_float_(uint32_t bits)
+{
+    union {
+        uint32_t bits;
+        float value;
+    } both;
+    both.bits = bits;
+    return both.value;
+}
+
+/* The value of a row of `count` features before the inverse link: the margin of a model with one output, times the scale
+ * that the model states; of a model with several outputs 0. The same bits as of the crate where the compiler computes in
+ * f32 (no excess precision). */
+PALPATE_API float palpate_predict_raw(const palpate_model *model, const int32_t *features, uint16_t count)
+{
+    const uint8_t *prediction = palpate_prediction_(model);
+    const float scale = palpate_float_(prediction == NULL ? 0x3f800000u : palpate_u32_(prediction + 4));
+    const float unit = palpate_float_(palpate_u32_(model->bytes + 32));
+    uint32_t sum;
+    if (model->objects != 1) {
+        return 0;
+    }
+    palpate_sum_(model, features, count, &sum);
+    return PALPATE_IS_F32_(model) ? palpate_float_(sum) * scale : PALPATE_AS_(float, PALPATE_AS_(int32_t, sum)) * (unit * scale);
+}
+
+/* e^x: within 1e-7 of the result. */
+static inline float palpate_exp_(float x)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } both;
+    uint32_t exponent, fraction;
+    uint64_t power;
+    int whole, half;
+    both.value = x;
+    if (x != x) {
+        return x;
+    }
+    if (x > 89.0f) {
+        return palpate_float_(0x7f800000u);
+    }
+    if (x < -104.0f) {
+        return 0;
+    }
+    exponent = both.bits >> 23 & 255;
+    /* |x| log2 e in Q32. */
+    power = PALPATE_AS_(uint64_t, (both.bits & 0x7fffff) | 0x800000) * 793129986396u;
+    power = exponent < 94 ? 0 : power >> (157 - exponent);
+    whole = PALPATE_AS_(int, power >> 32);
+    fraction = PALPATE_AS_(uint32_t, power);
+    if (x < 0) {
+        whole = -whole;
+    } else if (fraction != 0) {
+        whole++;
+        fraction = 0u - fraction;
+    }
+    whole -= 24;
+    half = whole / 2;
+    power = (palpate_exp2(fraction) + (PALPATE_AS_(uint32_t, 1) << 31)) >> 32;
+    return PALPATE_AS_(float, PALPATE_AS_(uint32_t, power)) * palpate_float_(PALPATE_AS_(uint32_t, 127 + half) << 23) *
+           palpate_float_(PALPATE_AS_(uint32_t, 127 + whole - half) << 23);
+}
+
+/* ln(1 + e), for e from 0 to 1. */
+static inline float palpate_ln_1p_(float e)
+{
+    const float s = e / (2.0f + e), t = s * s;
+    float sum = 1.0f / 13;
+    int divisor;
+    for (divisor = 11; divisor > 0; divisor -= 2) {
+        sum = sum * t + 1.0f / PALPATE_AS_(float, divisor);
+    }
+    return 2.0f * s * sum;
+}
+
+/* What the library predicts for a margin, by the model's inverse link. Error, relative to the result: at most 5e-7. */
+PALPATE_API float palpate_inverse_link(const palpate_model *model, float margin)
+{
+    const uint8_t *prediction = palpate_prediction_(model);
+    switch (prediction == NULL ? 0 : PALPATE_BYTE(prediction)) {
+    case 1:
+        if (margin >= 0) {
+            return 1.0f / (1.0f + palpate_exp_(-margin));
+        }
+        margin = palpate_exp_(margin);
+        return margin / (1.0f + margin);
+    case 2:
+        return palpate_exp_(margin);
+    case 3:
+        return margin < 0 ? -(margin * margin) : margin * margin;
+    case 4:
+        return margin > 0 ? margin + palpate_ln_1p_(palpate_exp_(-margin)) : palpate_ln_1p_(palpate_exp_(margin));
+    default:
+        return margin;
+    }
+}
+
+/* The value of a row of `count` features as the library predicts it: palpate_predict_raw after the inverse link. */
+PALPATE_API float palpate_predict_value(const palpate_model *model, const int32_t *features, uint16_t count)
+{
+    return palpate_inverse_link(model, palpate_predict_raw(model, features, count));
+}
+
 /* ---- Snapshots ---- */
 
 /* Seven bits a byte, the low ones first. Returns the length with them; bytes beyond `room` are counted only. */
@@ -1505,7 +1704,7 @@ static inline size_t palpate_put_(uint8_t *buffer, size_t length, size_t room, u
 {
     for (;; length++) {
         if (length < room) {
-            buffer[length] = (uint8_t)((number & 127) | (number > 127 ? 128 : 0));
+            buffer[length] = PALPATE_AS_(uint8_t, (number & 127) | (number > 127 ? 128 : 0));
         }
         number >>= 7;
         if (number == 0) {
@@ -1523,7 +1722,7 @@ static inline uint64_t palpate_take_(const uint8_t *buffer, size_t *at, size_t l
     for (i = 0; i < most && *at < length; i++) {
         const uint8_t byte = buffer[*at];
         *at += 1;
-        number |= (uint64_t)(byte & 127) << 7 * i;
+        number |= PALPATE_AS_(uint64_t, byte & 127) << 7 * i;
         if (byte < 128) {
             if (i + 1u == most && byte > last) {
                 break;
@@ -1548,10 +1747,13 @@ PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_
     if (room - length < 2 || room < length) {
         return 0;
     }
-    buffer[length++] = recognizer->verdict;
+    buffer[length++] = PALPATE_AS_(uint8_t, recognizer->verdict | (recognizer->forgotten != 0 ? 4 : 0));
     buffer[length++] = recognizer->verdict == PALPATE_RECOGNIZED ? recognizer->object : 0;
+    if (recognizer->forgotten != 0) {
+        length = palpate_put_(buffer, length, room, recognizer->forgotten);
+    }
     for (i = 0; i < model->objects; i++) {
-        const uint64_t evidence = (uint64_t)recognizer->evidence[i];
+        const uint64_t evidence = PALPATE_AS_(uint64_t, recognizer->evidence[i]);
         length = palpate_put_(buffer, length, room, evidence << 1 ^ (0u - (evidence >> 63)));
     }
     if (length > room || room - length < 4) {
@@ -1561,7 +1763,7 @@ PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_
         sum = palpate_crc_(sum, buffer[at]);
     }
     for (i = 0; i < 4; i++) {
-        buffer[length++] = (uint8_t)(~sum >> 8 * i);
+        buffer[length++] = PALPATE_AS_(uint8_t, ~sum >> 8 * i);
     }
     return length;
 }
@@ -1572,7 +1774,7 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     const palpate_model *model = recognizer->model;
     int64_t most = 0;
     size_t at = 0, start;
-    uint32_t sum = 0, found = 0xffffffffu, checksum, touches;
+    uint32_t sum = 0, found = 0xffffffffu, checksum, touches, forgotten = 0;
     uint_fast16_t i, best = 0;
     uint8_t verdict, object;
     if (length < 4) {
@@ -1580,7 +1782,7 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     }
     length -= 4;
     for (i = 0; i < 4; i++) {
-        sum |= (uint32_t)snapshot[length + i] << 8 * i;
+        sum |= PALPATE_AS_(uint32_t, snapshot[length + i]) << 8 * i;
     }
     sum = ~sum;
     for (at = 0; at < length; at++) {
@@ -1590,8 +1792,8 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     if (found != sum) {
         return PALPATE_DAMAGED;
     }
-    checksum = (uint32_t)palpate_take_(snapshot, &at, length, 5, 15);
-    touches = (uint32_t)palpate_take_(snapshot, &at, length, 5, 15);
+    checksum = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
+    touches = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
     if (at > length || length - at < 2) {
         return PALPATE_DAMAGED;
     }
@@ -1600,10 +1802,18 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     if (checksum != palpate_u32_(model->part_[PALPATE_END_])) {
         return PALPATE_OTHER_MODEL;
     }
+    if ((verdict & 4) != 0) {
+        /* The last touch is part of the evidence. */
+        verdict &= 251;
+        forgotten = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
+        if (forgotten == 0 || forgotten >= touches) {
+            return PALPATE_DAMAGED;
+        }
+    }
     start = at;
     for (i = 0; i < model->objects; i++) {
         const uint64_t number = palpate_take_(snapshot, &at, length, 10, 1);
-        const int64_t evidence = (int64_t)(number >> 1 ^ (0u - (number & 1)));
+        const int64_t evidence = PALPATE_AS_(int64_t, number >> 1 ^ (0u - (number & 1)));
         if (i == 0 || (evidence > most && i < model->known)) {
             most = evidence;
             best = i;
@@ -1615,11 +1825,12 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     }
     palpate_reset(recognizer);
     recognizer->touches = touches;
+    recognizer->forgotten = forgotten;
     recognizer->verdict = verdict;
     recognizer->object = object;
     for (i = 0; i < model->objects; i++) {
         const uint64_t number = palpate_take_(snapshot, &start, length, 10, 1);
-        recognizer->evidence[i] = (int64_t)(number >> 1 ^ (0u - (number & 1)));
+        recognizer->evidence[i] = PALPATE_AS_(int64_t, number >> 1 ^ (0u - (number & 1)));
     }
     return PALPATE_RESTORED;
 }

@@ -48,6 +48,7 @@
 //! | `compact`, `complete`, `grid`, `wide` | layouts of trees that can be read |
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
 //! | `shared-leaves` | trees whose equal leaves stand once |
+//! | `sentinel` | models over rows in which a number stands for a missing value |
 //! | `defmt` | touches, verdicts, refusals and faults can be logged; the only one that is off by default |
 //!
 //! `no_std`, without a heap and without `unsafe`; once a model has been validated nothing here can panic.
@@ -78,7 +79,7 @@ pub use decide::{
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 #[cfg(feature = "rows")]
 pub use layouts::batch::Batch;
-pub use model::{Model, Refused};
+pub use model::{Model, Refused, inverse_link};
 pub use palpate_shared as shared;
 
 /// `palpate.h`, which reads the same models in C99 and gives the same bits: for programs that write it beside a model. No

@@ -208,7 +208,7 @@ impl Descriptor {
 
     /// The features of a touch, clamped to ±[`FEATURE_LIMIT`].
     ///
-    /// Cost: about 60 instructions on a Cortex-M without a pose. Cannot fail.
+    /// Cost: a few instructions for each feature. Cannot fail.
     pub fn features(self, touch: &Touch) -> Features {
         const NONE: i32 = MISSING_FEATURE;
         let [first, middle, last] = touch.times();
@@ -248,7 +248,7 @@ impl Descriptor {
     /// The features of [`Descriptor::Curvature`] of a full touch that is over within four seconds, as nearly all are; `None`
     /// for others, of which [`Descriptor::features`] has them.
     ///
-    /// Cost: 20 instructions on a Cortex-M, since nothing can be missing or reach a limit.
+    /// Cost: less than that of [`Descriptor::features`], since nothing can be missing or reach a limit.
     #[inline]
     pub fn short_curvature(touch: &Touch) -> Option<[i32; 2]> {
         let [first, middle, last] = touch.times();

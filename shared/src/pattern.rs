@@ -26,7 +26,7 @@ impl ContactPattern {
 
     /// The pattern of fingers in their order along the row: whether each touched.
     ///
-    /// Cost: about ten instructions. Cannot fail.
+    /// Cost: a few instructions. Cannot fail.
     pub const fn of([first, middle, last]: [bool; 3]) -> Self {
         // Four bits for each: with no finger, the middle one, an outer one, that and the middle one, both outer ones, all.
         const CODES: u32 = 0x0054_3120;

@@ -55,7 +55,7 @@ pub struct Touch {
 impl Touch {
     /// A touch from three contact times on any common clock: the earliest becomes 0.
     ///
-    /// Cost: a dozen instructions. Cannot fail; three missing times are an approach that touched nothing.
+    /// Cost: a few instructions. Cannot fail; three missing times are an approach that touched nothing.
     pub fn new(times: [ContactTime; 3]) -> Self {
         let earliest = times.iter().map(|t| t.0).min().unwrap_or(0);
         Self {

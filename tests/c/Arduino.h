@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-enum { LOW = 0, INPUT_PULLUP = 2 };
+enum { LOW = 0, HIGH = 1, INPUT_PULLUP = 2 };
 struct Printer {
     void begin(unsigned long baud);
     void print(const char *text);
@@ -15,6 +15,5 @@ extern Printer Serial;
 void pinMode(uint8_t pin, uint8_t mode);
 int digitalRead(uint8_t pin);
 uint32_t micros();
-void delay(unsigned long milliseconds);
 
 #endif

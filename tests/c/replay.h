@@ -86,6 +86,17 @@ static void replay_numbers(const char *word, const int32_t *numbers, uint16_t co
     replay_put('\n');
 }
 
+/* The bits of a value; which of the NaNs it is, is up to the machine. */
+static void replay_float(float value)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } both;
+    both.value = value;
+    replay_i64(value != value ? -1 : (int64_t)both.bits);
+}
+
 /* What came of a touch or row with these features. */
 static void replay_known(palpate_answer answer, uint16_t count)
 {
@@ -116,6 +127,17 @@ static void replay_known(palpate_answer answer, uint16_t count)
         }
     }
 #endif
+    {
+        /* A model of several outputs has no value. */
+        const int has_value = objects == 1;
+        const uint16_t class_number = palpate_predict_class(&replay_model, replay_features, count, replay_margins);
+        replay_text("predicted");
+        replay_i64((int64_t)class_number);
+        replay_float(has_value ? palpate_predict_raw(&replay_model, replay_features, count) : 0);
+        replay_float(has_value ? palpate_predict_value(&replay_model, replay_features, count) : 0);
+        replay_put('\n');
+        replay_numbers("margins", replay_margins, objects);
+    }
     replay_text("evidence");
     for (i = 0; i < objects; i++) {
         replay_i64(replay_recognizer.evidence[i]);

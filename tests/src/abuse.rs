@@ -5,8 +5,8 @@ use crate::sections::{trained, with_sections};
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-    Counted, HEADER_LENGTH, Header, Length, MUST_UNDERSTAND, Tag, Trained, TrainedNoise, TrainedProbe, TrainedTouches,
-    checksum, write_section,
+    Counted, HEADER_LENGTH, Header, Length, Link, MUST_UNDERSTAND, Prediction, Sentinel, Tag, Trained, TrainedNoise,
+    TrainedProbe, TrainedTouches, checksum, write_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -125,9 +125,21 @@ pub fn section(tag: u16, content: &[u8]) -> Vec<u8> {
 
 /// A snapshot with this content, whatever it says.
 pub fn snapshot(model: &Model<'_>, touches: u32, verdict: u8, object: u8, evidence: &[i64]) -> Vec<u8> {
-    let mut buffer = [0; 32];
-    let head = (model.checksum(), touches, verdict, object);
-    let mut bytes = postcard::to_slice(&head, &mut buffer).expect("a long buffer").to_vec();
+    let head =
+        postcard::to_slice(&(model.checksum(), touches, verdict, object), &mut [0; 32]).map(|head| head.to_vec());
+    snapshot_of(head.expect("a long buffer"), evidence)
+}
+
+/// A snapshot, undecided, that the first touches are forgotten in.
+///
+/// # Panics
+/// Never.
+pub fn forgetful(model: &Model<'_>, touches: u32, forgotten: u32, evidence: &[i64]) -> Vec<u8> {
+    let head = (model.checksum(), touches, 4_u8, 0_u8, forgotten);
+    snapshot_of(postcard::to_slice(&head, &mut [0; 32]).expect("a long buffer").to_vec(), evidence)
+}
+
+fn snapshot_of(mut bytes: Vec<u8>, evidence: &[i64]) -> Vec<u8> {
     for evidence in evidence {
         bytes.extend_from_slice(postcard::to_slice(evidence, &mut [0; 10]).expect("a long buffer"));
     }
@@ -146,6 +158,7 @@ pub fn cases() -> Vec<Abuse> {
     axes(&mut put);
     groups(&mut put);
     tables(&mut put);
+    predictions(&mut put);
     shared_leaves(&mut put);
     cases
 }
@@ -292,6 +305,10 @@ fn axes(put: Put<'_>) {
     put("more thresholds than there are", "section", cuts, changed(&good, axes + 3, &[255]));
     let count = good[axes + 3];
     let width = usize::from(good[axes + 2]);
+    let second = cuts + width;
+    let mut turned = good.clone();
+    turned[second..second + width].copy_from_slice(&good[cuts..second]);
+    put("thresholds that do not ascend", "field", axes, changed(&turned, cuts, &good[second..second + width]));
     let last = usize::from(good[axes + 7]) * usize::from(good[axes + 6]);
     put(
         "thresholds that belong to no axis",
@@ -378,6 +395,28 @@ fn tables(put: Put<'_>) {
     let [_, _, axes, ..] = places(&good);
     put("tables by pattern with axes in another order", "section", axes, changed(&good, axes, &[2]));
     put("tables by pattern of another descriptor", "section", axes, changed(&good, 12, &[Descriptor::Gravity.code()]));
+}
+
+/// What a model predicts, and what stands for a missing value.
+fn predictions(put: Put<'_>) {
+    let plain = model(Layout::Compact, Leaf::I8, true);
+    let [optional, ..] = places(&plain);
+    let prediction = Prediction { link: Link::Exponential, last_of_ties: true, scale: 64.0 }.to_bytes();
+    let mut with = |name: &str, tag: Tag, content: &[u8]| {
+        put(name, "field", optional, with_sections(&plain, &section(tag.code() | MUST_UNDERSTAND, content)));
+    };
+    let changed = |at: usize, value: u8| {
+        let mut bytes = prediction;
+        bytes[at] = value;
+        bytes
+    };
+    with("a prediction that is too short", Tag::Prediction, &prediction[..7]);
+    with("a link that does not exist", Tag::Prediction, &changed(0, 5));
+    with("a rule for ties that does not exist", Tag::Prediction, &changed(1, 2));
+    with("a scale of nothing", Tag::Prediction, &[&prediction[..4], &[0; 4]].concat());
+    let sentinel = Sentinel { low: 1, high: 0 }.to_bytes();
+    with("a sentinel that is too short", Tag::Sentinel, &sentinel[..7]);
+    with("a sentinel that ends before it begins", Tag::Sentinel, &sentinel);
 }
 
 /// Leaves that are numbers of a table.

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNo
 use palpate_onboard::station::MappedFlash;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell, RefCell};
 use std::rc::Rc;
 
 /// Bytes that are written at once.
@@ -33,10 +33,35 @@ pub enum Fault {
     Half,
 }
 
+impl Fault {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::CutBefore,
+        Self::CutDuring,
+        Self::CutAfter,
+        Self::Refused,
+        Self::Torn,
+        Self::RefusedThoughDone,
+        Self::Nothing,
+        Self::Half,
+    ];
+}
+
+/// What a read finds once instead of what is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Misread {
+    /// A bit of each byte is wrong.
+    Flipped,
+    /// All looks erased.
+    Erased,
+}
+
 /// A flash's cells, which outlast its driver.
 pub struct Cells {
     /// Their content.
     pub bytes: Vec<u8>,
+    /// The same, for whoever looks while a driver has them.
+    pub mirror: Rc<RefCell<Vec<u8>>>,
     /// Erases of each sector.
     pub erases: Vec<u32>,
     /// Erases of each sector after which it keeps some of its bits.
@@ -45,6 +70,15 @@ pub struct Cells {
     pub steps: u64,
     /// Faults to come.
     pub faults: Vec<(u64, Fault)>,
+    /// Whether words can be written; if not, they stay as they are, and nothing errs.
+    pub programs: Rc<Cell<bool>>,
+    /// Erases of all sectors, for whoever looks while a driver has the cells.
+    pub erased: Rc<Cell<u32>>,
+    /// Reads so far.
+    pub reads: Cell<u64>,
+    /// The read that goes wrong, if one does.
+    pub misread: Option<(u64, Misread)>,
+    misread_as: OnceCell<Vec<u8>>,
     /// Off once a fault has cut it.
     pub power: Rc<Cell<bool>>,
     rng: ChaCha8Rng,
@@ -54,14 +88,29 @@ impl Cells {
     /// Cells that were never erased: they hold anything.
     pub fn new(sectors: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let bytes = (0..sectors * SECTOR).map(|_| rng.random()).collect();
+        Self::holding((0..sectors * SECTOR).map(|_| rng.random()).collect(), rng)
+    }
+
+    /// Cells as others are at this moment.
+    pub fn like(mirror: &RefCell<Vec<u8>>) -> Self {
+        Self::holding(mirror.borrow().clone(), ChaCha8Rng::seed_from_u64(0))
+    }
+
+    fn holding(bytes: Vec<u8>, rng: ChaCha8Rng) -> Self {
+        let sectors = bytes.len() / SECTOR;
         let power = Rc::new(Cell::new(true));
         Self {
+            mirror: Rc::new(RefCell::new(bytes.clone())),
             bytes,
             erases: vec![0; sectors],
             endurance: vec![u32::MAX; sectors],
             steps: 0,
             faults: Vec::new(),
+            programs: Rc::new(Cell::new(true)),
+            erased: Rc::default(),
+            reads: Cell::new(0),
+            misread: None,
+            misread_as: OnceCell::new(),
             power,
             rng,
         }
@@ -87,6 +136,7 @@ impl Cells {
             }
             *cell = *cell & !changed | wanted & changed;
         }
+        self.mirror.borrow_mut()[at..at + wanted.len()].copy_from_slice(&self.bytes[at..at + wanted.len()]);
         match fault {
             None | Some(Fault::Nothing | Fault::Half) => Ok(()),
             Some(Fault::Refused | Fault::Torn | Fault::RefusedThoughDone) => Err(NorFlashErrorKind::Other),
@@ -133,6 +183,7 @@ impl NorFlash for Driver<'_> {
                 }
             }
             self.0.erases[sector] += 1;
+            self.0.erased.set(self.0.erased.get() + 1);
             self.0.step(sector * SECTOR, &wanted)?;
         }
         Ok(())
@@ -148,6 +199,7 @@ impl NorFlash for Driver<'_> {
             // Worn cells aside, nothing is written twice.
             let worn = self.0.erases[at / SECTOR] > self.0.endurance[at / SECTOR];
             assert!(worn || cells == [0xff; WORD], "the word at {at} is not erased");
+            let word = if self.0.programs.get() { *word } else { cells };
             self.0.step(at, &std::array::from_fn::<u8, WORD, _>(|i| word[i] & cells[i]))?;
         }
         Ok(())
@@ -156,6 +208,14 @@ impl NorFlash for Driver<'_> {
 
 impl MappedFlash for Driver<'_> {
     fn bytes(&self) -> &[u8] {
-        &self.0.bytes
+        let Cells { bytes, reads, misread, misread_as, .. } = &*self.0;
+        let read = reads.replace(reads.get() + 1);
+        match misread {
+            Some((when, how)) if *when == read => misread_as.get_or_init(|| match how {
+                Misread::Flipped => bytes.iter().map(|byte| byte ^ 0x10).collect(),
+                Misread::Erased => vec![0xff; bytes.len()],
+            }),
+            _ => bytes,
+        }
     }
 }

@@ -11,5 +11,6 @@ pub mod random;
 pub mod replay;
 pub mod scripts;
 pub mod sections;
+pub mod stated;
 pub mod unaligned;
 pub mod vectors;

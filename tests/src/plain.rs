@@ -50,6 +50,7 @@ pub struct Plain<'a> {
     splits: &'a [u8],
     leaves: &'a [u8],
     /// Bytes of a leaf's number, and the values of all leaves, if the model shares them.
+    sentinel: Option<(i32, i32)>,
     shared: Option<(usize, &'a [u8])>,
     /// For each object.
     pub evidence: Vec<i64>,
@@ -112,7 +113,7 @@ impl<'a> Plain<'a> {
             object: (group[2] == 1).then_some(group[3].into()),
             trees: number(&group[4..]) as usize,
         });
-        let (mut odds_by_object, mut sharpness, mut shared) = (Vec::new(), 1 << 16, None);
+        let (mut odds_by_object, mut sharpness, mut shared, mut sentinel) = (Vec::new(), 1 << 16, None, None);
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -123,6 +124,7 @@ impl<'a> Plain<'a> {
                 5 => odds_by_object = content[..4 * objects].chunks(4).map(|odds| number(odds) << 24).collect(),
                 11 if (1 << 12..=1 << 20).contains(&number(&content[..4])) => sharpness = number(&content[..4]),
                 12 => shared = Some((content[0].into(), &content[4..])),
+                14 => sentinel = Some((signed(&content[..4]), signed(&content[4..8]))),
                 _ => {}
             }
             optional = &optional[8 + length.next_multiple_of(4)..];
@@ -148,6 +150,7 @@ impl<'a> Plain<'a> {
             thresholds,
             splits,
             leaves,
+            sentinel,
             shared,
             evidence: Vec::new(),
             touches: 0,
@@ -225,7 +228,9 @@ impl<'a> Plain<'a> {
 
     /// The sums of a row of features: units, or the bits of f32 numbers.
     pub fn sums(&self, features: &[i32]) -> Vec<i32> {
-        let feature = |index: usize| features.get(index).copied().unwrap_or(MISSING);
+        let is_missing = |value: i32| self.sentinel.is_some_and(|(low, high)| low <= value && value <= high);
+        let feature =
+            |index: usize| features.get(index).copied().filter(|value| !is_missing(*value)).unwrap_or(MISSING);
         let mut sums = self.base.clone();
         let mut leaves = self.leaves;
         let size = 1 << self.leaf;

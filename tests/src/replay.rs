@@ -129,6 +129,12 @@ impl<'m> Script<'m> {
             let bits = |sum: &f32| if sum.is_nan() { -1 } else { i64::from(sum.to_bits()) };
             self.numbers("sums", &sums.iter().map(bits).collect::<Vec<_>>());
         }
+        let class = model.predict_class(features, &mut margins).expect("as many margins as classes");
+        let bits =
+            |value: Option<f32>| value.map_or(0, |value| if value.is_nan() { -1 } else { i64::from(value.to_bits()) });
+        let values = [bits(model.predict_raw(features)), bits(model.predict_value(features))];
+        self.numbers("predicted", &[class as i64, values[0], values[1]]);
+        self.numbers("margins", &margins);
         let evidence = self.recognizer().evidence().to_vec();
         self.numbers("evidence", &evidence);
         let (verdict, object) = match self.recognizer().verdict() {

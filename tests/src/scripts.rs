@@ -5,7 +5,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    FitTerms, Held, ObjectFit, OddsByObject, Plan, Section, Strangers, Tag, Temperature, f32_key, write_section,
+    FitTerms, Held, Link, ObjectFit, OddsByObject, Plan, Prediction, Section, Sentinel, Strangers, Tag, Temperature,
+    f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -52,6 +53,17 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     write_section(Tag::Temperature, false, &temperature.to_bytes(), &mut put);
     let own = model.optional_sections().filter(|section| section.tag == Tag::SharedLeaves.code());
     own.for_each(|section| section.write(&mut put));
+    if rng.random_bool(0.7) {
+        let link = Link::ALL[rng.random_range(0..Link::ALL.len())];
+        let scale = [1.0, 0.5, 4096.0, 0.7][rng.random_range(0..4)];
+        let prediction = Prediction { link, last_of_ties: rng.random_bool(0.5), scale };
+        write_section(Tag::Prediction, scale != 1.0, &prediction.to_bytes(), &mut put);
+    }
+    if rng.random_bool(0.5) {
+        let low = rng.random_range(-300..300);
+        let sentinel = Sentinel { low, high: low + rng.random_range(0..100_000) };
+        write_section(Tag::Sentinel, true, &sentinel.to_bytes(), &mut put);
+    }
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
     with_sections(bytes, &sections)
 }

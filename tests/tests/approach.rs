@@ -240,7 +240,11 @@ fn no_limit_and_no_margin_makes_forgetting_panic() {
     let model = Model::new(&bytes).unwrap();
     for nats in [f32::NAN, f32::NEG_INFINITY, -1.0, 0.0, f32::MIN_POSITIVE, 1e30, f32::INFINITY] {
         let (mut recognizer, mut forgetting) = (recognizer::<4>(&model), Forgetting::new(&model, nats));
-        for margins in [[i32::MIN, i32::MAX, 0, 1], [i32::MAX, i32::MIN, 0, 1]].into_iter().cycle().take(9) {
+        for margins in [[i32::MIN, i32::MAX, i32::MAX, i32::MIN], [i32::MAX, i32::MIN, i32::MIN, i32::MAX]]
+            .into_iter()
+            .cycle()
+            .take(9)
+        {
             recognizer.push_margins_forgetting(&margins, &mut forgetting);
         }
         assert_eq!(recognizer.touches(), 9);

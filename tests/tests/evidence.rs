@@ -135,7 +135,7 @@ fn leaves_beyond_reason_are_refused_with_the_place() {
             let ensemble = steps(&[500.0], &[&[5.0, -5.0], &[value, 5.0]]);
             let error = compile(&ensemble, &Settings { leaf, ..Settings::default() }).unwrap_err();
             let message = error.to_string();
-            assert!(message.contains("margin of object 0") || message.contains("tree 0: leaf 2"), "{message}");
+            assert!(message.contains("margin of the object 0") || message.contains("tree 0: leaf 2"), "{message}");
             assert_eq!(error.exit_code(), 1);
         }
     }
@@ -259,4 +259,21 @@ fn priors_count_once() {
     assert!((recognizer.posterior(0).to_f64() - 0.9).abs() < 1e-3);
     recognizer.push(&touch(0)).unwrap();
     assert!((recognizer.posterior(0).to_f64() - 0.9).abs() < 1e-3);
+}
+
+#[test]
+fn level_objects_are_decided_at_once_at_odds_of_one_for_each_other_object_and_not_below() {
+    let one = 1_u64 << 56;
+    for objects in [2_u8, 3, 10, 255] {
+        let bytes = compiled(&steps(&[], &[&vec![0.5; objects.into()]]), Leaf::I16);
+        let model = Model::new(&bytes).unwrap();
+        let decided = |odds| {
+            let mut recognizer: Recognizer<256> = Recognizer::new(&model, Stopping::from_odds(odds, 50)).unwrap();
+            recognized(recognizer.push(&touch(1)))
+        };
+        let others = u64::from(objects) - 1;
+        assert_eq!(decided(others * one), Some((0, 1)));
+        assert_eq!(decided(others * one - 1), None);
+        assert_eq!(decided(u64::MAX), Some((0, 1)));
+    }
 }

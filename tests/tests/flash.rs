@@ -1,13 +1,14 @@
 //! Records and models in flash: whatever single step fails or loses its power, no touch is lost, doubled or changed.
 //!
-//! A step is one word written or one sector erased; every one of a session is tried with every fault.
+//! A step is one word written or one sector erased; every one of a session is tried with every fault, and every read with
+//! every misreading.
 
 use palpate::compile::{Leaf, Settings, compile};
 use palpate_onboard::station::{FlashStorage, ServeError, Station, Storage, record_length, serve};
 use palpate_shared::Descriptor;
-use palpate_shared::link::{Command, Decision, Device, Outcome, Payload, Query, Refusal};
+use palpate_shared::link::{Command, Decision, Device, DeviceEnd, Event, NotStored, Outcome, Payload, Query, Refusal};
 use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
-use palpate_tests::flash::{Cells, Driver, Fault, SECTOR, WORD};
+use palpate_tests::flash::{Cells, Driver, Fault, Misread, SECTOR, WORD};
 use palpate_tests::random::{self, Shape};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -101,6 +102,148 @@ fn a_step_that_errs_or_silently_does_nothing_loses_no_touch_even_if_the_power_go
             session(&[(step, fault), (later[step as usize % 2], Fault::CutDuring)]);
         }
     }
+}
+
+/// A record that says which one it is; some are longer.
+fn numbered(number: u32) -> Vec<u8> {
+    let length = 120 + (number as usize * 53) % 110;
+    number.to_le_bytes().into_iter().cycle().take(length).collect()
+}
+
+fn storage(cells: &mut Cells) -> FlashStorage<Driver<'_>, RECORD> {
+    let sectors = cells.bytes.len();
+    FlashStorage::new(Driver(cells), sectors).unwrap()
+}
+
+fn store(storage: &mut FlashStorage<Driver<'_>, RECORD>, number: u32) -> Result<(), NotStored> {
+    storage.store(|bytes| {
+        let record = numbered(number);
+        bytes[..record.len()].copy_from_slice(&record);
+        Some(record.len())
+    })
+}
+
+/// The number of the newest record.
+fn newest(storage: &FlashStorage<Driver<'_>, RECORD>) -> Option<u32> {
+    storage.newest().map(|(_, record)| u32::from_le_bytes(*record.first_chunk().unwrap()))
+}
+
+/// Stores records that fill the log more than once, and looks after each what a start would find: of what was acknowledged
+/// nothing is lost. Returns how many were not acknowledged.
+fn records(cells: &mut Cells, faults: &str) -> u32 {
+    let mirror = cells.mirror.clone();
+    let (mut kept, mut tried, mut unstored) = (None, None, 0);
+    let check = |found: Option<u32>, kept: Option<u32>, tried: Option<u32>| {
+        // What was not acknowledged may have been stored.
+        assert!(found >= kept && found <= tried, "{faults}: {found:?} found, {kept:?} kept, {tried:?} tried");
+        found
+    };
+    let mut number = 0;
+    // Two lives that go around the log, one of which begins in the midst of it.
+    for end in [11, 24] {
+        cells.power.set(true);
+        let power = cells.power.clone();
+        let mut chip = storage(cells);
+        kept = check(newest(&chip), kept, tried);
+        while number < end && power.get() {
+            tried = Some(number);
+            match store(&mut chip, number) {
+                Ok(()) => kept = tried,
+                Err(NotStored) => unstored += 1,
+            }
+            assert_eq!(newest(&chip), kept, "{faults}");
+            // The power may go at any time.
+            if number % 3 == 0 || number + 1 == end {
+                check(newest(&storage(&mut Cells::like(&mirror))), kept, tried);
+            }
+            number += 1;
+        }
+    }
+    unstored
+}
+
+#[test]
+fn a_step_that_fails_or_a_read_that_is_wrong_loses_no_acknowledged_record_however_many_follow() {
+    let new = || Cells::new(LOG, 1);
+    let mut cells = new();
+    assert_eq!(records(&mut cells, "no fault"), 0);
+    let (steps, reads) = (cells.steps, cells.reads.get());
+    assert!(cells.erases.iter().sum::<u32>() >= 4 && steps > 900 && reads > 60, "{steps} steps, {reads} reads");
+    for step in 0..steps {
+        for fault in Fault::ALL {
+            let mut cells = new();
+            cells.faults = vec![(step, fault)];
+            let unstored = records(&mut cells, &format!("{fault:?} at step {step}"));
+            assert_eq!(unstored, u32::from(!cells.power.get() || is_cut(fault)), "{fault:?} at step {step}");
+        }
+    }
+    for read in 0..reads {
+        for misread in [Misread::Flipped, Misread::Erased] {
+            let mut cells = new();
+            cells.misread = Some((read, misread));
+            assert_eq!(records(&mut cells, &format!("{misread:?} at read {read}")), 0);
+        }
+    }
+}
+
+fn is_cut(fault: Fault) -> bool {
+    matches!(fault, Fault::CutBefore | Fault::CutDuring | Fault::CutAfter)
+}
+
+/// `PALPATE_REPETITIONS=100000 cargo test -p palpate-tests --test flash several_faults` tries more.
+#[test]
+fn several_faults_lose_no_acknowledged_record() {
+    let repetitions = std::env::var("PALPATE_REPETITIONS").map_or(300, |count| count.parse().expect("a number"));
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut unstored = 0;
+    for _ in 0..repetitions {
+        let mut cells = Cells::new(LOG, rng.random());
+        let first = rng.random_range(0..900);
+        // Close together, so that one meets what is done about another.
+        let mut fault = || (first + rng.random_range(0..60), Fault::ALL[rng.random_range(0..Fault::ALL.len())]);
+        cells.faults = (0..6).map(|_| fault()).filter(|(_, fault)| !is_cut(*fault)).collect();
+        cells.misread = rng.random_bool(0.5).then(|| (rng.random_range(0..70), Misread::Flipped));
+        let faults = format!("{:?}, {:?}", cells.faults, cells.misread);
+        unstored += records(&mut cells, &faults);
+    }
+    println!("{unstored} records were not stored in {repetitions} sessions");
+}
+
+#[test]
+fn a_flash_that_erases_but_no_longer_programs_costs_four_erases_then_one_then_none() {
+    const SECTORS: usize = 64;
+    let mut cells = Cells::new(SECTORS, 1);
+    let (programs, erased) = (cells.programs.clone(), cells.erased.clone());
+    let mut chip = storage(&mut cells);
+    let mut number = 0;
+    let mut erases_of_a_store = |chip: &mut FlashStorage<_, RECORD>, expected| {
+        let before = erased.get();
+        number += 1;
+        assert_eq!(store(chip, number), expected, "record {number}");
+        erased.get() - before
+    };
+    assert_eq!(erases_of_a_store(&mut chip, Ok(())), 1);
+    programs.set(false);
+    assert_eq!(erases_of_a_store(&mut chip, Err(NotStored)), 4);
+    assert_eq!(erases_of_a_store(&mut chip, Err(NotStored)), 1);
+    // It may have been a dip of the supply.
+    programs.set(true);
+    assert_eq!([0; 2].map(|_| erases_of_a_store(&mut chip, Ok(()))), [1, 0]);
+    programs.set(false);
+    assert_eq!(erases_of_a_store(&mut chip, Err(NotStored)), 4);
+    for _ in 4..4 * SECTORS {
+        assert_eq!(erases_of_a_store(&mut chip, Err(NotStored)), 1);
+    }
+    for _ in 0..100 {
+        assert_eq!(erases_of_a_store(&mut chip, Err(NotStored)), 0);
+    }
+    assert_eq!(newest(&chip), Some(5));
+    // A start tries again.
+    programs.set(true);
+    let mut chip = FlashStorage::<_, RECORD>::new(chip.into_flash(), SECTORS * SECTOR).unwrap();
+    assert_eq!(newest(&chip), Some(5));
+    assert_eq!(erases_of_a_store(&mut chip, Ok(())), 0, "the rest of its sector is erased still");
+    assert_eq!(newest(&chip), Some(number));
 }
 
 #[test]
@@ -203,7 +346,7 @@ fn the_log_wears_as_little_as_the_readme_states_under_touches_from_a_host() {
     let mut desk = Desk::new(script, 0);
     run(&mut cells, bytes, &mut desk);
     let per_million = wear(&cells, touches.len());
-    assert!((40_000.0..47_000.0).contains(&per_million), "{per_million}");
+    assert!((42_000.0..48_000.0).contains(&per_million), "{per_million}");
 }
 
 #[test]
@@ -213,13 +356,21 @@ fn the_log_wears_as_little_as_the_readme_states_under_touches_of_its_own() {
     let mut cells = Cells::new(LOG + 2 * 44, 1);
     let storage = FlashStorage::<_, RECORD>::new(Driver(&mut cells), LOG * SECTOR).unwrap();
     // As a ProbeStation does it.
-    let (mut station, progress, _) = Station::<OBJECTS, _>::open(bytes, storage).unwrap();
+    let (mut station, progress, starts) = Station::<OBJECTS, _>::open(bytes, storage).unwrap();
+    let mut end = DeviceEnd::new(progress, starts);
     for touch in &touches {
-        if station.push(touch, true).is_ok_and(|verdict| verdict.decision != Decision::Undecided) {
+        let outcome = station.push(touch, true);
+        if outcome.is_ok_and(|verdict| verdict.decision != Decision::Undecided) {
             station.reset();
         }
-        station.store(&progress).unwrap();
+        let touch = touch.into();
+        let event = match outcome {
+            Ok(verdict) => Event::Touch { touch, pose_age: None, verdict },
+            Err(refusal) => Event::Refused { touch, refusal },
+        };
+        end.report(event, &mut station, |_| ());
     }
+    assert_eq!(end.statistics().unstored, 0);
     let per_million = wear(&cells, touches.len());
-    assert!((10_000.0..20_000.0).contains(&per_million), "{per_million}");
+    assert!((22_000.0..28_000.0).contains(&per_million), "{per_million}");
 }

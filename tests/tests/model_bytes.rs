@@ -1,11 +1,14 @@
 //! Bytes that are not a model are refused, and bytes that pass can be walked.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate_onboard::{Model, ModelError, Recognizer, Stopping};
+use palpate_onboard::{Batch, Model, ModelError, Recognizer, Stopping};
 use palpate_shared::format::{Counted, HEADER_LENGTH, Trained, TrainedNoise, TrainedTouches, checksum};
 use palpate_shared::{Descriptor, Patterns};
+use palpate_tests::abuse::places;
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
 
 /// What half of the models state.
 const TRAINED: Trained = Trained {
@@ -175,5 +178,70 @@ fn a_model_is_read_at_any_alignment() {
             let shifted = [vec![0; offset], bytes.clone()].concat();
             assert_eq!(margins(&shifted[offset..]), expected);
         }
+    }
+}
+
+#[test]
+fn changed_bytes_that_are_accepted_give_the_same_margins_at_every_address_and_alone_as_many_at_once() {
+    // With thresholds of two and of four bytes, and enough of them for every kind of search.
+    let mut rng = SmallRng::seed_from_u64(1);
+    let shape = Shape { thresholds: 200, trees: 60, ..Shape::SMALL };
+    let many = [Layout::Compact, Layout::Complete, Layout::Grid].map(|layout| {
+        let settings = Settings { leaf: Leaf::I16, layout: Some(layout), ..Settings::default() };
+        compile(&random::ensemble(shape, 6), &settings).unwrap().bytes
+    });
+    let models: Vec<Vec<u8>> = models().into_iter().step_by(2).chain(many).collect();
+    let (mut accepted, mut batch) = (0, Batch::new());
+    for round in 0..4_000 {
+        let mut bytes = models[round % models.len()].clone();
+        let [_, _, axes, cuts, groups, ..] = places(&bytes);
+        for _ in 0..rng.random_range(1..3) {
+            let part = match rng.random_range(0..3) {
+                0 if axes < cuts => axes..cuts,
+                1 if cuts < groups => cuts..groups,
+                _ => HEADER_LENGTH..bytes.len() - 4,
+            };
+            let at = rng.random_range(part);
+            bytes[at] = rng.random();
+        }
+        let bytes = with_checksum(bytes);
+        let Ok(model) = Model::new(&bytes) else { continue };
+        accepted += 1;
+        let (width, objects) = (model.feature_count(), model.object_count());
+        let rows: Vec<i32> = (0..20 * width).map(|_| rng.random_range(-300_000..300_000)).collect();
+        let margins = |bytes: &[u8]| -> Vec<i32> {
+            let model = Model::new(bytes).unwrap();
+            let mut margins = vec![0; 20 * objects];
+            for (row, margins) in rows.chunks(width).zip(margins.chunks_mut(objects)) {
+                assert!(model.margins_of(row, margins));
+            }
+            margins
+        };
+        let expected = margins(&bytes);
+        for offset in 1..4 {
+            let shifted = [vec![0; offset], bytes.clone()].concat();
+            assert_eq!(margins(&shifted[offset..]), expected, "round {round} at address {offset}");
+        }
+        let mut at_once = vec![0; 20 * objects];
+        assert!(model.margins_of_rows(&rows, &mut at_once, &mut batch));
+        assert_eq!(at_once, expected, "round {round}");
+    }
+    assert!(accepted > 800, "{accepted}");
+}
+
+#[test]
+fn an_object_that_a_model_does_not_know_has_no_name_and_a_text_that_is_cut_ends() {
+    for bytes in models() {
+        let model = Model::new(&bytes).unwrap();
+        assert!((0..model.object_count()).all(|object| !model.object_name(object).is_empty()));
+        // As many rounds would take centuries.
+        assert_eq!(model.object_name(usize::MAX), "");
+        assert_eq!(model.object_name(model.object_count()), "");
+        // The first name runs over the end of the text: no byte of it is the next one's length.
+        let mut cut = bytes.clone();
+        cut[HEADER_LENGTH + 1 + usize::from(bytes[HEADER_LENGTH])] = 255;
+        let cut = with_checksum(cut);
+        let model = Model::new(&cut).unwrap();
+        assert!((0..model.object_count() + 3).all(|object| model.object_name(object).is_empty()));
     }
 }

@@ -5,7 +5,7 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node};
 use palpate::evaluate::parity::{Parity, parity};
-use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate::touches::{Dataset, ObjectTouches, Origin, Source};
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use palpate_tests::random;
@@ -43,7 +43,7 @@ fn million(dataset: &Dataset) -> Dataset {
     let touches = random::touches(TOUCHES, 4);
     let share = TOUCHES / dataset.objects.len();
     let objects = dataset.objects.iter().zip(touches.chunks(share));
-    let objects = objects.map(|(object, part)| ObjectTouches { name: object.name.clone(), touches: part.to_vec() });
+    let objects = objects.map(|(object, part)| ObjectTouches::new(&object.name, part.to_vec(), Source::Object));
     Dataset::new(objects.collect())
 }
 

@@ -4,7 +4,7 @@
 
 use palpate::chip::{Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate::touches::{Dataset, ObjectTouches};
+use palpate::touches::{Dataset, ObjectTouches, Source};
 use palpate_onboard::Model;
 use palpate_onboard::station::{Memory, record_length, serve};
 use palpate_shared::Descriptor;
@@ -104,8 +104,9 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
     let mut connection = Connection::open(transport, HostSettings { retry: 5_000_000, attempts: 10 }).unwrap();
     connection.load(&bytes, &()).unwrap();
     let described = connection.model().unwrap();
-    let object =
-        |index: usize| ObjectTouches { name: format!("object {index}"), touches: random::touches(997, index as u64) };
+    let object = |index: usize| {
+        ObjectTouches::new(format!("object {index}"), random::touches(997, index as u64), Source::Object)
+    };
     let dataset = Dataset::new((0..OBJECTS).map(object).collect());
     let (mut early, mut done, mut events) = ([None; 2], 0_u64, 0);
     let processes = ["self".to_owned(), chip.id().to_string()];

@@ -93,14 +93,30 @@ fn mesh_of(object: &Bound<'_, PyAny>) -> PyResult<Mesh> {
     } else {
         object.extract().map_err(|_| PyTypeError::new_err("a mesh is a pair of arrays: vertices and faces"))?
     };
-    mesh(&vertices.extract()?, &faces.extract()?)
+    let vertices: Input<'_, f64, Ix2> = vertices.extract()?;
+    Ok(Mesh::from_f64(triples(&vertices, "vertices")?, triangles(&faces.extract()?)?).0)
+}
+
+fn triangles(faces: &Input<'_, i64, Ix2>) -> PyResult<Vec<[u32; 3]>> {
+    // Beyond the last vertex: refused with its number when the mesh is used.
+    let index = |&index: &i64| u32::try_from(index).unwrap_or(u32::MAX);
+    Ok(triples(faces, "faces")?.iter().map(|face| face.each_ref().map(index)).collect())
 }
 
 pub(crate) fn mesh(vertices: &Input<'_, f32, Ix2>, faces: &Input<'_, i64, Ix2>) -> PyResult<Mesh> {
-    // Beyond the last vertex: refused with its number when the mesh is used.
-    let index = |&index: &i64| u32::try_from(index).unwrap_or(u32::MAX);
-    let triangles = triples(faces, "faces")?.iter().map(|face| face.each_ref().map(index)).collect();
-    Ok(Mesh { vertices: triples(vertices, "vertices")?.to_vec(), triangles })
+    Ok(Mesh { vertices: triples(vertices, "vertices")?.to_vec(), triangles: triangles(faces)? })
+}
+
+/// The checksums of the meshes that each object is touched as, as `dataset.json` states them: the names, sorted, with those of
+/// their instances. All files are read.
+#[pyo3::pyfunction]
+pub(crate) fn checksums(py: Python<'_>, meshes: Meshes) -> Result<Vec<(String, Vec<String>)>, Failure> {
+    let objects = py.detach(|| meshes.objects(false))?;
+    let checksum = |object: Object| {
+        let checksums = object.instances().map(|instance| format!("{:016x}", instance.mesh.checksum())).collect();
+        (object.name, checksums)
+    };
+    Ok(objects.into_iter().map(checksum).collect())
 }
 
 /// The objects that sources stand for: their names, sorted, and what `capture` takes for each alone. Nothing is read.

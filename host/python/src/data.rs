@@ -39,6 +39,7 @@ pub(crate) struct DataSet {
     approaches: Option<Vec<u64>>,
     times: PyOnceLock<Py<PyArray2<f64>>>,
     objects: PyOnceLock<Py<PyArray1<i16>>>,
+    instances: PyOnceLock<Py<PyArray1<i16>>>,
     poses: PyOnceLock<[Py<PyArray2<f32>>; 2]>,
 }
 
@@ -49,6 +50,7 @@ impl DataSet {
             approaches,
             times: PyOnceLock::new(),
             objects: PyOnceLock::new(),
+            instances: PyOnceLock::new(),
             poses: PyOnceLock::new(),
         }
     }
@@ -64,7 +66,7 @@ impl DataSet {
     }
 
     pub(crate) fn touches(&self) -> impl Iterator<Item = &Touch> {
-        self.dataset.objects.iter().flat_map(|object| &object.touches)
+        self.dataset.touches()
     }
 
     /// Columns one after the other as an array with one row for each touch, without a copy.
@@ -106,9 +108,13 @@ impl DataSet {
     ///
     /// `times` has three contact times per touch, in seconds on any clock, NaN for a finger that did not touch; they are
     /// rounded to microseconds, and the earliest becomes 0. `objects` says which of the `names` each touch is of.
-    /// `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it.
+    /// `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it. `instances` are numbers
+    /// that say which mesh, or recording, of its object each touch is of, where objects have several: a sequence is of one.
     #[staticmethod]
-    #[pyo3(signature = (times, objects, names, *, direction=None, alignment=None, probe=None, approaches=false))]
+    #[pyo3(signature = (
+        times, objects, names, *, direction=None, alignment=None, probe=None, approaches=false, instances=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_arrays(
         times: Input<'_, f64, Ix2>,
         objects: Input<'_, i64, Ix1>,
@@ -117,15 +123,18 @@ impl DataSet {
         alignment: Option<Input<'_, f64, Ix2>>,
         probe: Option<Probe>,
         approaches: bool,
+        instances: Option<Input<'_, i64, Ix1>>,
     ) -> Result<Self, Failure> {
         let times = triples(&times, "times")?;
         let objects = objects.values()?;
         let direction = direction.as_ref().map(|array| triples(array, "direction")).transpose()?;
         let alignment = alignment.as_ref().map(|array| triples(array, "alignment")).transpose()?;
-        let lengths = [Some(objects.len()), direction.map(<[_]>::len), alignment.map(<[_]>::len)].into_iter().flatten();
-        if lengths.into_iter().any(|length| length != times.len()) {
+        let instances = instances.as_ref().map(Input::values).transpose()?;
+        let lengths =
+            [Some(objects.len()), direction.map(<[_]>::len), alignment.map(<[_]>::len), instances.map(<[_]>::len)];
+        if lengths.into_iter().flatten().any(|length| length != times.len()) {
             let rows = "as many rows as times";
-            return Err(Error::setting("objects, direction and alignment", "of another length", rows).into());
+            return Err(Error::setting("objects, direction, alignment and instances", "of another length", rows).into());
         }
         let mut order: Vec<usize> = (0..names.len()).collect();
         order.sort_by(|&a, &b| names[a].cmp(&names[b]));
@@ -149,20 +158,19 @@ impl DataSet {
             let slot = usize::try_from(*object).ok().and_then(|object| touches.get_mut(object));
             let slot =
                 slot.ok_or_else(|| Error::setting("objects", object, format!("0 to {}", names.len().max(1) - 1)))?;
-            slot.push(touch.map_err(Error::from)?);
+            slot.push((touch.map_err(Error::from)?, instances.map_or(0, |instances| instances[row])));
         }
-        let objects = order
-            .into_iter()
-            .map(|index| ObjectTouches { name: names[index].clone(), touches: std::mem::take(&mut touches[index]) });
+        let objects =
+            order.into_iter().map(|index| ObjectTouches::numbered(&names[index], &std::mem::take(&mut touches[index])));
         let objects: Vec<ObjectTouches> = objects.collect();
-        if objects.is_empty() || objects.iter().any(|object| object.touches.is_empty()) {
+        if objects.is_empty() || objects.iter().any(|object| object.is_empty()) {
             return Err(Error::from(palpate::error::EvaluateProblem::NoTouches).into());
         }
         let origin = probe.map(|Probe(probe)| Origin {
             probe,
             approaches,
             pose: direction.is_some(),
-            touches: objects.iter().map(|object| object.touches.len()).max().unwrap_or(0) as u64,
+            touches: objects.iter().map(|object| object.len()).max().unwrap_or(0) as u64,
             ..Origin::default()
         });
         Ok(Self::new(Dataset { origin, ..Dataset::new(objects) }, None))
@@ -177,7 +185,7 @@ impl DataSet {
     /// How many touches each object has, in the order of the names.
     #[getter]
     fn counts(&self) -> Vec<usize> {
-        self.dataset.objects.iter().map(|object| object.touches.len()).collect()
+        self.dataset.objects.iter().map(|object| object.len()).collect()
     }
 
     /// How many approaches each object took, where that is known.
@@ -230,8 +238,23 @@ impl DataSet {
         let made = self.objects.get_or_try_init(py, || {
             let numbers = (0_i16..).zip(&self.dataset.objects);
             let all: Vec<i16> =
-                numbers.flat_map(|(number, object)| std::iter::repeat_n(number, object.touches.len())).collect();
+                numbers.flat_map(|(number, object)| std::iter::repeat_n(number, object.len())).collect();
             let Output(array) = one(py, all);
+            array.call_method("setflags", (), Some(&pyo3::types::IntoPyDict::into_py_dict([("write", false)], py)?))?;
+            PyResult::Ok(array.unbind())
+        })?;
+        Ok(Output(made.bind(py).clone()))
+    }
+
+    /// The instance, recording or log that each touch is of, from 0: a sequence is of touches of one.
+    #[getter]
+    fn instances<'py>(&self, py: Python<'py>) -> PyResult<Output<'py, i16, Ix1>> {
+        let made = self.instances.get_or_try_init(py, || {
+            let of = |object: &ObjectTouches| {
+                let number = |touch| i16::try_from(object.source_of(touch)).unwrap_or(i16::MAX);
+                (0..object.len()).map(number).collect::<Vec<i16>>()
+            };
+            let Output(array) = one(py, self.dataset.objects.iter().flat_map(of).collect());
             array.call_method("setflags", (), Some(&pyo3::types::IntoPyDict::into_py_dict([("write", false)], py)?))?;
             PyResult::Ok(array.unbind())
         })?;
@@ -272,12 +295,12 @@ impl DataSet {
     fn noisy(&self, py: Python<'_>, noise: &str, timer: &str, seed: u64) -> Result<Self, Failure> {
         let noise = noise_of(noise, timer)?;
         noise.check()?;
-        let noisy = |object: &ObjectTouches| ObjectTouches {
-            name: object.name.clone(),
-            touches: noise.add(&object.name, &object.touches, seed),
-        };
-        let objects = py.detach(|| self.dataset.objects.iter().map(noisy).collect());
-        Ok(Self::new(Dataset { objects, ..(*self.dataset).clone() }, self.approaches.clone()))
+        let noisy = py.detach(|| {
+            let mut noisy = (*self.dataset).clone();
+            noisy.add_noise(&noise, seed, 1);
+            noisy
+        });
+        Ok(Self::new(noisy, self.approaches.clone()))
     }
 
     /// The touches as a table: object (a category), t1, t2 and t3, and where it is known direction and alignment.
@@ -288,7 +311,7 @@ impl DataSet {
     }
 
     /// Writes `<object>.parquet` for each object and, if the probe is known, `dataset.json`, into a directory that holds
-    /// no touches yet: what `read`, `palpate train` and pandas read.
+    /// no touches yet: what `read`, `palpate train` and pandas read. Which touch is of which instance or recording is kept.
     fn to_parquet(&self, py: Python<'_>, directory: PathBuf) -> Result<(), Failure> {
         self.write(py, directory, Format::Parquet)
     }

@@ -6,12 +6,12 @@ use crate::failure::Failure;
 use crate::named::{descriptor_of, noise_of};
 use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
-use palpate::ensemble::import::{self, PartTree, Parts};
+use palpate::ensemble::import::{self, Options, PartTree, Parts};
 use palpate::ensemble::train::{self as library, Settings, Small};
 use palpate::ensemble::{self, Inputs, StatedProbe};
 use palpate::error::{Error, EvaluateProblem, RowsProblem};
 use palpate::shared::Descriptor;
-use palpate::shared::format::Counted;
+use palpate::shared::format::{Counted, Link, Prediction};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -43,28 +43,51 @@ type Columns<'py> = (
 #[pyo3::pymethods]
 impl Ensemble {
     /// Reads what `save` or `palpate train` wrote, or a model of XGBoost, LightGBM, CatBoost or ONNX; the content says
-    /// which. `names` are the classes'.
+    /// which. `names` are the classes'. Where the file says that training stopped early, the trees up to the best
+    /// iteration are taken, with `all_trees` all of them. `missing` is the number that stood for a missing value in
+    /// training, beside NaN.
     #[staticmethod]
-    #[pyo3(signature = (path, names=None))]
-    fn load(py: Python<'_>, path: PathBuf, names: Option<Vec<String>>) -> Result<Self, Failure> {
-        let ensemble = py.detach(|| ensemble::Ensemble::load_named(&path, names.as_deref()))?;
+    #[pyo3(signature = (path, names=None, *, all_trees=false, missing=None))]
+    fn load(
+        py: Python<'_>,
+        path: PathBuf,
+        names: Option<Vec<String>>,
+        all_trees: bool,
+        missing: Option<f32>,
+    ) -> Result<Self, Failure> {
+        let options = Options { names: names.as_deref(), all_trees, missing };
+        let ensemble = py.detach(|| ensemble::Ensemble::load_with(&path, &options))?;
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
 
-    /// The same from the bytes of such a file.
+    /// The same from the bytes of such a file. `notes` are what to know about it beyond what it says itself.
     #[staticmethod]
-    #[pyo3(signature = (content, names=None))]
-    fn from_bytes(py: Python<'_>, content: Vec<u8>, names: Option<Vec<String>>) -> Result<Self, Failure> {
-        let ensemble = py.detach(|| import::read(Path::new("the model"), &content, names.as_deref()))?;
+    #[pyo3(signature = (content, names=None, *, all_trees=false, missing=None, notes=Vec::new()))]
+    fn from_bytes(
+        py: Python<'_>,
+        content: Vec<u8>,
+        names: Option<Vec<String>>,
+        all_trees: bool,
+        missing: Option<f32>,
+        notes: Vec<String>,
+    ) -> Result<Self, Failure> {
+        let options = Options { names: names.as_deref(), all_trees, missing };
+        let mut ensemble = py.detach(|| import::read_with(Path::new("the model"), &content, &options))?;
+        if let Some(imported) = &mut ensemble.origin.imported {
+            imported.notes.extend(notes);
+        }
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
 
     /// An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
     /// leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
     /// a leaf), the right child, the feature, the threshold, whether a missing value goes left, and the values. `base` is
-    /// what margins start from; an empty name stands for a feature that has none.
+    /// what margins start from; an empty name stands for a feature that has none. `link` is "identity", "logistic",
+    /// "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
+    /// largest margins names the class, otherwise the first.
     #[staticmethod]
-    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new()))]
+    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new(), link="identity", last_of_ties=false))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_trees(
         py: Python<'_>,
         kind: String,
@@ -73,7 +96,13 @@ impl Ensemble {
         trees: Vec<Columns<'_>>,
         names: Option<Vec<String>>,
         notes: Vec<String>,
+        link: &str,
+        last_of_ties: bool,
     ) -> Result<Self, Failure> {
+        let found = Link::ALL.iter().copied().find(|known| known.name() == link);
+        let link =
+            found.ok_or_else(|| Error::setting("link", link, "identity, logistic, exponential, square or softplus"))?;
+        let prediction = Prediction { link, last_of_ties, ..Prediction::default() };
         let tree = |(output, left, right, feature, threshold, missing_left, values): Columns<'_>| {
             PyResult::Ok(PartTree {
                 output,
@@ -86,7 +115,7 @@ impl Ensemble {
             })
         };
         let trees = trees.into_iter().map(tree).collect::<PyResult<_>>()?;
-        let parts = Parts { kind, features, names: Vec::new(), base, trees, notes };
+        let parts = Parts { kind, features, names: Vec::new(), base, trees, notes, prediction };
         let ensemble = py.detach(|| parts.into_ensemble(names.as_deref())).map_err(Error::from)?;
         Ok(Self { ensemble: Arc::new(ensemble) })
     }

@@ -47,14 +47,16 @@ pub(crate) fn evaluate(
     let data = &data.get().dataset;
     let evaluation = long(py, None, |_| {
         let mut dataset = (**data).clone();
-        let robots = add_noise(&mut dataset, &noise, seed)?;
-        let margins = Margins::new(candidate, &dataset)?.of_robots(robots);
+        // What the touches have already counts too.
+        let stated = dataset.real().and(&noise);
+        add_noise(&mut dataset, &noise, seed)?;
+        let margins = Margins::new(candidate, &dataset)?;
         let (usual, enough) = (Settings::default(), |count: u64| count >= LEAST_GROUPS);
         let at_approaches = at.clone().unwrap_or(usual.at_approaches);
         let at = at.unwrap_or_else(|| usual.at.into_iter().filter(|&at| enough(margins.distinct_groups(at))).collect());
-        let fewest = data.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
-        let at_approaches = at_approaches.into_iter().filter(|&at| at < fewest).collect();
-        let settings = Settings { at, at_approaches, groups, error_rate, max_touches, seed, noise };
+        let fewest = margins.fewest_approaches();
+        let at_approaches = at_approaches.into_iter().filter(|&at| at <= fewest).collect();
+        let settings = Settings { at, at_approaches, groups, error_rate, max_touches, seed, noise: stated };
         library::evaluate(&margins, &settings)
     })?;
     json(&evaluation)

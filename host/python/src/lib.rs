@@ -18,7 +18,7 @@ mod work;
 #[pyo3::pymodule(module = "palpate")]
 mod _native {
     #[pymodule_export]
-    use crate::capture::{capture, sources};
+    use crate::capture::{capture, checksums, sources};
     #[pymodule_export]
     use crate::data::DataSet;
     #[pymodule_export]

@@ -1,13 +1,15 @@
 //! Compiled models.
 
-use crate::arrays::{ARRAY_LIKE, Input, Output, two};
+use crate::arrays::{ARRAY_LIKE, Input, Output, one, two};
 use crate::cells::OpenedModel;
 use crate::data::DataSet;
 use crate::ensemble::Ensemble;
 use crate::failure::Failure;
-use numpy::ndarray::Ix2;
+use numpy::ndarray::{Ix1, Ix2};
 use palpate::compile::{self as library, CompiledModel, Core, Goal, Layout, Leaf, Settings};
 use palpate::error::{CompileProblem, Error, RowsProblem, TouchesProblem};
+use palpate::evaluate::Candidate;
+use palpate::evaluate::predict::{Predicted, predict};
 use palpate::evaluate::together::{AT_ONCE, Together};
 use palpate::onboard;
 use palpate::output;
@@ -104,6 +106,31 @@ impl Model {
             });
         }
         Ok(all)
+    }
+
+    /// The margins of rows of features, of which each has `found`.
+    fn of_rows<V: Copy + Into<f64> + Sync>(
+        &self,
+        py: Python<'_>,
+        (values, found): (&[V], usize),
+    ) -> Result<Vec<f64>, Failure> {
+        let (model, wanted) = (self.model(), self.model().feature_count());
+        if found != wanted {
+            return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
+        }
+        let margins = self.fill(py, values, wanted, |together, values, slots| {
+            together.rows(model, &self.encoder, values, slots);
+        });
+        Ok(margins?)
+    }
+
+    fn predicted<V: Copy + Into<f64> + Sync>(
+        &self,
+        py: Python<'_>,
+        (values, features): (&[V], usize),
+        raw: bool,
+    ) -> palpate::Result<Predicted> {
+        py.detach(|| predict(Candidate::Compiled(self.model()), values, features, raw))
     }
 
     fn of_touches(&self, py: Python<'_>, touches: &[Touch]) -> PyResult<Vec<f64>> {
@@ -212,26 +239,56 @@ impl Model {
                 let touches = touches(values, columns)?;
                 self.of_touches(py, &touches)?
             }
-            (Rows::Array(array), None) => {
-                let array: Input<'_, f32, Ix2> = array.extract()?;
-                let (values, found) = array.rows()?;
-                let wanted = self.model().feature_count();
-                if found != wanted {
-                    return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
+            (Rows::Array(array), None) => match &self.encoder {
+                Encoder::Real => {
+                    let array: Input<'_, f32, Ix2> = array.extract()?;
+                    self.of_rows(py, array.rows()?)?
                 }
-                let model = self.model();
-                self.fill(py, values, wanted, |together, values, slots| {
-                    together.rows(model, &self.encoder, values, slots)
-                })?
-            }
+                // f32 does not hold all whole numbers.
+                Encoder::Scaled(_) => {
+                    let array: Input<'_, f64, Ix2> = array.extract()?;
+                    self.of_rows(py, array.rows()?)?
+                }
+            },
         };
         Ok(two(py, margins, objects)?)
+    }
+
+    /// The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value,
+    /// with `raw` the margin before the inverse link. Rows are as for `margins`.
+    #[pyo3(signature = (rows, *, raw=false))]
+    fn predict<'py>(&self, py: Python<'py>, rows: Rows<'py>, raw: bool) -> Result<Predictions<'py>, Failure> {
+        let Rows::Array(array) = rows else { return Err(Error::from(RowsProblem::Touches).into()) };
+        let predicted = match &self.encoder {
+            Encoder::Real => {
+                let array: Input<'_, f32, Ix2> = array.extract()?;
+                self.predicted(py, array.rows()?, raw)?
+            }
+            Encoder::Scaled(_) => {
+                let array: Input<'_, f64, Ix2> = array.extract()?;
+                self.predicted(py, array.rows()?, raw)?
+            }
+        };
+        Ok(match predicted {
+            Predicted::Values(values) => Predictions::Values(one(py, values)),
+            Predicted::Classes(classes) => {
+                let names = self.objects();
+                Predictions::Classes(classes.into_iter().filter_map(|class| names.get(class).cloned()).collect())
+            }
+        })
     }
 
     fn __repr__(&self) -> String {
         let model = self.model();
         format!("Model({} bytes, {} objects, {})", model.bytes().len(), model.object_count(), model.layout().name())
     }
+}
+
+/// Predictions of a model over rows.
+#[derive(pyo3::IntoPyObject)]
+pub(crate) enum Predictions<'py> {
+    Classes(Vec<String>),
+    Values(Output<'py, f32, Ix1>),
 }
 
 /// Touches from rows of three or nine numbers.

@@ -120,7 +120,7 @@ impl Recognizer {
     }
 
     /// Takes in a row of features, for a model over those; NaN where one is missing.
-    fn push_row<'py>(&mut self, py: Python<'py>, row: Input<'py, f32, Ix1>) -> Result<objects::Verdict<'py>, Failure> {
+    fn push_row<'py>(&mut self, py: Python<'py>, row: Input<'py, f64, Ix1>) -> Result<objects::Verdict<'py>, Failure> {
         let row = row.values()?;
         let model = self.cell.borrow_dependent().model();
         if model.descriptor().is_none() && row.len() != model.feature_count() {

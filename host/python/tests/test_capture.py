@@ -103,6 +103,35 @@ def test_touches_from_arrays_are_rounded_and_start_at_zero() -> None:
             palpate.DataSet.from_arrays(times, objects, ["cup", "spoon"])
 
 
+def test_no_data_set_forgets_which_touch_is_of_which_instance(tmp_path: Path) -> None:
+    times = [[0.0, touch * 1e-3, 0.5] for touch in range(120)]
+    objects, instances = [touch % 2 for touch in range(120)], [touch // 2 % 3 for touch in range(120)]
+    names = ["cup", "spoon"]
+    data = palpate.DataSet.from_arrays(
+        times, objects, names, probe=palpate.Probe(), approaches=True, instances=instances
+    )
+
+    def kept(data: palpate.DataSet) -> bool:
+        own = np.round(data.times[:, 1] * 1e3).astype(int)
+        return bool((own // 2 % 3 == data.instances).all() and (own % 2 == data.objects).all())
+
+    train, test = data.split(0.2)
+    assert all(np.bincount(test.instances[test.objects == cup]).tolist() == [4, 4, 4] for cup in (0, 1))
+    assert kept(data) and kept(train) and kept(test)
+    for number, part in enumerate((data, train, test)):
+        for kind in ("parquet", "text"):
+            directory = tmp_path / f"{kind}-{number}"
+            part.to_parquet(directory) if kind == "parquet" else part.to_text(directory)
+            assert kept(palpate.DataSet.read(directory))
+    # Noise changes neither, and a copy states it.
+    noisy = data.noisy("5ms")
+    np.testing.assert_array_equal(noisy.instances, data.instances)
+    noisy.to_text(tmp_path / "noisy")
+    assert '"largest": 5000.0' in (tmp_path / "noisy" / "dataset.json").read_text()
+    with pytest.raises(palpate.InputError, match="3 instances"):
+        palpate.DataSet.from_arrays(times, objects, names, instances=instances).to_text(tmp_path / "unknown")
+
+
 def test_splits_share_no_touch_and_noise_takes_a_seed(touches: palpate.DataSet) -> None:
     train, test = touches.split(0.2, seed=3)
     assert test.counts == [300] * 3 and train.counts == [1200] * 3 and train.probe == touches.probe

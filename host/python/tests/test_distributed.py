@@ -158,7 +158,7 @@ def test_a_shard_that_kills_its_worker_each_time_is_named_and_the_others_finish(
     out = tmp_path / "many"
     options = {"seed": 1, "probe": None, "approaches": False, "aim": "box", "length": 10.0, "millimeters": None}
     everything = {"touches": 900, "pose": False, **options}
-    ((_, _, digest),) = palpate.distributed._objects(["fork"], everything, str(out), 3)
+    ((_, _, _, digest),) = palpate.distributed._objects(["fork"], everything, str(out), 3)
     with (
         distributed.LocalCluster(n_workers=3, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
@@ -180,6 +180,40 @@ def test_a_mesh_that_is_refused_is_named_and_the_others_finish(client: distribut
     )
     assert [lost.object for lost in summary.refused] == ["broken"] and "broken.obj" in summary.refused[0].reason
     assert set(files(tmp_path / "out")) == {"bowl.txt"}
+
+
+def test_a_buffer_beside_a_gltf_that_was_changed_is_captured_again(client: distributed.Client, tmp_path: Path) -> None:
+    import struct
+
+    def write(height: float) -> None:
+        corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, height)]
+        faces = [0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3]
+        data = b"".join(struct.pack("<3f", *corner) for corner in corners) + struct.pack("<12I", *faces)
+        (tmp_path / "wedge.bin").write_bytes(data)
+        document = {
+            "asset": {"version": "2.0"},
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                {"bufferView": 1, "componentType": 5125, "count": 12, "type": "SCALAR"},
+            ],
+            "bufferViews": [
+                {"buffer": 0, "byteLength": 48},
+                {"buffer": 0, "byteOffset": 48, "byteLength": 48},
+            ],
+            "buffers": [{"uri": "wedge.bin", "byteLength": 96}],
+        }
+        (tmp_path / "wedge.gltf").write_text(json.dumps(document))
+
+    def captured() -> tuple[int, int]:
+        meshes = ["bowl", str(tmp_path / "wedge.gltf")]
+        summary = palpate.distributed.capture(client, meshes, 100, tmp_path / "out", format="text")
+        return summary.done, summary.kept
+
+    write(1.0)
+    assert (captured(), captured()) == ((2, 0), (0, 2))
+    write(0.5)
+    assert captured() == (1, 1)
 
 
 def test_xgboost_trains_over_the_cluster_and_its_model_is_imported(client: distributed.Client, tmp_path: Path) -> None:

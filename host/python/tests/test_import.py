@@ -5,13 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import catboost
 import lightgbm
 import numpy as np
 import numpy.typing as npt
 import palpate
 import pytest
 import xgboost
-from sklearn import ensemble, tree
+from sklearn import (
+    calibration,
+    dummy,
+    ensemble,
+    linear_model,
+    model_selection,
+    multiclass,
+    pipeline,
+    preprocessing,
+    tree,
+)
 
 CLASSES = ["cup", "jug", "pan"]
 
@@ -66,14 +77,65 @@ def test_a_booster_and_its_file_give_the_same_model(tmp_path: Path) -> None:
     assert np.abs(small.margins(TEST) - expected).max() <= small.margin_error and small.size < model.size
 
 
-def test_trees_after_the_best_round_are_left_out() -> None:
+@pytest.mark.parametrize("kind", ["gbtree", "dart", "forests"])
+def test_trees_after_the_best_round_are_left_out_unless_all_are_asked_for(kind: str, tmp_path: Path) -> None:
     generator = np.random.default_rng(0)
-    estimator = xgboost.XGBClassifier(n_estimators=60, max_depth=4, early_stopping_rounds=3)
-    noise = generator.integers(0, 3, 600)
-    estimator.fit(TRAIN, noise, eval_set=[(TEST, generator.integers(0, 3, 2000))], verbose=False)
-    assert estimator.best_iteration + 1 < estimator.get_booster().num_boosted_rounds()
-    model = palpate.compile(estimator, leaf="f32")
-    np.testing.assert_array_equal(model.margins(TEST), estimator.predict(TEST, output_margin=True))
+    estimator = xgboost.XGBClassifier(
+        n_estimators=60,
+        max_depth=4,
+        learning_rate=0.5,
+        early_stopping_rounds=3,
+        booster="dart" if kind == "dart" else "gbtree",
+        rate_drop=0.3 if kind == "dart" else None,
+        num_parallel_tree=3 if kind == "forests" else None,
+        n_jobs=1,
+    )
+    noisy = [np.where(generator.random(len(x)) < 0.3, generator.integers(0, 3, len(x)), labels(x, 3)) for x in (TRAIN, TEST)]
+    estimator.fit(TRAIN, noisy[0], eval_set=[(TEST, noisy[1])], verbose=False)
+    booster = estimator.get_booster()
+    taken, rounds = estimator.best_iteration + 1, booster.num_boosted_rounds()
+    assert 1 < taken < rounds
+    # The booster states the best round too, and so does its file.
+    booster.save_model(tmp_path / "model.json")
+    for source in (estimator, booster, tmp_path / "model.json"):
+        full = palpate.to_ensemble(source)
+        per_round = 9 if kind == "forests" else 3
+        assert full.trees == taken * per_round
+        said = f"Training stopped early: the {taken * per_round} trees up to the best iteration, {taken - 1}, are used"
+        assert any(note.startswith(said) for note in full.notes)
+        model = palpate.compile(source, leaf="f32")
+        # Of dart the estimator, which takes no DMatrix, adds in another order.
+        found = model.margins(TEST)
+        expected = booster.predict(xgboost.DMatrix(TEST), output_margin=True, iteration_range=(0, taken))
+        np.testing.assert_array_equal(found, expected)
+        assert np.abs(found - estimator.predict(TEST, output_margin=True)).max() < 1e-6
+        every = palpate.compile(source, leaf="f32", all_trees=True)
+        expected = booster.predict(xgboost.DMatrix(TEST), output_margin=True)
+        np.testing.assert_array_equal(every.margins(TEST), expected)
+        assert palpate.to_ensemble(source, all_trees=True).trees == rounds * per_round
+    assert np.abs(every.margins(TEST) - model.margins(TEST)).max() > 0.01
+
+
+def test_trees_after_lightgbms_best_round_are_left_out_unless_all_are_asked_for() -> None:
+    generator = np.random.default_rng(0)
+    train = lightgbm.Dataset(TRAIN, generator.integers(0, 2, 600))
+    booster = lightgbm.train(
+        {"objective": "binary", "verbose": -1, "num_threads": 1},
+        train,
+        60,
+        valid_sets=[lightgbm.Dataset(TEST, generator.integers(0, 2, 2000), reference=train)],
+        callbacks=[lightgbm.early_stopping(5, verbose=False)],
+        keep_training_booster=True,
+    )
+    taken, rounds = booster.best_iteration, booster.current_iteration()
+    assert 0 < taken < rounds
+    said = f"Training stopped early: the best {taken} of {rounds} rounds are taken"
+    assert palpate.to_ensemble(booster).notes[-1].startswith(said)
+    for all_trees in (False, True):
+        model = palpate.compile(booster, leaf="f32", all_trees=all_trees)
+        expected = booster.predict(TEST, raw_score=True, num_iteration=-1 if all_trees else None)
+        assert np.abs(model.margins(TEST)[:, 1] - expected).max() <= model.margin_error < 1e-4
+    assert palpate.to_ensemble(booster, all_trees=True).trees == rounds > palpate.to_ensemble(booster).trees
 
 
 def test_a_regression_gives_its_margin() -> None:
@@ -95,6 +157,23 @@ def test_lightgbm_gives_its_own_scores(classes: int) -> None:
     assert palpate.compile(estimator).objects == CLASSES[:classes]
 
 
+def test_whole_numbers_that_f32_does_not_hold_go_where_lightgbm_sends_them() -> None:
+    generator = np.random.default_rng(7)
+    # LightGBM rounds whole numbers to f32, and not f64.
+    seconds = 1.7e9 + generator.integers(0, 600, (600, 2))
+    kinds = ((seconds[:, 0] % 60 // 20 + seconds[:, 1] % 30 // 15) % 3).astype(int)
+    estimator = lightgbm.LGBMClassifier(n_estimators=12, num_leaves=31, min_child_samples=2, verbose=-1, n_jobs=1)
+    estimator.fit(seconds, kinds)
+    model = palpate.compile(estimator, leaf="f32", scales=[1.0, 1.0])
+    expected = estimator.predict(seconds, raw_score=True)
+    for given in (seconds, seconds.astype(np.int64)):
+        assert np.abs(model.margins(given) - expected).max() <= model.margin_error < 1e-4
+        assert model.predict(given) == [str(kind) for kind in estimator.predict(seconds)]
+    recognizer = palpate.Recognizer(model)
+    recognizer.push_row(seconds[0])
+    assert recognizer.best == str(expected[0].argmax())
+
+
 def raw(estimator: Any, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
     if hasattr(estimator, "decision_function"):
         scores = np.asarray(estimator.decision_function(values))
@@ -110,10 +189,18 @@ ESTIMATORS = [
     ensemble.HistGradientBoostingClassifier(max_iter=12, max_depth=4, random_state=1),
     ensemble.GradientBoostingClassifier(n_estimators=12, max_depth=3, random_state=1),
     tree.DecisionTreeClassifier(max_depth=5, random_state=1),
+    tree.ExtraTreeClassifier(max_depth=5, random_state=1),
     ensemble.RandomForestRegressor(n_estimators=12, max_depth=6, random_state=1),
+    ensemble.ExtraTreesRegressor(n_estimators=12, max_depth=6, random_state=1),
     ensemble.HistGradientBoostingRegressor(max_iter=12, random_state=1),
     ensemble.GradientBoostingRegressor(n_estimators=12, random_state=1),
+    tree.DecisionTreeRegressor(max_depth=5, random_state=1),
+    tree.ExtraTreeRegressor(max_depth=5, random_state=1),
 ]
+
+
+def test_every_estimator_that_is_taken_is_tested() -> None:
+    assert sorted(type(estimator).__name__ for estimator in ESTIMATORS) == sorted(palpate._sklearn.KNOWN)
 
 
 @pytest.mark.parametrize("classes", [2, 3])
@@ -151,19 +238,186 @@ def test_thresholds_of_histograms_are_compared_exactly() -> None:
         assert np.abs(model.margins(test) - estimator.decision_function(test)).max() <= model.margin_error
 
 
-def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
-    from sklearn.linear_model import LogisticRegression
+def test_posteriors_of_exponential_loss_are_those_of_predict_proba() -> None:
+    train, test = rows(600, False, 3), rows(2000, False, 4)
+    estimator = ensemble.GradientBoostingClassifier(n_estimators=12, loss="exponential", random_state=1)
+    estimator.fit(train, labels(train, 2))
+    full = palpate.to_ensemble(estimator)
+    assert len(full.notes) == 1 and "twice the values of `decision_function`" in full.notes[0]
+    margins = full.margins(test).astype(np.float64)
+    posterior = 1.0 / (1.0 + np.exp(margins[:, 0] - margins[:, 1]))
+    assert np.abs(posterior - estimator.predict_proba(test)[:, 1]).max() < 1e-6
+    np.testing.assert_array_equal(margins.argmax(axis=1), estimator.predict(test))
+    model = palpate.compile(estimator, leaf="f32")
+    assert np.abs(model.margins(test)[:, 1] - 2 * estimator.decision_function(test)).max() <= model.margin_error
 
+
+@pytest.mark.parametrize("init", ["zero", dummy.DummyClassifier(strategy="uniform"), dummy.DummyClassifier(strategy="prior")])
+def test_boosting_may_start_from_any_constant(init: Any) -> None:
+    train, test = rows(600, False, 3), rows(500, False, 4)
+    estimator = ensemble.GradientBoostingClassifier(n_estimators=5, init=init, random_state=1).fit(train, labels(train, 3))
+    model = palpate.compile(estimator, leaf="f32")
+    assert np.abs(model.margins(test) - estimator.decision_function(test)).max() <= model.margin_error
+
+
+@pytest.mark.parametrize("init", [dummy.DummyClassifier(strategy="stratified"), tree.DecisionTreeClassifier(max_depth=2)])
+def test_boosting_that_starts_from_another_prediction_is_refused(init: Any) -> None:
+    train = rows(600, False, 3)
+    estimator = ensemble.GradientBoostingClassifier(n_estimators=5, init=init, random_state=1).fit(train, labels(train, 3))
+    with pytest.raises(palpate.InputError, match=f"`init` is a {type(init).__name__} whose prediction is no constant"):
+        palpate.compile(estimator)
+
+
+@pytest.mark.parametrize("loss", ["poisson", "gamma", "squared_error"])
+def test_a_regression_predicts_the_librarys_value_after_its_link(loss: str) -> None:
+    estimator = ensemble.HistGradientBoostingRegressor(loss=loss, max_iter=12, random_state=1)
+    estimator.fit(TRAIN, 1.0 + labels(TRAIN, 3))
+    model = palpate.compile(estimator, leaf="f32")
+    np.testing.assert_allclose(model.predict(TEST), estimator.predict(TEST), rtol=1e-5)
+
+
+def combining() -> list[Any]:
+    """Estimators of which each holds trees and does something else than to add them up."""
+    stump = tree.DecisionTreeClassifier(max_depth=1)
+    deep, regression = tree.DecisionTreeClassifier(max_depth=4), tree.DecisionTreeRegressor(max_depth=4)
+    forest = ensemble.RandomForestClassifier(5, random_state=1)
+    return [
+        ensemble.AdaBoostClassifier(stump, n_estimators=10, random_state=1),
+        ensemble.AdaBoostRegressor(regression, n_estimators=10, random_state=1),
+        ensemble.BaggingClassifier(deep, n_estimators=10, max_features=0.5, random_state=1),
+        ensemble.BaggingRegressor(regression, n_estimators=10, max_features=0.5, random_state=1),
+        ensemble.VotingClassifier([("a", deep), ("b", stump)], voting="soft", weights=[9, 1]),
+        ensemble.VotingClassifier([("a", deep), ("b", stump)], voting="hard"),
+        ensemble.VotingRegressor([("a", regression), ("b", regression)], weights=[9, 1]),
+        ensemble.StackingClassifier([("a", deep), ("b", stump)]),
+        ensemble.StackingRegressor([("a", regression), ("b", regression)]),
+        ensemble.IsolationForest(n_estimators=10, random_state=1),
+        ensemble.RandomTreesEmbedding(n_estimators=10, random_state=1),
+        calibration.CalibratedClassifierCV(deep),
+        model_selection.FixedThresholdClassifier(deep, threshold=0.8),
+        model_selection.GridSearchCV(deep, {"max_depth": [2, 3]}),
+        multiclass.OneVsRestClassifier(deep),
+        pipeline.make_pipeline(preprocessing.StandardScaler(), forest),
+        linear_model.LogisticRegression(),
+    ]
+
+
+@pytest.mark.parametrize("estimator", combining(), ids=lambda estimator: type(estimator).__name__)
+def test_estimators_that_combine_trees_in_their_own_way_are_refused_by_name(estimator: Any) -> None:
+    train = rows(300, False, 6)
+    estimator.fit(train, labels(train, 2))
+    name = type(estimator).__name__
+    with pytest.raises(palpate.InputError, match=f"^sklearn's {name} has no trees that can be read.*RandomForestClassifier"):
+        palpate.compile(estimator)
+
+
+class Doubtful(ensemble.RandomForestClassifier):
+    """A forest that refuses to decide."""
+
+    def predict(self, rows: Any) -> Any:
+        return np.zeros(len(rows))
+
+
+class Shifted(xgboost.XGBClassifier):
+    """XGBoost with another threshold."""
+
+    def predict(self, rows: Any, **options: Any) -> Any:
+        return self.predict_proba(rows)[:, 1] > 0.8
+
+
+@pytest.mark.parametrize(
+    ("estimator", "base"), [(Doubtful(5), "sklearn's RandomForestClassifier"), (Shifted(n_estimators=3), "xgboost's XGBClassifier")]
+)
+def test_classes_derived_from_others_are_refused_by_name(estimator: Any, base: str) -> None:
+    estimator.fit(TRAIN, labels(TRAIN, 2))
+    with pytest.raises(palpate.InputError, match=f"{type(estimator).__name__} is derived from {base} and may predict in another way"):
+        palpate.compile(estimator)
+
+
+def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
     categories = ensemble.HistGradientBoostingClassifier(categorical_features=[3], max_iter=2)
     categories.fit(np.abs(rows(200, False, 5)), np.arange(200) % 2)
+    several = ensemble.RandomForestClassifier(3).fit(rows(50, False, 6), np.stack([np.arange(50) % 2, np.arange(50) % 3], axis=1))
+    halves = {"objective": "binary", "verbose": -1, "num_threads": 1}
+    folds = lightgbm.cv(halves, lightgbm.Dataset(TRAIN, labels(TRAIN, 2)), 2, return_cvbooster=True)["cvbooster"]
     for model, message in [
-        (LogisticRegression().fit(rows(50, False, 6), np.arange(50) % 2), "LogisticRegression has no trees"),
         (ensemble.RandomForestClassifier(), "not fitted"),
         (categories, "splits on categories"),
+        (several, "several targets"),
+        (folds, "lightgbm's CVBooster has no trees that can be read"),
+        (xgboost.XGBModel(n_estimators=2).fit(TRAIN, TRAIN[:, 3] > 0), "xgboost's XGBModel has no trees that can be read"),
         (object(), "builtins.object is no model"),
     ]:
         with pytest.raises(palpate.InputError, match=message):
             palpate.compile(model)
+
+
+@pytest.mark.parametrize("missing", [0.0, -1, np.float32(2.0), None])
+def test_the_number_that_stands_for_a_missing_value_is_the_estimators(missing: float | None, tmp_path: Path) -> None:
+    # The trees do not hold it: as a number it would go by comparisons, and not where missing values go.
+    train, test = np.round(TRAIN), np.round(TEST)
+    test[::7] *= -0.0
+    settings = {} if missing is None else {"missing": missing}
+    estimator = xgboost.XGBClassifier(n_estimators=12, n_jobs=1, **settings).fit(train, labels(train, 3))
+    expected = estimator.predict(test, output_margin=True)
+    full, model = palpate.to_ensemble(estimator), palpate.compile(estimator, leaf="f32")
+    np.testing.assert_array_equal(full.margins(test), expected)
+    np.testing.assert_array_equal(model.margins(test), expected)
+    assert full.notes == []
+    # A booster and its file do not hold the number, either: they say so, and take it.
+    estimator.save_model(tmp_path / "model.json")
+    for source in (estimator.get_booster(), tmp_path / "model.json"):
+        assert "does not say which number stood for a missing value" in palpate.to_ensemble(source).notes[0]
+        same = palpate.compile(source, leaf="f32", missing=np.nan if missing is None else missing)
+        np.testing.assert_array_equal(same.margins(test), expected)
+        if missing is not None:
+            assert (palpate.compile(source, leaf="f32").margins(test) != expected).any()
+    with pytest.raises(palpate.SettingError, match="missing is 5.0. Leave it out: the XGBClassifier says"):
+        palpate.compile(estimator, missing=5.0)
+
+
+def test_only_xgboost_is_told_what_is_missing() -> None:
+    forest = ensemble.RandomForestClassifier(2).fit(TRAIN, labels(TRAIN, 2))
+    with pytest.raises(palpate.SettingError, match="missing is 0.0. Leave it out: a model of sklearn"):
+        palpate.compile(forest, missing=0.0)
+
+
+@pytest.mark.parametrize("estimator", [
+    ensemble.GradientBoostingClassifier(n_estimators=1, max_depth=1),
+    ensemble.HistGradientBoostingClassifier(max_iter=1, max_depth=1),
+    ensemble.RandomForestClassifier(2, max_depth=1, bootstrap=False, random_state=1),
+], ids=lambda estimator: type(estimator).__name__)
+@pytest.mark.parametrize("leaf", ["f32", "i16"])
+def test_exact_ties_break_as_in_scikit_learn(estimator: Any, leaf: str) -> None:
+    # Each half of the rows has as many of either class: no split says anything, and scores are 0.
+    grid = np.repeat(np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]], dtype=np.float32), 50, axis=0)
+    estimator.fit(grid, (grid[:, 0] != grid[:, 1]).astype(int))
+    model = palpate.compile(estimator, leaf=leaf)
+    assert np.ptp(model.margins(grid), axis=1).max() == 0.0
+    assert list(model.predict(grid)) == [str(name) for name in estimator.predict(grid)]
+
+
+def test_classes_by_another_threshold_than_the_posterior_are_refused() -> None:
+    estimator = xgboost.XGBClassifier(n_estimators=5, objective="binary:logitraw").fit(TRAIN, labels(TRAIN, 2))
+    with pytest.raises(palpate.InputError, match="compares margins with 0.5"):
+        palpate.compile(estimator)
+    model = palpate.compile(estimator.get_booster(), leaf="f32")
+    np.testing.assert_array_equal(model.margins(TEST)[:, 1], estimator.predict(TEST, output_margin=True))
+
+
+@pytest.mark.parametrize("classes", [2, 3])
+def test_catboost_gives_its_own_scores(classes: int) -> None:
+    estimator = catboost.CatBoostClassifier(iterations=12, depth=4, verbose=0, thread_count=1, allow_writing_files=False)
+    estimator.fit(TRAIN, np.array(CLASSES)[labels(TRAIN, classes)])
+    model = palpate.compile(estimator, leaf="f32")
+    expected = estimator.predict(TEST, prediction_type="RawFormulaVal")
+    found = model.margins(TEST) if classes > 2 else model.margins(TEST)[:, 1]
+    assert np.abs(found - expected).max() <= model.margin_error < 1e-4
+    assert model.objects == CLASSES[:classes]
+    if classes == 2:
+        estimator.set_probability_threshold(0.8)
+        with pytest.raises(palpate.InputError, match="probability threshold 0.8"):
+            palpate.compile(estimator)
 
 
 def test_a_model_over_features_recognizes_rows() -> None:

@@ -27,10 +27,11 @@ assert_type(ensemble, palpate.Ensemble)
 assert_type(ensemble.margins([[0.0, 0.0]]), npt.NDArray[np.float32])
 assert_type(ensemble.descriptor, str | None)
 
-model = palpate.compile(ensemble, max_bytes=None)
+model = palpate.compile(ensemble, max_bytes=None, all_trees=True)
 assert_type(model, palpate.Model)
 assert_type(model.margins(data), npt.NDArray[np.float64])
 assert_type(model.margins([[0.0, 0.1, 0.2]]), npt.NDArray[np.float64])
+assert_type(model.predict([[0.0, 0.1]]), list[str] | npt.NDArray[np.float32])
 assert_type(model.to_bytes(), bytes)
 assert_type(model.margin_error, float)
 

@@ -1,8 +1,8 @@
 //! Thresholds that keep a promise, from sequences.
 
 use super::sequence::{Odds, Sequence, odds_of};
-use super::walk::{Kept, Stop, Tally, binomial_tail, needed, walk};
-use crate::error::{CalibrateProblem, Result};
+use super::walk::{Kept, Stop, Tally, needed, walk};
+use crate::error::{CalibrateProblem, Result, Supplied};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
 
@@ -12,6 +12,10 @@ const STEP: f64 = 0.01;
 const LOOSEST: f64 = 0.05;
 /// Steps at once where names have thresholds of their own.
 const NAMES_STEP: usize = 2;
+/// Thresholds by name are learned on one in this many sequences, and tested on the others.
+const LEARNED: usize = 3;
+/// From how much stricter than the learned thresholds by name to how much looser the tested ones are, in nats.
+const AROUND: [f64; 2] = [2.0, -1.0];
 
 /// What is promised.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +35,11 @@ pub struct Chosen {
     pub odds: Odds,
     /// Wrong names of those given: one tally for an average, one for each object otherwise.
     pub tallies: Vec<Tally>,
-    /// Sequences that were tested on.
+    /// Of the names given to each object, those that were wrong, whatever the rate is promised of.
+    pub touched: Vec<Tally>,
+    /// Of the times that each object was named, those when another was touched, whatever the rate is promised of.
+    pub named: Vec<Tally>,
+    /// Sequences that were tested on; with thresholds by name, without those that these were learned on.
     pub sequences: usize,
     /// Names given in these.
     pub given: usize,
@@ -47,15 +55,31 @@ pub struct Chosen {
 /// `strictest` (a margin in nats) or to the limit of touches. `objects` are the model's.
 ///
 /// A sequence that ends without a name is neither right nor wrong: the error rate is that of names that are given. One
-/// threshold is walked from strict to loose for an average as for each object, whose rates are all kept at once with the
-/// stated probability. With thresholds by name each name walks; each rate is kept with that probability by itself.
+/// threshold is walked from strict to loose for an average as for each object ([`walk`]: fixed-sequence testing, with an
+/// intersection-union test at each step), so that the rates of all objects are kept at once with the stated probability.
+///
+/// Thresholds by name depend on each other, so there is no one order from strict to loose. One is learned on a third of the
+/// sequences of each object: thresholds that seem to keep each rate, and those about them. It is walked on the other two
+/// thirds, which had no part in it (split fixed-sequence testing, in the same paper), and ends where any name fails. So
+/// the rates of all names are kept at once with the stated probability. Nothing is adjusted to the sequences tested on.
 ///
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise or too few names are given to know.
 pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms: &Terms) -> Result<Chosen> {
+    Ok(chosen(sequences, objects, strictest, terms, None)?)
+}
+
+/// The same of sequences that used up what was `supplied`, if they did.
+pub(super) fn chosen(
+    sequences: &[Sequence],
+    objects: &[String],
+    strictest: f64,
+    terms: &Terms,
+    supplied: Option<Supplied>,
+) -> Result<Chosen, CalibrateProblem> {
     let Terms { rate, confidence, per } = *terms;
     let count = objects.len();
-    let tested: Vec<&Sequence> = sequences.iter().collect();
+    let mut tested: Vec<&Sequence> = sequences.iter().collect();
     let kept: Result<Kept<Odds>, Stop> = match per {
         Per::Average | Per::Object => {
             let margins = grid(strictest, LOOSEST).map(|margin| Odds::All(odds_of(margin)));
@@ -65,18 +89,27 @@ pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms:
             });
             walk(steps, rate, confidence)
         }
-        Per::Name => walk_by_name(&tested, count, strictest, terms),
+        Per::Name => {
+            let (learn, test) = learned_and_tested(&tested);
+            let steps = around(&learned(&learn, count, strictest, rate), strictest);
+            tested = test;
+            let tally = |odds| {
+                let tallies = tallies(&tested, &odds, By::Named(count));
+                (odds, tallies)
+            };
+            walk(steps.into_iter().map(tally), rate, confidence)
+        }
     };
     let of = |position: usize| (per != Per::Average).then(|| objects.get(position).cloned()).flatten();
     let Kept { threshold, tallies } = kept.map_err(|stop| match stop {
         Stop::TooFew { position, found } => {
-            CalibrateProblem::TooFew { object: of(position), rate, found, needed: needed(rate, confidence) }
+            CalibrateProblem::TooFew { object: of(position), rate, found, needed: needed(rate, confidence), supplied }
         }
         Stop::TooMany { position, tally: Tally { wrong, all } } => {
             CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all }
         }
     })?;
-    Ok(summary(threshold, tallies, &tested))
+    Ok(summary(threshold, tallies, &tested, count))
 }
 
 /// Margins from `strict` to `loose`.
@@ -127,56 +160,73 @@ fn tallies(sequences: &[&Sequence], odds: &Odds, by: By) -> Vec<Tally> {
     sequences.par_iter().with_min_len(1_000).fold(none, add).reduce(none, sum)
 }
 
-/// Walks over the thresholds of all names at once: they loosen together, and a name whose test fails stays where it last
-/// passed while the others go on. What those take from it later is mostly theirs, so that it is wrong no more often; if it
-/// is, it is made stricter in the end, until every name passes where all of them ended.
-fn walk_by_name(sequences: &[&Sequence], count: usize, strictest: f64, terms: &Terms) -> Result<Kept<Odds>, Stop> {
-    let Terms { rate, confidence, .. } = *terms;
-    let passes = |tally: Tally| binomial_tail(tally, rate) <= 1.0 - confidence;
-    let needed = needed(rate, confidence);
-    let mut kept: Vec<Option<f64>> = vec![None; count];
+/// The sequences that thresholds by name are learned on, the first of each object, and those that they are tested on.
+fn learned_and_tested<'s>(sequences: &[&'s Sequence]) -> (Vec<&'s Sequence>, Vec<&'s Sequence>) {
+    let objects = sequences.iter().map(|sequence| sequence.object + 1).max().unwrap_or(0);
+    let mut left = vec![0_usize; objects];
+    sequences.iter().for_each(|sequence| left[sequence.object] += 1);
+    left.iter_mut().for_each(|left| *left /= LEARNED);
+    sequences.iter().partition(|sequence| {
+        let left = &mut left[sequence.object];
+        let is_learned = *left > 0;
+        *left -= usize::from(is_learned);
+        is_learned
+    })
+}
+
+/// The margins at which each name seems to be wrong as often as promised. They loosen together; a name that is wrong more
+/// often stays where it was, while the others go on. What those take from it later may make it wrong more often, and
+/// then it is made stricter. Nothing is promised for them: that takes a test on other sequences.
+fn learned(sequences: &[&Sequence], count: usize, strictest: f64, rate: f64) -> Vec<f64> {
+    // As if one more had been wrong: a name that was hardly ever given is not given freely.
+    let seems_kept = |tally: Tally| (tally.wrong + 1) as f64 <= rate * (tally.all + 1) as f64;
+    let tells = |tally: Tally| rate * (tally.all + 1) as f64 >= 1.0;
+    let at = |margins: &[f64]| {
+        tallies(sequences, &Odds::ByObject(margins.iter().copied().map(stored).collect()), By::Named(count))
+    };
+    let mut margins = vec![strictest; count];
     let mut walks = vec![true; count];
-    let mut most = vec![0; count];
     for margin in grid(strictest, LOOSEST).step_by(NAMES_STEP) {
-        let tried = (0..count).map(|name| stored(kept[name].filter(|_| !walks[name]).unwrap_or(margin)));
-        let tallies = tallies(sequences, &Odds::ByObject(tried.collect()), By::Named(count));
-        for name in (0..count).filter(|&name| tallies[name].all >= needed) {
-            if !walks[name] {
-                continue;
-            }
-            if passes(tallies[name]) {
-                kept[name] = Some(margin);
-            } else if kept[name].is_none() {
-                return Err(Stop::TooMany { position: name, tally: tallies[name] });
+        let tried: Vec<f64> = (0..count).map(|name| if walks[name] { margin } else { margins[name] }).collect();
+        for (name, tally) in at(&tried).into_iter().enumerate().filter(|(_, tally)| tells(*tally)) {
+            if walks[name] && seems_kept(tally) {
+                margins[name] = margin;
             } else {
                 walks[name] = false;
             }
         }
-        most.iter_mut().zip(&tallies).for_each(|(most, tally)| *most = tally.all.max(*most));
         if !walks.contains(&true) {
             break;
         }
     }
-    let too_few = |name: usize| Stop::TooFew { position: name, found: most[name] };
-    let kept: Result<Vec<f64>, Stop> = (0..count).map(|name| kept[name].ok_or_else(|| too_few(name))).collect();
-    let mut kept = kept?;
     loop {
-        let odds = Odds::ByObject(kept.iter().map(|&margin| stored(margin)).collect());
-        let tallies = tallies(sequences, &odds, By::Named(count));
-        let failed: Vec<usize> = (0..count).filter(|&name| !passes(tallies[name])).collect();
-        if failed.is_empty() {
-            return Ok(Kept { threshold: odds, tallies });
+        let tallies = at(&margins);
+        let is_broken =
+            |name: &usize| tells(tallies[*name]) && !seems_kept(tallies[*name]) && margins[*name] < strictest;
+        let broken: Vec<usize> = (0..count).filter(is_broken).collect();
+        if broken.is_empty() {
+            return margins;
         }
-        for name in failed {
-            if kept[name] >= strictest {
-                return Err(Stop::TooMany { position: name, tally: tallies[name] });
-            }
-            kept[name] = (kept[name] + STEP).min(strictest);
-        }
+        broken.into_iter().for_each(|name| margins[name] = (margins[name] + STEP).min(strictest));
     }
 }
 
-fn summary(odds: Odds, tallies: Vec<Tally>, tested: &[&Sequence]) -> Chosen {
+/// Thresholds by name about the learned ones, from strict to loose: all names' by as much.
+fn around(learned: &[f64], strictest: f64) -> Vec<Odds> {
+    let [strict, loose] = AROUND;
+    let steps = ((strict - loose) / (STEP * NAMES_STEP as f64)).round() as usize;
+    let odds = (0..=steps).map(|step| {
+        let beyond = strict - STEP * (NAMES_STEP * step) as f64;
+        let margin = |learned: &f64| stored((learned + beyond).clamp(LOOSEST, strictest.max(LOOSEST)));
+        Odds::ByObject(learned.iter().map(margin).collect())
+    });
+    let mut odds: Vec<Odds> = odds.collect();
+    odds.dedup();
+    odds
+}
+
+fn summary(odds: Odds, kept: Vec<Tally>, tested: &[&Sequence], count: usize) -> Chosen {
+    let [touched, named] = [By::Touched(count), By::Named(count)].map(|by| tallies(tested, &odds, by));
     let (mut given, mut wrong, mut touches, mut approaches) = (0, 0, 0_u64, 0_u64);
     for sequence in tested {
         let look = sequence.given(&odds);
@@ -188,5 +238,5 @@ fn summary(odds: Odds, tallies: Vec<Tally>, tested: &[&Sequence]) -> Chosen {
     let sequences = tested.len();
     let mean = |sum: u64| sum as f64 / sequences.max(1) as f64;
     let (mean_touches, mean_approaches) = (mean(touches), mean(approaches));
-    Chosen { odds, tallies, sequences, given, wrong, mean_touches, mean_approaches }
+    Chosen { odds, tallies: kept, touched, named, sequences, given, wrong, mean_touches, mean_approaches }
 }

@@ -5,7 +5,8 @@ use super::sequence::{Sequence, odds_of};
 use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
-use palpate_onboard::{Model, Recognizer, Stopping};
+use crate::touches::ObjectTouches;
+use palpate_onboard::{Fit, Model, Recognizer, Stopping};
 use palpate_shared::Touch;
 use palpate_shared::format::Plan;
 use rand::seq::SliceRandom;
@@ -40,7 +41,7 @@ pub struct Until {
 pub struct Supply<'d> {
     object: usize,
     touches: &'d [Touch],
-    /// One for each instance, or one for each robot: a sequence is of touches of one pool.
+    /// One for each source and robot: a sequence is of touches of one pool.
     pools: Vec<Pool>,
     /// The pool of the next sequence.
     next: usize,
@@ -60,22 +61,20 @@ struct Pool {
 }
 
 impl<'d> Supply<'d> {
-    /// The touches of the object with this name and this index in the model. Touch i is of instance i modulo `instances`
-    /// and was made by robot i modulo `robots`; a sequence is of touches of one instance and one robot. With more than one
-    /// robot, every robot makes one sequence, so that the sequences' biases are independent; `robots` should be a multiple
-    /// of `instances` then.
-    pub fn new(object: usize, name: &str, touches: &'d [Touch], instances: usize, robots: usize, seed: u64) -> Self {
-        let is_once = robots > 1;
-        let pools = if is_once { robots } else { instances.max(1) };
-        let pool = |turn: usize| {
-            let own = (turn..touches.len()).step_by(pools).filter_map(|touch| u32::try_from(touch).ok());
-            let mut order: Vec<u32> = own.collect();
+    /// The touches of the object with this index in the model. A sequence is of touches of one source, such as an
+    /// instance, by one robot. Where robots differ, every robot makes one sequence, so that the sequences' biases are
+    /// independent.
+    pub fn new(object: usize, touched: &'d ObjectTouches, seed: u64) -> Self {
+        let is_once = touched.has_robots();
+        let pool = |(turn, pool): (u64, crate::touches::Pool)| {
+            let mut order = pool.touches;
             if !is_once {
-                order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, turn as u64));
+                order.shuffle(&mut random::generator(seed, Purpose::Calibration, &touched.name, turn));
             }
             Pool { order, ..Pool::default() }
         };
-        Self { object, touches, pools: (0..pools).map(pool).collect(), next: 0, is_once, candidates: Vec::new() }
+        let pools = (0..).zip(touched.pools()).map(pool).collect();
+        Self { object, touches: touched.touches(), pools, next: 0, is_once, candidates: Vec::new() }
     }
 
     /// Splits off one in `parts` of the touches as a supply of its own; where there are robots, one in `parts` of them.
@@ -210,9 +209,11 @@ fn one<const N: usize>(
             continue;
         }
         let (evidence, best, touches) = (recognizer.evidence(), recognizer.best(), recognizer.touches());
-        let may_name = gate(&Moment { touch, evidence, best, touches, approaches });
+        // What the model's own test says, as on the chip: a name is held back, or there is none.
+        let fit = recognizer.fit();
+        let may_name = gate(&Moment { touch, evidence, best, touches, approaches }) && fit == Fit::Fits;
         let odds = sequence.push(recognizer, approaches, may_name);
-        if (may_name && odds <= strictest) || touches >= until.max_touches {
+        if (may_name && odds <= strictest) || fit == Fit::Stranger || touches >= until.max_touches {
             return (sequence, true);
         }
     }

@@ -8,7 +8,7 @@ use crate::evaluate::Candidate;
 use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::Progress;
-use crate::touches::{Dataset, ObjectTouches, Origin};
+use crate::touches::{Dataset, ObjectTouches, Origin, Source};
 use palpate_onboard::{Model, Refused, Stopping};
 
 /// Samples of each object from which it is estimated how many a sequence takes.
@@ -33,7 +33,7 @@ impl Fresh {
         let names = self.objects.iter().map(|object| object.name.as_str());
         if self.origin.as_ref() != Some(origin) || !names.eq(objects.iter().map(|(name, _)| *name)) {
             self.origin = Some(origin.clone());
-            let none = |(name, _): &(&str, &[Scene])| ObjectTouches { name: (*name).into(), touches: Vec::new() };
+            let none = |(name, _): &(&str, &[Scene])| ObjectTouches::new(*name, Vec::new(), Source::Object);
             self.objects = objects.iter().map(none).collect();
         }
         &mut self.objects
@@ -79,51 +79,63 @@ pub(crate) fn fresh(
     progress.begin("touching, to calibrate", None);
     let touch = |(name, scenes): &(&str, &[Scene]), samples| -> Result<ObjectTouches> {
         crate::progress::check(progress)?;
-        Ok(ObjectTouches { name: (*name).into(), touches: capture::touches(scenes, name, origin, samples)? })
+        capture::touches(scenes, name, origin, samples)
     };
-    let instances = objects.iter().filter(|(_, scenes)| scenes.len() > 1);
-    let instances = instances.map(|(name, scenes)| ((*name).to_owned(), scenes.len())).collect();
     let first: Vec<ObjectTouches> = objects.iter().map(|object| touch(object, 0..FIRST)).collect::<Result<_>>()?;
-    let dataset =
-        Dataset { origin: Some(Origin { touches: FIRST, ..origin.clone() }), instances, ..Dataset::new(first) };
+    let dataset = Dataset { origin: Some(Origin { touches: FIRST, ..origin.clone() }), ..Dataset::new(first) };
     let means = means(model, &dataset, settings)?;
     let wanted = settings.sequences as f64 / objects.len().max(1) as f64;
-    let counts = means.into_iter().map(|mean| {
-        // A few standard errors more, as if lengths were exponentially distributed.
-        let count = SPARE * mean * (wanted + 3.0 * wanted.sqrt());
+    let counts = means.into_iter().map(|Lengths { longest, pools }| {
+        // A few standard errors more, as if lengths were exponentially distributed. Instances get equally many.
+        let wanted = wanted / pools as f64;
+        let count = SPARE * longest * (wanted + 3.0 * wanted.sqrt()) * pools as f64;
         (count.ceil() as u64).clamp(1, MOST)
     });
     let more = objects.iter().zip(counts).zip(kept.of(objects, origin)).map(|((object, count), kept)| {
-        let has = kept.touches.len() as u64;
+        let has = kept.len() as u64;
         if has < count {
-            kept.touches.extend(touch(object, FIRST + has..FIRST + count)?.touches);
+            kept.append(&touch(object, FIRST + has..FIRST + count)?);
         }
         // As many as there are, if that is fewer than a machine counts.
-        let count = usize::try_from(count).unwrap_or(usize::MAX).min(kept.touches.len());
-        Ok(ObjectTouches { name: kept.name.clone(), touches: kept.touches[..count].to_vec() })
+        let count = usize::try_from(count).unwrap_or(usize::MAX).min(kept.len());
+        Ok(kept.select(0..count))
     });
     Ok(Dataset { objects: more.collect::<Result<_>>()?, ..dataset })
 }
 
+/// Lengths of the sequences of an object.
+struct Lengths {
+    /// The samples that a sequence takes on average, of the instance for which it takes the most.
+    longest: f64,
+    /// The number of instances.
+    pools: usize,
+}
+
 /// How many samples of each object a sequence takes on average.
-fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Vec<f64>> {
+fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Vec<Lengths>> {
     let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
     let (_, known) = Candidate::Compiled(model).of(dataset)?;
     let trained = model.trained_touches();
-    let mean = |(touched, &object): (&ObjectTouches, &usize)| -> Result<f64> {
-        let ObjectTouches { name, touches } = touched;
+    let mean = |(touched, &object): (&ObjectTouches, &usize)| -> Result<Lengths> {
+        let touches = touched.touches();
         let used = touches.iter().filter(|touch| Refused::check(&trained, touch).is_ok()).count().max(1);
         let to_the_limit = f64::from(max_touches) * touches.len() as f64 / used as f64;
+        let pools = touched.sources().len().max(1);
         if settings.noise.has_bias() {
-            return Ok(to_the_limit);
+            return Ok(Lengths { longest: to_the_limit, pools });
         }
-        let noisy = settings.noise.add(name, touches, settings.seed);
+        let noisy = touched.noisy(&settings.noise, settings.seed, 1);
         let margin = ((1.0 - settings.rate) / settings.rate).ln() + super::model::STRICTEST[0];
-        let mut supply = [Supply::new(object, name, &noisy, 1, 1, settings.seed)];
+        let mut supply = [Supply::new(object, &noisy, settings.seed)];
         let until = Until { margin, max_touches };
         let found = follow(model, &mut supply, &[usize::MAX], until, || |_: &super::Moment<'_>| true, &())?;
-        let approaches: f64 = found.iter().map(|sequence| f64::from(sequence.approaches)).sum();
-        Ok(if found.is_empty() { to_the_limit } else { approaches / found.len() as f64 })
+        // Sequences are of the instances in turn.
+        let mean = |pool: usize| {
+            let own = || found.iter().skip(pool).step_by(pools);
+            let approaches: f64 = own().map(|sequence| f64::from(sequence.approaches)).sum();
+            if own().len() == 0 { to_the_limit } else { approaches / own().len() as f64 }
+        };
+        Ok(Lengths { longest: (0..pools).map(mean).fold(0.0, f64::max), pools })
     };
     dataset.objects.iter().zip(&known).map(mean).collect()
 }

@@ -10,8 +10,12 @@
 //!
 //! - on average ([`Per::Average`]): of all names, with objects touched as often as the model's priors say;
 //! - per name ([`Per::Name`]): of each name, when it is given, with objects touched as often as that; each name has a
-//!   threshold of its own, and its rate is kept with the stated probability, whether or not the others' are;
-//! - per object ([`Per::Object`]): of the names given to each object, however often it is touched.
+//!   threshold of its own, and the rates of all names are kept at once with the stated probability;
+//! - per object ([`Per::Object`]): of the names given to each object, however often it is touched; the rates of all objects
+//!   are kept at once with the stated probability.
+//!
+//! The probability is over calibrations: of calibrations on touches drawn anew, at most the share of one less the confidence
+//! gives thresholds whose rate is above the promised one.
 //!
 //! ```no_run
 //! use palpate::calibrate::{self, calibrate};
@@ -44,7 +48,9 @@ pub use draw::{Moment, Supply, Until, follow, follow_plan};
 #[cfg(feature = "cli")]
 pub(crate) use fresh::fresh;
 pub use fresh::{Fresh, calibrate_fresh};
-pub use model::{Calibrated, Settings, added_bytes, calibrate, calibrate_with};
+pub use model::{Calibrated, OfObject, Settings, Worse, added_bytes, calibrate};
+#[cfg(feature = "train")]
+pub(crate) use model::{STRICTEST, add_noise, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
 #[cfg(feature = "cli")]

@@ -1,17 +1,17 @@
 //! A model's thresholds, its promise and its temperature.
 
-use super::choose::{Chosen, Terms, choose};
+use super::choose::{Chosen, Terms, chosen};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
-use super::{Per, Tally};
+use super::{Per, Tally, binomial_tail};
 use crate::compile::{self, Restated, restate};
 use crate::ensemble::StatedProbe;
-use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result};
-use crate::evaluate::{Candidate, least_common_multiple};
+use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result, Supplied};
+use crate::evaluate::Candidate;
 use crate::progress::Progress;
-use crate::touches::Dataset;
 use crate::touches::noise::Noise;
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused, Stopping};
 use palpate_shared::format::{OddsByObject, Promise, SECTION_HEADER_LENGTH, Tag, Temperature};
 use serde::Serialize;
@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 /// One touch in this many serves the pilot alone, which says how strict to begin; its sequences are at most one in this many.
 const PILOT: usize = 30;
 /// The strictest threshold beyond that of the posterior, in nats: usually, and where a tenth of that is not enough.
-pub(super) const STRICTEST: [f64; 2] = [2.5, 10.0];
+pub(crate) const STRICTEST: [f64; 2] = [2.5, 10.0];
 
 /// What is promised, and on how much.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +79,7 @@ pub struct Calibrated {
     pub sequences: usize,
     /// Share of the names given in these that were wrong.
     pub error: f64,
-    /// Share of these that ended undecided.
+    /// Share of these that ended without a name: undecided, or unknown to the model's test.
     pub undecided: f64,
     /// Touches used on average that were evidence.
     pub mean_touches: f64,
@@ -92,12 +92,61 @@ pub struct Calibrated {
     pub margins: BTreeMap<String, f64>,
     /// For each name, or object, that the rate is promised for: the share that was wrong. Empty for an average.
     pub errors: BTreeMap<String, f64>,
+    /// Each object, whatever the rate is promised of.
+    pub objects: BTreeMap<String, OfObject>,
     /// What evidence is divided by before it is shown as a posterior.
     pub temperature: f64,
 }
 
+/// Figures of an object under the thresholds, in the sequences that the promise rests on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct OfObject {
+    /// Names given to it, right or wrong.
+    pub given: u64,
+    /// Wrong ones of these.
+    pub wrong: u64,
+    /// Times that its name was given, to whatever object.
+    pub named: u64,
+    /// Of these, the wrong ones.
+    pub named_wrongly: u64,
+}
+
+/// An object whose names are wrong more often than all names together may be, which their average does not show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Worse {
+    /// The object.
+    pub object: String,
+    /// The share of wrong ones among the names given to it, if that is above the rate.
+    pub given: Option<f64>,
+    /// The share of wrong ones among the times that its name was given, if that is above the rate.
+    pub named: Option<f64>,
+}
+
+impl Calibrated {
+    /// The objects whose names are wrong more often than promised, though the promise is kept: one that is undecided
+    /// mostly has few names in an average. Shares that may be above the rate by chance (a binomial test at 1 %) are left
+    /// out.
+    pub fn worse(&self) -> Vec<Worse> {
+        worse(&self.objects, self.promised)
+    }
+}
+
+pub(super) fn worse(objects: &BTreeMap<String, OfObject>, rate: f64) -> Vec<Worse> {
+    let above = |wrong: u64, all: u64| {
+        let below = wrong.checked_sub(1).map_or(0.0, |wrong| binomial_tail(Tally { wrong, all }, rate));
+        (all > 0 && below >= 0.99).then(|| wrong as f64 / all as f64)
+    };
+    let worse = objects.iter().map(|(object, of)| Worse {
+        object: object.clone(),
+        given: above(of.wrong, of.given),
+        named: above(of.named_wrongly, of.named),
+    });
+    worse.filter(|worse| worse.given.is_some() || worse.named.is_some()).collect()
+}
+
 /// Sets a model's thresholds so that it keeps a promised error rate and uses it up, on touches that nothing was trained
-/// on; also its temperature. A data set of approaches is counted in these.
+/// on; also its temperature. A data set of approaches is counted in these. If the model has a test of fit, names are held
+/// back and sequences end as unknown where the chip's would, and the promise is one of the model with its test.
 ///
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or the data set lacks an
@@ -110,19 +159,18 @@ pub fn calibrate(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
-    calibrate_with(model, dataset, settings, || |_: &Moment<'_>| true, progress)
+    calibrate_from(model, dataset, settings, None, progress)
 }
 
-/// The same for a recognizer that holds names back: `gate` makes for each sequence what says after each touch whether a
-/// name may be given.
+/// The same with the strictest threshold given, as a margin in nats, instead of one that a few sequences suggest.
 ///
 /// # Errors
 /// As [`calibrate`].
-pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
+pub(crate) fn calibrate_from(
     model: &Model<'_>,
     mut dataset: Dataset,
     settings: &Settings,
-    gate: impl Fn() -> G + Sync,
+    strictest: Option<f64>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     check(settings)?;
@@ -141,14 +189,11 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
     if !missing.is_empty() {
         return Err(CalibrateProblem::Missing { objects: missing }.into());
     }
-    let robots = add_noise(model, &mut dataset, settings, max_touches)?;
+    // Another seed than those of training and tests.
+    add_noise(model, &mut dataset, &settings.noise, max_touches, settings.seed.wrapping_add(0x9e37_79b9));
     let touched = dataset.objects.iter().zip(&known);
-    let mut supplies: Vec<Supply<'_>> = touched
-        .map(|(touched, &object)| {
-            let instances = dataset.instances.get(&touched.name).copied().unwrap_or(1);
-            Supply::new(object, &touched.name, &touched.touches, instances, robots, settings.seed)
-        })
-        .collect();
+    let mut supplies: Vec<Supply<'_>> =
+        touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect();
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let naive = ((1.0 - settings.rate) / settings.rate).ln();
@@ -156,9 +201,9 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
     let wanted = |count: usize| -> Vec<usize> {
         shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
     };
-    let draw = |supplies: &mut [Supply<'_>], count: usize, beyond: f64| {
-        let until = Until { margin: naive + beyond, max_touches };
-        follow(model, supplies, &wanted(count), until, &gate, progress)
+    let draw = |supplies: &mut [Supply<'_>], count: usize, margin: f64| {
+        let until = Until { margin, max_touches };
+        follow(model, supplies, &wanted(count), until, || |_: &Moment<'_>| true, progress)
     };
     let mut first: Vec<Supply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
     if settings.active {
@@ -169,10 +214,20 @@ pub fn calibrate_with<G: FnMut(&Moment<'_>) -> bool>(
         follow_plan(&mut first, &names, &plan)?;
         follow_plan(&mut supplies, &names, &plan)?;
     }
-    let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), STRICTEST[1])?;
-    let beyond = if is_kept_well(&pilot, naive + STRICTEST[0], settings.rate) { STRICTEST[0] } else { STRICTEST[1] };
-    let sequences = draw(&mut supplies, settings.sequences, beyond)?;
-    let chosen = choose(&sequences, &names, naive + beyond, &terms)?;
+    let strictest = match strictest {
+        Some(margin) => margin,
+        None => {
+            let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), naive + STRICTEST[1])?;
+            let is_enough = is_kept_well(&pilot, naive + STRICTEST[0], settings.rate);
+            naive + if is_enough { STRICTEST[0] } else { STRICTEST[1] }
+        }
+    };
+    let sequences = draw(&mut supplies, settings.sequences, strictest)?;
+    let supplied = (sequences.len() < wanted(settings.sequences).iter().sum()).then(|| Supplied {
+        approaches: dataset.holds_approaches(),
+        fewest: dataset.objects.iter().map(|object| object.len() as u64).min().unwrap_or(0),
+    });
+    let chosen = chosen(&sequences, &names, strictest, &terms, supplied)?;
     let temperature = temperature(model, &dataset, &known);
     finished(model, &dataset, settings, max_touches, &names, &chosen, temperature)
 }
@@ -191,32 +246,22 @@ fn check(settings: &Settings) -> Result<()> {
     settings.noise.check()
 }
 
-/// Adds noise to the touches. With a bias every sequence is made by a robot of its own, which has touches enough to reach
-/// the limit; the answer is how many robots there are.
-fn add_noise(model: &Model<'_>, dataset: &mut Dataset, settings: &Settings, max_touches: u32) -> Result<usize> {
-    let noise = &settings.noise;
+/// Adds noise to the touches; the origin does not state it. With a bias every sequence is made by a robot of its own, which
+/// has touches enough to reach the limit, of one instance or recording.
+pub(crate) fn add_noise(model: &Model<'_>, dataset: &mut Dataset, noise: &Noise, max_touches: u32, seed: u64) {
     if noise.is_none() {
-        return Ok(1);
+        return;
     }
     let trained = model.trained_touches();
-    let robots = |touches: &[palpate_shared::Touch]| {
-        let used = touches.iter().filter(|touch| Refused::check(&trained, touch).is_ok()).count();
+    let robots = |object: &ObjectTouches| {
+        let used = object.touches().iter().filter(|touch| Refused::check(&trained, touch).is_ok()).count();
         used / max_touches.max(1) as usize
     };
-    let fewest = dataset.objects.iter().map(|object| robots(&object.touches)).min().unwrap_or(0);
-    // A robot's touches are then of one instance, also where objects have different numbers of them.
-    let instances = dataset.instances.values().fold(1, |all, &instances| least_common_multiple(all, instances.max(1)));
-    let robots = if noise.has_bias() { (fewest / instances * instances).max(1) } else { 1 };
-    // Another seed than those of training and tests.
-    let seed = settings.seed.wrapping_add(0x9e37_79b9);
+    let fewest = dataset.objects.iter().map(robots).min().unwrap_or(0);
     for object in &mut dataset.objects {
-        object.touches = if noise.has_bias() {
-            noise.add_by_robots(&object.name, &object.touches, seed, robots)
-        } else {
-            noise.add(&object.name, &object.touches, seed)
-        };
+        let sources = object.sources().len().max(1);
+        *object = object.noisy(noise, seed, (fewest / sources * sources).max(sources));
     }
-    Ok(robots)
 }
 
 /// How often each object of the data set is touched: as its prior says.
@@ -295,6 +340,10 @@ fn finished(
     let is_each = settings.per != Per::Average;
     let errors = names.iter().cloned().zip(chosen.tallies.iter().map(share)).filter(|_| is_each).collect();
     let margin = |(object, name): (usize, &String)| (name.clone(), margin_of(chosen.odds.of(object)));
+    let of_object = |(name, (touched, named)): (&String, (&Tally, &Tally))| {
+        let of = OfObject { given: touched.all, wrong: touched.wrong, named: named.all, named_wrongly: named.wrong };
+        (name.clone(), of)
+    };
     Ok(Calibrated {
         model: restate(model, &restated)?,
         promise,
@@ -310,6 +359,7 @@ fn finished(
         uncalibrated_margin: ((1.0 - settings.rate) / settings.rate).ln(),
         margins: names.iter().enumerate().map(margin).collect(),
         errors,
+        objects: names.iter().zip(chosen.touched.iter().zip(&chosen.named)).map(of_object).collect(),
         temperature: stated.value(),
     })
 }

@@ -16,7 +16,7 @@ const HALVINGS: usize = 24;
 /// 1 if no touch is evidence.
 pub(crate) fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
     let rows = |(touched, &object): (&ObjectTouches, &usize)| {
-        let evidence = touched.touches.iter().filter(|touch| model.accepts(touch).is_ok());
+        let evidence = touched.touches().iter().filter(|touch| model.accepts(touch).is_ok());
         let evidence: Vec<&Touch> = evidence.take(MOST).collect();
         let row = |margins: &[i32]| {
             let own = margins.get(object).copied().unwrap_or(0);

@@ -5,6 +5,11 @@
 //! probability of at most 1 − confidence under it, by the binomial tail. The walk ends before the first threshold whose
 //! hypothesis is not rejected; the one before is kept. So the probability that a threshold is kept whose error rate is
 //! above the promised one is at most 1 − confidence, however many are tried.
+//!
+//! The tail is exact for independent cases that are all wrong with the same probability. Where each object has its own and
+//! has equally many cases, the lower tail is no heavier than the binomial one (Hoeffding, On the distribution of the number
+//! of successes in independent trials, 1956). How many names are given is taken as given; the simulations of
+//! `calibrate/tests.rs`, whose error rates are known, count how often a promise is broken in the end.
 
 /// What happened at a threshold: errors, of cases that could have been errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,7 +54,8 @@ pub enum Stop {
 /// With several tallies all rates are kept at once with that probability, without dividing it among them: the
 /// hypothesis is that one of the rates is above, and to reject it every test has to (an intersection-union test).
 /// Thresholds at which a tally is so small that it could not pass without any error say nothing and are passed over
-/// (Tarone, 1990): how many cases there are decides that, not how many are errors.
+/// (Tarone, 1990): how many cases there are decides that, not how many are errors. That is exact as long as how many there
+/// are at one threshold says nothing about how many are errors at another.
 ///
 /// ```
 /// use palpate::calibrate::{Tally, walk};

@@ -120,6 +120,12 @@ fn meshes(there: &Listing, here: &Listing) -> Vec<String> {
         } else if own.instances != other.instances {
             differences.push(format!("{name} has other instances there than here"));
         }
+        // Earlier versions stated no checksums.
+        let is_known = own.meshes.len() == other.meshes.len();
+        for (index, _) in own.meshes.iter().zip(&other.meshes).enumerate().filter(|(_, (a, b))| is_known && a != b) {
+            let of = own.instances.get(index).map_or_else(String::new, |instance| format!(" of instance {instance}"));
+            differences.push(format!("{name}'s mesh{of} is another one there than here"));
+        }
         if let (Some(own), Some(other)) = (own.millimeters, other.millimeters)
             && own != other
         {

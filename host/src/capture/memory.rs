@@ -1,10 +1,10 @@
 //! A capture that stays in memory.
 
-use super::{Sampler, Settings, scenes};
+use super::{Sampler, Settings, entry, scenes};
 use crate::error::{CaptureProblem, Result};
 use crate::mesh::Object;
 use crate::progress::{self, Progress};
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, Meshes, ObjectTouches};
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -50,15 +50,14 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
         let drawn: Vec<Vec<(Touch, u64)>> = chunks.into_par_iter().map(chunk).collect::<Result<_>>()?;
         approaches.push(drawn.iter().flatten().map(|(_, approaches)| approaches).sum());
         let kept = |(touch, _): (Touch, u64)| if origin.writes_pose() { touch } else { Touch::new(touch.times()) };
-        touched.push(ObjectTouches {
-            name: object.name.clone(),
-            touches: drawn.into_iter().flatten().map(kept).collect(),
-        });
+        let touches = drawn.into_iter().flatten().map(kept).collect();
+        let instances: Vec<String> = object.instances().map(|instance| instance.name.clone()).collect();
+        let entry = entry(object, origin);
+        let meshes = Meshes { checksums: entry.meshes, millimeters: entry.millimeters };
+        let object = ObjectTouches::in_turn(&object.name, touches, &instances, samples.start);
+        touched.push(object.of_meshes(Some(meshes)));
     }
-    let several = |object: &&&Object| object.instances().len() > 1;
-    let instances = objects.iter().filter(several).map(|object| (object.name.clone(), object.instances().len()));
-    let dataset = Dataset { instances: instances.collect(), origin: Some(origin.clone()), ..Dataset::new(touched) };
-    Ok((dataset, approaches))
+    Ok((Dataset { origin: Some(origin.clone()), ..Dataset::new(touched) }, approaches))
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ use crate::error::{CaptureProblem, Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::{Entry, Origin};
+use crate::touches::{Entry, ObjectTouches, Origin};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
@@ -150,6 +150,7 @@ fn entry(object: &Object, origin: &Origin) -> Entry {
     Entry {
         name: object.name.clone(),
         instances: object.instances().filter(|_| has_several).map(|instance| instance.name.clone()).collect(),
+        meshes: object.instances().map(|instance| format!("{:016x}", instance.mesh.checksum())).collect(),
         millimeters: object.millimeters.filter(|_| origin.unit == Length::Millimeter),
         ..Entry::default()
     }
@@ -180,14 +181,22 @@ pub(crate) fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progre
 }
 
 /// The touches of one object with these sample numbers, in memory: the same that [`capture`] writes. The object's
-/// instances, one scene for each, are touched in turn.
+/// instances, one scene for each, are touched in turn; they are called by their numbers.
 ///
 /// # Errors
 /// When a setting is wrong, or the object cannot be touched with all three fingers.
-pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64>) -> Result<Vec<Touch>> {
+pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64>) -> Result<ObjectTouches> {
     origin.check()?;
     let sampler = Sampler::of_instances(scenes, name, origin);
-    samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)).collect()
+    let first = samples.start;
+    let touches: Vec<Touch> =
+        samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)).collect::<Result<_>>()?;
+    Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first))
+}
+
+/// Names for an object's instances of which only the scenes are known.
+pub(crate) fn numbered(scenes: &[Scene]) -> Vec<String> {
+    (1..=scenes.len()).map(|number| number.to_string()).collect()
 }
 
 #[cfg(test)]
@@ -282,8 +291,8 @@ mod tests {
         let dataset = Dataset::read(directory.path()).unwrap();
         for (object, read) in objects().iter().zip(&dataset.objects) {
             let scene = [Scene::new(object.mesh(), origin.length).unwrap()];
-            assert_eq!(read.touches, touches(&scene, &object.name, &origin, 0..1500).unwrap());
-            assert!(read.touches.iter().all(|touch| touch.is_full() && touch.pose().is_some()));
+            assert!(read.touches() == touches(&scene, &object.name, &origin, 0..1500).unwrap().touches());
+            assert!(read.touches().iter().all(|touch| touch.is_full() && touch.pose().is_some()));
         }
         let listing = Listing::read(directory.path()).unwrap().unwrap();
         assert!(listing.complete);
@@ -426,6 +435,44 @@ mod tests {
         let replaced = Settings { force: true, ..with(origin(10)) };
         capture(&objects(), &replaced, directory.path(), &()).unwrap();
         assert_eq!(read_files(directory.path())["globe.txt"].lines().count(), 10);
+    }
+
+    #[test]
+    fn touches_of_a_mesh_that_was_replaced_are_not_mixed_with_those_of_the_old_one() {
+        let changed: Vec<Object> = objects()
+            .into_iter()
+            .map(|object| match object.name.as_str() {
+                "globe" => Object::new("globe", Mesh::globe(13)),
+                _ => object,
+            })
+            .collect();
+        let said = "globe's mesh is another one there than here";
+        // Resumed: before, the file went on with touches of the other mesh, and the data set was called complete.
+        let directory = tempfile::tempdir().unwrap();
+        cancelled(&settings(), directory.path());
+        let resume = Settings { resume: true, ..settings() };
+        match refusal(&changed, &resume, directory.path()) {
+            CaptureProblem::ResumesOtherSettings { differences } => assert_eq!(differences, said),
+            other => panic!("{other}"),
+        }
+        capture(&objects(), &resume, directory.path(), &()).unwrap();
+        // Repeated, which would delete the touches of the old mesh.
+        match refusal(&changed, &settings(), directory.path()) {
+            CaptureProblem::HoldsOtherSettings { differences, .. } => assert_eq!(differences, said),
+            other => panic!("{other}"),
+        }
+        // Added to, after an interruption.
+        let of = |name: &str, rings| Object::of_instances("cups", vec![instance("one", 5), instance(name, rings)]);
+        let add = Settings { add: true, ..settings() };
+        capture(&[of("two", 6).unwrap()], &add, directory.path(), &CancelAfter(1.into())).unwrap_err();
+        match refusal(&[of("two", 7).unwrap()], &Settings { resume: true, ..add.clone() }, directory.path()) {
+            CaptureProblem::ResumesOtherSettings { differences } => {
+                assert_eq!(differences, "cups's mesh of instance two is another one there than here");
+            }
+            other => panic!("{other}"),
+        }
+        capture(&[of("two", 6).unwrap()], &Settings { resume: true, ..add }, directory.path(), &()).unwrap();
+        capture(&changed, &Settings { force: true, ..settings() }, directory.path(), &()).unwrap();
     }
 
     #[test]
@@ -583,8 +630,8 @@ mod tests {
         let scene = [Scene::new(&mesh, 10.0).unwrap()];
         let text = |origin: &Origin, samples| {
             let mut text = String::new();
-            for touch in touches(&scene, "tetrahedron", origin, samples).unwrap() {
-                crate::touches::write_touch(&mut text, &touch, origin.pose);
+            for touch in touches(&scene, "tetrahedron", origin, samples).unwrap().touches() {
+                crate::touches::write_touch(&mut text, touch, origin.pose);
             }
             text
         };

@@ -18,6 +18,9 @@ pub enum Received {
     Outcome(Outcome),
     /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
+    /// Something that happened before this host listened: the power went before the chip had told it, and it does so now
+    /// that it has started again.
+    Earlier(Event),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,7 +49,8 @@ pub struct Connection {
     end: HostEnd,
     transport: Transport,
     started: Instant,
-    heard: VecDeque<Received>,
+    /// Items heard and not handed out yet; of events also the boot number of the start that they are of.
+    heard: VecDeque<(Received, u32)>,
     reply: Option<Reply>,
     open: bool,
 }
@@ -66,6 +70,14 @@ impl Connection {
             open: false,
         };
         connection.connect()?;
+        let boot = connection.end.boot();
+        for (received, of) in &mut connection.heard {
+            if let Received::Event(event, _) = received
+                && *of != boot
+            {
+                *received = Received::Earlier(*event);
+            }
+        }
         Ok(connection)
     }
 
@@ -134,7 +146,7 @@ impl Connection {
         if self.heard.is_empty() {
             self.exchange(wait)?;
         }
-        Ok(self.heard.pop_front())
+        Ok(self.heard.pop_front().map(|(received, _)| received))
     }
 
     fn exchange(&mut self, wait: Duration) -> Result<()> {
@@ -149,8 +161,8 @@ impl Connection {
         };
         end.receive(&bytes, now, &mut send, |incoming| match incoming {
             Incoming::Opened => *open = true,
-            Incoming::Outcome { outcome, .. } => heard.push_back(Received::Outcome(outcome)),
-            Incoming::Event { event, missed } => heard.push_back(Received::Event(event, missed)),
+            Incoming::Outcome { outcome, .. } => heard.push_back((Received::Outcome(outcome), 0)),
+            Incoming::Event { event, missed, boot } => heard.push_back((Received::Event(event, missed), boot)),
             Incoming::Answer(answer) => *reply = Some(keep(answer)),
         });
         let ticked = end.tick(now, &mut send);
@@ -304,7 +316,7 @@ impl Connection {
                     progress::advance(progress, chunk.map_or(0, |chunk| chunk.len() as u64))?;
                     done += 1;
                 }
-                Some(Received::Event(..)) | None => progress::check(progress)?,
+                Some(Received::Event(..) | Received::Earlier(_)) | None => progress::check(progress)?,
             }
         }
         Ok(())

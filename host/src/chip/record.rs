@@ -35,6 +35,8 @@ pub enum Heard<'a> {
         /// What the chip made of it: that it does not count it does not matter here.
         verdict: Result<VerdictMessage, Refusal>,
     },
+    /// A touch was not recorded, because it was made before the recording began: the chip tells it again since it started.
+    Earlier(Touch),
     /// A touch was not recorded, because it lacks the pose.
     NoPose(Touch),
     /// A finger is faulty.
@@ -149,8 +151,12 @@ fn listen(
     if count.is_some_and(|count| summary.touches >= count) {
         return Ok(ControlFlow::Break(()));
     }
-    let Some(Received::Event(event, missed)) = connection.hear(Duration::from_millis(50))? else {
-        return each(&Heard::Idle);
+    let (event, missed) = match connection.hear(Duration::from_millis(50))? {
+        Some(Received::Event(event, missed)) => (event, missed),
+        Some(Received::Earlier(Event::Touch { touch, .. } | Event::Refused { touch, .. })) => {
+            return each(&Heard::Earlier(Touch::from(&touch)));
+        }
+        _ => return each(&Heard::Idle),
     };
     if missed > 0 {
         summary.missed += u64::from(missed);

@@ -1,7 +1,7 @@
 //! What is streamed to a chip: touches, and where one object ends and the next begins.
 
 use crate::error::{Error, Place, Result};
-use crate::touches::{Dataset, Log, parse_touch};
+use crate::touches::{Dataset, Log, ObjectTouches, Pool, parse_touch};
 use palpate_shared::Touch;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
@@ -25,6 +25,8 @@ pub enum Steps {
         length: usize,
         /// Touches still to come.
         left: u64,
+        /// Of each object the touches that may follow each other.
+        pools: Vec<Vec<Pool>>,
         /// Which sequence, and which touch of it.
         at: (usize, usize),
     },
@@ -43,9 +45,11 @@ pub enum Steps {
 
 impl Steps {
     /// `count` touches of a data set: `length` of the first object, `length` of the second, and so on, then `length` more
-    /// of the first. An object's touches begin again when they are used up.
+    /// of the first. An object's touches begin again when they are used up. Those of a sequence are of one source, such as
+    /// an instance; sources take turns.
     pub fn sequences(dataset: Dataset, length: usize, count: u64) -> Self {
-        Self::Sequences { dataset: dataset.into(), length: length.max(1), left: count, at: (0, 0) }
+        let pools = dataset.objects.iter().map(ObjectTouches::pools).collect();
+        Self::Sequences { dataset: dataset.into(), length: length.max(1), left: count, pools, at: (0, 0) }
     }
 
     /// Lines as in a data set's files, until they end.
@@ -86,18 +90,22 @@ impl Steps {
     /// When a line is not a touch.
     pub fn next_step(&mut self) -> Result<Option<Step>> {
         match self {
-            Self::Sequences { dataset, length, left, at: (sequence, touch) } => {
+            Self::Sequences { dataset, length, left, pools, at: (sequence, touch) } => {
                 if *left == 0 {
                     return Ok(None);
                 }
                 let objects = dataset.objects.len();
-                let Some(object) = dataset.objects.get(*sequence % objects.max(1)) else { return Ok(None) };
+                let number = *sequence % objects.max(1);
+                let Some((object, pools)) = dataset.objects.get(number).zip(pools.get(number)) else { return Ok(None) };
                 if *touch == 0 {
                     *touch = 1;
                     return Ok(Some(Step::Object(Some(object.name.clone()))));
                 }
-                let index = (*sequence / objects) * *length + *touch - 1;
-                let next = object.touches.get(index % object.touches.len().max(1)).copied();
+                let round = *sequence / objects;
+                let own = pools.get(round % pools.len().max(1)).map_or(&[][..], |pool| &pool.touches);
+                let index = (round / pools.len().max(1)) * *length + *touch - 1;
+                let next =
+                    own.get(index % own.len().max(1)).and_then(|&next| object.touches().get(next as usize)).copied();
                 *left -= 1;
                 (*sequence, *touch) = if touch == length { (*sequence + 1, 0) } else { (*sequence, *touch + 1) };
                 Ok(next.map(Step::Touch))
@@ -124,13 +132,13 @@ impl Steps {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touches::ObjectTouches;
+    use crate::touches::Source;
 
     #[test]
     fn sequences_take_turns_and_continue_where_each_object_stopped() {
-        let object = |name: &str, first: u32| ObjectTouches {
-            name: name.into(),
-            touches: (first..first + 3).map(|t| Touch::from_micros([0, t, t])).collect(),
+        let object = |name: &str, first: u32| {
+            let touches = (first..first + 3).map(|t| Touch::from_micros([0, t, t])).collect();
+            ObjectTouches::new(name, touches, Source::Object)
         };
         let dataset = Dataset::new(vec![object("a", 10), object("b", 20)]);
         let mut steps = Steps::sequences(dataset, 2, 7);

@@ -166,6 +166,7 @@ pub fn stream(
         let update = match connection.hear(Duration::from_millis(50))? {
             None => Update::Idle,
             Some(Received::Event(event, missed)) => Update::Event(event, missed),
+            Some(Received::Earlier(event)) => Update::Event(event, 0),
             Some(Received::Outcome(outcome)) => run.take(outcome, chip).map_err(|problem| connection.wrong(problem))?,
         };
         busy.set(!run.under_way.is_empty(), Instant::now());

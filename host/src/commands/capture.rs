@@ -1,5 +1,5 @@
 use super::numbers::count;
-use super::probe::SizeArguments;
+use super::probe::{IN_MILLIMETERS, SizeArguments};
 use super::progress::Bar;
 use crate::capture::{self, Settings, Summary};
 use crate::error::{CaptureProblem, Problem, TouchesProblem};
@@ -115,7 +115,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         }
     }
     let summary = capture::capture(&objects, &settings, &arguments.output, &Bar::new())?;
-    if arguments.json { output::print_json(&summary) } else { output::print(&table(&summary)) }
+    if arguments.json {
+        return output::print_json(&summary);
+    }
+    output::print(&if settings.origin.approaches { kept(&summary) } else { table(&summary) })
 }
 
 impl Arguments {
@@ -125,7 +128,7 @@ impl Arguments {
         let base = self.size.origin(there.map_or_else(Origin::default, |listing| listing.origin))?;
         let stated = [self.radius, self.spacing, self.speed].iter().all(Option::is_some);
         if self.size.lacks_probe() && !stated && !self.add {
-            let allowed = "a file with unit = \"mm\", or give --radius, --spacing and --speed in millimeters";
+            let allowed = format!("{IN_MILLIMETERS}; or give --radius, --spacing and --speed in millimeters");
             return Err(Error::setting("probe", "not given", allowed));
         }
         Ok(Origin {
@@ -173,6 +176,22 @@ pub(super) fn hint(error: &Error) -> Option<&'static str> {
         CaptureProblem::NoTrueSize { .. } => Some("See --unit."),
         _ => None,
     }
+}
+
+/// Counts of a capture that keeps every approach: none of them has to be a touch.
+fn kept(summary: &Summary) -> String {
+    let width = summary.objects.iter().map(|object| object.name.len()).max().unwrap_or(0).max(6);
+    let mut text = format!("{:width$}  {:>12}  {:>14}\n", "object", "approaches", "approaches/s");
+    let mut row = |name: &str, approaches: u64, now: u64, seconds: f64| {
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "{name:width$}  {approaches:>12}  {:>14.0}", now as f64 / seconds);
+    };
+    for object in &summary.objects {
+        row(&object.name, object.approaches, object.approaches_now, object.seconds);
+    }
+    let now = summary.objects.iter().map(|object| object.approaches_now).sum();
+    row("all", summary.approaches(), now, summary.seconds);
+    text + "Every approach was kept, also those that touched nothing: `palpate data check` counts which fingers touched.\n"
 }
 
 fn table(summary: &Summary) -> String {

@@ -1,9 +1,10 @@
 use crate::Error;
 use crate::Result;
-use crate::mesh::file;
+use crate::mesh::file::{self, Contents};
 use crate::output;
-use crate::probe::cast::{self, Agreement};
+use crate::probe::cast::{self, Agreement, Line};
 use crate::probe::scene::Scene;
+use glam::DVec3;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -47,9 +48,17 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             return Err(Error::setting(name, value, "a number greater than 0"));
         }
     }
-    let mesh = file::read(&arguments.mesh)?.mesh;
+    let Contents { mesh, moved, .. } = file::read(&arguments.mesh)?;
     let scene = if arguments.as_is { Scene::as_is(&mesh) } else { Scene::new(&mesh, arguments.length) }?;
-    let lines = cast::read(&arguments.casts)?;
+    let mut lines = cast::read(&arguments.casts)?;
+    if arguments.as_is {
+        // Where the mesh is: far from the origin, its coordinates count from its center.
+        for line in &mut lines {
+            if let Line::Cast(cast) = line {
+                cast.origin -= DVec3::from(moved);
+            }
+        }
+    }
     let times = cast::times(&scene, &lines, f64::from(arguments.radius));
     let text = cast::annotate(&lines, &times);
     let Some(path) = arguments.output else { return output::print(&text) };

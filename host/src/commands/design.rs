@@ -1,6 +1,6 @@
 //! `palpate probe`, and `palpate probe design`.
 
-use super::numbers::share;
+use super::numbers::error_rate;
 use super::probe::UnitArguments;
 use super::progress::Bar;
 use crate::Result;
@@ -35,6 +35,8 @@ enum Command {
 #[command(after_help = "\
 Tries probes in the simulator: spacing and radius of the fingers, tilt, and where approaches aim. For each, a model is trained and tested on other approaches; the best probe needs the fewest approaches at the error rate. Lengths are in units, a tenth of the object's longest side, or with --true-size in millimeters. DIR gets probe.toml, the best probe, and design.html, what another one would cost.
 
+Figures compare probes and promise nothing: thresholds are set, and the best is chosen, on the very touches that are counted, so the best of many looks somewhat better than it is. A model of the chosen probe is calibrated with `palpate calibrate`.
+
 Examples:
   palpate probe design meshes/ -o design
   palpate probe design builtin -o design --spacing 1..2 --radius 0.2
@@ -67,7 +69,7 @@ struct DesignArguments {
     #[arg(long, value_name = "DURATION", value_parser = super::noise::duration, default_value = "1ms")]
     noise: f64,
     /// The share of wrong verdicts to reach, such as 0.01 or 1%
-    #[arg(long, value_name = "RATE", value_parser = share, default_value = "0.01")]
+    #[arg(long, value_name = "RATE", value_parser = error_rate, default_value = "0.01")]
     error_rate: f64,
     /// Which features a touch is turned into, such as oriented for a robot that knows the object's orientation
     #[arg(long, value_name = "NAME", value_parser = super::train::descriptor, default_value = "curvature")]

@@ -1,7 +1,7 @@
 use super::expected::{self, ExpectedArguments};
 use super::figures::{Confusion, Evaluated, confusion_table, text};
 use super::noise::NoiseArguments;
-use super::numbers::share;
+use super::numbers::error_rate;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::error::{Problem, RowsProblem};
@@ -24,13 +24,15 @@ use std::path::PathBuf;
 #[command(after_help = "\
 The model is a compiled one (model.palpate), evaluated by the code that runs on the chip, or an ensemble (ensemble.json), evaluated in f32. The same seed draws the same groups of touches for both.
 
-Evaluate on touches that the model was not trained on: capture them with another seed. An ensemble knows its training touches again; a compiled model does not.
+Evaluate on touches that the model was not trained on: capture them with another seed. A model knows its training touches again, and says so.
 
 With --probe, what the file says under [real] is added to the touches, and the data set must have been captured with the probe of the file.
 
 On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
 
-Without --error-rate a compiled model stops by its own thresholds. If it was calibrated, the figures show whether it keeps what it promises; with noise, priors or objects other than those of the calibration the promise is void, and the figures show by how much it is broken.
+Without --error-rate a compiled model stops by its own thresholds. If it was calibrated, the figures show whether it keeps what it promises. With other touches than those of the calibration (other noise, priors or objects, full touches instead of every approach) the promise is void, which is said, and so is by how much it is broken.
+
+Two shares of wrong names are shown: wrong is of all sequences, of names is of those that got a name, which is what a promise is about. An object that mostly stays undecided can have few wrong sequences and many wrong names.
 
 With --active, on approaches with pose, each next approach is drawn from those of the same object in the pose that the model's plan proposes, none twice in a sequence. A pose whose approaches are used up is not proposed again in the sequence; where none is left, it ends without a verdict.
 
@@ -76,7 +78,7 @@ pub(crate) struct Arguments {
     groups: usize,
     /// Stop touching when the posterior passes one less this, such as 0.05 or 5%, which nothing promises [default: the
     /// model's own thresholds; 1% for an ensemble]
-    #[arg(long, value_name = "RATE", value_parser = share)]
+    #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
     #[arg(long, value_name = "TOUCHES")]
@@ -120,14 +122,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         return rows(&arguments, &file, label);
     }
     let mut dataset = super::dataset(&arguments.directory)?;
-    let touches = || dataset.objects.iter().flat_map(|object| &object.touches);
+    let touches = || dataset.touches();
     if counts_patterns(&file) {
         super::warn_of_full(touches().count(), touches().any(|touch| !touch.is_full()));
     }
-    let trained_on: Vec<String> = match &file {
-        ModelFile::Full(ensemble) => ensemble.origin.trained_on(&dataset).into_iter().map(String::from).collect(),
-        ModelFile::Compiled(_) => Vec::new(),
-    };
+    let trained_on: Vec<String> = file.trained_on(&dataset).into_iter().map(String::from).collect();
     let probe = arguments.probe.read()?;
     arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
     let noise = arguments.noise.over(arguments.probe.noise(probe.as_ref(), &dataset, Noise::default())?);
@@ -143,7 +142,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     });
     let unknown = unknown.transpose()?;
     let evaluated = file.with(|candidate| {
-        let mut margins = Margins::new(candidate, &dataset)?.of_robots(robots);
+        let mut margins = Margins::new(candidate, &dataset)?;
         let own = match candidate {
             Candidate::Compiled(model) => expected::own_weights(model),
             Candidate::Full(ensemble) => vec![1.0; ensemble.objects.len()],
@@ -178,10 +177,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         let strangers = unknown.as_ref().map(|(directory, dataset)| {
             let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
             let known = (&margins, &evaluation.sequential);
-            evaluate::strangers(known, &unknown.of_robots(robots), &settings.sequences())
+            evaluate::strangers(known, &unknown, &settings.sequences())
         });
         let (confusion, strangers) = (confusion.transpose()?, strangers.transpose()?);
-        let (instances, active) = (dataset.instances.clone(), active.map(|active| active.facts()));
+        let (instances, active) = (dataset.several(), active.map(|active| active.facts()));
         Ok(Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch, strangers })
     })?;
     drop(progress);
@@ -193,6 +192,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 
 /// Evaluates a model on labeled rows.
 fn rows(arguments: &Arguments, file: &ModelFile, label: &str) -> Result<()> {
+    if file.with(|candidate| Ok(candidate.is_of_touches()))? {
+        return Err(Error::from(RowsProblem::Touches).in_file(&arguments.model));
+    }
     let names = match file {
         ModelFile::Full(ensemble) => ensemble.inputs.names().into_iter().map(String::from).collect(),
         ModelFile::Compiled(compiled) => feature_names(&compiled.model()),

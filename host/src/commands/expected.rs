@@ -96,7 +96,7 @@ fn position(option: &'static str, name: &str, names: &[String]) -> Result<usize>
 fn prior(text: &str) -> Result<(String, f64), String> {
     let example = || "give a name and a probability, such as fork=0.3".to_owned();
     let (name, share) = text.rsplit_once('=').ok_or_else(example)?;
-    let share = super::numbers::share(share).map_err(|_| example())?;
+    let share = super::numbers::number_or_percent(share).map_err(|_| example())?;
     if !(0.0..=1e9).contains(&share) {
         return Err(example());
     }

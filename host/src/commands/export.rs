@@ -1,13 +1,18 @@
 use super::chips::{features, instructions};
 use super::expected::PriorArguments;
-use super::numbers::share;
+use super::numbers::error_rate;
+use super::unstated::UnstatedArguments;
 use crate::Result;
-use crate::compile::{self, Candidate, Goal, Instructions, Language, Layout, Leaf, Settings};
+use crate::compile::{self, Candidate, CompiledModel, Goal, Instructions, Language, Layout, Leaf, Settings};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Error;
 use crate::output;
-use crate::rows::scales::{self, Effect};
+use crate::rows::Rows;
+use crate::rows::scales::{self, Effect, Merged};
+use palpate_shared::format::{Link, MAGIC};
 use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// Compile an ensemble to the bytes that the chip reads.
@@ -24,9 +29,13 @@ Layouts: without --layout all that fit are tried, and --for decides. `balanced` 
 
 Shared leaves: where many leaves are equal, as in forests, each stands once in a table, and a leaf is its number there; margins are the same. It is tried with every layout that walks trees.
 
-Instructions per touch are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
+A compiled model, such as one that was calibrated, is written as source code: -o says beside which file, which becomes a copy of it; --emit what. Nothing else about it can be changed.
 
-Whole numbers: --scale says in which units a chip without a float unit measures a feature: --scale width=100 for hundredths. A value is its whole number of units, the nearest one; thresholds become whole numbers, too. Values beyond ±(2^31 - 1) units count as that. --fit-scales chooses the scales that hold the values of rows exactly, or to seven digits, as powers of ten.
+Instructions per touch, or per row, are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
+
+Whole numbers: --scale says in which units a chip without a float unit measures a feature: --scale width=100 for hundredths. A value is its whole number of units, the nearest one; thresholds become whole numbers, too. Values beyond ±(2^31 - 1) units count as that. --fit-scales chooses the scales that hold the values of rows exactly, or to seven digits, as powers of ten. LightGBM compares f64: whole numbers that f32 does not hold, such as seconds since 1970, need --scale too.
+
+What another library's file does not say: --missing is the number that stood for a missing value in training, and --link what makes a regression's value of its margin, where the file's own link is not the one. Where training stopped early, the trees up to the best iteration are taken; --all-trees takes all.
 
 Examples:
   palpate export ensemble.json -o model.palpate
@@ -36,11 +45,13 @@ Examples:
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
   palpate export lightgbm.txt -o model.palpate --for speed
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
+  palpate export xgboost.json -o model.palpate --missing -999
   palpate export ensemble.json -o model.palpate --emit c  # also model.h
+  palpate export sure.palpate -o sure.palpate --emit c    # sure.h alone
   palpate export lightgbm.txt -o model.palpate --emit json
                                                   # also model.json, for XGBoost")]
 pub(crate) struct Arguments {
-    /// Ensemble that `palpate train` or another library saved
+    /// Ensemble that `palpate train` or another library saved; or a compiled model, to be written as source code
     ensemble: PathBuf,
     /// Where to write the model
     #[arg(short, long, value_name = "FILE")]
@@ -74,7 +85,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "ROWS.csv")]
     fit_scales: Option<PathBuf>,
     /// The error rate, such as 0.05 or 5%, at which recognizers stop unless told otherwise
-    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
     /// The touches after which they give up
     #[arg(long, default_value_t = 200, value_name = "N")]
@@ -86,6 +97,11 @@ pub(crate) struct Arguments {
     /// Print what was exported as JSON
     #[arg(long)]
     json: bool,
+    /// What makes a regression's value of its margin [default: as the file says]
+    #[arg(long, value_parser = link, value_name = "identity|logistic|exponential|square|softplus")]
+    link: Option<Link>,
+    #[command(flatten)]
+    unstated: UnstatedArguments,
     #[command(flatten)]
     prior: PriorArguments,
 }
@@ -134,6 +150,12 @@ struct Exported {
     #[serde(skip_serializing_if = "Option::is_none")]
     features: Option<Vec<String>>,
     classes: Vec<String>,
+    /// The prediction of a model over rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    predicts: Option<Predicts>,
+    /// Features of which thresholds become the same in f32.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    merged: Vec<Merged>,
     /// The kind of file, if another library wrote it.
     #[serde(skip_serializing_if = "Option::is_none")]
     imported: Option<String>,
@@ -151,15 +173,28 @@ struct Exported {
     ensemble: Option<PathBuf>,
 }
 
+/// What is written of a compiled model.
+#[derive(serde::Serialize)]
+struct Sources {
+    bytes: usize,
+    layout: &'static str,
+    leaf: &'static str,
+    sources: Vec<PathBuf>,
+}
+
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    if is_compiled(&arguments.ensemble) {
+        return emit_compiled(&arguments);
+    }
     output::refuse_input(
         &arguments.output,
         [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten(),
     )?;
     let emitted = places(&arguments)?;
     let names = arguments.names.as_deref().map(names).transpose()?;
-    let ensemble = Ensemble::load_named(&arguments.ensemble, names.as_deref())?;
-    let scales = scales(&arguments, &ensemble)?;
+    let mut ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
+    set_link(&mut ensemble, arguments.link)?;
+    let (scales, fitted) = scales(&arguments, &ensemble)?;
     let usual = match ensemble.inputs {
         Inputs::Touches(_) => Settings::for_touches(ensemble.objects.len()),
         Inputs::Rows(_) => Settings::default(),
@@ -197,9 +232,15 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             Inputs::Touches(_) => None,
         },
         classes: ensemble.objects.clone(),
+        predicts: Predicts::of(&ensemble),
+        merged: if settings.scales.is_some() { Vec::new() } else { scales::merged(&ensemble) },
         imported: imported.map(|imported| imported.kind.clone()),
         notes: imported.map(|imported| imported.notes.clone()).unwrap_or_default(),
-        scales: settings.scales.as_ref().map(|scales| scales::effects(&ensemble, scales)).unwrap_or_default(),
+        scales: settings
+            .scales
+            .as_ref()
+            .map(|scales| scales::effects(&ensemble, scales, fitted.as_ref()))
+            .unwrap_or_default(),
         sources: emitted.iter().filter(|(kind, _)| *kind != Emitted::Ensemble).map(|(_, path)| path.clone()).collect(),
         ensemble: emitted.into_iter().find(|(kind, _)| *kind == Emitted::Ensemble).map(|(_, path)| path),
     };
@@ -207,6 +248,72 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         return output::print_json_about(&arguments.output, &exported);
     }
     output::print_about(&arguments.output, &text(&arguments.output, &exported))
+}
+
+/// Whether a file is a compiled model, by its first bytes. Where it cannot be read, whoever reads it as an ensemble says so.
+fn is_compiled(path: &Path) -> bool {
+    let mut head = [0; MAGIC.len()];
+    // A pipe must not lose its first bytes, and is read as an ensemble.
+    let file = path.metadata().is_ok_and(|metadata| metadata.is_file()).then(|| File::open(path));
+    file.is_some_and(|file| file.and_then(|mut file| file.read_exact(&mut head)).is_ok()) && head == MAGIC
+}
+
+/// Writes a compiled model as source code.
+fn emit_compiled(arguments: &Arguments) -> Result<()> {
+    let model = &arguments.ensemble;
+    let compiled = CompiledModel::read(model)?;
+    let refuse = |name: &'static str, value: &str| {
+        Err(Error::setting(name, value, format!("it with an ensemble: {} is a compiled model", model.display())))
+    };
+    let usual = Settings::default();
+    for (name, is_given) in [
+        ("names", arguments.names.is_some()),
+        ("leaf", arguments.leaf.is_some()),
+        ("layout", arguments.layout.0.is_some()),
+        ("for", arguments.goal != usual.goal),
+        ("shared_leaves", arguments.shared_leaves.0.is_some()),
+        ("scale", !arguments.scale.is_empty()),
+        ("fit_scales", arguments.fit_scales.is_some()),
+        ("error_rate", arguments.error_rate != usual.error_rate),
+        ("max_touches", arguments.max_touches != usual.max_touches),
+        ("prior", arguments.prior.of(&compiled.names())?.is_some()),
+    ] {
+        if is_given {
+            return refuse(name, "given");
+        }
+    }
+    if arguments.emit.is_empty() {
+        return Err(Error::setting(
+            "emit",
+            "not given",
+            format!("c or rust: {} is a compiled model already", model.display()),
+        ));
+    }
+    if arguments.emit.contains(&Emitted::Ensemble) {
+        return refuse("emit", "json");
+    }
+    let emitted = places(arguments)?;
+    // The model itself may be what the source code is to stand beside.
+    if output::refuse_input(&arguments.output, [model]).is_ok() {
+        output::write_bytes(&arguments.output, compiled.bytes())?;
+    }
+    emitted.iter().try_for_each(|(emitted, path)| write_source(*emitted, path, compiled.bytes()))?;
+    let written = Sources {
+        bytes: compiled.bytes().len(),
+        layout: compiled.model().layout().name(),
+        leaf: compiled.model().leaf_type().name(),
+        sources: emitted.into_iter().map(|(_, path)| path).collect(),
+    };
+    if arguments.json {
+        return output::print_json_about(&arguments.output, &written);
+    }
+    let mut text = format!("{}: {} bytes, as it was\n", arguments.output.display(), written.bytes);
+    for source in &written.sources {
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "Source code: {}", source.display());
+    }
+    text += &features(written.layout, written.leaf, compiled.model().shared_leaves().is_some());
+    output::print_about(&arguments.output, &text)
 }
 
 /// Where the rest is to be written: beside the model, under its name.
@@ -236,15 +343,21 @@ const HEADER: &str = "palpate.h";
 
 fn write_emitted(emitted: &[(Emitted, PathBuf)], bytes: &[u8], ensemble: &Ensemble) -> Result<()> {
     for (emitted, path) in emitted {
-        let Emitted::Source(language) = *emitted else {
-            ensemble.save(path)?;
-            continue;
-        };
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        output::write_bytes(path, compile::emit(&compile::open(bytes)?, &name, language).as_bytes())?;
-        if language == Language::C {
-            output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
+        match emitted {
+            Emitted::Ensemble => ensemble.save(path)?,
+            Emitted::Source(_) => write_source(*emitted, path, bytes)?,
         }
+    }
+    Ok(())
+}
+
+/// Writes a model as source code; in C with the header that reads it.
+fn write_source(emitted: Emitted, path: &Path, bytes: &[u8]) -> Result<()> {
+    let Emitted::Source(language) = emitted else { return Ok(()) };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    output::write_bytes(path, compile::emit(&compile::open(bytes)?, &name, language).as_bytes())?;
+    if language == Language::C {
+        output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
     }
     Ok(())
 }
@@ -267,16 +380,84 @@ fn names(text: &str) -> Result<Vec<String>> {
     Ok(text.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect())
 }
 
-/// The scale of each feature, if whole numbers are asked for.
-fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<Option<Vec<f32>>> {
+/// The prediction of a model over rows.
+#[derive(serde::Serialize)]
+struct Predicts {
+    /// "class" or "value".
+    what: &'static str,
+    /// What makes a value of a margin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    link: Option<&'static str>,
+    /// Whether the last of several largest margins names the class.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    last_of_ties: bool,
+    /// The least and the largest of the numbers that stand for a missing value, beside NaN.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    missing: Option<[f32; 2]>,
+}
+
+impl Predicts {
+    fn of(ensemble: &Ensemble) -> Option<Self> {
+        let imported = ensemble.origin.imported.as_ref()?;
+        let is_value = ensemble.objects.len() == 1;
+        Some(Self {
+            what: if is_value { "value" } else { "class" },
+            link: is_value.then(|| imported.prediction.link.name()),
+            last_of_ties: imported.prediction.last_of_ties,
+            missing: imported.sentinel,
+        })
+    }
+
+    fn text(&self) -> String {
+        let what = match self.link {
+            None if self.last_of_ties => "the class with the largest margin, of several the last".into(),
+            None => "the class with the largest margin, of several the first".into(),
+            Some(link) => format!("{}{}", formula(link), if link == "identity" { "" } else { " of the margin x" }),
+        };
+        let missing = match self.missing {
+            None => String::new(),
+            Some([low, high]) if low == high => format!("; {low} stands for a missing value"),
+            Some([low, high]) => format!("; {low:e} to {high:e} stands for a missing value"),
+        };
+        format!("Predicts {what}{missing}\n")
+    }
+}
+
+/// What a link makes of a margin.
+pub(super) fn formula(link: &str) -> &'static str {
+    match link {
+        "logistic" => "the value 1 / (1 + e^-x)",
+        "exponential" => "the value e^x",
+        "square" => "the value x |x|",
+        "softplus" => "the value ln(1 + e^x)",
+        _ => "the value, which is the margin",
+    }
+}
+
+/// Takes another link than the file's, of a regression.
+fn set_link(ensemble: &mut Ensemble, link: Option<Link>) -> Result<()> {
+    let Some(link) = link else { return Ok(()) };
+    let is_value = ensemble.objects.len() == 1;
+    match ensemble.origin.imported.as_mut().filter(|_| is_value) {
+        Some(imported) => imported.prediction.link = link,
+        None => return Err(Error::setting("link", link.name(), "none: only a regression has one")),
+    }
+    Ok(())
+}
+
+fn link(name: &str) -> Result<Link, String> {
+    let found = Link::ALL.iter().copied().find(|link| link.name() == name);
+    found.ok_or_else(|| "use one of identity, logistic, exponential, square, softplus".to_owned())
+}
+
+/// The scale of each feature, if whole numbers are asked for, and the rows that they were fitted to.
+fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>>, Option<Rows>)> {
     if arguments.scale.is_empty() && arguments.fit_scales.is_none() {
-        return Ok(None);
+        return Ok((None, None));
     }
     let names = ensemble.inputs.names();
-    let mut scales = match &arguments.fit_scales {
-        Some(path) => scales::fit(ensemble, &super::verify::read_rows(path, &names, None)?),
-        None => vec![1.0; names.len()],
-    };
+    let rows = arguments.fit_scales.as_deref().map(|path| super::verify::read_rows(path, &names, None)).transpose()?;
+    let mut scales = rows.as_ref().map_or_else(|| vec![1.0; names.len()], |rows| scales::fit(ensemble, rows));
     for (name, scale) in &arguments.scale {
         let Some(index) = names.iter().position(|own| own == name) else {
             return Err(Error::setting("scale", format!("{name}={scale}"), format!("a feature: {}", names.join(", "))));
@@ -293,7 +474,7 @@ fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<Option<Vec<f32>>
             return Err(Error::setting("scale", "incomplete", allowed));
         }
     }
-    Ok(Some(scales))
+    Ok((Some(scales), rows))
 }
 
 fn text(path: &Path, exported: &Exported) -> String {
@@ -305,7 +486,7 @@ fn text(path: &Path, exported: &Exported) -> String {
     let shared = exported.shared_leaves.map_or(String::new(), |count| format!(", {count} different"));
     _ = writeln!(
         text,
-        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}{shared}), margins within {:.2e} nats",
+        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}{shared}), margins within {:.2e}{}",
         path.display(),
         exported.bytes,
         exported.trees,
@@ -314,6 +495,7 @@ fn text(path: &Path, exported: &Exported) -> String {
         exported.layout,
         exported.leaf,
         exported.margin_error,
+        if exported.predicts.is_some() { " of the library's" } else { " nats" },
     );
     if exported.candidates.len() > 1 {
         _ = writeln!(text, "{:16} {:>9} {:>12} {:>12}", "layout", "bytes", "Cortex-M4F", "Cortex-M0+");
@@ -326,14 +508,17 @@ fn text(path: &Path, exported: &Exported) -> String {
             _ = writeln!(text, "{name:16} {bytes:>9} {:>12} {m0_plus:>12}{mark}", instructions.m4f);
         }
     }
-    _ = writeln!(text, "Instructions per touch, estimated: {}", instructions(exported.instructions));
-    for Effect { feature, scale, thresholds, different, largest_step } in &exported.scales {
+    let each = if exported.features.is_some() { "row" } else { "touch" };
+    _ = writeln!(text, "Instructions per {each}, estimated: {}", instructions(exported.instructions));
+    text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
+    for Merged { feature, thresholds, different } in &exported.merged {
         _ = writeln!(
             text,
-            "{feature}: {scale} units make up 1; of {thresholds} thresholds {different} stay different; a value within \
-             {largest_step:e} of one may go the other way"
+            "{feature}: of {thresholds} thresholds {different} stay different in f32, so that values between the others go \
+             another way than in the library; --scale {feature}=UNITS compares whole numbers instead"
         );
     }
+    text += &effects(&exported.scales);
     for source in &exported.sources {
         _ = writeln!(text, "Source code: {}", source.display());
     }
@@ -343,12 +528,39 @@ fn text(path: &Path, exported: &Exported) -> String {
     for note in &exported.notes {
         _ = writeln!(text, "Note: {note}");
     }
-    text + &features(exported.layout, exported.leaf, exported.shared_leaves.is_some())
+    let has_sentinel = exported.predicts.as_ref().is_some_and(|predicts| predicts.missing.is_some());
+    let features = features(exported.layout, exported.leaf, exported.shared_leaves.is_some());
+    if has_sentinel { text + features.trim_end() + ", sentinel\n" } else { text + &features }
+}
+
+/// What whole numbers do: of features that they hold exactly only how many there are.
+fn effects(all: &[Effect]) -> String {
+    let mut text = String::new();
+    let is_exact = |effect: &&Effect| effect.values_are_whole == Some(true) && effect.different == effect.thresholds;
+    let exact: Vec<String> =
+        all.iter().filter(is_exact).map(|effect| format!("{} × {}", effect.feature, effect.scale)).collect();
+    if !exact.is_empty() {
+        _ = writeln!(
+            text,
+            "Whole units hold every value of these rows, and all thresholds stay different: {}",
+            exact.join(", ")
+        );
+    }
+    for Effect { feature, scale, thresholds, different, largest_step, .. } in
+        all.iter().filter(|effect| !is_exact(effect))
+    {
+        _ = writeln!(
+            text,
+            "{feature}: {scale} units make up 1; of {thresholds} thresholds {different} stay different; a value within \
+             {largest_step:e} of one may go the other way"
+        );
+    }
+    text
 }
 
 fn classes(names: &[String]) -> String {
     match names {
-        [name] => format!("one output ({name}): margins only, no verdicts"),
+        [name] => format!("one output ({name})"),
         _ => format!("{} classes ({})", names.len(), names.join(", ")),
     }
 }

@@ -1,7 +1,7 @@
 //! The figures of an evaluation as JSON and as text.
 
 use super::percent;
-use crate::evaluate::{ActiveFacts, Approaches, Evaluation, PromiseCheck, Rule, Strangers, Switched};
+use crate::evaluate::{ActiveFacts, Approaches, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ pub(super) struct Evaluated {
     pub(super) evaluation: Evaluation,
     /// Robots that made the touches in turn, each with its own bias.
     pub(super) robots: usize,
-    /// How many instances the objects have that have several: each group is of touches of one.
+    /// How many instances or recordings the objects have that have several: each group is of touches of one.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) instances: BTreeMap<String, usize>,
     /// Objects whose touches are those that the model was trained on.
@@ -51,6 +51,7 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
     if let Some(promise) = &evaluated.evaluation.promise {
         text += &promise_text(promise);
     }
+    text += &above_text(&evaluated.evaluation);
     if let Some(ActiveFacts { rolls, poses, left_out, without_approaches }) = &evaluated.active {
         // Writing to a string cannot fail.
         _ = writeln!(
@@ -65,7 +66,7 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
         _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
     }
     if let Some(most) = evaluated.instances.values().max() {
-        _ = writeln!(text, "Objects have up to {most} instances; each group is of touches of one instance.");
+        _ = writeln!(text, "Objects have up to {most} instances or recordings; each group is of touches of one.");
     }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);
@@ -96,7 +97,34 @@ fn stops(error_rate: f64, promised: Option<f64>) -> String {
     }
 }
 
-/// What was promised, what was measured, and what makes the promise void.
+/// Names that are wrong more often than the rate that was asked for or promised of all together.
+fn above_text(evaluation: &Evaluation) -> String {
+    let (of, above, error_rate, promised) = match &evaluation.approaches {
+        Some(Approaches { sequential: of, .. }) => {
+            (&of.error_of_given_per_object, &of.above, of.error_rate, of.promised)
+        }
+        None => {
+            let of = &evaluation.sequential;
+            (&of.error_of_given_per_object, &of.above, of.error_rate, of.promised)
+        }
+    };
+    let share = |name: &String| format!("{name} {:.1} %", 100.0 * of.get(name).copied().unwrap_or(f64::NAN));
+    match (above.is_empty(), promised) {
+        (true, _) => String::new(),
+        (false, promised) => format!(
+            "More than {} % are wrong of the names given to: {}.{}\n",
+            percent(error_rate),
+            above.iter().map(share).collect::<Vec<_>>().join(", "),
+            match promised {
+                Some(_) =>
+                    " The promise is of all names together; palpate calibrate --per object makes one of each object.",
+                None => "",
+            }
+        ),
+    }
+}
+
+/// What was promised, what was measured, whether the promise is kept, and what makes it void.
 fn promise_text(check: &PromiseCheck) -> String {
     let of = match (check.per, &check.of) {
         ("name", Some(name)) => format!(" of {name}, the name that is wrong most often,"),
@@ -104,7 +132,7 @@ fn promise_text(check: &PromiseCheck) -> String {
         _ => " of the names given".to_owned(),
     };
     let mut text = format!(
-        "\nPromised: at most {} % wrong ({}, {} % sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}.\n",
+        "\nPromised: at most {} % wrong ({}, {} % sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}: {}.\n",
         percent(check.promised),
         match check.per {
             "name" => "each name, when it is given",
@@ -115,13 +143,20 @@ fn promise_text(check: &PromiseCheck) -> String {
         check.sequences,
         100.0 * check.error,
         100.0 * check.standard_error,
+        match check.finding {
+            Finding::Kept => "the promise is kept".to_owned(),
+            Finding::Unclear => {
+                format!("{:.2} points above what is promised, which may be chance", 100.0 * check.exceeded_by)
+            }
+            Finding::Broken => format!("the promise is broken by {:.2} points", 100.0 * check.exceeded_by),
+            Finding::Untested => "no name was given, so nothing is known of the promise".to_owned(),
+        }
     );
     if !check.void.is_empty() {
-        let (by, side) = (100.0 * check.exceeded_by.abs(), if check.exceeded_by > 0.0 { "above" } else { "below" });
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "The promise is void: {}. The error rate is {by:.2} points {side} the promised one.",
+            "It was made for other touches than these, for which it is void: {}.",
             check.void.join("; ")
         );
         if let Some(most) = check.by_theory {
@@ -146,16 +181,17 @@ fn table(evaluation: &Evaluation) -> String {
     };
     let percent = |share: &f64| format!("{:.1} %", 100.0 * share);
     cells(&mut text, &mut evaluation.accuracy.keys().map(ToString::to_string));
-    _ = writeln!(text, " {:>9} {:>9} {:>9}", "to stop", "wrong", "undecided");
+    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "of names", "undecided");
     for (name, accuracy) in &evaluation.per_object {
         _ = write!(text, "{name:width$}");
         cells(&mut text, &mut accuracy.values().map(percent));
         let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
         _ = writeln!(
             text,
-            " {:>9.1} {:>9} {:>9}",
+            " {:>9.1} {:>9} {:>9} {:>9}",
             of(&sequential.per_object),
             percent(&of(&sequential.error_per_object)),
+            given(of(&sequential.error_of_given_per_object)),
             percent(&of(&sequential.undecided_per_object))
         );
     }
@@ -163,9 +199,10 @@ fn table(evaluation: &Evaluation) -> String {
     cells(&mut text, &mut evaluation.accuracy.values().map(percent));
     _ = writeln!(
         text,
-        " {:>9.1} {:>9} {:>9}",
+        " {:>9.1} {:>9} {:>9} {:>9}",
         sequential.mean_touches,
         percent(&sequential.error),
+        given(sequential.error_of_given),
         percent(&sequential.undecided)
     );
     _ = write!(text, "{:width$}", "±");
@@ -179,7 +216,8 @@ fn table(evaluation: &Evaluation) -> String {
     _ = write!(
         text,
         "\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
-         {}.\n{} groups per object of {} touches in all; ± is a standard error.\n",
+         {}.\nWrong: of all sequences; of names: of those that got a name.\n{} groups per object of {} touches in all; ± is \
+         a standard error.\n",
         stops(sequential.error_rate, sequential.promised),
         sequential.mean_touches,
         100.0 * sequential.error,
@@ -192,6 +230,11 @@ fn table(evaluation: &Evaluation) -> String {
     text
 }
 
+/// A share of names given: none where no name was given.
+fn given(share: f64) -> String {
+    if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
+}
+
 /// What approaches come to: one row per object, one column per number of approaches; then the sequential figures.
 fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> String {
     let names = approaches.per_object.keys().map(|name| name.chars().count());
@@ -201,23 +244,31 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
     let mut text = format!("\n{:width$}", "approaches");
     // Writing to a string cannot fail.
     approaches.accuracy.keys().for_each(|at| _ = write!(text, " {at:>7}"));
-    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "undecided", "used");
-    let mut line = |name: &str, accuracy: Vec<f64>, [stop, wrong, undecided, used]: [f64; 4]| {
+    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "of names", "undecided", "used");
+    let mut line = |name: &str, accuracy: Vec<f64>, [stop, wrong, of_given, undecided, used]: [f64; 5]| {
         _ = write!(text, "{name:width$}");
         accuracy.into_iter().for_each(|share| _ = write!(text, " {:>7}", percent(share)));
-        _ = writeln!(text, " {stop:>9.1} {:>9} {:>9} {:>9}", percent(wrong), percent(undecided), percent(used));
+        let shares = [percent(wrong), given(of_given), percent(undecided), percent(used)];
+        _ = writeln!(text, " {stop:>9.1} {:>9} {:>9} {:>9} {:>9}", shares[0], shares[1], shares[2], shares[3]);
     };
     for (name, accuracy) in &approaches.per_object {
         let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
         let stopping = [
             of(&sequential.per_object),
             of(&sequential.error_per_object),
+            of(&sequential.error_of_given_per_object),
             of(&sequential.undecided_per_object),
             of(&approaches.used_per_object),
         ];
         line(name, accuracy.values().copied().collect(), stopping);
     }
-    let stopping = [sequential.mean_approaches, sequential.error, sequential.undecided, approaches.used];
+    let stopping = [
+        sequential.mean_approaches,
+        sequential.error,
+        sequential.error_of_given,
+        sequential.undecided,
+        approaches.used,
+    ];
     line("all", approaches.accuracy.values().copied().collect(), stopping);
     let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {}", percent(*share)));
     _ = writeln!(
@@ -262,9 +313,20 @@ fn switch_table(switch: &Switched) -> String {
 
 /// What is said to strangers, in percent: one row per object.
 fn strangers_table(strangers: &Strangers) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    if !strangers.has_test {
+        let named = strangers.wrong_name_per_object.iter().map(|(name, share)| format!("{name} {}", percent(*share)));
+        return format!(
+            "\nObjects that the model does not know: {} got a name, {} no verdict. The model has no test of whether touches \
+             fit an object that it knows, so it never says that one is unknown: palpate calibrate --strangers certain adds \
+             one. Got a name: {}.\n",
+            percent(strangers.wrong_name),
+            percent(strangers.undecided),
+            named.collect::<Vec<_>>().join(", ")
+        );
+    }
     let names = strangers.detected_per_object.keys().map(|name| name.chars().count());
     let width = names.max().unwrap_or(0).max("found out by".len());
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let mut text = format!("\n{:width$}", "found out by");
     // Writing to a string cannot fail.
     strangers.detected.keys().for_each(|at| _ = write!(text, " {at:>8}"));

@@ -1,7 +1,7 @@
 use super::chips::{core, instructions};
 use super::stated::{
-    Defaults, Feature, Noise, PlanOf, Probe, Promised, Tested, Touches, evidence, features, noise, pattern, plan,
-    priors, probe, promised, tested,
+    Defaults, Feature, Noise, PlanOf, Predicts, Probe, Promised, Tested, Touches, TrainedOn, evidence, features, noise,
+    pattern, plan, predicts, priors, probe, promised, tested, trained_on,
 };
 use crate::Result;
 use crate::chip::instructions::Chip;
@@ -49,6 +49,9 @@ struct Inspected<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     feature_names: Option<Vec<Feature>>,
     objects: Vec<&'a str>,
+    /// Of a model over rows: what it predicts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    predicts: Option<Predicts>,
     layout: &'static str,
     leaf: &'static str,
     /// How many different leaves there are, if equal ones stand once.
@@ -80,6 +83,8 @@ struct Inspected<'a> {
     noise: Option<Noise>,
     /// Share of each contact pattern among the approaches of the training; null if the model does not state it.
     pattern: Option<BTreeMap<&'static str, f64>>,
+    /// The touches that it was trained on; null if the model does not state it.
+    trained_on: Option<TrainedOn>,
     /// The plan of approaches; null if the model has none.
     plan: Option<PlanOf>,
     /// Per touch, estimated.
@@ -127,6 +132,7 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         features: model.feature_count(),
         feature_names: model.descriptor().is_none().then(|| features(model)),
         objects: (0..model.known_count()).map(|object| model.object_name(object)).collect(),
+        predicts: predicts(model),
         layout: model.layout().name(),
         leaf: model.leaf_type().name(),
         shared_leaves: compile::different_leaves(model),
@@ -151,6 +157,7 @@ fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         touches: evidence(model),
         noise: noise(model),
         pattern: pattern(model),
+        trained_on: trained_on(model),
         plan: plan(model),
         instructions: Instructions::of_model(model),
         chip: None,
@@ -232,7 +239,16 @@ fn text(inspected: &Inspected<'_>) -> String {
         };
         line("features", features.iter().map(feature).collect::<Vec<_>>().join(", "));
     }
-    line("objects", format!("{}: {}", inspected.objects.len(), inspected.objects.join(", ")));
+    let is_rows = inspected.predicts.is_some();
+    let (things, each) = if is_rows { ("rows", "row") } else { ("touches", "touch") };
+    match &inspected.predicts {
+        Some(Predicts { what: "value", .. }) => line("output", inspected.objects.join(", ")),
+        Some(_) => line("classes", format!("{}: {}", inspected.objects.len(), inspected.objects.join(", "))),
+        None => line("objects", format!("{}: {}", inspected.objects.len(), inspected.objects.join(", "))),
+    }
+    if let Some(predicts) = &inspected.predicts {
+        line("predicts", predicts.text());
+    }
     line("trees", format!("{}, {} splits, {} leaves", inspected.trees, inspected.splits, inspected.leaves));
     let shared = inspected.shared_leaves.map_or(String::new(), |count| format!(", {count} different ones, each once"));
     line("layout", format!("{}, {} leaves{shared}", inspected.layout, inspected.leaf));
@@ -244,10 +260,10 @@ fn text(inspected: &Inspected<'_>) -> String {
         "stopping",
         match &inspected.promise {
             None => format!(
-                "error rate {}, at most {} touches",
+                "error rate {}, at most {} {things}",
                 inspected.stopping.error_rate, inspected.stopping.max_touches
             ),
-            Some(_) => format!("at most {} touches", inspected.stopping.max_touches),
+            Some(_) => format!("at most {} {things}", inspected.stopping.max_touches),
         },
     );
     if let Some(promise) = &inspected.promise {
@@ -303,28 +319,30 @@ fn text(inspected: &Inspected<'_>) -> String {
         let prior = |(name, prior): (&&str, &f64)| format!("{name} {prior:.2}");
         line("priors", format!("nats: {}", priors.iter().map(prior).collect::<Vec<_>>().join(", ")));
     }
-    line(
-        "probe",
-        match &inspected.probe {
-            Probe { radius: Some(radius), spacing, speed, unit, .. } => {
-                let unit = if *unit == "unit" { "units" } else { unit };
-                format!("radius {radius}, spacing {spacing} {unit}, speed {speed} {unit} per second")
-            }
-            Probe { spacing, speed, .. } => {
-                format!("not stated; assumed: spacing {spacing} units, speed {speed} units per second")
-            }
-        },
-    );
-    let Touches { counted, patterns, needs_pose, largest_spread } = &inspected.touches;
-    line(
-        "touches",
-        format!(
-            "{counted} ({}){}{}",
-            patterns.join(", "),
-            if *needs_pose { ", with a pose" } else { "" },
-            largest_spread.map_or(String::new(), |spread| format!(", within {:.3} s", f64::from(spread) / 1e6))
-        ),
-    );
+    if !is_rows {
+        line(
+            "probe",
+            match &inspected.probe {
+                Probe { radius: Some(radius), spacing, speed, unit, .. } => {
+                    let unit = if *unit == "unit" { "units" } else { unit };
+                    format!("radius {radius}, spacing {spacing} {unit}, speed {speed} {unit} per second")
+                }
+                Probe { spacing, speed, .. } => {
+                    format!("not stated; assumed: spacing {spacing} units, speed {speed} units per second")
+                }
+            },
+        );
+        let Touches { counted, patterns, needs_pose, largest_spread } = &inspected.touches;
+        line(
+            "touches",
+            format!(
+                "{counted} ({}){}{}",
+                patterns.join(", "),
+                if *needs_pose { ", with a pose" } else { "" },
+                largest_spread.map_or(String::new(), |spread| format!(", within {:.3} s", f64::from(spread) / 1e6))
+            ),
+        );
+    }
     if let Some(Noise { least, largest, timer, pose_degrees }) = &inspected.noise {
         line(
             "noise",
@@ -340,10 +358,21 @@ fn text(inspected: &Inspected<'_>) -> String {
         let shares = pattern.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
         line("approaches", shares.collect::<Vec<_>>().join(", "));
     }
+    if let Some(TrainedOn { capture, samples: [first, end] }) = &inspected.trained_on {
+        line(
+            "trained on",
+            match capture {
+                Some(capture) => {
+                    format!("capture {capture}, samples {first} to {} of each object", end.saturating_sub(1))
+                }
+                None => "touches that are known again by the first ones".into(),
+            },
+        );
+    }
     if let Some(PlanOf { rolls, poses, left_out }) = &inspected.plan {
         line("plan", format!("{poses} poses: 26 directions, {rolls} of the row's rolls each; {left_out} never touch"));
     }
-    line("instructions", format!("{} (per touch, estimated)", instructions(inspected.instructions)));
+    line("instructions", format!("{} (per {each}, estimated)", instructions(inspected.instructions)));
     line("bytes", inspected.bytes.to_string());
     for (part, bytes) in &inspected.bytes_by_part {
         line("", format!("{bytes:>9} {}", part.replace('_', " ")));

@@ -33,6 +33,7 @@ mod strangers;
 mod teach;
 mod train;
 mod tune;
+mod unstated;
 mod verify;
 mod view;
 mod watch;
@@ -40,6 +41,7 @@ mod watch;
 use crate::error::{Problem, TouchesProblem};
 use crate::touches::{Dataset, Format, Listing, Log, Warning};
 use crate::{Error, Result};
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -122,7 +124,9 @@ commands! {
 Examples:
   palpate run                 capture, train and recognize built-in objects
   palpate run meshes/ -o out  the same for your own meshes
-  palpate help capture        what a command does, with examples"
+  palpate help capture        what a command does, with examples
+
+What the words of the output mean: docs/words.md"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -169,7 +173,7 @@ fn unwrapped(text: &str) -> String {
 
 /// Runs the command that the arguments name, prints its error if it has one, and returns the exit code.
 pub fn main() -> ExitCode {
-    let matches = cli().get_matches();
+    let matches = cli().try_get_matches().unwrap_or_else(|error| without_trailing(error).exit());
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let hint = cli.command.hint();
     match cli.command.run() {
@@ -184,6 +188,17 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// The error without the advice to give an option that does not exist as a value: no file or object begins with a dash.
+fn without_trailing(mut error: clap::Error) -> clap::Error {
+    if let Some(ContextValue::StyledStrs(advice)) = error.remove(ContextKind::Suggested) {
+        let others: Vec<_> = advice.into_iter().filter(|advice| !advice.to_string().starts_with("to pass ")).collect();
+        if !others.is_empty() {
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(others));
+        }
+    }
+    error
 }
 
 /// The error as the user of `command` understands it: where the library names a setting, this names the option.
@@ -269,6 +284,17 @@ mod tests {
     fn paragraphs_of_help_are_joined_and_lists_are_not() {
         let text = "One\ntwo.\n\nExamples:\n  palpate run\n  palpate view\n\nThree\nfour.";
         assert_eq!(unwrapped(text), "One two.\n\nExamples:\n  palpate run\n  palpate view\n\nThree four.");
+    }
+
+    #[test]
+    fn an_unknown_option_is_not_said_to_be_a_value() {
+        for words in [&["palpate", "report", "--touches", "5"][..], &["palpate", "view", "bowl", "--touch", "5"]] {
+            let error = without_trailing(cli().try_get_matches_from(words).unwrap_err()).to_string();
+            assert!(error.contains("unexpected argument") && !error.contains("-- --touch"), "{error}");
+        }
+        // The option that may have been meant is still named.
+        let error = cli().try_get_matches_from(["palpate", "view", "bowl", "--touch", "5"]).unwrap_err();
+        assert!(without_trailing(error).to_string().contains("--touches"));
     }
 
     #[test]

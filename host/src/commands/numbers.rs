@@ -19,8 +19,27 @@ fn whole(text: &str) -> Option<u64> {
     (number.fract() == 0.0 && (0.0..1e15).contains(&number)).then_some(number as u64)
 }
 
-/// A share, such as an error rate: `0.05` or `5%`.
+/// An error rate: `0.05` or `5%`, above 0 and below one half.
+pub(crate) fn error_rate(text: &str) -> Result<f64, String> {
+    match share(text)? {
+        rate if rate > 0.0 && rate < 0.5 => Ok(rate),
+        _ => Err("give an error rate above 0 and below one half, such as 1% or 0.01".to_owned()),
+    }
+}
+
+/// A share of a whole: `0.95` or `95%`.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
+    match number_or_percent(text)? {
+        share if (0.0..=1.0).contains(&share) => Ok(share),
+        number if (1.0..=100.0).contains(&number) => {
+            Err(format!("a share is at most 1: for {number} percent write {number}%"))
+        }
+        _ => Err("give a share from 0 to 1 such as 0.05, or percent such as 5%".to_owned()),
+    }
+}
+
+/// A number, or hundredths of one: `0.05` or `5%`.
+pub(crate) fn number_or_percent(text: &str) -> Result<f64, String> {
     let (number, percent) = match text.trim().strip_suffix('%') {
         Some(number) => (number.trim_end(), 100.0),
         None => (text, 1.0),
@@ -41,6 +60,21 @@ mod tests {
         }
         for text in ["", "many", "-1", "1.5", "1e99", "nan"] {
             assert_eq!(count(text), Err("give a whole number, such as 21000".into()), "{text}");
+        }
+    }
+
+    #[test]
+    fn percent_without_their_sign_are_refused_with_what_to_write() {
+        for of in [share, error_rate] {
+            assert_eq!(of("2"), Err("a share is at most 1: for 2 percent write 2%".into()));
+            assert_eq!(of("2%"), Ok(0.02));
+        }
+        for text in ["0", "0.5", "60%", "1"] {
+            let error = error_rate(text).unwrap_err();
+            assert!(error.contains("below one half"), "{text}: {error}");
+        }
+        for text in ["-1%", "101", "inf"] {
+            assert!(share(text).unwrap_err().contains("from 0 to 1"), "{text}");
         }
     }
 

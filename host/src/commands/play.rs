@@ -64,7 +64,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         play::train(&objects, &Training { origin: origin.clone(), noise }, &progress)?
     } else {
         let models = model.iter().map(CompiledModel::read).collect::<Result<_>>()?;
-        play::expect(models, &surfaces, &Origin { seed: seed.wrapping_add(5), ..origin.clone() }, &noise, &progress)?
+        let origin = Origin { seed: seed.wrapping_add(5), ..origin.clone() };
+        let mut contenders = play::expect(models, &surfaces, &origin, &noise, &progress)?;
+        play::distinguish(&mut contenders, &model);
+        contenders
     };
     drop(progress);
     let models = model.iter().flat_map(|path| ["--model".into(), path.to_string_lossy().into_owned()]);

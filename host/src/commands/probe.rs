@@ -229,10 +229,14 @@ impl SizeArguments {
     }
 }
 
+/// What states a probe for objects at their true size.
+pub(crate) const IN_MILLIMETERS: &str = "a file that states it in millimeters, since the published one is in units: such as \
+     probe.toml with the lines unit = \"mm\", radius = 1.5, spacing = 15, speed = 100, one below the other";
+
 /// Refuses objects at their true size without a probe.
 pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
     match size.lacks_probe() {
-        true => Err(Error::setting("probe", "not given", "a file with unit = \"mm\": the published probe is in units")),
+        true => Err(Error::setting("probe", "not given", IN_MILLIMETERS)),
         false => Ok(()),
     }
 }

@@ -1,5 +1,5 @@
 use super::expected::{self, ExpectedArguments};
-use super::numbers::share;
+use super::numbers::error_rate;
 use crate::Result;
 use crate::chip::Entry;
 use crate::compile::{self, CompiledModel};
@@ -23,7 +23,7 @@ FILE may be a robot's log as well (MCAP, see docs/mcap.md): its touches are take
 
 With --mcap touches and verdicts are written as a log, with the posterior of every object after every touch, once all touches are recognized. Foxglove shows it: plot /verdict.posteriors.fork. Touches that are not from a log are logged a second apart.
 
-With --features each line in is a row of features for a model that was exported from another library's: CSV with the features' names in the header, or as many columns as features, empty cells for missing values. Each line out is the verdict of that row alone, or with --add-up of all rows since the last verdict. A model with one output gives its value and no verdict.
+With --features each line in is a row of features for a model that was exported from another library's: CSV with the features' names in the header, or as many columns as features, empty cells for missing values. Each line out is the class of that row and its posterior, or with --add-up the verdict of all rows since the last one. A regression gives the value that its library predicts, after the inverse link; with --json also the margin before it.
 
 Examples:
   palpate recognize model.palpate data/fork.txt
@@ -51,7 +51,7 @@ pub(crate) struct Arguments {
     #[arg(long, requires = "features")]
     add_up: bool,
     /// Stop when the posterior passes one less this, such as 0.05 or 5%, instead of at the model's own thresholds; nothing is promised then
-    #[arg(long, value_name = "RATE", value_parser = share)]
+    #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
     /// Give up after this many touches instead of the model's limit
     #[arg(long, value_name = "N")]

@@ -3,7 +3,7 @@
 use super::verify::read_rows;
 use crate::Result;
 use crate::error::RowsProblem;
-use crate::evaluate::verify::{best, margins};
+use crate::evaluate::verify::margins;
 use crate::output;
 use crate::rows::{Encoder, feature_names};
 use palpate_onboard::{Recognizer, Verdict};
@@ -16,18 +16,22 @@ struct Line<'a> {
     row: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     verdict: Option<&'static str>,
+    /// The predicted class of the row, or the leading one of the rows so far.
     #[serde(skip_serializing_if = "Option::is_none")]
-    object: Option<&'a str>,
+    class: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     posterior: Option<f64>,
     /// Rows of the same object so far, where their evidence is added.
     #[serde(skip_serializing_if = "Option::is_none")]
     rows: Option<u32>,
-    /// The row's own.
+    /// What a regression predicts, after its inverse link.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    value: Option<f32>,
+    /// The row's own, before any link.
     margins: Vec<f64>,
 }
 
-/// Prints a verdict for each row: of that row alone, or where `adds_up` of it and those before it since the last verdict.
+/// Prints the class or the value of each row; where `adds_up` a verdict, of it and those before it since the last verdict.
 pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, adds_up: bool, json: bool) -> Result<()> {
     let mut recognizer = recognizer;
     let model = *recognizer.model();
@@ -39,29 +43,30 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, adds_up: bool, j
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
     let rows = read_rows(path, &names, None)?;
     let encoder = Encoder::of(&model);
+    let has_classes = model.object_count() > 1;
+    let mut scratch = vec![0; model.object_count()];
     for (number, row) in (1..).zip(rows.iter()) {
         let encoded = encoder.row(row);
-        let own = margins(&model, &encoded);
         if !adds_up || recognizer.verdict() != Verdict::Undecided {
             recognizer.reset();
         }
         recognizer.push_features(&encoded).map_err(|_| RowsProblem::Touches)?;
-        // The row's own margins are not rounded where the model adds f32; evidence is.
-        let object = if adds_up { recognizer.best() } else { best(&own) };
+        let own = model.predict_class(&encoded, &mut scratch).unwrap_or_default();
+        let class = if adds_up { recognizer.best() } else { own };
         let verdict = match recognizer.verdict() {
             Verdict::Undecided => "undecided",
             Verdict::Recognized { .. } => "recognized",
             Verdict::Unknown => "unknown",
             Verdict::GaveUp => "gave-up",
         };
-        let has_classes = model.object_count() > 1;
         let line = Line {
             row: number,
-            verdict: has_classes.then_some(verdict),
-            object: has_classes.then(|| model.object_name(object)),
-            posterior: has_classes.then(|| recognizer.posterior(object).to_f64()),
+            verdict: (has_classes && adds_up).then_some(verdict),
+            class: has_classes.then(|| model.object_name(class)),
+            posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
             rows: (has_classes && adds_up).then(|| recognizer.touches()),
-            margins: own,
+            value: model.predict_value(&encoded),
+            margins: margins(&model, &encoded),
         };
         print(&line, json)?;
     }
@@ -74,10 +79,12 @@ fn print(line: &Line<'_>, json: bool) -> Result<()> {
         let text = serde_json::to_string(line).unwrap_or_default();
         return output::print(&format!("{text}\n"));
     }
-    match (line.verdict, line.object, line.posterior) {
-        (Some(verdict), Some(object), Some(posterior)) => {
-            output::print(&format!("{:4}  {verdict:10}  {object} {posterior:.4}\n", line.row))
+    let row = line.row;
+    match (line.verdict, line.class, line.posterior) {
+        (Some(verdict), Some(class), Some(posterior)) => {
+            output::print(&format!("{row:4}  {verdict:10}  {class} {posterior:.4}\n"))
         }
-        _ => output::print(&format!("{:4}  {}\n", line.row, line.margins.first().copied().unwrap_or_default())),
+        (None, Some(class), Some(posterior)) => output::print(&format!("{row:4}  {class} {posterior:.4}\n")),
+        _ => output::print(&format!("{row:4}  {}\n", line.value.unwrap_or_default())),
     }
 }

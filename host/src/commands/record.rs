@@ -101,6 +101,9 @@ impl LinkArguments {
                 Heard::Touch { touch, number, verdict } => {
                     say(json, &format!("{}\n", line(*number, touch, said(verdict, &names).as_deref())))?;
                 }
+                Heard::Earlier(_) => {
+                    eprintln!("palpate: warning: a touch from before this recording was told again, and not recorded");
+                }
                 Heard::NoPose(_) => eprintln!("palpate: warning: a touch without a pose was not recorded"),
                 Heard::Fault { kind, finger } => eprintln!("palpate: warning: {}", fault(*kind, *finger)),
                 Heard::Missed(missed) => {

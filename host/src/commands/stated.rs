@@ -109,6 +109,49 @@ pub(super) struct Noise {
     pub(super) pose_degrees: f64,
 }
 
+/// The prediction of a model over rows.
+#[derive(serde::Serialize)]
+pub(super) struct Predicts {
+    /// "class" or "value".
+    pub(super) what: &'static str,
+    /// What makes a value of a margin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) link: Option<&'static str>,
+    /// What a margin of the model is multiplied by to be the library's.
+    pub(super) scale: f32,
+    /// Whether the last of several largest margins names the class.
+    pub(super) last_of_ties: bool,
+    /// The least and the largest of the features that stand for a missing value: whole numbers, or keys of f32 values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) missing: Option<[i32; 2]>,
+}
+
+impl Predicts {
+    pub(super) fn text(&self) -> String {
+        let what = match self.link {
+            None if self.last_of_ties => "the class with the largest margin, of several the last",
+            None => "the class with the largest margin, of several the first",
+            Some(link) => super::export::formula(link),
+        };
+        match self.missing {
+            Some([low, high]) => format!("{what}; features from {low} to {high} are missing"),
+            None => what.into(),
+        }
+    }
+}
+
+pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
+    let is_value = model.object_count() == 1;
+    let prediction = model.prediction();
+    model.descriptor().is_none().then(|| Predicts {
+        what: if is_value { "value" } else { "class" },
+        link: is_value.then(|| prediction.link.name()),
+        scale: prediction.scale,
+        last_of_ties: prediction.last_of_ties,
+        missing: model.sentinel().map(|sentinel| [sentinel.low, sentinel.high]),
+    })
+}
+
 /// The features of a model over rows.
 pub(super) fn features(model: &Model<'_>) -> Vec<Feature> {
     let scales: Vec<Option<f32>> = match Encoder::of(model) {
@@ -191,6 +234,21 @@ pub(super) fn pattern(model: &Model<'_>) -> Option<BTreeMap<&'static str, f64>> 
     let share = |share: u16| (f64::from(share) / 65.535).round() / 1000.0;
     let shares = model.pattern_shares()?.0.map(share);
     Some(ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(shares).collect())
+}
+
+/// The touches that a model was trained on.
+#[derive(serde::Serialize)]
+pub(super) struct TrainedOn {
+    /// 16 bits of a checksum of the capture's seed and settings, in hexadecimal digits; null if no capture is known.
+    pub(super) capture: Option<String>,
+    /// The first sample of each object, and the one after the last.
+    pub(super) samples: [u32; 2],
+}
+
+pub(super) fn trained_on(model: &Model<'_>) -> Option<TrainedOn> {
+    let stated = model.trained_capture()?;
+    let capture = (stated.settings != 0).then(|| format!("{:04x}", stated.settings));
+    Some(TrainedOn { capture, samples: [stated.samples.start, stated.samples.end] })
 }
 
 /// The plan of approaches.

@@ -2,11 +2,9 @@
 
 use super::progress::Bar;
 use crate::Result;
-use crate::compile;
 use crate::mesh::builtin::BACKGROUND_SHAPES;
-use crate::strangers::{self, Calibrated, Settings, Shapes};
-use crate::touches::Dataset;
-use crate::touches::noise::Noise;
+use crate::strangers::{self, Calibrated, Settings};
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::format::Held;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -32,7 +30,7 @@ pub(crate) struct Found {
     held: &'static str,
     /// The promised share of known objects' sequences that end as unknown.
     promised: f64,
-    /// That share of the sequences that the threshold was tested on.
+    /// That share of the sequences that it was tested on, under thresholds for names that are at least as strict.
     false_alarms: f64,
     sequences: u32,
     /// Touches before which no name is given.
@@ -45,70 +43,42 @@ pub(crate) struct Found {
 }
 
 impl StrangersArguments {
-    /// Whether a test is wanted.
-    pub(crate) fn is_wanted(&self) -> bool {
-        matches!(self.strangers, Some(Wanted(Some(_))))
-    }
-
-    /// The model with the test that is wanted, and what was found; with nothing wanted, the model as it is.
-    ///
-    /// # Errors
-    /// As [`strangers::calibrate`].
-    pub(crate) fn apply(
-        &self,
-        bytes: &[u8],
-        dataset: &Dataset,
-        settings: &Settings,
-        noise: &Noise,
-    ) -> Result<(Vec<u8>, Option<Found>)> {
-        let model = compile::open(bytes)?;
-        let Some(Wanted(Some(held))) = self.strangers else { return Ok((bytes.to_vec(), None)) };
-        let mut shapes = self.shapes(dataset)?;
-        let mut noisy = dataset.clone();
-        if !noise.is_none() {
-            let add = |name: &str, touches: &[_]| noise.add(name, touches, settings.seed);
-            noisy.objects.iter_mut().for_each(|object| object.touches = add(&object.name, &object.touches));
-            shapes.iter_mut().for_each(|shapes| shapes.touches = add("background", &shapes.touches));
-        }
-        let calibrated = strangers::calibrate(&model, &noisy, &shapes, &Settings { held, ..*settings })?;
-        let found = found(held, settings, &calibrated);
-        Ok((calibrated.bytes, Some(found)))
+    /// The test that is wanted, if one is.
+    pub(crate) fn held(&self) -> Option<Held> {
+        self.strangers.and_then(|Wanted(held)| held)
     }
 
     /// The other shapes: those that are given, or as the data set was captured; none for one of unknown origin.
-    fn shapes(&self, dataset: &Dataset) -> Result<Vec<Shapes>> {
+    pub(crate) fn shapes(&self, dataset: &Dataset) -> Result<Vec<ObjectTouches>> {
         match (&self.background, &dataset.origin) {
-            (Some(directory), _) => {
-                let (read, shapes) = strangers::of_dataset(directory)?;
-                super::checked(read);
-                Ok(shapes)
-            }
+            (Some(directory), _) => Ok(super::checked(Dataset::read_any(directory)?).objects),
             (None, Some(origin)) => Ok(vec![strangers::captured(BACKGROUND_SHAPES, origin, &Bar::new())?]),
             (None, None) => Ok(Vec::new()),
         }
     }
 }
 
-fn found(held: Held, settings: &Settings, calibrated: &Calibrated) -> Found {
-    let terms = &calibrated.terms;
-    Found {
-        held: held.name(),
-        promised: settings.alarms,
-        false_alarms: calibrated.alarms as f64 / f64::from(terms.sequences.max(1)),
-        sequences: terms.sequences,
-        least_touches: terms.least,
-        mean_touches: calibrated.mean_touches,
-        mean_touches_without: calibrated.mean_touches_without,
-        left_out: calibrated.left_out.clone(),
-    }
-}
-
 impl Found {
+    pub(crate) fn new(settings: &Settings, calibrated: &Calibrated) -> Self {
+        let terms = &calibrated.terms;
+        Self {
+            held: settings.held.name(),
+            promised: settings.alarms,
+            false_alarms: calibrated.alarms as f64 / f64::from(terms.sequences.max(1)),
+            sequences: terms.sequences,
+            least_touches: terms.least,
+            mean_touches: calibrated.mean_touches,
+            mean_touches_without: calibrated.mean_touches_without,
+            left_out: calibrated.left_out.clone(),
+        }
+    }
+
     /// As text.
     pub(crate) fn text(&self) -> String {
         let percent = |share: f64| format!("{:.2} %", 100.0 * share);
         let mut text = format!(
-            "\nStrangers ({}): at most {} of known objects are taken for unknown; {} were, of {} sequences.\n\
+            "\nStrangers ({}): at most {} of known objects are taken for unknown; {} were, of {} sequences under thresholds at \
+             least as strict.\n\
              Names are given after {} touches at the earliest; {:.1} on average, {:.1} without the test.\n",
             self.held,
             percent(self.promised),

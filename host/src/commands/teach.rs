@@ -78,7 +78,6 @@ fn add(all: &mut Dataset, read: Dataset, path: &Path) -> Result<()> {
         crate::ensemble::StatedProbe::compare(["the first recording", &path.display().to_string()], stated)?;
     }
     all.origin = all.origin.take().or(read.origin);
-    all.instances.extend(read.instances);
     all.objects.extend(read.objects);
     all.objects.sort_by(|a: &ObjectTouches, b| a.name.cmp(&b.name));
     Ok(())

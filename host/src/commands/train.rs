@@ -198,7 +198,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         descriptor: ensemble.descriptor().map_or("", Descriptor::name),
         objects: ensemble.known_count(),
         touches: dataset.len(),
-        used: dataset.objects.iter().flat_map(|object| &object.touches).filter(is_used).count(),
+        used: dataset.touches().filter(is_used).count(),
         counted: evidence.counted.name(),
         trees,
         splits,
@@ -259,8 +259,7 @@ fn simulated(arguments: &Arguments, directory: &PathBuf, recorded: Option<&Datas
     };
     let mut known = dataset.clone();
     if let Some(background) = background {
-        let touches = background.objects.into_iter().flat_map(|object| object.touches).collect();
-        known.objects.push(ObjectTouches { name: BACKGROUND.into(), touches });
+        known.objects.push(ObjectTouches::joined(BACKGROUND, &background.objects));
     }
     // An ensemble that is there states what it was trained for.
     let noise = arguments.teach.extend.is_none().then_some(settings.noise);

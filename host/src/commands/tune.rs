@@ -1,6 +1,6 @@
 use super::chips::{core, features};
 use super::noise::NoiseArguments;
-use super::numbers::share;
+use super::numbers::error_rate;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use crate::Result;
@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "NAME")]
     descriptor: Descriptor,
     /// The error rate that the model promises, such as 0.05 or 5%
-    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = share)]
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
     /// Groups of touches, and sequences, to draw at random for each object
     #[arg(long, default_value_t = 1000)]

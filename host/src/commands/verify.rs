@@ -1,8 +1,9 @@
 use super::progress::Bar;
+use super::unstated::UnstatedArguments;
 use crate::Result;
 use crate::compile::CompiledModel;
 use crate::ensemble::Ensemble;
-use crate::error::{Error, Place};
+use crate::error::{Error, Place, RowsProblem};
 use crate::evaluate::verify::{Verified, verify};
 use crate::output;
 use crate::rows::{Rows, read_margins};
@@ -17,7 +18,9 @@ ROWS is a CSV file: a header with the features' names, one row per line, empty c
 
 With --library-margins the model is also compared with the library's own raw scores of the rows: no header, one row per line, one column per output, or one column for a binary model (the score of its second class). In Python, for XGBoost: np.savetxt(\"margins.csv\", booster.predict(rows, output_margin=True), delimiter=\",\").
 
-The exit code is 1 if a margin differs by more than the model states.
+Classes are those of the largest margin, and ties go as the library has them.
+
+The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the rounding that the model states does not explain it.
 
 Examples:
   palpate verify model.palpate xgboost.json rows.csv
@@ -34,6 +37,8 @@ pub(crate) struct Arguments {
     /// The library's own raw scores of the rows
     #[arg(long, value_name = "MARGINS.csv")]
     library_margins: Option<PathBuf>,
+    #[command(flatten)]
+    unstated: UnstatedArguments,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -41,7 +46,10 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
-    let ensemble = Ensemble::load(&arguments.ensemble)?;
+    let ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(None))?;
+    if ensemble.descriptor().is_some() {
+        return Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches));
+    }
     let rows = read_rows(&arguments.rows, &ensemble.inputs.names(), None)?;
     let library = arguments.library_margins.as_deref().map(read_margins).transpose()?;
     let place = |error: Error| match (&arguments.library_margins, error.problem()) {
@@ -76,7 +84,11 @@ fn text(verified: &Verified) -> String {
          model states {stated_bound:.2e}); another class for {class_differs}\n"
     );
     if let (Some(error), Some(classes)) = (verified.library_max_margin_error, verified.library_class_differs) {
-        text += &format!("The library's own margins differ by at most {error:.2e}; another class for {classes} rows\n");
+        let unexplained = verified.library_class_unexplained.unwrap_or_default();
+        text += &format!(
+            "The library's own margins differ by at most {error:.2e}; another class for {classes} rows, of which the \
+             rounding that the model states does not explain {unexplained}\n"
+        );
     }
     if let Some((change, classes)) = verified.scaling {
         text += &format!(

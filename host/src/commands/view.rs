@@ -70,10 +70,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     )?;
     output::write_bytes(&arguments.output, page.as_bytes())?;
     let mut text = format!("{}: open it in a browser\n", arguments.output.display());
-    let complaints = Facts::of(object.mesh()).complaints(object.millimeters);
+    let facts = Facts::of(object.mesh());
+    let complaints = facts.complaints(object.millimeters);
     match complaints.is_empty() {
         true => text += &format!("{}: nothing is wrong with the mesh\n", object.name),
         false => complaints.iter().for_each(|complaint| text += &format!("{}: {complaint}\n", object.name)),
     }
+    text += &format!("{}: {}\n", object.name, view::verdict(&facts, length, &probe));
     output::print_about(&arguments.output, &text)
 }

@@ -84,8 +84,8 @@ impl Memory {
     /// What a compiled model takes on a processor.
     pub fn of_model(model: &Model<'_>, core: Core) -> Self {
         let objects = model.object_count();
-        // A recognizer: 8 bytes per object and 32; an opened model: 64.
-        let ram = 8 * objects + 32 + 64;
+        // A recognizer: 8 bytes per object and 40; an opened model: 64.
+        let ram = 8 * objects + 40 + 64;
         // The most that was seen for ten objects, less their margins.
         let stack = 4 * objects
             + match model.layout() {

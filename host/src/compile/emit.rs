@@ -52,33 +52,53 @@ fn c(model: &Model<'_>, name: &str) -> String {
     let leaf = model.leaf_type().name().to_uppercase();
     let strangers = u8::from(model.strangers().is_some());
     let shared = u8::from(model.shared_leaves().is_some());
+    let sentinel = u8::from(model.sentinel().is_some());
     let (objects, length) = (model.object_count(), model.bytes().len());
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
          #ifndef {guard}\n#define {guard}\n\n\
-         /* What of palpate.h this model needs. For several models in one program: define these before including the first. */\n\
+         /* What of palpate.h this model needs. For several models in one file: define these before including the first. */\n\
          #ifndef PALPATE_LAYOUTS\n#define PALPATE_LAYOUTS PALPATE_{layout}\n#endif\n\
          #ifndef PALPATE_LEAVES\n#define PALPATE_LEAVES PALPATE_{leaf}\n#endif\n\
          #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
+         #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
-         #if (PALPATE_LAYOUTS & PALPATE_{layout}) == 0 || (PALPATE_LEAVES & PALPATE_{leaf}) == 0 || \\\n    PALPATE_STRANGERS < {strangers} || PALPATE_SHARED < {shared} || PALPATE_MAX_OBJECTS < {objects}\n\
-         #error \"this model needs PALPATE_{layout} in PALPATE_LAYOUTS, PALPATE_{leaf} in PALPATE_LEAVES, PALPATE_STRANGERS {strangers} or more, PALPATE_SHARED {shared} or more, and room for {objects} objects\"\n\
-         #endif\n\n\
+         {checks}\n\
          /* palpate_open(&model, {name}_model, sizeof {name}_model) */\n\
          static const uint8_t {name}_model[{length}]\n\
          #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
          {array}}};\n\n#endif\n",
         about = about(model).replace("*/", "* /"),
+        checks = checks(&name.to_uppercase(), &layout, &leaf, [strangers, shared, sentinel], objects),
         array = array(model.bytes()),
     )
 }
 
+/// What says, where another model or the program itself has left out what this one needs, which line makes room for all.
+fn checks(name: &str, layout: &str, leaf: &str, [strangers, shared, sentinel]: [u8; 3], objects: usize) -> String {
+    let several =
+        |all: &str, own: &str| (format!("({all} & {own}) == 0"), format!("{all} ({own} | those of the others)"));
+    let number = |all: &str, own: usize| (format!("{all} < {own}"), format!("{all} {own}"));
+    let mut checks = vec![
+        several("PALPATE_LAYOUTS", &format!("PALPATE_{layout}")),
+        several("PALPATE_LEAVES", &format!("PALPATE_{leaf}")),
+        number("PALPATE_MAX_OBJECTS", objects),
+    ];
+    checks.extend((strangers == 1).then(|| number("PALPATE_STRANGERS", 1)));
+    checks.extend((shared == 1).then(|| number("PALPATE_SHARED", 1)));
+    checks.extend((sentinel == 1).then(|| number("PALPATE_SENTINEL", 1)));
+    let check = |(fails, line): (String, String)| {
+        format!("#if {fails}\n#error \"model {name}: before the first model is included, #define {line}\"\n#endif\n")
+    };
+    checks.into_iter().map(check).collect()
+}
+
 fn rust(model: &Model<'_>, name: &str) -> String {
     format!(
-        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}.\n\n\
+        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}.\n\n\
          /// The model: `Model::new(&{constant}.0)`.\n\
          #[rustfmt::skip]\n\
          pub static {constant}: palpate_onboard::Aligned<[u8; {length}]> = palpate_onboard::Aligned([\n\
@@ -87,6 +107,7 @@ fn rust(model: &Model<'_>, name: &str) -> String {
         layout = model.layout().name(),
         leaf = model.leaf_type().name(),
         shared = if model.shared_leaves().is_some() { ", shared-leaves" } else { "" },
+        sentinel = if model.sentinel().is_some() { ", sentinel" } else { "" },
         constant = name.to_uppercase(),
         length = model.bytes().len(),
         array = array(model.bytes()),

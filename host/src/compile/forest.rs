@@ -1,6 +1,6 @@
 //! An ensemble that was checked, with thresholds as the integers that the chip compares.
 
-use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output, Tree, check_leaf};
+use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output, Threshold, Tree, check_leaf};
 use crate::error::{CompileProblem, Error, Result, TreeProblem};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{Key, f32_key};
@@ -15,6 +15,7 @@ const MAX_DEPTH: usize = 256;
 /// A checked ensemble.
 pub(super) struct Forest<'a> {
     pub(super) base: &'a [f32],
+    names: &'a [String],
     pub(super) trees: Vec<Branches<'a>>,
     pub(super) features: usize,
     pub(super) key: Key,
@@ -71,12 +72,15 @@ impl<'a> Forest<'a> {
                 }
                 Output::Each => objects,
             };
-            let mut reader = Reader { tree, values, features, thresholds, left: tree.nodes.len(), largest: 0.0 };
+            let own = |node| ensemble.threshold(index, node);
+            let mut reader =
+                Reader { tree, own: &own, values, features, thresholds, left: tree.nodes.len(), largest: 0.0 };
             let (root, splits, depth) = reader.branch(0, 0).map_err(place)?;
             trees.push(Branches { root, output: tree.output, depth, splits, largest: reader.largest });
         }
         let forest = Self {
             base: &ensemble.base_margins,
+            names: &ensemble.objects,
             trees,
             features,
             key: thresholds.key(),
@@ -131,7 +135,9 @@ impl<'a> Forest<'a> {
             let range = self.range(object);
             if range.is_nan() || range > MARGIN_RANGE {
                 let largest = self.trees.iter().map(|tree| tree.largest).fold(self.base[object].abs(), f32::max);
-                return Err(CompileProblem::MarginRange { object, range, largest, most: MARGIN_RANGE }.into());
+                let kind = if self.descriptor.is_some() { "object" } else { "class" };
+                let of = format!("the {kind} {}", self.names.get(object).map_or("", String::as_str));
+                return Err(CompileProblem::MarginRange { of, range, largest, most: MARGIN_RANGE }.into());
             }
         }
         Ok(())
@@ -156,8 +162,10 @@ impl Branches<'_> {
     }
 }
 
-struct Reader<'a> {
+struct Reader<'a, 'r> {
     tree: &'a Tree,
+    /// The threshold of a node as the file has it.
+    own: &'r dyn Fn(usize) -> Option<Threshold>,
     values: usize,
     features: usize,
     thresholds: Thresholds<'a>,
@@ -166,7 +174,7 @@ struct Reader<'a> {
     largest: f32,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> Reader<'a, '_> {
     /// A branch, its splits and its depth.
     fn branch(&mut self, index: usize, depth: usize) -> Result<(Branch<'a>, usize, usize), TreeProblem> {
         if depth > MAX_DEPTH {
@@ -196,7 +204,8 @@ impl<'a> Reader<'a> {
                 }
                 let (left, left_splits, left_depth) = self.branch(left, depth + 1)?;
                 let (right, right_splits, right_depth) = self.branch(right, depth + 1)?;
-                let cut = self.thresholds.cut(feature, threshold);
+                let own = (self.own)(index).unwrap_or(Threshold::below(f64::from(threshold)));
+                let cut = self.thresholds.cut(feature, threshold, own);
                 let split = Split { feature: number, cut, missing_left, left, right, left_splits };
                 let depth = 1 + left_depth.max(right_depth);
                 Ok((Branch::Split(Box::new(split)), 1 + left_splits + right_splits, depth))
@@ -260,14 +269,15 @@ impl<'a> Thresholds<'a> {
         }
     }
 
-    /// The integer threshold that splits keys as `threshold` splits the values of `feature`.
-    fn cut(self, feature: usize, threshold: f32) -> i32 {
+    /// The integer threshold that splits keys as `threshold` splits the values of `feature`; `own` is the same as the
+    /// file has it.
+    fn cut(self, feature: usize, threshold: f32, own: Threshold) -> i32 {
         // `as` keeps a value beyond an i32 at its limits; -2^31 is a missing value.
         let whole = |threshold: f64| (threshold.ceil() as i32).max(i32::MIN + 1);
         match self {
             Self::Whole => whole(f64::from(threshold)),
             Self::Real => f32_key(threshold),
-            Self::Scaled(scales) => whole(f64::from(threshold) * f64::from(scales[feature])),
+            Self::Scaled(scales) => whole(own.units(scales[feature])),
         }
     }
 }
@@ -296,7 +306,9 @@ fn check_thresholds(ensemble: &Ensemble, descriptor: Descriptor) -> Result<()> {
         thresholds.sort_unstable_by(f32::total_cmp);
         thresholds.dedup();
         if let Some(&example) = thresholds.iter().find(|&&threshold| is_fraction(threshold)) {
-            let whole = thresholds.iter().map(|&threshold| Thresholds::Whole.cut(feature, threshold));
+            let whole = thresholds
+                .iter()
+                .map(|&threshold| Thresholds::Whole.cut(feature, threshold, Threshold::below(threshold.into())));
             let rounded = whole.collect::<BTreeSet<_>>().len();
             let thresholds = thresholds.len();
             return Err(CompileProblem::Thresholds { feature: name, thresholds, rounded, example }.into());

@@ -46,6 +46,7 @@ mod layout;
 mod model;
 mod parts;
 mod quantize;
+mod range;
 mod restate;
 mod rounding;
 mod share;
@@ -162,7 +163,8 @@ pub struct Compiled {
     pub splits: usize,
     /// Leaves of the ensemble.
     pub leaves: usize,
-    /// The farthest that a margin can be from the ensemble's, and from that of the library that trained it, in nats.
+    /// The farthest that a margin can be from the ensemble's, and from that of the library that trained it: in nats, or
+    /// the value's own unit.
     pub margin_error: f32,
     /// How the trees are laid out.
     pub layout: Layout,
@@ -193,8 +195,11 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 /// that fall together when rounded to whole numbers, more of something than the format can count, or that does not fit
 /// the layout asked for; [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
+    let original = ensemble;
+    let ensemble = &*range::scaled(ensemble);
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
+    write::check_sentinel(ensemble, settings)?;
     let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
     let made =
@@ -205,19 +210,21 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         shared_leaves: parts.shared.is_some(),
         bytes: parts.bytes() + overhead,
         instructions: parts.instructions,
-        margin_error: parts.margin_error,
+        margin_error: rounding::round_up(f64::from(parts.margin_error) * f64::from(ensemble.prediction().scale)),
     };
     let candidates: Vec<Candidate> = made.iter().map(candidate).collect();
     let chosen = chosen(&candidates, settings.goal);
-    let Some((layout, parts)) = chosen.and_then(|chosen| made.into_iter().nth(chosen)) else {
+    let Some((layout, mut parts)) = chosen.and_then(|chosen| made.into_iter().nth(chosen)) else {
         return Err(CompileProblem::FitsNoLayout.into());
     };
     let instructions = parts.instructions;
     let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
-    let margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding);
-    let bytes = write::write(ensemble, settings, &forest, stopping, layout, &parts, margin_error)?;
+    let scale = f64::from(ensemble.prediction().scale);
+    parts.margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding / scale);
+    let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
     let (splits, leaves) = (forest.splits(), forest.leaves());
     let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
+    let margin_error = rounding::round_up(f64::from(parts.margin_error) * scale);
     Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates })
 }
 
@@ -244,7 +251,8 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
 
 /// The ensemble's trees in the order in which a model with such leaves has them.
 pub(crate) fn order_of_trees(ensemble: &Ensemble, leaf: Leaf) -> Result<Vec<usize>> {
-    let forest = Forest::new(ensemble, None)?;
+    let ensemble = range::scaled(ensemble);
+    let forest = Forest::new(&ensemble, None)?;
     let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
     Ok(trees::order(&forest, leaf, &scale))
 }

@@ -243,7 +243,8 @@ fn every_ensemble_that_contradicts_itself_is_refused_by_what_is_wrong() {
         tree(TreeProblem::LeafValue { node: 2, value: f32::INFINITY })
     );
     match refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5])) {
-        CompileProblem::MarginRange { object: 0, largest, .. } if (1e5..1.1e5).contains(&f64::from(largest)) => {}
+        CompileProblem::MarginRange { of, largest, .. }
+            if of.starts_with("the object ") && (1e5..1.1e5).contains(&f64::from(largest)) => {}
         other => panic!("{other:?}"),
     }
     assert_eq!(refused(&|e| e.objects[0] = "x".repeat(256)), CompileProblem::NameTooLong { name: "x".repeat(256) });

@@ -6,28 +6,32 @@ use super::parts::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
 use crate::error::{CompileProblem, Error, Result};
 use crate::probe::approach::Probe;
+use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HeaderBuilder, Layout, RAW_FEATURES, Strangers, Tag, Trained, checksum, write_section,
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, checksum,
+    f32_key, write_section,
 };
 
-/// The model's bytes.
+/// The model's bytes; `hash` is that of the ensemble as it was read.
 pub(super) fn write(
     ensemble: &Ensemble,
+    hash: u64,
     settings: &Settings,
     forest: &Forest<'_>,
     stopping: Stopping,
     layout: Layout,
     parts: &Parts,
-    margin_error: f32,
 ) -> Result<Vec<u8>> {
     let mut text = text(ensemble)?;
     let priors = priors(settings, forest.objects(), parts.unit)?;
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
     // Where nothing is known, the published probe.
     let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
-    // Its tag is the largest of those that are written.
-    let optional = [optional(ensemble, settings, forest)?, parts.section()].concat();
+    // In the order of the tags.
+    let optional =
+        [optional(ensemble, settings, forest)?, parts.section(), of_rows(ensemble, settings), captured(ensemble)]
+            .concat();
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);
@@ -55,14 +59,14 @@ pub(super) fn write(
         .with_unit(parts.unit)
         .with_unit_bits(unit_bits)
         .with_unit_shift(unit_shift)
-        .with_margin_error(margin_error)
+        .with_margin_error(parts.margin_error)
         .with_odds(stopping.odds())
         .with_max_touches(stopping.max_touches())
         .with_spacing(probe.spacing as f32)
         .with_speed(probe.speed as f32)
         .with_text_length(count(text.len())?)
         .with_sections(count(optional.len())?)
-        .with_ensemble(hash(ensemble))
+        .with_ensemble(hash)
         .with_cuts_length(count(parts.cuts.len())?)
         .with_nodes_length(count(parts.nodes.len())?)
         .with_leaves_length(count(parts.leaves.len())?);
@@ -81,7 +85,9 @@ pub(super) fn write(
 
 /// Bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
 pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
-    Ok(text(ensemble)?.len().next_multiple_of(4) + optional(ensemble, settings, forest)?.len() + CHECKSUM_LENGTH)
+    let sections =
+        optional(ensemble, settings, forest)?.len() + of_rows(ensemble, settings).len() + captured(ensemble).len();
+    Ok(text(ensemble)?.len().next_multiple_of(4) + sections + CHECKSUM_LENGTH)
 }
 
 /// What the model states about its training.
@@ -117,6 +123,54 @@ fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
     Ok(bytes)
 }
 
+/// What a model over rows predicts, and which features stand for a missing value.
+fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let Some(imported) = ensemble.origin.imported.as_ref().filter(|_| ensemble.descriptor().is_none()) else {
+        return bytes;
+    };
+    let mut put = |part: &[u8]| bytes.extend_from_slice(part);
+    let prediction = imported.prediction;
+    if prediction != Prediction::default() {
+        // Whoever does not know it would take scaled margins for values.
+        write_section(Tag::Prediction, prediction.scale != 1.0, &prediction.to_bytes(), &mut put);
+    }
+    if let Some([low, high]) = imported.sentinel {
+        let ends = |scale: Option<f32>| match scale {
+            None => [f32_key(low), f32_key(high)],
+            Some(scale) => [whole(low, scale), whole(high, scale)],
+        };
+        // The same for every feature, which was checked.
+        let [low, high] = ends(settings.scales.as_ref().and_then(|scales| scales.first().copied()));
+        write_section(Tag::Sentinel, true, &Sentinel { low, high }.to_bytes(), &mut put);
+    }
+    bytes
+}
+
+/// The section that says which touches it was trained on; nothing where that is not known.
+fn captured(ensemble: &Ensemble) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if let Some(content) = ensemble.descriptor().and_then(|_| ensemble.origin.section(&ensemble.objects)) {
+        write_section(Tag::Capture, false, &content, &mut |part| bytes.extend_from_slice(part));
+    }
+    bytes
+}
+
+/// Whether the features that stand for a missing value are the same whole numbers for every feature: a model states one
+/// range of them.
+pub(super) fn check_sentinel(ensemble: &Ensemble, settings: &Settings) -> Result<()> {
+    let sentinel = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);
+    let (Some(sentinel), Some(scales)) = (sentinel, &settings.scales) else { return Ok(()) };
+    let ends = |scale: &f32| sentinel.map(|end| whole(end, *scale));
+    if scales.iter().any(|scale| ends(scale) != ends(&scales[0])) {
+        let text = scales.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        let allowed =
+            format!("the same scale for all features, since {} stands for a missing value in each", sentinel[0]);
+        return Err(Error::setting("scales", text, allowed));
+    }
+    Ok(())
+}
+
 /// The program's version and the objects' names, each with its length in a byte.
 fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
     let mut text = Vec::new();
@@ -148,7 +202,7 @@ fn unit_bits(unit: f32) -> (u32, u8) {
 }
 
 /// A CRC-64 (XZ) of everything that makes up an ensemble.
-fn hash(ensemble: &Ensemble) -> u64 {
+pub(super) fn hash(ensemble: &Ensemble) -> u64 {
     const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let mut digest = CRC.digest();
     digest.update(&[ensemble.descriptor().map_or(RAW_FEATURES, palpate_shared::Descriptor::code)]);

@@ -18,10 +18,12 @@ mod xgboost;
 pub(crate) use check::check_names;
 pub(crate) use check::{MAX_FEATURES, MAX_OBJECTS, check_leaf};
 pub use inputs::Inputs;
-pub use origin::{Imported, Origin, StatedProbe, Trained};
+pub use nodes::Threshold;
+pub use origin::{Imported, Origin, StatedProbe, Trained, compiled_trained_on};
 
-use palpate_shared::format::TrainedTouches;
+use palpate_shared::format::{Prediction, TrainedTouches};
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
+use std::borrow::Cow;
 
 /// Boosted trees over features of touches or of rows, with one margin for each object.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,20 +112,52 @@ impl Tree {
 
 impl Ensemble {
     /// The margins of one row of features, in f32, leaves added in tree order to the base margins: the trainer's own
-    /// prediction, bit for bit.
+    /// prediction, bit for bit; times the [scale](Prediction::scale) that an imported ensemble states.
     ///
     /// # Panics
     /// If there are fewer features than the ensemble splits on, or it is one that [`Ensemble::check`] refuses.
     pub fn margins_of_features(&self, features: &[f32]) -> Vec<f32> {
+        let known = self.known_features(features);
+        self.margins_of_leaves(|_, tree| tree.leaf(&known))
+    }
+
+    /// The margins where `leaf` says which leaf of a tree is reached, given its number too.
+    pub(crate) fn margins_of_leaves<'t>(&'t self, leaf: impl Fn(usize, &'t Tree) -> &'t [f32]) -> Vec<f32> {
         let mut margins = self.base_margins.clone();
-        for tree in &self.trees {
-            let leaf = tree.leaf(features);
+        for (number, tree) in self.trees.iter().enumerate() {
+            let leaf = leaf(number, tree);
             match tree.output {
                 Output::One(object) => margins[object] += leaf[0],
                 Output::Each => margins.iter_mut().zip(leaf).for_each(|(margin, value)| *margin += value),
             }
         }
+        let scale = self.prediction().scale;
+        if scale != 1.0 {
+            margins.iter_mut().for_each(|margin| *margin *= scale);
+        }
         margins
+    }
+
+    /// The features with NaN for those that stand for a missing value.
+    pub(crate) fn known_features<'f>(&self, features: &'f [f32]) -> Cow<'f, [f32]> {
+        let Some([low, high]) = self.origin.imported.as_ref().and_then(|imported| imported.sentinel) else {
+            return Cow::Borrowed(features);
+        };
+        let known = |&value: &f32| if (low..=high).contains(&value) { f32::NAN } else { value };
+        features.iter().map(known).collect()
+    }
+
+    /// How margins become a class or a value.
+    pub fn prediction(&self) -> Prediction {
+        self.origin.imported.as_ref().map(|imported| imported.prediction).unwrap_or_default()
+    }
+
+    /// The threshold of a split as the file has it that the ensemble is from; `None` for a leaf, or a node that does not
+    /// exist.
+    pub fn threshold(&self, tree: usize, node: usize) -> Option<Threshold> {
+        let Node::Split { threshold, .. } = self.trees.get(tree)?.nodes.get(node)? else { return None };
+        let stated = self.origin.imported.as_ref().and_then(|imported| imported.thresholds.get(tree)?.get(node));
+        Some(stated.copied().unwrap_or(Threshold::below(f64::from(*threshold))))
     }
 
     /// The margins of a touch.

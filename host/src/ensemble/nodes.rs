@@ -3,9 +3,49 @@
 use super::Node;
 use crate::error::TreeProblem;
 
+/// A threshold as a library compares with it: in f64, at times including the threshold itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Threshold {
+    /// The number that values are compared with.
+    pub value: f64,
+    /// Whether a value that equals it goes left.
+    pub inclusive: bool,
+}
+
+impl Threshold {
+    /// That of `x <= value`.
+    pub const fn at_or_below(value: f64) -> Self {
+        Self { value, inclusive: true }
+    }
+
+    /// That of `x < value`.
+    pub const fn below(value: f64) -> Self {
+        Self { value, inclusive: false }
+    }
+
+    /// The threshold c with which `x < c` sends every f32 x to the same side. There is none for `x <= ∞`, which holds for
+    /// every number.
+    pub(crate) fn single(self) -> Option<f32> {
+        match self {
+            Self { value: f64::INFINITY, inclusive: true } => None,
+            Self { value, inclusive: true } => Some(after(value)),
+            Self { value, inclusive: false } => Some(from(value)),
+        }
+    }
+
+    /// The least whole number of units that goes right, where `scale` units make up 1.
+    pub fn units(self, scale: f32) -> f64 {
+        let units = self.value * f64::from(scale);
+        // A product that is a whole number but for its rounding is that number.
+        let whole = units.round();
+        let units = if (units - whole).abs() <= 2.0 * f64::EPSILON * units.abs() { whole } else { units };
+        if self.inclusive { units.floor() + 1.0 } else { units.ceil() }
+    }
+}
+
 /// The threshold c with which `x < c` is `x <= threshold` for every f32 x: the f32 after the largest one that is not
 /// above the threshold.
-pub(super) fn after(threshold: f64) -> f32 {
+fn after(threshold: f64) -> f32 {
     // `as` rounds to nearest, and to infinity what is beyond.
     let near = threshold as f32;
     let below = if f64::from(near) > threshold { near.next_down() } else { near };
@@ -13,7 +53,7 @@ pub(super) fn after(threshold: f64) -> f32 {
 }
 
 /// The threshold c with which `x < c` is `x < threshold` for every f32 x: the smallest f32 that is not below it.
-pub(super) fn from(threshold: f64) -> f32 {
+fn from(threshold: f64) -> f32 {
     let near = threshold as f32;
     if f64::from(near) < threshold { near.next_up() } else { near }
 }

@@ -1,10 +1,13 @@
 //! Where the touches that an ensemble was trained on came from.
 
+use super::nodes::Threshold;
 use crate::error::{ProbeProblem, Result};
 use crate::probe::approach::Probe;
 use crate::touches::noise::Noise;
-use crate::touches::{self, Dataset, tenth, unit};
-use palpate_shared::format::{Counted, Length, PatternShares, TrainedProbe, TrainedTouches};
+use crate::touches::{self, Captured, Dataset, short, tenth, unit};
+use palpate_shared::format::{
+    Counted, Length, PatternShares, Prediction, TrainedCapture, TrainedProbe, TrainedTouches,
+};
 use palpate_shared::{ContactPattern, Patterns};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -20,6 +23,8 @@ pub struct Origin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
+    /// The capture that made them, where that is known.
+    pub captured: Option<Captured>,
     /// The last object is a background: many other shapes, which stand for all that the ensemble does not know. It is a
     /// rival of the others, and never named.
     pub background: bool,
@@ -37,6 +42,14 @@ pub struct Imported {
     pub rounding: f64,
     /// What a user should know about it, each a sentence.
     pub notes: Vec<String>,
+    /// How margins become a class or a value, as the library's `predict` does it. Its scale makes the library's margins of
+    /// what the trees add up to.
+    pub prediction: Prediction,
+    /// The least and the largest of the numbers that stand for a missing value, beside NaN.
+    pub sentinel: Option<[f32; 2]>,
+    /// For each node of each tree the threshold as the file has it, of no meaning for leaves; empty where all are the
+    /// ensemble's own.
+    pub thresholds: Vec<Vec<Threshold>>,
 }
 
 /// The probe that a data set was made with, and the size of its objects.
@@ -177,18 +190,54 @@ impl TryFrom<Stated> for Trained {
 const FINGERPRINTED: usize = 16;
 
 impl Origin {
-    /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
-    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
-        Self { probe, trained, touches: fingerprints(dataset), ..Self::default() }
+    /// The content of the section that says which touches they were, for a model of these objects; none where nothing is known.
+    pub(crate) fn section(&self, objects: &[String]) -> Option<Vec<u8>> {
+        let captured = self.captured.as_ref();
+        let stated = |name: &String| {
+            let captured = captured.and_then(|captured| captured.stated_of(name));
+            captured.or_else(|| self.touches.get(name).map(|&fingerprint| short(fingerprint))).unwrap_or_default()
+        };
+        let stated: Vec<u16> = objects.iter().map(stated).collect();
+        let (settings, samples) = captured.map_or((0, 0..u32::MAX), Captured::stated);
+        let is_known = stated.iter().any(|&object| object != 0);
+        is_known.then(|| {
+            let head = TrainedCapture::head(settings, samples).into_iter();
+            head.chain(stated.iter().flat_map(|object| object.to_le_bytes())).collect()
+        })
     }
 
-    /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of the
-    /// same capture.
+    /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
+    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
+        Self { probe, trained, touches: fingerprints(dataset), captured: Captured::of(dataset), ..Self::default() }
+    }
+
+    /// The objects whose touches in `dataset` are of the capture that made those of the training, or begin like those: the
+    /// same touches, or more or fewer of them. What becomes of them elsewhere, such as noise, does not count. A part of a data
+    /// set that was trained on counts as the whole.
     pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
         let own = fingerprints(dataset);
-        let same = |name: &&str| own.get(*name).is_some_and(|own| self.touches.get(*name) == Some(own));
+        let captured = self.captured.as_ref().zip(Captured::of(dataset));
+        let shared: Vec<String> = captured
+            .map_or_else(Vec::new, |(trained, tested)| trained.shared(&tested).into_iter().map(String::from).collect());
+        let begins = |name: &&str| own.get(*name).is_some_and(|own| self.touches.get(*name) == Some(own));
+        let same = |name: &&str| begins(name) || shared.iter().any(|shared| shared == name);
         dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
     }
+}
+
+/// The same for a compiled model of the objects `names`, as far as it states its training touches.
+pub fn compiled_trained_on<'d>(stated: &TrainedCapture<'_>, names: &[String], dataset: &'d Dataset) -> Vec<&'d str> {
+    let captured = Captured::of(dataset);
+    let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(stated));
+    // A capture of another seed has other touches; what is not captured is told by its first touches.
+    let fingerprints = if captured.is_none() || stated.settings == 0 { fingerprints(dataset) } else { BTreeMap::new() };
+    let same = |name: &&str| {
+        let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));
+        let is_captured = is_near && captured.as_ref().and_then(|captured| captured.stated_of(name)) == object;
+        let begins = fingerprints.get(*name).map(|&fingerprint| short(fingerprint));
+        object.is_some() && (is_captured || begins == object)
+    };
+    dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
 }
 
 /// A CRC-64 (XZ) of the contact times of each object's first touches.
@@ -196,7 +245,7 @@ fn fingerprints(dataset: &Dataset) -> BTreeMap<String, u64> {
     const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let fingerprint = |object: &crate::touches::ObjectTouches| {
         let mut digest = CRC.digest();
-        for time in object.touches.iter().take(FINGERPRINTED).flat_map(|touch| touch.times()) {
+        for time in object.touches().iter().take(FINGERPRINTED).flat_map(|touch| touch.times()) {
             digest.update(&time.micros().unwrap_or(u32::MAX).to_le_bytes());
         }
         (object.name.clone(), digest.finalize())

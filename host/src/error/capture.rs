@@ -145,9 +145,11 @@ impl CaptureProblem {
             Self::HoldsFiles { .. } => "Give another directory, or move the files away.",
             Self::HoldsUnfinished { .. } => "Resume that capture, replace it, or give another directory.",
             Self::AlreadyThere { .. } => "Leave them out, or give another directory.",
-            Self::AddsOtherSettings { .. } => "Capture with the settings of these touches, or give another directory.",
+            Self::AddsOtherSettings { .. } => {
+                "Capture with the settings and meshes of these touches, or give another directory."
+            }
             Self::ResumesOtherVersion { .. } | Self::ResumesOtherSettings { .. } | Self::ResumesOtherObjects { .. } => {
-                "Repeat the arguments of the first capture, or give another directory."
+                "Repeat the arguments and restore the meshes of the first capture, or give another directory."
             }
             Self::Shorter { .. } => "Capture again from the beginning, replacing these touches.",
             Self::NotWritten { kind: ErrorKind::StorageFull | ErrorKind::QuotaExceeded, .. } => {

@@ -29,12 +29,12 @@ pub enum CompileProblem {
     },
     /// Leaves or base margins are too large.
     #[error(
-        "cannot compile the ensemble: the margin of object {object} can reach {range:e} nats (the largest single value is {largest:e}), beyond the {most} that a model can hold"
+        "cannot compile the ensemble: the margin of {of} can reach {range:e} (the largest single value is {largest:e}), beyond the {most} that a model can hold"
     )]
     MarginRange {
-        /// The object, counted from 0.
-        object: usize,
-        /// How far from 0 its margin can be, in nats.
+        /// The object or class, by name.
+        of: String,
+        /// How far from 0 its margin can be.
         range: f64,
         /// The largest single value.
         largest: f32,
@@ -117,7 +117,7 @@ impl CompileProblem {
             Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",
             Self::Tree { .. } => "Train it again, or check the program that wrote it.",
             Self::MarginRange { .. } => {
-                "Train it again, a regression on a target in a larger unit, or check the program that wrote it."
+                "Margins are logarithms of probabilities, of which a few dozen are sure enough: train it again, or check the program that wrote it."
             }
             Self::Features { .. } => "Train on the features that matter, at most 256.",
             Self::Thresholds { .. } => {

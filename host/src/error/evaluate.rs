@@ -33,7 +33,7 @@ pub enum EvaluateProblem {
         found: usize,
     },
     /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
-    #[error("the touches make only {object_sequences} sequences of an object, and the promise takes at least {needed}")]
+    #[error("{}", too_few_for_alarms(*object_sequences, *needed))]
     TooFewForAlarms {
         /// Sequences of the object with the fewest.
         object_sequences: usize,
@@ -62,6 +62,16 @@ pub enum EvaluateProblem {
         objects: usize,
         /// Room of the recognizer.
         capacity: usize,
+    },
+    /// A compiled model's margins are not its ensemble's.
+    #[error(
+        "not exported from this ensemble: margins differ by up to {found:.2e} nats, where the model states {stated:.2e} at most"
+    )]
+    NotExported {
+        /// The largest difference, in nats.
+        found: f64,
+        /// The largest one that the model states.
+        stated: f64,
     },
     /// The model has no plan of approaches.
     #[error("the model has no plan of approaches")]
@@ -126,6 +136,20 @@ pub enum EvaluateProblem {
     },
 }
 
+/// Which of the two it is.
+fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
+    if (object_sequences as u64) < needed {
+        format!(
+            "the touches make only {object_sequences} sequences of an object, and the promise takes at least {needed}"
+        )
+    } else {
+        format!(
+            "of {object_sequences} sequences of each object too many end as unknown at every threshold, so the promise takes \
+             more sequences"
+        )
+    }
+}
+
 impl EvaluateProblem {
     /// What to do about it, as a sentence.
     pub fn fix(&self) -> String {
@@ -138,7 +162,7 @@ impl EvaluateProblem {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
             }
             Self::NoPose { .. } => "Capture the touches with their pose.",
-            Self::OtherModel => "Give the ensemble that the model was exported from.",
+            Self::OtherModel | Self::NotExported { .. } => "Give the ensemble that the model was exported from.",
             Self::NoTouches => "Give at least one touch of each object.",
             Self::TooManyObjects { .. } => "Use a model of fewer objects.",
             Self::NoPlan => {
@@ -161,5 +185,17 @@ impl EvaluateProblem {
             Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
         }
         .into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn enough_sequences_with_too_many_alarms_are_not_said_to_be_too_few() {
+        let said = |object_sequences| EvaluateProblem::TooFewForAlarms { object_sequences, needed: 30 }.to_string();
+        assert!(said(29).contains("only 29 sequences of an object") && said(29).ends_with("at least 30"));
+        assert!(said(37).starts_with("of 37 sequences of each object too many end as unknown"), "{}", said(37));
     }
 }

@@ -15,7 +15,7 @@ mod teach;
 mod touches;
 mod tune;
 
-pub use calibrate::CalibrateProblem;
+pub use calibrate::{CalibrateProblem, Supplied};
 pub use capture::CaptureProblem;
 pub use chip::ChipProblem;
 pub use compile::CompileProblem;

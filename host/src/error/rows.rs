@@ -1,5 +1,10 @@
 //! What can be wrong with rows of features, and with comparing models on them.
 
+use crate::evaluate::verify::ClassDiffers;
+
+/// What `verify` compares with.
+const RAW_SCORES: &str = "Give the library's raw scores, before the softmax or the logistic function: one column per output, or one for a binary model (its second class), in the order of the classes. XGBoost: `output_margin=True`; LightGBM: `raw_score=True`; CatBoost: `prediction_type=\"RawFormulaVal\"`; scikit-learn: `decision_function`, of forests `predict_proba`; onnxruntime: a model converted with `options={id(model): {\"raw_scores\": True}}`, of forests its probabilities.";
+
 /// What can be wrong with rows of features, and with comparing models on them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -78,6 +83,20 @@ pub enum RowsProblem {
         /// Which tree is the first to differ.
         tree: Option<String>,
     },
+    /// The library's margins are something else.
+    #[error("the library's numbers look like probabilities, and margins are needed")]
+    Probabilities,
+    /// Classes are others than the library's.
+    #[error(
+        "{rows} rows get another class than the library gives them, and the rounding that the model states does not explain it: the first is row {}, of {:?}, and {:?} by the library, whose margins of the two are {:.3e} apart",
+        first.row, first.classes[0], first.classes[1], first.gap
+    )]
+    Class {
+        /// How many.
+        rows: usize,
+        /// The first of them.
+        first: ClassDiffers,
+    },
     /// A label is none of the model's classes.
     #[error("the label {label:?} in row {row} is none of the model's classes: {}", known.join(", "))]
     Label {
@@ -97,7 +116,7 @@ fn of([features, outputs, trees]: [usize; 3]) -> String {
 impl RowsProblem {
     /// Whether the file of the library's margins is what is wrong.
     pub fn is_about_margins(&self) -> bool {
-        matches!(self, Self::MarginRows { .. } | Self::MarginColumns { .. })
+        matches!(self, Self::MarginRows { .. } | Self::MarginColumns { .. } | Self::Probabilities)
     }
 
     /// What to do about it, as a sentence.
@@ -111,13 +130,17 @@ impl RowsProblem {
             Self::NoColumn { .. } => "Name one of the columns in the header.",
             Self::Number { .. } => "Give a number, or leave the cell empty where the value is missing.",
             Self::MarginRows { .. } => "Give one line of margins for each row, without a header.",
-            Self::MarginColumns { .. } => {
-                "Give the library's raw scores: one column per output, or one for a binary model."
+            Self::MarginColumns { .. } => RAW_SCORES,
+            Self::Probabilities => RAW_SCORES,
+            Self::Class { .. } => {
+                "Export with `--leaf f32`, and check that the margins are the library's raw scores of these rows."
             }
             Self::Touches => "Use `palpate parity` and `palpate evaluate` for models of touches.",
-            Self::OtherModel { .. } => "Give the file that the model was exported from.",
+            Self::OtherModel { .. } => {
+                "Give the file that the model was exported from, and --all-trees if it was exported with that."
+            }
             Self::Beyond { .. } => {
-                "Check that the model was exported from this file, and the margins are the library's raw scores of these rows."
+                "Check that the model was exported from this file, with the same --missing and --all-trees, and the margins are the library's raw scores of these rows."
             }
             Self::Label { .. } => "Correct the label, or name the model's classes with `export --names`.",
         }

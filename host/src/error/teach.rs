@@ -76,7 +76,11 @@ impl TeachProblem {
             Self::Missing { .. } => {
                 "Give the data set that the ensemble was trained on, or another one of the same objects."
             }
-            Self::Known { .. } => "Rename the recorded object's file, or leave the simulated object out.",
+            Self::Known { .. } => {
+                "Teaching adds objects and does not adjust known ones: to train for the probe that made the recordings, fit it \
+                 (`palpate probe fit`) and capture with the file; to learn the object from the recordings alone, leave it out \
+                 of the simulated touches; or rename its recording to teach it as another object."
+            }
             Self::FullTouches { .. } => {
                 "Record every approach, also those that missed a finger, or train on full touches."
             }

@@ -63,6 +63,14 @@ pub enum TouchesProblem {
         /// What is wrong with it.
         problem: Box<Self>,
     },
+    /// A row of a file of touches names another object than the file.
+    #[error("a touch of {found:?} in the file of {object:?}")]
+    OtherObject {
+        /// The object that the row names.
+        found: String,
+        /// The object that the file is called after.
+        object: String,
+    },
     /// A file is not Parquet, or its structure is damaged.
     #[error("not a usable Parquet file ({message})")]
     NotParquet {
@@ -209,6 +217,22 @@ pub enum TouchesProblem {
         /// What the parser said.
         message: String,
     },
+    /// Touches of several instances or logs, without an origin that `dataset.json` could state.
+    #[error(
+        "{name} has {sources} instances or logs, and without a known probe no dataset.json says which touch is of which"
+    )]
+    Unsaid {
+        /// The object's name.
+        name: String,
+        /// How many there are.
+        sources: usize,
+    },
+    /// Touches of robots that differ, which no file can say.
+    #[error("the touches of {name} are of robots with biases of their own, and no file says which touch is of which")]
+    OfRobots {
+        /// The object's name.
+        name: String,
+    },
     /// `dataset.json` names an object that no file of the directory can be called after.
     #[error("no file can be called after the object {name:?}")]
     BadName {
@@ -336,8 +360,10 @@ impl TouchesProblem {
                  alignment."
             }
             Self::HalfPose { .. } => "Give both or neither.",
+            Self::OtherObject { .. } => "Give each object a file that is called like it.",
             Self::Row { problem, .. } => match **problem {
                 Self::HalfPose { .. } => "Give both or neither.",
+                Self::OtherObject { .. } => "Give each object a file that is called like it.",
                 _ => "Correct the row, or capture the object again.",
             },
             Self::NotParquet { .. } | Self::NoColumn { .. } | Self::Column { .. } | Self::NoTouches => {
@@ -370,6 +396,10 @@ impl TouchesProblem {
             Self::BadListing { .. } | Self::BadName { .. } | Self::ListedTwice { .. } => {
                 "Remove the file if the touches are from elsewhere, else capture them again."
             }
+            Self::Unsaid { .. } => {
+                "Say which probe made them (from Python `probe=`), or record each log with `palpate data record`."
+            }
+            Self::OfRobots { .. } => "Write them without noise, and add it where they are read.",
             Self::Missing { .. } | Self::OtherCount { .. } => {
                 "Restore the file or capture the objects again, or remove dataset.json if this is meant."
             }

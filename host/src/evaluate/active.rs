@@ -15,7 +15,7 @@ use serde::Serialize;
 /// some object has no test approach in are never proposed, and one whose approaches are used up in a sequence is not
 /// proposed again in it; where none is left, the sequence ends without a verdict.
 pub struct Active {
-    /// For each tested object, for each turn: of its instances, and of robots.
+    /// For each tested object, for each pool: of its sources, and of robots.
     by_pose: Vec<Vec<ByPose>>,
     /// Poses that may be proposed.
     candidates: Vec<u16>,
@@ -54,7 +54,7 @@ impl Active {
         }
         let poses = plan.poses();
         let turns = |(tested, object): (&Tested<'_>, &ObjectTouches)| -> Result<Vec<ByPose>> {
-            (0..tested.turns).map(|turn| ByPose::new(object, poses, turn, tested.turns)).collect()
+            tested.pools.iter().map(|pool| ByPose::new(object, poses, &pool.touches)).collect()
         };
         let by_pose: Vec<Vec<ByPose>> =
             margins.tested.iter().zip(&dataset.objects).map(turns).collect::<Result<_>>()?;

@@ -60,6 +60,12 @@ pub struct ApproachSequential {
     pub error_per_object: BTreeMap<String, f64>,
     /// Share of sequences without a verdict, for each object.
     pub undecided_per_object: BTreeMap<String, f64>,
+    /// Share of wrong names among those given; not a number if there are none.
+    pub error_of_given: f64,
+    /// The same of those given to each object; without objects that never got a name.
+    pub error_of_given_per_object: BTreeMap<String, f64>,
+    /// Objects of whose names more are wrong than [`ApproachSequential::error_rate`], by more than chance.
+    pub above: Vec<String>,
     /// Share of wrong names among those given of each name; without names that were never given.
     pub error_per_name: BTreeMap<String, f64>,
     /// For each tested object, how it went for every sequence.
@@ -91,7 +97,7 @@ impl Margins<'_> {
         }
         if let Some(position) = (0..self.tested.len()).find(|&position| self.most_approaches(position) < most) {
             let (name, has) = (&self.tested_names()[position], self.most_approaches(position));
-            let allowed = format!("fewer approaches, or capture more: {name} has only {has}");
+            let allowed = format!("fewer approaches, or capture more: {name} has only {has}{}", self.of_what(name));
             return Err(Error::setting("at", most, allowed));
         }
         let positions = 0..self.tested.len();
@@ -99,8 +105,8 @@ impl Margins<'_> {
             positions.clone().map(|position| self.after(position, at, most, groups, seed)).collect();
         let outcomes: Vec<Vec<Outcome>> = positions
             .map(|position| {
-                let all = self.most_approaches(position);
                 let run = |sequence| {
+                    let all = self.most_approaches_of(position, sequence);
                     let draws = self.draws(all, position, sequence, seed);
                     self.outcome(position, stopping, draws.map(|draw| self.approach(position, sequence, draw)))
                 };
@@ -154,7 +160,7 @@ impl Margins<'_> {
         let tested = &self.tested[position];
         let group = |mut correct: Vec<usize>, group| {
             let (mut evidence, mut is_evidence) = (self.prior(), false);
-            let draws = self.draws(self.most_approaches(position), position, group, seed);
+            let draws = self.draws(self.most_approaches_of(position, group), position, group, seed);
             for (index, draw) in draws.take(most).enumerate() {
                 if let Some(touch) = self.approach(position, group, draw) {
                     tested.add(touch as usize, &mut evidence);
@@ -192,7 +198,10 @@ impl Margins<'_> {
             per_object: approaches.per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
-            error_per_name: self.wrong_by_name(&outcomes).into_iter().map(|(name, of)| (name, of.value)).collect(),
+            error_of_given: self.wrong_of_given(&outcomes).value,
+            error_of_given_per_object: self.wrong_by_object(&outcomes),
+            above: self.objects_above(&outcomes, error_rate),
+            error_per_name: self.wrong_by_name(&outcomes),
             outcomes,
         }
     }

@@ -52,7 +52,7 @@ const QUANTILE: f64 = 1.96;
 /// Kolmogorov's distribution at 95 %.
 const KOLMOGOROV: f64 = 1.358;
 
-/// A share, and between what it is with a probability of 95 %.
+/// A share and its 95 % interval, by the normal approximation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Share {
     /// The share.
@@ -202,21 +202,14 @@ pub fn compare(
     if settings.folds < 2 {
         return Err(Error::setting("folds", settings.folds, "2 or more"));
     }
-    let any = |dataset: &Dataset, is: fn(&Touch) -> bool| dataset.objects.iter().flat_map(|own| &own.touches).any(is);
+    let any = |dataset: &Dataset, is: fn(&Touch) -> bool| dataset.touches().any(is);
     if any(recorded, |touch| !touch.is_full()) && !any(simulated, |touch| !touch.is_full()) {
         return refuse("the recorded touches are of approaches, the simulated ones full touches only".into());
     }
     let empties = any(recorded, Touch::is_empty);
     let partial = any(recorded, |touch| !touch.is_full());
-    let alike = |touch: &&Touch| touch.is_full() || partial && (empties || !touch.is_empty());
-    let simulated = simulated.with(
-        (simulated.objects.iter())
-            .map(|own| ObjectTouches {
-                name: own.name.clone(),
-                touches: own.touches.iter().filter(alike).copied().collect(),
-            })
-            .collect(),
-    );
+    let alike = |touch: &Touch| touch.is_full() || partial && (empties || !touch.is_empty());
+    let simulated = simulated.each(|own| own.filtered(alike));
     let find = |name: &str| simulated.objects.iter().find(|own| own.name == name);
     let pairs: Vec<(&ObjectTouches, &ObjectTouches)> =
         recorded.objects.iter().filter_map(|own| Some((own, find(&own.name)?))).collect();
@@ -224,7 +217,7 @@ pub fn compare(
         return refuse("no object is in both".into());
     }
     for (own, other) in &pairs {
-        let fewest = own.touches.len().min(other.touches.len());
+        let fewest = own.len().min(other.len());
         if fewest < LEAST {
             return refuse(format!("{} has {fewest} touches to compare, of at least {LEAST}", own.name));
         }
@@ -242,7 +235,7 @@ pub fn compare(
     };
     let compared: Vec<(ObjectComparison, Estimate)> = pairs.par_iter().map(one).collect::<Result<_>>()?;
     let told_apart = Share::of(Estimate::mean_of(compared.iter().map(|(_, told)| *told)));
-    let recorded = recorded.with(pairs.iter().map(|(own, _)| (*own).clone()).collect());
+    let recorded = recorded.only(|name| find(name).is_some());
     Ok(Comparison {
         descriptor: descriptor.name().into(),
         told_apart,
@@ -258,9 +251,10 @@ fn object(
     counted: Counted,
     settings: &Settings,
 ) -> Result<(ObjectComparison, Estimate)> {
-    let most = (MOST * recorded.touches.len()).max(1_000).min(simulated.touches.len());
-    let both = [&recorded.touches[..], &simulated.touches[..most]];
-    let told = told_apart(both, counted, settings)?;
+    let most = (MOST * recorded.len()).max(1_000).min(simulated.len());
+    let simulated = &first(simulated, most);
+    let told = told_apart([recorded, simulated], counted, settings)?;
+    let both = [recorded.touches(), simulated.touches()];
     let share = |pattern: ContactPattern| {
         both.map(|touches| {
             touches.iter().filter(|touch| touch.pattern() == pattern).count() as f64 / touches.len() as f64
@@ -280,6 +274,21 @@ fn object(
         features: features.collect(),
     };
     Ok((comparison, told))
+}
+
+/// The first touches of an object, equally many of each of its sources, as far as there are.
+fn first(object: &ObjectTouches, count: usize) -> ObjectTouches {
+    if count >= object.len() {
+        return object.clone();
+    }
+    let mut order: Vec<(usize, usize, usize)> = Vec::new();
+    for (source, touches) in object.by_source().into_iter().enumerate() {
+        order.extend(touches.into_iter().enumerate().map(|(rank, touch)| (rank, source, touch)));
+    }
+    order.sort_unstable();
+    let mut chosen: Vec<usize> = order.into_iter().take(count).map(|(.., touch)| touch).collect();
+    chosen.sort_unstable();
+    object.select(chosen)
 }
 
 /// The values of a feature where it is not missing, in order.
@@ -313,9 +322,8 @@ fn feature(name: &str, [recorded, simulated]: [Vec<f64>; 2]) -> Option<FeatureCo
 }
 
 /// How often trees tell touches of two samples apart that they were not trained on; the two samples weigh equally.
-fn told_apart([recorded, simulated]: [&[Touch]; 2], counted: Counted, settings: &Settings) -> Result<Estimate> {
-    let samples = [("recorded", recorded), ("simulated", simulated)]
-        .map(|(name, touches)| ObjectTouches { name: name.into(), touches: touches.to_vec() });
+fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, settings: &Settings) -> Result<Estimate> {
+    let samples = [("recorded", recorded), ("simulated", simulated)].map(|(name, object)| object.clone().renamed(name));
     let both = Dataset::new(samples.into());
     let recipe = train::Settings {
         descriptor: settings.descriptor,
@@ -338,7 +346,7 @@ fn told_apart([recorded, simulated]: [&[Touch]; 2], counted: Counted, settings: 
                 let margins = trees.margins(touch);
                 margins[class] > margins[1 - class]
             };
-            right[class] += object.touches.iter().filter(is_right).count();
+            right[class] += object.touches().iter().filter(is_right).count();
         }
     }
     let counts = [recorded.len(), simulated.len()];
@@ -354,8 +362,7 @@ fn cost(recorded: &Dataset, simulated: &Dataset, settings: &Settings, progress: 
     let recipe = train::Settings { descriptor: settings.descriptor, ..train::Settings::compact() };
     let model = train::train(&split.train, &recipe, progress)?;
     let names = recorded.names();
-    let tested = split.test.objects.into_iter().filter(|own| names.contains(&own.name)).collect();
-    let tested = simulated.with(tested);
+    let tested = split.test.only(|name| names.iter().any(|own| own == name));
     progress.begin("measuring", None);
     let accuracy = |dataset: &Dataset, at: &[usize]| -> Result<BTreeMap<usize, Estimate>> {
         let margins = Margins::new(Candidate::Full(&model), dataset)?;
@@ -400,15 +407,11 @@ fn needed(accuracy: &BTreeMap<usize, Estimate>, wanted: f64) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::error::Problem;
-    use crate::touches::noise::{Noise, noisy};
+    use crate::touches::noise::Noise;
     use crate::touches::synthetic;
 
     fn shifted(dataset: &Dataset, noise: &Noise) -> Dataset {
-        let one = |own: &ObjectTouches| ObjectTouches {
-            name: own.name.clone(),
-            touches: noise.add(&own.name, &own.touches, 3),
-        };
-        dataset.with(dataset.objects.iter().map(one).collect())
+        dataset.each(|own| own.noisy(noise, 3, 1))
     }
 
     fn quick() -> Settings {
@@ -453,10 +456,10 @@ mod tests {
         other.objects.iter_mut().for_each(|own| own.name += "-other");
         assert!(refused(&dataset, &other).contains("no object"));
         let mut few = dataset.clone();
-        few.objects[0].touches.truncate(LEAST - 1);
+        few.objects[0] = few.objects[0].select(0..LEAST - 1);
         assert!(refused(&few, &dataset).contains("29 touches"));
         let mut full = dataset.clone();
-        full.objects.iter_mut().for_each(|own| own.touches.retain(Touch::is_full));
+        full.objects.iter_mut().for_each(|own| *own = own.filtered(Touch::is_full));
         assert!(refused(&dataset, &full).contains("full touches only"));
         let compared = compare(&full, &dataset, &quick(), &()).unwrap();
         assert_eq!(compared.objects[0].patterns["all"], [1.0, 1.0], "partial ones are left out");
@@ -465,11 +468,8 @@ mod tests {
     #[test]
     fn one_object_is_compared_without_a_cost() {
         let dataset = synthetic::dataset(&[300, 300], 1);
-        let one = dataset.with(dataset.objects[..1].to_vec());
-        let noisy = dataset.with(vec![ObjectTouches {
-            name: dataset.objects[0].name.clone(),
-            touches: noisy("x", &dataset.objects[0].touches, 1_000.0, 1),
-        }]);
+        let one = dataset.only(|name| name == "object0");
+        let noisy = one.each(|own| own.noisy(&Noise::gaussian(1_000.0), 1, 1));
         assert_eq!(compare(&one, &noisy, &quick(), &()).unwrap().cost, None);
     }
 }

@@ -4,7 +4,7 @@ use super::{Candidate, Margins, add_noise};
 use crate::ensemble::train::{self, train};
 use crate::error::Result;
 use crate::touches::noise::Noise;
-use crate::touches::{Dataset, ObjectTouches, folds};
+use crate::touches::{Dataset, folds};
 use serde::Serialize;
 
 /// Touches after which accuracy is compared.
@@ -36,27 +36,24 @@ pub struct CostOfNoise {
 /// # Errors
 /// As [`train`](fn@train) and [`Margins::new`].
 pub fn cost_of_noise(dataset: &Dataset, settings: &train::Settings, noise: &Noise) -> Result<Option<CostOfNoise>> {
-    if dataset.objects.iter().any(|object| object.touches.len() < LEAST) {
+    if dataset.objects.iter().any(|object| object.len() < LEAST) {
         return Ok(None);
     }
     let split = folds::split(dataset, 0.2, settings.seed)?;
     let [train_part, mut test] = [(&split.train, MOST[0]), (&split.test, MOST[1])].map(|(part, most)| {
-        let first = |object: &ObjectTouches| ObjectTouches {
-            name: object.name.clone(),
-            touches: object.touches.iter().take(most).copied().collect(),
-        };
-        part.with(part.objects.iter().map(first).collect())
+        // In the order of a split, any stretch has the same share of each instance.
+        part.each(|object| object.select(0..most))
     });
     let clean = train::Settings { noise: Noise::default(), rounds: settings.rounds.min(ROUNDS), ..settings.clone() };
     let ensemble = train(&train_part, &clean, &())?;
-    let accuracy = |test: &Dataset, robots: usize| -> Result<f64> {
-        let margins = Margins::new(Candidate::Full(&ensemble), test)?.of_robots(robots);
+    let accuracy = |test: &Dataset| -> Result<f64> {
+        let margins = Margins::new(Candidate::Full(&ensemble), test)?;
         Ok(margins.curve(AT, GROUPS, settings.seed)?.accuracy(AT).value)
     };
-    let clean = accuracy(&test, 1)?;
+    let clean = accuracy(&test)?;
     // Another seed than that of noise in training.
-    let robots = add_noise(&mut test, noise, settings.seed.wrapping_add(1))?;
-    Ok(Some(CostOfNoise { touches: AT, clean, noisy: accuracy(&test, robots)? }))
+    add_noise(&mut test, noise, settings.seed.wrapping_add(1))?;
+    Ok(Some(CostOfNoise { touches: AT, clean, noisy: accuracy(&test)? }))
 }
 
 #[cfg(test)]

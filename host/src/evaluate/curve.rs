@@ -93,7 +93,8 @@ impl Margins<'_> {
         let touches = (0..self.tested.len()).map(|position| self.most_touches(position));
         match touches.zip(self.tested_names()).find(|(touches, _)| *touches < most) {
             Some((touches, name)) => {
-                let allowed = format!("fewer touches, or capture more: {name} has only {touches}");
+                let allowed =
+                    format!("fewer touches, or capture more: {name} has only {touches}{}", self.of_what(name));
                 Err(Error::setting("at", most, allowed))
             }
             None => Ok(()),

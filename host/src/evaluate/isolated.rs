@@ -14,7 +14,7 @@ pub(super) fn first_different_tree(
     model: &Model<'_>,
     reference: &Reference<'_>,
     ensemble: &Ensemble,
-    row: &[f32],
+    row: &[f64],
 ) -> Option<usize> {
     // Each leaf's values where the leaf is, so that those of one tree alone can be changed.
     let plain = compile::unshared(model).ok()?;
@@ -25,16 +25,18 @@ pub(super) fn first_different_tree(
     if order.len() != leaves.len() {
         return None;
     }
-    let encoded = crate::rows::Encoder::of(model).row(row);
+    let encoded = reference.encoder.row(row);
+    // Of shares of votes.
+    let scale = ensemble.prediction().scale;
     let mut different = order.iter().zip(&leaves).filter_map(|(&number, leaves)| {
         let tree = ensemble.trees.get(number)?;
         let bytes = isolated(model, &leaves.bytes);
         let own = reference::margins(&Model::new(&bytes).ok()?, &encoded);
-        let leaf = reference.leaf(tree, row, &encoded);
+        let leaf = reference.leaf(number, row, &encoded);
         // Half a unit of the tree's leaves, or nothing.
         let slack = match model.leaf_type() {
             LeafType::F32 => 0.0,
-            LeafType::I8 | LeafType::I16 => 0.501 * f64::from(model.unit()) * f64::from(leaves.shift).exp2(),
+            LeafType::I8 | LeafType::I16 => 0.501 * reference::unit(model) * f64::from(leaves.shift).exp2(),
         };
         let expected = |object: usize| match tree.output {
             Output::One(own) => {
@@ -46,7 +48,8 @@ pub(super) fn first_different_tree(
             }
             Output::Each => leaf[object],
         };
-        let differs = own.iter().enumerate().any(|(object, own)| (own - f64::from(expected(object))).abs() > slack);
+        let differs =
+            own.iter().enumerate().any(|(object, own)| (own - f64::from(expected(object) * scale)).abs() > slack);
         differs.then_some(number)
     });
     let first = different.next()?;

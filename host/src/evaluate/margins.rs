@@ -33,6 +33,8 @@ pub struct Margins<'m> {
     pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
     hold_approaches: bool,
+    /// Whether a real probe made the touches.
+    pub(super) is_recorded: bool,
     shares: [f64; 6],
     /// How often each object that the model knows is touched, if not as the model says.
     pub(super) weights: Option<Vec<u32>>,
@@ -49,14 +51,21 @@ pub(super) struct Tested<'m> {
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
     pub(super) approaches: Vec<Option<u32>>,
-    /// How many instances the object has, touched in turn.
-    instances: usize,
-    /// How many instances and robots there are together: touch i is of turn i modulo this, and so are groups.
-    pub(super) turns: usize,
-    /// For each turn the positions of its touches that are evidence, among all that are.
-    evidence: Vec<Vec<u32>>,
+    /// Of each source and robot one: group i, and sequence i, is of pool i modulo their number.
+    pub(super) pools: Vec<TestedPool>,
     /// Of the touches that are evidence.
     pub(super) values: Values<'m>,
+}
+
+/// Touches of one source, such as an instance, by one robot.
+pub(super) struct TestedPool {
+    /// Their positions in the data set.
+    pub(super) touches: Vec<u32>,
+    /// The positions of those that are evidence, among all that are.
+    evidence: Vec<u32>,
+    /// The fewest touches of a pool of this source, and the fewest that are evidence: as many are drawn from each.
+    fewest: usize,
+    fewest_evidence: usize,
 }
 
 /// Margins of touch after touch, one for each object that the model knows.
@@ -112,7 +121,7 @@ impl Candidate<'_> {
     /// The descriptor, if the data set's touches can be evidence; see [`Margins::new`].
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor> {
         let descriptor = self.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
-        let mut touches = dataset.objects.iter().flat_map(|object| &object.touches);
+        let mut touches = dataset.touches();
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
             return Err(EvaluateProblem::NoPose { descriptor }.into());
         }
@@ -137,7 +146,8 @@ impl Candidate<'_> {
 
 impl<'m> Margins<'m> {
     /// Computes the margins of all touches that are evidence to the model, on all threads; the others cost an approach
-    /// and change nothing. Every object of the data set must be known to the model; the
+    /// and change nothing. Every group and sequence that is drawn from them is of one source's touches, such as an
+    /// instance's, by one robot. Every object of the data set must be known to the model; the
     /// model may know more.
     ///
     /// # Errors
@@ -168,23 +178,22 @@ impl<'m> Margins<'m> {
         let trained = candidate.trained_touches();
         let tested = dataset.objects.iter().zip(indices).map(|(touched, &object)| {
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
-            let evidence: Vec<&Touch> = touched.touches.iter().filter(is_evidence).collect();
+            let evidence: Vec<&Touch> = touched.touches().iter().filter(is_evidence).collect();
             let mut position = 0..;
             let approach = |touch| if is_evidence(&touch) { position.next() } else { None };
+            let approaches: Vec<Option<u32>> = touched.touches().iter().map(approach).collect();
             Tested {
                 object,
                 touches: evidence.len(),
-                approaches: touched.touches.iter().map(approach).collect(),
-                instances: dataset.instances.get(&touched.name).copied().unwrap_or(1).max(1),
-                turns: 1,
-                evidence: Vec::new(),
+                pools: pools(touched, &approaches),
+                approaches,
                 values: values(candidate, descriptor, &evidence),
             }
         });
         let tested = tested.collect();
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
         let known = candidate.known_count();
-        let margins = Self {
+        Self {
             candidate,
             descriptor,
             objects,
@@ -192,22 +201,10 @@ impl<'m> Margins<'m> {
             tested,
             tested_names,
             hold_approaches,
+            is_recorded: dataset.is_recorded(),
             shares,
             weights: None,
-        };
-        margins.of_robots(1)
-    }
-
-    /// The same where `robots` robots made the touches of each object in turn (touch i by robot i modulo `robots`): every
-    /// group and sequence is then of one robot's touches, as it is of one of the object's instances. 0 means 1.
-    pub fn of_robots(mut self, robots: usize) -> Self {
-        for tested in &mut self.tested {
-            let turns = least_common_multiple(robots.max(1), tested.instances);
-            let of = |turn| tested.approaches.iter().skip(turn).step_by(turns).copied().flatten().collect();
-            tested.evidence = (0..turns).map(of).collect();
-            tested.turns = turns;
         }
-        self
     }
 
     /// The same for a recognizer that is told how often each object is touched, which replaces the model's priors
@@ -283,20 +280,25 @@ impl<'m> Margins<'m> {
         self.tested.iter().map(|tested| tested.approaches.len()).sum()
     }
 
-    /// The fewest approaches that one robot made of a tested object.
+    /// The fewest approaches that one robot made of a tested object, or of one of its instances or recordings.
     pub fn fewest_approaches(&self) -> usize {
         (0..self.tested.len()).map(|position| self.most_approaches(position)).min().unwrap_or(0)
     }
 
-    /// The most approaches that a group of a tested object can have.
+    /// The most approaches that every group of a tested object can have.
     pub(super) fn most_approaches(&self, position: usize) -> usize {
-        self.tested[position].approaches.len() / self.tested[position].turns
+        self.tested[position].pools.iter().map(|pool| pool.fewest).min().unwrap_or(0)
     }
 
-    /// What the `draw`-th approach of the robot of group `group` is to the model.
+    /// The most approaches that group `group` of a tested object can have.
+    pub(super) fn most_approaches_of(&self, position: usize, group: usize) -> usize {
+        self.tested[position].pool(group).fewest
+    }
+
+    /// What the `draw`-th approach of the pool of group `group` is to the model.
     pub(super) fn approach(&self, position: usize, group: usize, draw: usize) -> Option<u32> {
         let tested = &self.tested[position];
-        tested.approaches[draw * tested.turns + group % tested.turns]
+        tested.approaches[tested.pool(group).touches[draw] as usize]
     }
 
     /// The fewest touches that are evidence that a tested object has: the longest group that can be drawn from each.
@@ -304,9 +306,21 @@ impl<'m> Margins<'m> {
         (0..self.tested.len()).map(|position| self.most_touches(position)).min().unwrap_or(0)
     }
 
-    /// The most touches that a group of a tested object can have.
+    /// The most touches that every group of a tested object can have.
     pub(super) fn most_touches(&self, position: usize) -> usize {
-        self.tested[position].evidence.iter().map(Vec::len).min().unwrap_or(0)
+        self.tested[position].pools.iter().map(|pool| pool.fewest_evidence).min().unwrap_or(0)
+    }
+
+    /// What a group of this tested object is of, if not of all of its touches: for messages.
+    pub(super) fn of_what(&self, name: &str) -> &'static str {
+        let position = self.tested_names.iter().position(|tested| tested == name);
+        let pools = position.and_then(|position| self.tested.get(position)).map_or(1, |tested| tested.pools.len());
+        if pools > 1 { " of one instance or recording, by one robot" } else { "" }
+    }
+
+    /// The most touches that group `group` of a tested object can have.
+    pub(super) fn most_touches_of(&self, position: usize, group: usize) -> usize {
+        self.tested[position].pool(group).fewest_evidence
     }
 
     /// How many different groups of `touches` touches can be drawn from the object with the fewest, where that is below
@@ -358,15 +372,40 @@ impl<'m> Margins<'m> {
 
     /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
     pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> Vec<usize> {
-        let turn = group % self.tested[position].turns;
+        let pool = self.tested[position].pool(group);
         let group = u64::try_from(group).unwrap_or(u64::MAX);
         let mut random = random::generator(seed, Purpose::Groups, &self.tested_names[position], group);
-        let drawn = rand::seq::index::sample(&mut random, self.most_touches(position), count);
-        drawn.into_iter().map(|touch| self.tested[position].evidence[turn][touch] as usize).collect()
+        let drawn = rand::seq::index::sample(&mut random, pool.fewest_evidence, count);
+        drawn.into_iter().map(|touch| pool.evidence[touch] as usize).collect()
     }
 }
 
+/// The pools of an object's touches, of which `approaches` says which are evidence.
+fn pools(touched: &ObjectTouches, approaches: &[Option<u32>]) -> Vec<TestedPool> {
+    let pools = touched.pools();
+    let evidence = |touches: &[u32]| -> Vec<u32> {
+        touches.iter().filter_map(|&touch| approaches.get(touch as usize).copied().flatten()).collect()
+    };
+    let mut fewest = vec![[usize::MAX; 2]; touched.sources().len().max(1)];
+    let found: Vec<(Vec<u32>, usize, Vec<u32>)> =
+        pools.into_iter().map(|pool| (evidence(&pool.touches), pool.source, pool.touches)).collect();
+    for (evidence, source, touches) in &found {
+        let [all, used] = &mut fewest[*source];
+        (*all, *used) = ((*all).min(touches.len()), (*used).min(evidence.len()));
+    }
+    let tested = found.into_iter().map(|(evidence, source, touches)| {
+        let [fewest, fewest_evidence] = fewest[source];
+        TestedPool { touches, evidence, fewest, fewest_evidence }
+    });
+    tested.collect()
+}
+
 impl Tested<'_> {
+    /// The pool of group `group`.
+    pub(super) fn pool(&self, group: usize) -> &TestedPool {
+        &self.pools[group % self.pools.len()]
+    }
+
     /// Adds the margins of touch `touch` to `evidence`. Whole numbers stay exact: their sums are far below 2⁵³.
     pub(super) fn add(&self, touch: usize, evidence: &mut [f64]) {
         let row = row(touch, evidence.len());
@@ -379,15 +418,6 @@ impl Tested<'_> {
             }
         }
     }
-}
-
-/// The least common multiple of two positive numbers.
-pub(crate) fn least_common_multiple(a: usize, b: usize) -> usize {
-    let (mut divisor, mut rest) = (a, b);
-    while rest > 0 {
-        (divisor, rest) = (rest, divisor % rest);
-    }
-    a / divisor * b
 }
 
 /// Where the margins of touch `touch` stand.

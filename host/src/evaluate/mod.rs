@@ -49,6 +49,7 @@ mod noisy;
 pub mod parity;
 mod plan;
 mod poses;
+pub mod predict;
 mod promise;
 mod reference;
 mod rows;
@@ -69,12 +70,11 @@ pub use curve::{Confidence, Curve};
 pub use estimate::Estimate;
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
-pub(crate) use margins::least_common_multiple;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
 pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
 pub use poses::{ByPose, Stock};
-pub use promise::{PromiseCheck, by_theory};
+pub use promise::{Finding, PromiseCheck, by_theory};
 pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 #[cfg(feature = "cli")]
 pub(crate) use sequential::significant;

@@ -4,6 +4,7 @@ use crate::compile::CompiledModel;
 use crate::ensemble::{Ensemble, import};
 use crate::error::{Error, Result};
 use crate::evaluate::Candidate;
+use crate::touches::Dataset;
 use palpate_shared::format::MAGIC;
 use std::path::Path;
 
@@ -28,6 +29,14 @@ impl ModelFile {
             return CompiledModel::from_file(path, bytes).map(Self::Compiled);
         }
         import::read(path, &bytes, None).map(|ensemble| Self::Full(Box::new(ensemble)))
+    }
+
+    /// The objects whose touches in `dataset` the model was trained on, as far as it states that.
+    pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
+        match self {
+            Self::Full(ensemble) => ensemble.origin.trained_on(dataset),
+            Self::Compiled(compiled) => compiled.trained_on(dataset),
+        }
     }
 
     /// Calls `evaluate` with the model, ready to be evaluated.

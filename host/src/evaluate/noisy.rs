@@ -1,8 +1,8 @@
 //! Test touches with noise.
 
 use crate::error::Result;
-use crate::touches::Dataset;
 use crate::touches::noise::Noise;
+use crate::touches::{Dataset, ObjectTouches};
 
 /// The most robots whose biases are drawn.
 pub const ROBOTS: usize = 20;
@@ -10,21 +10,16 @@ pub const ROBOTS: usize = 20;
 /// The touches of each object that a robot makes at least, where there are enough.
 const LEAST: usize = 250;
 
-/// Adds noise to test touches and returns how many robots made them in turn, for
-/// [`Margins::of_robots`](super::Margins::of_robots): one, unless the noise has a bias. Touches that no noise changes stay
-/// as they are.
+/// Adds noise to test touches and returns how many robots made them in turn: one, unless the noise has a bias. Every group
+/// and sequence is then of one robot's touches. Touches that no noise changes stay as they are.
 ///
 /// # Errors
 /// As [`Noise::check`].
 pub fn add_noise(dataset: &mut Dataset, noise: &Noise, seed: u64) -> Result<usize> {
     noise.check()?;
-    let fewest = dataset.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
+    let fewest = dataset.objects.iter().map(ObjectTouches::len).min().unwrap_or(0);
     let robots = if noise.has_bias() { (fewest / LEAST).clamp(1, ROBOTS) } else { 1 };
-    if !noise.is_none() {
-        for object in &mut dataset.objects {
-            object.touches = noise.add_by_robots(&object.name, &object.touches, seed, robots);
-        }
-    }
+    dataset.add_noise(noise, seed, robots);
     Ok(robots)
 }
 
@@ -43,7 +38,7 @@ mod tests {
         let noise = Noise { speed_bias: 0.05, ..Noise::default() };
         let robots = add_noise(&mut dataset, &noise, 1).unwrap();
         assert_eq!(robots, 3);
-        let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap().of_robots(robots);
+        let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap();
         assert_eq!(margins.fewest_touches(), 253);
         for (position, touches) in [(0, 1_000), (1, 760)] {
             let mut seen = BTreeSet::new();
@@ -62,10 +57,14 @@ mod tests {
     fn every_group_is_of_one_instances_touches_and_one_robots() {
         let mut dataset = synthetic::dataset(&[1_000, 760], 1);
         let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
-        let name = dataset.objects[1].name.clone();
-        dataset.instances.insert(name, 4);
+        let names = ["a", "b", "c", "d"].map(String::from);
+        let object = &dataset.objects[1];
+        dataset.objects[1] = ObjectTouches::in_turn(object.name.clone(), object.touches().to_vec(), &names, 0);
+        let bias = Noise { pose_bias: 1.0, ..Noise::default() };
         for (robots, turns) in [(1, [1, 4]), (3, [3, 12]), (2, [2, 4])] {
-            let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap().of_robots(robots);
+            let mut of_robots = dataset.clone();
+            of_robots.add_noise(&bias, 1, robots);
+            let margins = Margins::new(Candidate::Full(&ensemble), &of_robots).unwrap();
             for (position, turns) in turns.into_iter().enumerate() {
                 for group in 0..30 {
                     let drawn = margins.draw(position, group, 20, 1);

@@ -7,7 +7,7 @@ use crate::ensemble::Ensemble;
 use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
-use crate::touches::Dataset;
+use crate::touches::{Dataset, ObjectTouches, Pool};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
 use rand::RngExt;
@@ -36,11 +36,11 @@ pub struct Parity {
 const CAPACITY: usize = 256;
 
 /// Compares a compiled model with its ensemble: on every touch of a data set, and on `sequences` sequences, each of
-/// touches drawn at random from one object's until there is a verdict. Both models stop by the compiled model's own rule.
+/// touches drawn at random from those of one object's source, such as an instance, until there is a verdict. Both models stop by the compiled model's own rule.
 ///
 /// # Errors
-/// [`EvaluateProblem`] when the two are not of the same objects and descriptor, or an object of the data set has no
-/// touches; [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`EvaluateProblem`] when the two are not of the same objects and descriptor, their margins differ by more than the model
+/// states (it was exported from another ensemble), or an object of the data set has no touches; [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn parity(
     ensemble: &Ensemble,
     model: &Model<'_>,
@@ -49,10 +49,10 @@ pub fn parity(
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Parity> {
-    if dataset.objects.is_empty() || dataset.objects.iter().any(|object| object.touches.is_empty()) {
+    if dataset.objects.is_empty() || dataset.objects.iter().any(ObjectTouches::is_empty) {
         return Err(EvaluateProblem::NoTouches.into());
     }
-    let touches: Vec<&Touch> = dataset.objects.iter().flat_map(|object| &object.touches).collect();
+    let touches: Vec<&Touch> = dataset.touches().collect();
     check(ensemble, model)?;
     let full = FullMargins::new(ensemble, &touches, progress)?;
     let compiled = margins_of_touches(model, &touches);
@@ -60,21 +60,24 @@ pub fn parity(
     let rows = compiled.par_chunks_exact(objects).enumerate();
     let margins = rows.map(|(index, compiled)| compare_margins(full.of(index), model, compiled));
     let Difference { max_margin_error, best_differs } = margins.reduce(Difference::default, Difference::worse);
+    let stated_bound = f64::from(model.margin_error());
+    if max_margin_error > stated_bound {
+        return Err(EvaluateProblem::NotExported { found: max_margin_error, stated: stated_bound }.into());
+    }
     // Sequences draw the same touches again and again: whether each is evidence, and its margins, are found once.
     let trained = model.trained_touches();
     let is_evidence: Vec<bool> = touches.iter().map(|touch| Refused::check(&trained, touch).is_ok()).collect();
-    let firsts: Vec<usize> = dataset
-        .objects
-        .iter()
-        .scan(0, |next, object| Some(std::mem::replace(next, *next + object.touches.len())))
-        .collect();
+    let firsts: Vec<usize> =
+        dataset.objects.iter().scan(0, |next, object| Some(std::mem::replace(next, *next + object.len()))).collect();
+    let pools: Vec<Vec<Pool>> = dataset.objects.iter().map(ObjectTouches::pools).collect();
     progress.begin("verdicts", Some(sequences as u64));
     let runs = (0..sequences).into_par_iter().map(|index| -> Result<_> {
         progress::advance(progress, 1)?;
         let mut rng = random::generator(seed, Purpose::Sequences, "", index as u64);
         let object = rng.random_range(0..dataset.objects.len());
+        let pool = &pools[object][index % pools[object].len()].touches;
         let draw = std::iter::repeat_with(|| {
-            let index = firsts[object] + rng.random_range(0..dataset.objects[object].touches.len());
+            let index = firsts[object] + pool[rng.random_range(0..pool.len())] as usize;
             is_evidence[index].then(|| (full.of(index), &compiled[row(index, objects)]))
         });
         compare_verdicts::<CAPACITY>(ensemble, model, draw)
@@ -83,7 +86,7 @@ pub fn parity(
     Ok(Parity {
         touches: touches.len(),
         max_margin_error,
-        stated_bound: f64::from(model.margin_error()),
+        stated_bound,
         best_differs,
         sequences,
         verdict_differs,
@@ -258,6 +261,23 @@ mod tests {
             let dataset = synthetic::dataset(counts, 1);
             assert_eq!(problem(parity(&ensemble, &model, &dataset, 10, 1, &())), EvaluateProblem::NoTouches);
         }
+    }
+
+    #[test]
+    fn an_ensemble_of_the_same_objects_that_the_model_was_not_exported_from_is_refused() {
+        let ensemble = ensemble();
+        let other = train(
+            &synthetic::dataset(&[200, 200, 200], 2),
+            &train::Settings { rounds: 5, depth: 3, ..train::Settings::compact() },
+            &(),
+        );
+        let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+        let model = compile::open(&bytes).unwrap();
+        let dataset = synthetic::dataset(&[50, 50, 50], 3);
+        let error = parity(&other.unwrap(), &model, &dataset, 10, 1, &()).unwrap_err();
+        assert!(error.to_string().contains("not exported from this ensemble: margins differ by up to"), "{error}");
+        assert_eq!(error.exit_code(), 1);
+        assert!(parity(&ensemble, &model, &dataset, 10, 1, &()).is_ok());
     }
 
     #[test]

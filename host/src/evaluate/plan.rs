@@ -43,8 +43,8 @@ pub struct Hardest {
     pub separation: f64,
 }
 
-/// Adds a plan to a compiled model, from a data set of approaches with pose to all of its objects, misses included. A plan
-/// that is there is replaced.
+/// Adds a plan to a compiled model, from a data set of approaches with pose to all objects that it knows, misses included. A
+/// plan that is there is replaced. Of a background, which is never named, no approach says anything.
 ///
 /// For each pose and each two objects the separation is 1 − the mean of e^(−evidence/2) over the approaches to one object,
 /// evidence being for it against the other; the smaller of both orders. Unlike the mean evidence it counts what an
@@ -57,20 +57,25 @@ pub struct Hardest {
 /// a pose.
 pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> {
     let poses = Poses::with_rolls(rolls).ok_or_else(|| Error::setting("rolls", rolls, "1, 2 or 4"))?;
-    if model.object_count() < 2 {
+    if model.known_count() < 2 {
         return Err(EvaluateProblem::OneObjectToPlan.into());
     }
     if !dataset.holds_approaches() {
         return Err(EvaluateProblem::NoApproaches.into());
     }
     let margins = Margins::new(Candidate::Compiled(model), dataset)?;
-    let tested: Vec<usize> = (0..model.object_count())
+    let tested: Vec<usize> = (0..model.known_count())
         .map(|object| {
             let missing = || EvaluateProblem::NoneOf { object: model.object_name(object).into() };
             margins.tested.iter().position(|tested| tested.object == object).ok_or_else(missing)
         })
         .collect::<Result<_, _>>()?;
-    let by_pose = tested.iter().map(|&position| ByPose::new(&dataset.objects[position], poses, 0, 1));
+    let by_pose = tested.iter().map(|&position| {
+        let object = &dataset.objects[position];
+        // A separation is of single approaches: those of all instances count.
+        let all: Vec<u32> = (0_u32..).take(object.len()).collect();
+        ByPose::new(object, poses, &all)
+    });
     let by_pose: Vec<ByPose> = by_pose.collect::<Result<_>>()?;
     let may_touch = may_touch(dataset, poses);
     let fewest = fewest(&by_pose, &may_touch)?;
@@ -81,6 +86,12 @@ pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> 
     let mut hardest: Option<(f64, [usize; 2])> = None;
     for high in 0..objects {
         for low in 0..high {
+            if high >= tested.len() {
+                let none =
+                    may_touch.iter().map(|&may_touch| if may_touch { 0 } else { Plan::UNTOUCHED.cast_unsigned() });
+                content.extend(none);
+                continue;
+            }
             let separation = |pose: usize| {
                 // In either order; what is compared is of the touched object against the other.
                 1.0 - overlaps[low][pose * objects + high].max(overlaps[high][pose * objects + low])
@@ -119,7 +130,7 @@ fn stored(separation: f64) -> i8 {
 /// For each pose whether any approach to any object touched anything.
 fn may_touch(dataset: &Dataset, poses: Poses) -> Vec<bool> {
     let mut may_touch = vec![false; poses.count().into()];
-    for touch in dataset.objects.iter().flat_map(|object| &object.touches) {
+    for touch in dataset.touches() {
         if let (Some(pose), true) = (touch.pose(), touch.pattern() != ContactPattern::None) {
             may_touch[usize::from(poses.number_of(&pose))] = true;
         }
@@ -176,19 +187,22 @@ mod tests {
 
     /// One nat for the first object below a curvature of 50 ms, one for the second above. Misses are no evidence.
     fn model() -> Vec<u8> {
+        compile(&ensemble(), &compile::Settings::default()).unwrap().bytes
+    }
+
+    fn ensemble() -> Ensemble {
         let nodes = vec![
             Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 },
             Node::Leaf(vec![0.5, -0.5]),
             Node::Leaf(vec![-0.5, 0.5]),
         ];
-        let ensemble = Ensemble {
+        Ensemble {
             inputs: Descriptor::Curvature.into(),
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
             origin: Origin::default(),
-        };
-        compile(&ensemble, &compile::Settings::default()).unwrap().bytes
+        }
     }
 
     /// What `touch` says for each direction, 20 times each.
@@ -199,7 +213,7 @@ mod tests {
             let each = |(pose, index)| touch(object, pose, index).with_pose(poses.pose(pose).unwrap());
             (0..26).flat_map(of).map(each).collect()
         };
-        let object = |(index, name): (usize, &str)| ObjectTouches { name: name.into(), touches: all(index) };
+        let object = |(index, name): (usize, &str)| ObjectTouches::new(name, all(index), touches::Source::Object);
         let objects = ["bowl", "fork"].into_iter().enumerate().map(object).collect();
         let origin = touches::Origin { approaches: true, pose: true, ..touches::Origin::default() };
         Dataset { origin: Some(origin), ..Dataset::new(objects) }
@@ -268,6 +282,37 @@ mod tests {
     }
 
     #[test]
+    fn a_model_with_a_background_gets_a_plan_of_the_objects_that_it_knows() {
+        let touched = |object, pose, _: usize| if pose == 5 && object == 1 { bent() } else { flat() };
+        let (bytes, dataset) = (model(), dataset(touched));
+        let alone = plan(&Model::new(&bytes).unwrap(), &dataset, 1).unwrap();
+        let mut with_background = ensemble();
+        with_background.objects.push(crate::mesh::BACKGROUND.into());
+        with_background.base_margins.push(0.0);
+        with_background.origin.background = true;
+        for node in with_background.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
+            if let Node::Leaf(values) = node {
+                // Ahead of both objects.
+                values.push(2.0);
+            }
+        }
+        let bytes = compile(&with_background, &compile::Settings::default()).unwrap().bytes;
+        let planned = plan(&Model::new(&bytes).unwrap(), &dataset, 1).unwrap();
+        assert_eq!((&planned.hardest.objects, planned.fewest), (&alone.hardest.objects, alone.fewest));
+        // Leaves are rounded in other units.
+        assert!((planned.hardest.separation - alone.hardest.separation).abs() < 1e-3);
+        let models = [&alone.bytes, &planned.bytes].map(|bytes| Model::new(bytes).unwrap());
+        let [own, other] = models.each_ref().map(|model| model.plan().unwrap().separations(0, 1));
+        assert!(own.iter().zip(other).all(|(own, other)| own.cast_signed().abs_diff(other.cast_signed()) <= 1));
+        let proposed = models.each_ref().map(|model| {
+            let mut recognizer = Recognizer::<3>::new(model, Stopping::from_model(model)).unwrap();
+            recognizer.push(&flat()).unwrap();
+            recognizer.next_approach(0..26).map(|best| best.pose)
+        });
+        assert_eq!(proposed, [Some(5); 2], "also where the background has the most evidence");
+    }
+
+    #[test]
     fn what_no_plan_can_be_made_of_is_refused_by_name() {
         let bytes = model();
         let model = Model::new(&bytes).unwrap();
@@ -283,20 +328,19 @@ mod tests {
         };
         assert!(plan(&model, &good, 1).is_ok());
         assert_eq!(refused(&|_| {}, 3).exit_code(), 2);
-        let few = refused(&|dataset| _ = dataset.objects[1].touches.pop(), 1);
+        let few = refused(&|dataset| dataset.objects[1].edit(|touches| _ = touches.pop()), 1);
         let expected = EvaluateProblem::FewInPose { object: "fork".into(), found: 19, needed: LEAST_IN_POSE };
         assert_eq!(problem(few), expected);
         let full = refused(&|dataset| dataset.origin.as_mut().unwrap().approaches = false, 1);
         assert_eq!(problem(full), EvaluateProblem::NoApproaches);
         let one = refused(&|dataset| dataset.objects.truncate(1), 1);
         assert_eq!(problem(one), EvaluateProblem::NoneOf { object: "fork".into() });
-        let no_pose = refused(&|dataset| dataset.objects[1].touches[9] = flat(), 1);
+        let no_pose = refused(&|dataset| dataset.objects[1].edit(|touches| touches[9] = flat()), 1);
         assert_eq!(problem(no_pose), EvaluateProblem::NoPoseOf { object: "fork".into() });
         let missed = refused(
             &|dataset| {
-                for touch in dataset.objects.iter_mut().flat_map(|object| &mut object.touches) {
-                    *touch = super::tests::missed().with_pose(touch.pose().unwrap());
-                }
+                let missed = |touch: &Touch| super::tests::missed().with_pose(touch.pose().unwrap());
+                *dataset = dataset.each(|object| object.changed(missed));
             },
             1,
         );

@@ -16,13 +16,15 @@ pub struct ByPose {
 }
 
 impl ByPose {
-    /// The approaches to an object of one turn of `turns`, such as robots: number i is of turn i modulo `turns`.
+    /// Some approaches to an object, by their positions, such as those of one robot to one of its instances.
     ///
     /// # Errors
     /// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
-    pub fn new(touched: &ObjectTouches, poses: Poses, turn: usize, turns: usize) -> Result<Self> {
+    pub fn new(touched: &ObjectTouches, poses: Poses, approaches_of: &[u32]) -> Result<Self> {
         let mut approaches = vec![Vec::new(); poses.count().into()];
-        for (number, touch) in (0_u32..).zip(&touched.touches).skip(turn).step_by(turns.max(1)) {
+        let touches =
+            approaches_of.iter().filter_map(|&number| Some((number, touched.touches().get(number as usize)?)));
+        for (number, touch) in touches {
             let no_pose = || EvaluateProblem::NoPoseOf { object: touched.name.clone() };
             let pose = poses.number_of(&touch.pose().ok_or_else(no_pose)?);
             approaches[usize::from(pose)].push(number);
@@ -82,6 +84,7 @@ impl Stock<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::touches::Source;
     use palpate_shared::Touch;
     use std::collections::BTreeSet;
 
@@ -89,13 +92,14 @@ mod tests {
     fn touched() -> ObjectTouches {
         let poses = Poses::with_rolls(1).unwrap();
         let touch = |number: u16| Touch::from_micros([0, 1, 2]).with_pose(poses.pose(number / 2 % 26).unwrap());
-        ObjectTouches { name: "cup".into(), touches: (0..520).map(touch).collect() }
+        ObjectTouches::new("cup", (0..520).map(touch).collect(), Source::Object)
     }
 
     #[test]
     fn every_approach_of_a_pose_is_drawn_once_whatever_else_is_drawn() {
         let poses = Poses::with_rolls(1).unwrap();
-        let by_pose = ByPose::new(&touched(), poses, 1, 2).unwrap();
+        let odd: Vec<u32> = (1..520).step_by(2).collect();
+        let by_pose = ByPose::new(&touched(), poses, &odd).unwrap();
         assert!((0..26).all(|pose| by_pose.count(pose) == 10));
         let mut stock = by_pose.stock(3, 1);
         let drawn: Vec<u32> = std::iter::from_fn(|| stock.draw(7)).collect();
@@ -111,10 +115,10 @@ mod tests {
 
     #[test]
     fn touches_without_a_pose_are_refused() {
-        let mut touched = touched();
-        touched.touches[5] = Touch::from_micros([0, 1, 2]);
-        let error = ByPose::new(&touched, Poses::with_rolls(1).unwrap(), 1, 2).unwrap_err().to_string();
+        let fifth = touched().touches()[5];
+        let touched = touched().changed(|touch| if *touch == fifth { Touch::from_micros([0, 1, 2]) } else { *touch });
+        let error = ByPose::new(&touched, Poses::with_rolls(1).unwrap(), &[3, 4, 5]).unwrap_err().to_string();
         assert!(error.contains("cup"), "{error}");
-        assert!(ByPose::new(&touched, Poses::with_rolls(1).unwrap(), 0, 2).is_ok());
+        assert!(ByPose::new(&touched, Poses::with_rolls(1).unwrap(), &[0, 2, 6]).is_ok());
     }
 }

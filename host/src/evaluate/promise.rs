@@ -5,9 +5,27 @@ use super::margins::{Candidate, Margins};
 use super::sequential::Outcome;
 use crate::touches::noise::Noise;
 use palpate_onboard::{Model, Stopping};
-use palpate_shared::format::Per;
+use palpate_shared::format::{Counted, Per};
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+/// Whether a promise is kept on test touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Finding {
+    /// The measured error rate is at most the promised one.
+    Kept,
+    /// It is above, but if the promise were just kept, more errors than these would be no surprise: their probability is
+    /// at least 1 % (binomial; divided by the number of names or objects, of which the worst is looked at).
+    Unclear,
+    /// It is above by more than that.
+    Broken,
+    /// No name was given.
+    Untested,
+}
+
+/// The probability of errors that a promise just kept is taken to be able to make.
+const BY_CHANCE: f64 = 0.01;
 
 /// Whether a model keeps its promise on test touches. Shares are of the names that are given; a sequence that ends
 /// undecided counts as neither right nor wrong.
@@ -29,7 +47,9 @@ pub struct PromiseCheck {
     pub of: Option<String>,
     /// By how much [`PromiseCheck::error`] is above the promised rate; negative below it.
     pub exceeded_by: f64,
-    /// What differs from the calibration: with any of these the promise is void.
+    /// Whether that is more than chance.
+    pub finding: Finding,
+    /// What differs from the calibration: with any of these the promise was made for other touches, and is void for these.
     pub void: Vec<String>,
     /// What the error rate is at most by theory, whatever the priors and the objects, if posteriors can be believed: which
     /// they cannot with other noise than the calibration's.
@@ -48,14 +68,36 @@ impl Margins<'_> {
     ) -> Option<PromiseCheck> {
         let Candidate::Compiled(model) = self.candidate else { return None };
         let promise = model.promise()?;
-        let (error, of) = match promise.per {
-            Per::Average => (self.wrong_of(outcomes, |_, _| true), None),
-            Per::Name => largest(self.wrong_by_name(outcomes)),
-            Per::Object => largest(self.wrong_by_object(outcomes)),
+        let named = |(name, wrong): (&String, &Wrong)| (Some(name.clone()), *wrong);
+        let found: Vec<(Option<String>, Wrong)> = match promise.per {
+            Per::Average => vec![(None, self.wrong_of(outcomes, |_, _| true))],
+            Per::Name => self.wrong_of_names(outcomes).iter().map(named).collect(),
+            Per::Object => self.wrong_of_objects(outcomes).iter().map(named).collect(),
         };
+        let finding = Wrong::finding(found.iter().map(|(_, wrong)| wrong), promise.rate);
+        let worst = found.into_iter().max_by(|(_, a), (_, b)| a.share().total_cmp(&b.share()));
+        let (of, error) = worst.map_or((None, Wrong::default().estimate()), |(of, wrong)| (of, wrong.estimate()));
         let mut void = Vec::new();
-        if promise.noise != noise.promised() {
-            void.push(format!("promised with {}, tested with {noise}", Noise::of_promise(&promise.noise)));
+        let simulated = Noise::of_promise(&promise.noise);
+        // Without noise they may have been recorded then, too.
+        if self.is_recorded && noise.is_none() && !simulated.is_none() {
+            void.push(format!(
+                "promised for simulated touches with {simulated}, tested on recorded ones, which have the noise of their \
+                 probe"
+            ));
+        } else if promise.noise != noise.promised() {
+            let on = if self.is_recorded { "on recorded touches with more noise:" } else { "with" };
+            void.push(format!("promised with {simulated}, tested {on} {noise}"));
+        }
+        // A model that waits for full touches gets no other ones, whatever the data set holds.
+        let takes_others = model.trained_touches().counted != Counted::Full;
+        if takes_others && promise.approaches != self.hold_approaches() {
+            let what = |approaches| if approaches { "every approach" } else { "full touches only" };
+            void.push(format!("promised for {}, tested on {}", what(promise.approaches), what(self.hold_approaches())));
+        }
+        let known = self.candidate.known_count();
+        if self.tested.len() < known {
+            void.push(format!("promised for all {known} objects of the model, tested on {}", self.tested.len()));
         }
         if promise.active != active {
             let how = |active| if active { "as the plan proposes" } else { "at random" };
@@ -77,52 +119,126 @@ impl Margins<'_> {
             standard_error: error.standard_error,
             of,
             exceeded_by: error.value - promise.rate,
+            finding,
             void,
             by_theory: (promise.noise == noise.promised()).then(|| by_theory(model)),
         })
     }
 
     /// The share of wrong names among those given of each name that is given.
-    pub(super) fn wrong_by_name(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Estimate> {
-        let estimate = |object: usize| self.wrong_of(outcomes, |_, named| named == object);
+    pub(super) fn wrong_by_name(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, f64> {
+        self.wrong_of_names(outcomes).into_iter().map(|(name, wrong)| (name, wrong.share())).collect()
+    }
+
+    /// The share of wrong names among those given to each object that got one.
+    pub(super) fn wrong_by_object(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, f64> {
+        self.wrong_of_objects(outcomes).into_iter().map(|(name, wrong)| (name, wrong.share())).collect()
+    }
+
+    /// The share of wrong names among all that are given.
+    pub(super) fn wrong_of_given(&self, outcomes: &[Vec<Outcome>]) -> Estimate {
+        self.wrong_of(outcomes, |_, _| true).estimate()
+    }
+
+    /// The objects whose names are wrong more often than `rate`, by more than chance.
+    pub(super) fn objects_above(&self, outcomes: &[Vec<Outcome>], rate: f64) -> Vec<String> {
+        let objects = self.wrong_of_objects(outcomes);
+        let is_above = |wrong: &Wrong| Wrong::finding_of(*wrong, rate, objects.len()) == Finding::Broken;
+        objects.iter().filter(|(_, wrong)| is_above(wrong)).map(|(name, _)| name.clone()).collect()
+    }
+
+    fn wrong_of_names(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Wrong> {
+        let wrong = |object: usize| self.wrong_of(outcomes, |_, named| named == object);
         let names = self.objects().iter().cloned().enumerate();
-        names.map(|(object, name)| (name, estimate(object))).filter(|(_, of)| of.value.is_finite()).collect()
+        names.map(|(object, name)| (name, wrong(object))).filter(|(_, of)| of.given > 0.0).collect()
     }
 
-    fn wrong_by_object(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Estimate> {
-        let estimate = |position: usize| self.wrong_of(outcomes, |touched, _| touched == position);
+    fn wrong_of_objects(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Wrong> {
+        let wrong = |position: usize| self.wrong_of(outcomes, |touched, _| touched == position);
         let names = self.tested_names().iter().cloned().enumerate();
-        names.map(|(position, name)| (name, estimate(position))).filter(|(_, of)| of.value.is_finite()).collect()
+        names.map(|(position, name)| (name, wrong(position))).filter(|(_, of)| of.given > 0.0).collect()
     }
 
-    /// The share of wrong names among those given that `counts` (tested object's position, named object), each tested
-    /// object weighted by its frequency; not a number if there are none.
-    fn wrong_of(&self, outcomes: &[Vec<Outcome>], counts: impl Fn(usize, usize) -> bool) -> Estimate {
-        let (mut given, mut wrong, mut spread, mut number) = (0.0, 0.0, 0.0, 0.0);
+    /// What is wrong of the names given that `counts` (tested object's position, named object), each tested object weighted
+    /// by its frequency.
+    fn wrong_of(&self, outcomes: &[Vec<Outcome>], counts: impl Fn(usize, usize) -> bool) -> Wrong {
+        let mut of = Wrong::default();
         for (position, outcomes) in outcomes.iter().enumerate() {
             let weight = self.frequency(position);
             let names = outcomes.iter().filter_map(|outcome| outcome.recognized);
             for name in names.filter(|&name| counts(position, name)) {
-                given += weight;
-                spread += weight * weight;
-                number += 1.0;
-                wrong += if name == self.tested[position].object { 0.0 } else { weight };
+                of.given += weight;
+                of.spread += weight * weight;
+                of.wrong += if name == self.tested[position].object { 0.0 } else { weight };
             }
         }
-        // As many names of equal weight as say as much.
-        let effective = if spread > 0.0 { given * given / spread } else { number };
-        let value = wrong / given;
-        Estimate { value, standard_error: (value * (1.0 - value) / effective).sqrt() }
+        of
     }
 }
 
-/// The largest estimate, and whose it is.
-fn largest(of: BTreeMap<String, Estimate>) -> (Estimate, Option<String>) {
-    let largest = of.into_iter().max_by(|(_, a), (_, b)| a.value.total_cmp(&b.value));
-    match largest {
-        Some((name, estimate)) => (estimate, Some(name)),
-        None => (Estimate { value: f64::NAN, standard_error: f64::NAN }, None),
+/// Names that are given, each with a weight.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wrong {
+    given: f64,
+    wrong: f64,
+    /// The sum of the weights' squares.
+    spread: f64,
+}
+
+impl Wrong {
+    /// The share of wrong names; not a number if none is given.
+    fn share(&self) -> f64 {
+        self.wrong / self.given
     }
+
+    /// As many names of equal weight as say as much.
+    fn effective(&self) -> f64 {
+        if self.spread > 0.0 { self.given * self.given / self.spread } else { 0.0 }
+    }
+
+    fn estimate(self) -> Estimate {
+        let value = self.share();
+        Estimate { value, standard_error: (value * (1.0 - value) / self.effective()).sqrt() }
+    }
+
+    /// Whether each of these is at most `rate`.
+    fn finding<'w>(all: impl Iterator<Item = &'w Self> + Clone, rate: f64) -> Finding {
+        let number = all.clone().count();
+        let each = || all.clone().map(|wrong| Self::finding_of(*wrong, rate, number));
+        match () {
+            () if all.clone().all(|wrong| wrong.given <= 0.0) => Finding::Untested,
+            () if each().any(|finding| finding == Finding::Broken) => Finding::Broken,
+            () if each().any(|finding| finding == Finding::Unclear) => Finding::Unclear,
+            () => Finding::Kept,
+        }
+    }
+
+    /// The same for one of `number` that are looked at.
+    fn finding_of(self, rate: f64, number: usize) -> Finding {
+        if self.given <= 0.0 {
+            return Finding::Untested;
+        }
+        if self.share() <= rate {
+            return Finding::Kept;
+        }
+        let trials = self.effective().round().max(1.0);
+        let errors = (self.share() * trials).round().max(1.0);
+        let chance = at_least(errors, trials, rate);
+        if chance < BY_CHANCE / number.max(1) as f64 { Finding::Broken } else { Finding::Unclear }
+    }
+}
+
+/// The probability of at least `errors`, of which there is at least one, in `trials` at a rate: the binomial upper tail.
+fn at_least(errors: f64, trials: f64, rate: f64) -> f64 {
+    let ln_choose = libm::lgamma(trials + 1.0) - libm::lgamma(errors + 1.0) - libm::lgamma(trials - errors + 1.0);
+    let mut term = (ln_choose + errors * rate.ln() + (trials - errors) * (1.0 - rate).ln()).exp();
+    let (mut tail, mut count) = (term, errors);
+    while count < trials && term > 1e-12 * tail {
+        term *= (trials - count) / (count + 1.0) * rate / (1.0 - rate);
+        tail += term;
+        count += 1.0;
+    }
+    tail.min(1.0)
 }
 
 /// What the error rate of a model's thresholds is at most by theory, with any priors and of any of its objects: one less
@@ -140,4 +256,39 @@ pub fn by_theory(model: &Model<'_>) -> f64 {
     let others = objects.saturating_sub(1).max(1) as f64;
     let margin = (-odds.ln() - (temperature - 1.0) * others.ln()) / temperature;
     1.0 / (1.0 + margin.exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_promise_is_broken_only_by_more_errors_than_chance_makes() {
+        let of = |wrong: f64, given: f64| Wrong { given, wrong, spread: given };
+        for (wrong, given, expected) in [
+            (0.0, 0.0, Finding::Untested),
+            (0.0, 10.0, Finding::Kept),
+            (20.0, 1_000.0, Finding::Kept),
+            // 1.3 standard errors above 2 %.
+            (26.0, 1_000.0, Finding::Unclear),
+            (40.0, 1_000.0, Finding::Broken),
+            // One error of three names is rare at 2 %, and no proof.
+            (1.0, 3.0, Finding::Unclear),
+            (3.0, 3.0, Finding::Broken),
+        ] {
+            assert_eq!(of(wrong, given).finding_of(0.02, 1), expected, "{wrong} of {given}");
+        }
+        // The worst of many is further up by chance: the probability of 36 errors is .0006.
+        assert_eq!(
+            (of(36.0, 1_000.0).finding_of(0.02, 1), of(36.0, 1_000.0).finding_of(0.02, 40)),
+            (Finding::Broken, Finding::Unclear)
+        );
+        // 1 - .98^100, and .98^100 · (1 + 100 · .02 / .98) left out of it.
+        assert!((at_least(1.0, 100.0, 0.02) - 0.867_380).abs() < 1e-6);
+        assert!((at_least(2.0, 100.0, 0.02) - 0.596_729).abs() < 1e-5);
+        let all = [of(0.0, 100.0), of(40.0, 1_000.0), of(0.0, 0.0)];
+        assert_eq!(Wrong::finding(all.iter(), 0.02), Finding::Broken);
+        assert_eq!(Wrong::finding(all[..1].iter(), 0.02), Finding::Kept);
+        assert_eq!(Wrong::finding(all[2..].iter(), 0.02), Finding::Untested);
+    }
 }

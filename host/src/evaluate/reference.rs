@@ -3,64 +3,94 @@
 use crate::ensemble::{Ensemble, Node, Output, Tree};
 use crate::rows::Encoder;
 use palpate_onboard::Model;
-use palpate_shared::format::LeafType;
+use palpate_shared::MISSING_FEATURE;
+use palpate_shared::format::{LeafType, Sentinel};
 
-/// The ensemble as a model compares: values as they are, or as whole numbers of the features' units.
+/// The ensemble as a model compares: values as f32, or as whole numbers of the features' units.
 pub(super) struct Reference<'a> {
     pub(super) ensemble: &'a Ensemble,
     pub(super) encoder: Encoder,
+    /// The features that stand for a missing value in the model.
+    pub(super) sentinel: Option<Sentinel>,
 }
 
-impl Reference<'_> {
+impl<'a> Reference<'a> {
+    /// The ensemble as `model` compares.
+    pub(super) fn new(ensemble: &'a Ensemble, model: &Model<'_>) -> Self {
+        Self { ensemble, encoder: Encoder::of(model), sentinel: model.sentinel() }
+    }
+
+    /// Whether the first of two classes has what the second one's leaves of 1, as in a vote.
+    pub(super) fn is_share(&self) -> bool {
+        self.ensemble.trees.iter().any(|tree| tree.output != Output::One(1))
+    }
+
     /// The margins of what the model gets.
-    pub(super) fn margins(&self, row: &[f32], encoded: &[i32]) -> Vec<f32> {
-        let Encoder::Scaled(scales) = &self.encoder else { return self.ensemble.margins_of_features(row) };
-        let mut margins = self.ensemble.base_margins.clone();
-        for tree in &self.ensemble.trees {
-            let leaf = scaled_leaf(tree, encoded, scales);
-            match tree.output {
-                Output::One(object) => margins[object] += leaf[0],
-                Output::Each => margins.iter_mut().zip(leaf).for_each(|(margin, value)| *margin += value),
-            }
-        }
-        margins
-    }
-
-    /// The leaf of a tree that a row reaches.
-    pub(super) fn leaf<'t>(&self, tree: &'t Tree, row: &[f32], encoded: &[i32]) -> &'t [f32] {
+    pub(super) fn margins(&self, row: &[f64], encoded: &[i32]) -> Vec<f32> {
         match &self.encoder {
-            Encoder::Real => tree.leaf(row),
-            Encoder::Scaled(scales) => scaled_leaf(tree, encoded, scales),
+            Encoder::Real => self.ensemble.margins_of_features(&singles(row)),
+            Encoder::Scaled(scales) => {
+                self.ensemble.margins_of_leaves(|number, tree| self.scaled_leaf(number, tree, encoded, scales))
+            }
         }
     }
-}
 
-/// The leaf that whole numbers reach: left if the number is below the threshold in the feature's units.
-fn scaled_leaf<'t>(tree: &'t Tree, encoded: &[i32], scales: &[f32]) -> &'t [f32] {
-    let mut index = 0;
-    loop {
-        match &tree.nodes[index] {
-            Node::Leaf(values) => return values,
-            Node::Split { feature, threshold, missing_left, left, right } => {
-                let goes_left = match encoded[*feature] {
-                    palpate_shared::MISSING_FEATURE => *missing_left,
-                    number => f64::from(number) < f64::from(*threshold) * f64::from(scales[*feature]),
-                };
-                index = if goes_left { *left } else { *right };
+    /// The leaf of a tree, given by its number, that a row reaches.
+    pub(super) fn leaf(&self, number: usize, row: &[f64], encoded: &[i32]) -> &'a [f32] {
+        let tree = &self.ensemble.trees[number];
+        match &self.encoder {
+            Encoder::Real => tree.leaf(&self.ensemble.known_features(&singles(row))),
+            Encoder::Scaled(scales) => self.scaled_leaf(number, tree, encoded, scales),
+        }
+    }
+
+    /// The leaf that whole numbers reach: left if the number is below the threshold in the feature's units.
+    fn scaled_leaf<'t>(&self, number: usize, tree: &'t Tree, encoded: &[i32], scales: &[f32]) -> &'t [f32] {
+        let mut index = 0;
+        loop {
+            match &tree.nodes[index] {
+                Node::Leaf(values) => return values,
+                Node::Split { feature, missing_left, left, right, .. } => {
+                    let value = encoded[*feature];
+                    let value = self.sentinel.map_or(value, |sentinel| sentinel.or_missing(value));
+                    let threshold = self.ensemble.threshold(number, index);
+                    let goes_left = match (value, threshold) {
+                        (MISSING_FEATURE, _) | (_, None) => *missing_left,
+                        (value, Some(threshold)) => f64::from(value) < threshold.units(scales[*feature]),
+                    };
+                    index = if goes_left { *left } else { *right };
+                }
             }
         }
     }
 }
 
-/// A model's margins in nats: the trainer's own f32, if the model adds those.
+fn singles(row: &[f64]) -> Vec<f32> {
+    row.iter().map(|&value| value as f32).collect()
+}
+
+/// A model's margins as the library has them: in nats, the trainer's own f32 if the model adds those, times the scale that
+/// the model states.
 pub fn margins(model: &Model<'_>, encoded: &[i32]) -> Vec<f64> {
     let objects = model.object_count();
     if model.leaf_type() == LeafType::F32 {
         let mut margins = vec![0.0_f32; objects];
         model.f32_margins_of(encoded, &mut margins);
-        return margins.into_iter().map(f64::from).collect();
+        let scale = model.prediction().scale;
+        return margins.into_iter().map(|margin| f64::from(margin * scale)).collect();
     }
+    let unit = unit(model);
     let mut margins = vec![0; objects];
     model.margins_of(encoded, &mut margins);
-    margins.into_iter().map(|margin| f64::from(margin) * f64::from(model.unit())).collect()
+    margins.into_iter().map(|margin| f64::from(margin) * unit).collect()
+}
+
+/// What one unit of a margin is to the library, in nats: the model's unit times the scale that it states.
+pub fn unit(model: &Model<'_>) -> f64 {
+    f64::from(model.unit()) * f64::from(model.prediction().scale)
+}
+
+/// The farthest that a margin can be from the library's own.
+pub fn bound(model: &Model<'_>) -> f64 {
+    f64::from(model.margin_error()) * f64::from(model.prediction().scale)
 }

@@ -2,11 +2,9 @@
 
 use super::Candidate;
 use super::estimate::Estimate;
-use super::margins::best;
-use super::together::margins_of_rows;
+use super::predict::{Predicted, predict};
 use crate::error::{Result, RowsProblem};
-use crate::rows::{Encoder, Rows};
-use rayon::prelude::*;
+use crate::rows::Rows;
 use std::collections::BTreeMap;
 
 /// What a model makes of labeled rows.
@@ -25,7 +23,7 @@ pub struct RowsEvaluation {
 /// What a model of classes comes to, each row taken alone.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Classes {
-    /// Share of the rows whose class has the largest margin.
+    /// Share of the rows whose class is the predicted one.
     pub accuracy: f64,
     /// Its standard error.
     pub accuracy_standard_error: f64,
@@ -37,7 +35,7 @@ pub struct Classes {
     pub confusion: Vec<Vec<usize>>,
 }
 
-/// How far a regression is off: its margins as they are, before any transformation that the library makes of them.
+/// How far a regression is off: its values after the inverse link, as the library predicts them.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Regression {
     /// The mean of the absolute differences.
@@ -62,45 +60,38 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
         let missing = "features".into();
         return Err(RowsProblem::Columns { found: rows.features, wanted: features, missing }.into());
     }
-    let all: Vec<Vec<f64>> = match candidate {
-        Candidate::Full(ensemble) => rows
-            .values
-            .par_chunks_exact(features)
-            .map(|row| ensemble.margins_of_features(row).into_iter().map(f64::from).collect())
-            .collect(),
-        Candidate::Compiled(model) => {
-            let margins = margins_of_rows(model, &Encoder::of(model), &rows.values);
-            margins.chunks_exact(names.len()).map(<[f64]>::to_vec).collect()
-        }
-    };
+    let predicted = predict(candidate, &rows.values, rows.features, false)?;
     let label = |row: usize| rows.labels.get(row).map_or("", String::as_str);
     let wrong = |row: usize, known: &[String]| RowsProblem::Label {
         label: label(row).into(),
         row: row + 1,
         known: known.to_vec(),
     };
-    if names.len() == 1 {
-        let (mut absolute, mut squares) = (0.0, 0.0);
-        for (row, margins) in all.iter().enumerate() {
-            let truth: f64 = label(row).parse().map_err(|_| wrong(row, &["numbers".into()]))?;
-            let difference = margins[0] - truth;
-            absolute += difference.abs();
-            squares += difference * difference;
+    let classes = match predicted {
+        Predicted::Classes(classes) => classes,
+        Predicted::Values(values) => {
+            let (mut absolute, mut squares) = (0.0, 0.0);
+            for (row, &value) in values.iter().enumerate() {
+                let truth: f64 = label(row).parse().map_err(|_| wrong(row, &["numbers".into()]))?;
+                let difference = f64::from(value) - truth;
+                absolute += difference.abs();
+                squares += difference * difference;
+            }
+            let count = values.len() as f64;
+            let regression =
+                Regression { mean_absolute_error: absolute / count, root_mean_square_error: (squares / count).sqrt() };
+            return Ok(RowsEvaluation { rows: values.len(), classes: None, regression: Some(regression) });
         }
-        let count = all.len() as f64;
-        let regression =
-            Regression { mean_absolute_error: absolute / count, root_mean_square_error: (squares / count).sqrt() };
-        return Ok(RowsEvaluation { rows: all.len(), classes: None, regression: Some(regression) });
-    }
+    };
     let mut confusion = vec![vec![0; names.len()]; names.len()];
-    for (row, margins) in all.iter().enumerate() {
+    for (row, &class) in classes.iter().enumerate() {
         let by_name = names.iter().position(|name| name == label(row));
         let by_number = || label(row).parse().ok().filter(|number| *number < names.len());
         let truth = by_name.or_else(by_number).ok_or_else(|| wrong(row, &names))?;
-        confusion[truth][best(margins)] += 1;
+        confusion[truth][class] += 1;
     }
     let right: usize = (0..names.len()).map(|class| confusion[class][class]).sum();
-    let accuracy = Estimate::share(right, all.len());
+    let accuracy = Estimate::share(right, rows.len());
     let of_class = |(class, name): (usize, &String)| {
         let count: usize = confusion[class].iter().sum();
         (count > 0).then(|| (name.clone(), confusion[class][class] as f64 / count as f64))
@@ -108,5 +99,5 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
     let per_class = names.iter().enumerate().filter_map(of_class).collect();
     let (accuracy, accuracy_standard_error) = (accuracy.value, accuracy.standard_error);
     let classes = Classes { accuracy, accuracy_standard_error, per_class, names, confusion };
-    Ok(RowsEvaluation { rows: all.len(), classes: Some(classes), regression: None })
+    Ok(RowsEvaluation { rows: rows.len(), classes: Some(classes), regression: None })
 }

@@ -56,6 +56,12 @@ pub struct Sequential {
     pub error_per_object: BTreeMap<String, f64>,
     /// Share of sequences without a verdict, for each object.
     pub undecided_per_object: BTreeMap<String, f64>,
+    /// Share of wrong names among those given; not a number if there are none.
+    pub error_of_given: f64,
+    /// The same of those given to each object; without objects that never got a name.
+    pub error_of_given_per_object: BTreeMap<String, f64>,
+    /// Objects of whose names more are wrong than [`Sequential::error_rate`], by more than chance.
+    pub above: Vec<String>,
     /// Share of wrong names among those given of each name; without names that were never given.
     pub error_per_name: BTreeMap<String, f64>,
     /// For each tested object, how it went for every sequence.
@@ -117,7 +123,10 @@ impl Margins<'_> {
             per_object: touches.per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
-            error_per_name: self.wrong_by_name(&outcomes).into_iter().map(|(name, of)| (name, of.value)).collect(),
+            error_of_given: self.wrong_of_given(&outcomes).value,
+            error_of_given_per_object: self.wrong_by_object(&outcomes),
+            above: self.objects_above(&outcomes, error_rate),
+            error_per_name: self.wrong_by_name(&outcomes),
             outcomes,
         }
     }
@@ -164,8 +173,9 @@ impl Margins<'_> {
     }
 
     fn outcomes(&self, position: usize, stopping: Stopping, sequences: usize, seed: u64) -> Vec<Outcome> {
-        let limit = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX).min(self.most_touches(position));
+        let most = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX);
         let run = |sequence| {
+            let limit = most.min(self.most_touches_of(position, sequence));
             let touches = self.draw(position, sequence, limit, seed).into_iter();
             // A position is below the number of a file's lines.
             self.outcome(position, stopping, touches.map(|touch| u32::try_from(touch).ok()))

@@ -1,6 +1,6 @@
 //! Objects that a model does not know.
 
-use super::margins::Margins;
+use super::margins::{Candidate, Margins};
 use super::sequential::{Outcome, Sequential, SequentialSettings};
 use crate::error::Result;
 use serde::Serialize;
@@ -13,6 +13,8 @@ pub const DETECTED_BY: [usize; 3] = [30, 60, 120];
 /// evidence; each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Strangers {
+    /// Whether the model has a test of fit; without one nothing is ever found out.
+    pub has_test: bool,
     /// Share of the known objects' sequences that ended as unknown.
     pub false_alarms: f64,
     /// By numbers of touches, the share of the strangers' sequences whose verdict was unknown by then.
@@ -51,7 +53,12 @@ pub fn strangers(
     };
     let named = strangers.wrong(&found.outcomes);
     let alarms = known.0.unknown(&known.1.outcomes);
+    let has_test = match strangers.candidate {
+        Candidate::Compiled(model) => model.strangers().is_some_and(|strangers| strangers.test.is_some()),
+        Candidate::Full(_) => false,
+    };
     Ok(Strangers {
+        has_test,
         false_alarms: alarms.all.value,
         detected: DETECTED_BY.map(|at| (at, mean_by(at))).into(),
         wrong_name: named.all.value,

@@ -142,7 +142,7 @@ impl Margins<'_> {
 
     /// The margins of a tested object's approaches in the order of a group; none where one is no evidence.
     fn rows(&self, position: usize, group: usize, seed: u64) -> impl Iterator<Item = Option<&[i32]>> {
-        let draws = self.draws(self.most_approaches(position), position, group, seed);
+        let draws = self.draws(self.most_approaches_of(position, group), position, group, seed);
         draws.map(move |draw| {
             let touch = self.approach(position, group, draw)?;
             match &self.tested[position].values {

@@ -47,7 +47,7 @@ fn accuracy_after_one_touch_is_what_counting_touches_gives() {
             let m = ensemble.margins(touch);
             (0..3).all(|other| other == position || m[other] < m[position])
         };
-        let share = object.touches.iter().filter(right).count() as f64 / object.touches.len() as f64;
+        let share = object.touches().iter().filter(right).count() as f64 / object.len() as f64;
         let estimate = curve.object_accuracy(position, 1);
         // Five standard errors: drawn 20,000 times with the same seed, it cannot fail by chance later.
         assert!((estimate.value - share).abs() < 5.0 * (0.25 / groups as f64).sqrt(), "{estimate:?} {share}");
@@ -112,7 +112,7 @@ fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
             let mut recognizer = Recognizer::<3>::new(&model, Stopping::new(0.01, 40).unwrap()).unwrap();
             let mut verdict = Verdict::Undecided;
             for touch in margins.draw(position, sequence, 40, 1) {
-                verdict = recognizer.push(&touches.objects[position].touches[touch]).unwrap();
+                verdict = recognizer.push(&touches.objects[position].touches()[touch]).unwrap();
                 if verdict != Verdict::Undecided {
                     break;
                 }
@@ -228,11 +228,12 @@ fn what_cannot_be_evaluated_says_so() {
 fn with_missing_contacts(dataset: &Dataset, one_in: usize) -> Dataset {
     let mut dataset = dataset.clone();
     for object in &mut dataset.objects {
-        object.touches.retain(Touch::is_full);
-        for touch in object.touches.iter_mut().enumerate().filter(|(index, _)| index % one_in != 0).map(|(_, t)| t) {
+        let mut index = 0..;
+        *object = object.filtered(Touch::is_full).changed(|touch| {
             let [first, second, _] = touch.times();
-            *touch = Touch::new([first, second, palpate_shared::ContactTime::MISSING]);
-        }
+            let partial = Touch::new([first, second, palpate_shared::ContactTime::MISSING]);
+            if index.next().is_some_and(|index| index % one_in != 0) { partial } else { *touch }
+        });
     }
     dataset
 }
@@ -244,7 +245,7 @@ fn touches_that_a_model_does_not_use_cost_an_approach_and_change_nothing() {
     let bytes = compiled(&ensemble);
     let model = Model::new(&bytes).unwrap();
     let approaches = with_missing_contacts(&synthetic::dataset(&[3_000; 3], 2), 4);
-    let full: Vec<_> = approaches.objects.iter().map(|o| o.touches.iter().filter(|t| t.is_full()).count()).collect();
+    let full: Vec<_> = approaches.objects.iter().map(|o| o.touches().iter().filter(|t| t.is_full()).count()).collect();
     for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
         let margins = Margins::new(candidate, &approaches).unwrap();
         assert_eq!(margins.touch_count(), full.iter().sum::<usize>());
@@ -273,7 +274,7 @@ fn a_dead_finger_ends_undecided_where_a_model_knows_full_touches_only() {
     let model = Model::new(&bytes).unwrap();
     let dead = with_missing_contacts(&test_touches(), usize::MAX);
     let mut dead = dead;
-    dead.objects.iter_mut().for_each(|object| _ = object.touches.remove(0));
+    dead.objects.iter_mut().for_each(|object| *object = object.select(1..object.len()));
     let margins = Margins::new(Candidate::Compiled(&model), &dead).unwrap();
     assert_eq!(margins.touch_count(), 0);
     let evaluation = evaluate(&margins, &Settings { at: Vec::new(), ..quick() }).unwrap();

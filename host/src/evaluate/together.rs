@@ -67,9 +67,15 @@ impl Together {
         self.units = units;
     }
 
-    /// The margins of rows of features in nats, the trainer's own f32 if the model adds those: one row for each row of
+    /// The margins of rows of features as the library has them (see [`verify::margins`](super::verify::margins)): one row for each row of
     /// `values`, which has as many as the model has features. `margins` is as long as that.
-    pub fn rows(&mut self, model: &Model<'_>, encoder: &Encoder, values: &[f32], margins: &mut [f64]) {
+    pub fn rows<V: Copy + Into<f64>>(
+        &mut self,
+        model: &Model<'_>,
+        encoder: &Encoder,
+        values: &[V],
+        margins: &mut [f64],
+    ) {
         let values = values.chunks_exact(model.feature_count());
         if values.len() < FEW {
             let margins = margins.chunks_exact_mut(model.object_count());
@@ -84,7 +90,8 @@ impl Together {
         let is_whole = if model.leaf_type() == LeafType::F32 {
             self.exact.resize(margins.len(), 0.0);
             let is_whole = model.f32_margins_of_rows(&self.features, &mut self.exact, batch);
-            margins.iter_mut().zip(&self.exact).for_each(|(margin, exact)| *margin = f64::from(*exact));
+            let scale = model.prediction().scale;
+            margins.iter_mut().zip(&self.exact).for_each(|(margin, exact)| *margin = f64::from(*exact * scale));
             is_whole
         } else {
             self.units.resize(margins.len(), 0);
@@ -97,7 +104,7 @@ impl Together {
 }
 
 fn in_nats(model: &Model<'_>, units: &[i32], margins: &mut [f64]) {
-    let unit = f64::from(model.unit());
+    let unit = reference::unit(model);
     margins.iter_mut().zip(units).for_each(|(margin, units)| *margin = f64::from(*units) * unit);
 }
 
@@ -111,7 +118,7 @@ pub fn margins_of_touches<T: Borrow<Touch> + Sync>(model: &Model<'_>, touches: &
 }
 
 /// The margins of rows of features in nats (see [`Together::rows`]), one row for each, on all threads.
-pub fn margins_of_rows(model: &Model<'_>, encoder: &Encoder, values: &[f32]) -> Vec<f64> {
+pub fn margins_of_rows<V: Copy + Into<f64> + Sync>(model: &Model<'_>, encoder: &Encoder, values: &[V]) -> Vec<f64> {
     let (objects, width) = (model.object_count(), model.feature_count());
     let mut margins = vec![0.0; values.len() / width * objects];
     let tasks = margins.par_chunks_mut(AT_ONCE * objects).zip(values.par_chunks(AT_ONCE * width));

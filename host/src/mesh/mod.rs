@@ -38,6 +38,7 @@ pub mod builtin;
 #[path = "no_builtin.rs"]
 mod builtin;
 mod collada;
+mod exact;
 pub mod facts;
 pub mod file;
 mod gltf;

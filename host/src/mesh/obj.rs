@@ -5,6 +5,7 @@
 
 use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::Mesh;
+use crate::mesh::exact::{Bounds, Moved, rounded};
 use crate::mesh::polygon::Cutter;
 use crate::mesh::words::{coordinate, number, shown};
 use std::fs::File;
@@ -16,7 +17,9 @@ pub(super) const KEYWORDS: [&[u8]; 11] =
     [b"v", b"vn", b"vt", b"vp", b"f", b"o", b"g", b"s", b"l", b"mtllib", b"usemtl"];
 
 /// Reads the mesh of an OBJ file: all its objects and groups together, polygons cut into triangles, without faces that
-/// are a single point. Coordinates stay in the units of the file.
+/// are a single point. Coordinates stay in the units of the file; those of a mesh that is far from the origin (its center
+/// more than 16 times its longest side) count from its center, since f32 would damage it:
+/// [`file::read`](super::file::read) says so.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line when a vertex is not three finite numbers
@@ -34,6 +37,11 @@ pub fn read(path: &Path) -> Result<Mesh> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
+    parse_moved(text, path).map(|(mesh, _)| mesh)
+}
+
+/// The same, with what was subtracted from the coordinates.
+pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
     let mut filter = FacesOnly::new(text, path);
     let loaded = tobj::load_obj_buf(&mut filter, &tobj::LoadOptions::default(), |_| Ok(Default::default()));
     if let Some(error) = filter.error.take() {
@@ -42,16 +50,17 @@ pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
     filter.check_indices()?;
     let unusable = |problem| Error::at(Place::file(path), problem);
     let (models, _) = loaded.map_err(|error| unusable(MeshProblem::Unreadable { reason: error.to_string() }))?;
+    let offset = Bounds::of(models.iter().flat_map(|model| model.mesh.positions.as_chunks().0).copied()).offset();
     let mut mesh = Mesh::default();
     for model in models {
-        append(&mut mesh, model.mesh);
+        append(&mut mesh, model.mesh, offset);
     }
-    mesh.usable().map_err(unusable)
+    Ok((mesh.usable().map_err(unusable)?, offset))
 }
 
-fn append(mesh: &mut Mesh, part: tobj::Mesh) {
+fn append(mesh: &mut Mesh, part: tobj::Mesh, offset: [f64; 3]) {
     let base = mesh.vertices.len() as u32;
-    mesh.vertices.extend_from_slice(part.positions.as_chunks().0);
+    mesh.vertices.extend(part.positions.as_chunks().0.iter().map(|&vertex| rounded(vertex, offset)));
     if part.face_arities.is_empty() {
         let faces = part.indices.as_chunks().0;
         mesh.triangles.extend(faces.iter().map(|face: &[u32; 3]| face.map(|index| base + index)));

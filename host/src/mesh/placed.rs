@@ -1,6 +1,7 @@
 //! Meshes that a file places by transforms, some of them several times: what the readers of scenes share.
 
 use super::Mesh;
+use super::exact::Moved;
 use crate::error::MeshProblem;
 use glam::{DAffine3, DVec3};
 
@@ -8,7 +9,8 @@ use glam::{DAffine3, DVec3};
 /// kilobytes could place meshes a trillion times.
 #[derive(Debug)]
 pub(super) struct Placed {
-    mesh: Mesh,
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
     /// The most bytes that vertices and triangles may take.
     limit: u64,
 }
@@ -17,13 +19,13 @@ impl Placed {
     /// An empty scene of a file of `length` bytes. With the growth of vectors, its mesh, and one that is to be placed, take
     /// less than 192 bytes for each byte of the file and 768 KB.
     pub(super) fn new(length: u64) -> Self {
-        Self { mesh: Mesh::default(), limit: (3 << 16) + 48 * length }
+        Self { vertices: Vec::new(), triangles: Vec::new(), limit: (3 << 16) + 48 * length }
     }
 
     /// Refuses a mesh of so many vertices and triangles that the scene would become too large.
     pub(super) fn check(&self, vertices: usize, triangles: usize) -> Result<(), MeshProblem> {
-        let Mesh { vertices: own, triangles: all } = &self.mesh;
-        let bytes = 12 * (own.len() as u64 + all.len() as u64 + vertices as u64 + triangles as u64);
+        let sum = |own: usize, more: usize| own as u64 + more as u64;
+        let bytes = 24 * sum(self.vertices.len(), vertices) + 12 * sum(self.triangles.len(), triangles);
         if bytes > self.limit { Err(MeshProblem::TooLarge { limit: self.limit }) } else { Ok(()) }
     }
 
@@ -39,14 +41,13 @@ impl Placed {
         transform: &DAffine3,
     ) -> Result<(), MeshProblem> {
         self.check(vertices.len(), triangles.len())?;
-        let Mesh { vertices: own, triangles: all } = &mut self.mesh;
+        let Self { vertices: own, triangles: all, .. } = self;
         let base = u32::try_from(own.len()).map_err(|_| MeshProblem::TooManyVertices)?;
         u32::try_from(own.len() + vertices.len()).map_err(|_| MeshProblem::TooManyVertices)?;
         for vertex in vertices {
             // As it stands where nothing moves it, every bit.
-            let place =
-                if *transform == DAffine3::IDENTITY { vertex } else { transform.transform_point3(vertex) }.as_vec3();
-            for (axis, value) in ['x', 'y', 'z'].into_iter().zip(place.to_array()) {
+            let place = if *transform == DAffine3::IDENTITY { vertex } else { transform.transform_point3(vertex) };
+            for (axis, value) in ['x', 'y', 'z'].into_iter().zip(place.as_vec3().to_array()) {
                 if !value.is_finite() {
                     return Err(MeshProblem::NotFinite { axis, text: value.to_string() });
                 }
@@ -62,7 +63,8 @@ impl Placed {
     ///
     /// # Errors
     /// As [`Mesh::usable`].
-    pub(super) fn into_mesh(self) -> Result<Mesh, MeshProblem> {
-        self.mesh.usable()
+    pub(super) fn into_mesh(self) -> Result<Moved, MeshProblem> {
+        let (mesh, moved) = Mesh::from_f64(&self.vertices, self.triangles);
+        Ok((mesh.usable()?, moved))
     }
 }

@@ -23,6 +23,16 @@ impl Mesh {
         corners.map(|v| [v, v]).reduce(|[low, high], [v, _]| [low.min(v), high.max(v)]).unwrap_or([Vec3::ZERO; 2])
     }
 
+    /// A checksum (CRC-64 XZ) of vertices and triangles: which mesh was touched, whatever files it was read from.
+    pub fn checksum(&self) -> u64 {
+        const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
+        let mut digest = CRC.digest();
+        digest.update(&(self.vertices.len() as u64).to_le_bytes());
+        self.vertices.iter().flatten().for_each(|coordinate| digest.update(&coordinate.to_bits().to_le_bytes()));
+        self.triangles.iter().flatten().for_each(|index| digest.update(&index.to_le_bytes()));
+        digest.finalize()
+    }
+
     /// The mesh with vertices at the same place merged into one, without the triangles that thereby lose a corner. Files
     /// often repeat a vertex for each triangle; merged, neighbors share their edges.
     ///

@@ -8,9 +8,9 @@ pub(super) fn number<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
 }
 
 /// A coordinate: a number within the range of an `f32`.
-pub(super) fn coordinate(word: &[u8], axis: char) -> Result<f32, MeshProblem> {
-    let value: f32 = number(word).ok_or_else(|| MeshProblem::NotANumber { text: shown(word) })?;
-    if value.is_finite() { Ok(value) } else { Err(MeshProblem::NotFinite { axis, text: shown(word) }) }
+pub(super) fn coordinate(word: &[u8], axis: char) -> Result<f64, MeshProblem> {
+    let value: f64 = number(word).ok_or_else(|| MeshProblem::NotANumber { text: shown(word) })?;
+    if (value as f32).is_finite() { Ok(value) } else { Err(MeshProblem::NotFinite { axis, text: shown(word) }) }
 }
 
 /// A word of the file for an error message: its first 40 bytes.

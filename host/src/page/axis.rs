@@ -13,6 +13,8 @@ pub(crate) struct Axis {
     pub(crate) ticks: Vec<(f64, String)>,
     /// Whether lines are drawn across the chart at the ticks.
     pub(crate) grid: bool,
+    /// Whether ticks are names, of which none may be left out.
+    pub(crate) is_names: bool,
 }
 
 impl Axis {
@@ -24,7 +26,7 @@ impl Axis {
         let first = (low / step - 1e-9).ceil() as i64;
         let last = (high / step + 1e-9).floor() as i64;
         let ticks = (first..=last).map(|k| k as f64 * step).map(|value| (value, number(value, decimals))).collect();
-        Self { low, high, logarithmic: false, ticks, grid: true }
+        Self { low, high, logarithmic: false, ticks, grid: true, is_names: false }
     }
 
     /// From `low` to `high`, both positive, logarithmic, with ticks at 1, 2 and 5 times the powers of ten, or at the
@@ -51,7 +53,7 @@ impl Axis {
                 }
             }
         }
-        Self { low, high, logarithmic: true, ticks, grid: true }
+        Self { low, high, logarithmic: true, ticks, grid: true, is_names: false }
     }
 
     /// From 0 to 1, written as percentages.
@@ -72,7 +74,7 @@ impl Axis {
     pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let ticks: Vec<(f64, String)> =
             names.into_iter().enumerate().map(|(index, name)| (index as f64 + 0.5, name.to_string())).collect();
-        Self { low: 0.0, high: ticks.len().max(1) as f64, logarithmic: false, ticks, grid: false }
+        Self { low: 0.0, high: ticks.len().max(1) as f64, logarithmic: false, ticks, grid: false, is_names: true }
     }
 
     /// The same upside down, or right to left.
@@ -93,13 +95,8 @@ impl Axis {
         self
     }
 
-    /// The longest tick's text, in characters.
-    pub(crate) fn longest(&self) -> usize {
-        self.ticks.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0)
-    }
-
     /// Where `value` lies: 0 at the low end, 1 at the high end; clamped to the chart's surroundings.
-    fn place(&self, value: f64) -> f64 {
+    pub(crate) fn place(&self, value: f64) -> f64 {
         let place = if self.logarithmic {
             (value.max(f64::MIN_POSITIVE) / self.low).ln() / (self.high / self.low).ln()
         } else {

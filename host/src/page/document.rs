@@ -45,7 +45,7 @@ impl Figure {
             let (x, y) = (width * (index % columns), height * (index / columns));
             text += &panel.text.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1);
         }
-        Svg { text: text + "</svg>\n", width: whole_width, height: whole_height }
+        Svg { text: text + "</svg>\n", width: whole_width, height: whole_height, narrow: None }
     }
 }
 
@@ -54,6 +54,8 @@ impl Figure {
 pub(crate) enum Block {
     /// A paragraph.
     Text(String),
+    /// A paragraph about what may make the figures wrong.
+    Warning(String),
     /// A figure.
     Figure(Figure),
     /// A table.
@@ -95,6 +97,12 @@ impl Section {
     /// Adds a paragraph.
     pub(crate) fn text(&mut self, text: impl Into<String>) -> &mut Self {
         self.blocks.push(Block::Text(text.into()));
+        self
+    }
+
+    /// Adds a paragraph about what may make the figures wrong.
+    pub(crate) fn warning(&mut self, text: impl Into<String>) -> &mut Self {
+        self.blocks.push(Block::Warning(text.into()));
         self
     }
 
@@ -197,26 +205,23 @@ impl Page {
 
     fn block(&self, block: &Block) -> Markup {
         match block {
-            Block::Text(text) => html! { p { (text) } },
+            Block::Text(text) => html! { p { (marked(text)) } },
+            Block::Warning(text) => html! { p.warning { strong { "Warning: " } (marked(text)) } },
             Block::Link(file, text) => html! { p { a href=(file) { (text) } } },
             Block::Figure(figure) => html! {
                 figure id=(figure.id) {
                     h3 { (figure.title) }
                     div.panels {
-                        @for panel in &figure.panels {
-                            div.panel.wide[panel.width > 400] style={ "--width:" (panel.width) "px" } role="img" aria-label=(figure.title) {
-                                (PreEscaped(&panel.text))
-                            }
-                        }
+                        @for panel in &figure.panels { (drawing(panel, &figure.title)) }
                     }
-                    figcaption { (figure.caption) (self.origin(&figure.id, &figure.command, true)) }
+                    figcaption { (marked(&figure.caption)) (self.origin(&figure.id, &figure.command, true)) }
                 }
             },
             Block::Table(table) => html! {
                 figure.table id=(table.id) {
                     h3 { (table.title) }
-                    (rows(&table.data))
-                    figcaption { (table.caption) (self.origin(&table.id, &table.command, false)) }
+                    (rows(&table.data, &table.title))
+                    figcaption { (marked(&table.caption)) (self.origin(&table.id, &table.command, false)) }
                 }
             },
             Block::Pictures(pictures) => html! {
@@ -246,13 +251,37 @@ impl Page {
     }
 }
 
-fn rows(data: &Records) -> Markup {
+/// A drawing, and beside it the same for a phone, of which the style shows one.
+fn drawing(panel: &Svg, title: &str) -> Markup {
+    html! {
+        div.panel.wide[panel.width > 400] style={ "--width:" (panel.width) "px" } role="img" aria-label=(title) {
+            @match &panel.narrow {
+                None => (PreEscaped(&panel.text)),
+                Some(narrow) => {
+                    div.natural { (PreEscaped(&panel.text)) }
+                    div.narrow { (PreEscaped(narrow)) }
+                }
+            }
+        }
+    }
+}
+
+/// Text of which what stands between backticks is code.
+fn marked(text: &str) -> Markup {
+    html! {
+        @for (index, part) in text.split('`').enumerate() {
+            @if index % 2 == 1 { code { (part) } } @else { (part) }
+        }
+    }
+}
+
+fn rows(data: &Records, title: &str) -> Markup {
     // A column reads as numbers if none of its cells is words.
     let numeric: Vec<bool> = (0..data.columns.len())
         .map(|column| !data.rows.iter().any(|row| matches!(row[column], Cell::Text(_))))
         .collect();
     html! {
-        div.scroll {
+        div.scroll tabindex="0" role="region" aria-label=(title) {
             table {
                 thead {
                     tr { @for (name, numeric) in data.columns.iter().zip(&numeric) {
@@ -286,7 +315,7 @@ mod tests {
         section.table(Table {
             id: "t".into(),
             title: "T".into(),
-            caption: "C".into(),
+            caption: "See `palpate calibrate <model>`.".into(),
             command: "palpate report a b".into(),
             data,
         });
@@ -305,6 +334,7 @@ mod tests {
             "data-value=\"2\"",
             "href=\"t.csv\"",
             "palpate report a b",
+            "See <code>palpate calibrate &lt;model&gt;</code>.",
         ] {
             assert!(html.contains(part), "{part}");
         }
@@ -315,7 +345,8 @@ mod tests {
 
     #[test]
     fn panels_are_tiled_into_one_drawing() {
-        let panel = Svg { text: "<svg width=\"500\" height=\"100\"></svg>\n".into(), width: 500, height: 100 };
+        let text = "<svg width=\"500\" height=\"100\"></svg>\n".into();
+        let panel = Svg { text, width: 500, height: 100, narrow: None };
         let figure = Figure {
             id: "f".into(),
             title: String::new(),

@@ -42,7 +42,7 @@ fn the_approaches_of_a_round_are_the_samples_of_a_capture_with_its_seed_and_nois
     let scene = std::slice::from_ref(game.scene(0).unwrap());
     let captured = capture::touches(scene, "disc", &origin, 0..200).unwrap();
     let mut round = game.round(0, 7).unwrap();
-    for (index, captured) in (0..).zip(captured) {
+    for (index, captured) in (0..).zip(captured.touches().iter().copied()) {
         let approached = game.touch_at_random(&mut round);
         assert_eq!(approached.exact, captured);
         assert_eq!(noise.add("disc", &[captured], (7 << 32) + index), [approached.touch]);

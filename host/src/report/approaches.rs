@@ -16,7 +16,7 @@ use crate::page::table::{Cell, Records, Table};
 use crate::probe::approach::Probe;
 use crate::probe::scene::Scene;
 use crate::progress;
-use crate::touches::{Dataset, ObjectTouches, Origin};
+use crate::touches::{Dataset, Origin};
 use crate::tune::probe::{median_length, scaled_probe};
 use palpate_shared::ContactPattern;
 use palpate_shared::format::{Counted, Length};
@@ -122,7 +122,7 @@ pub(super) fn measure(context: &Context) -> Result<ByApproach> {
         sizes = Some(if is_true { [here, there] } else { [there, here] });
         true_probe = Some(if is_true { origin.probe } else { settings.capture.probe });
     }
-    let shares = test.objects.iter().map(|object| shares(&object.touches)).collect();
+    let shares = test.objects.iter().map(|object| shares(object.touches())).collect();
     Ok(ByApproach { shares, ways, aimed, sizes, true_probe })
 }
 
@@ -132,8 +132,7 @@ pub(super) fn approaches(context: &Context, scenes: &[Vec<Scene>], origin: &Orig
     let touched = |samples: Range<u64>| -> Result<Dataset> {
         let of = |(object, scenes): (&Object, &Vec<Scene>)| {
             progress::check(context.progress)?;
-            let touches = capture::touches(scenes, &object.name, origin, samples.clone())?;
-            Ok(ObjectTouches { name: object.name.clone(), touches })
+            capture::touches(scenes, &object.name, origin, samples.clone())
         };
         let objects = context.objects.iter().zip(scenes).map(of).collect::<Result<_>>()?;
         Ok(Dataset { origin: Some(origin.clone()), ..Dataset::new(objects) })
@@ -155,17 +154,18 @@ fn way(context: &Context, ensemble: &Ensemble, test: &Dataset) -> Result<Way> {
 
 /// The same approaches, without [`AVOIDED`] of those that touched nothing.
 fn fewer_misses(test: &Dataset) -> Dataset {
-    let mut aimed = test.clone();
-    for object in &mut aimed.objects {
-        let mut misses = 0u32;
-        object.touches.retain(|touch| {
-            let is_miss = touch.pattern() == ContactPattern::None;
-            misses += u32::from(is_miss);
+    test.each(|object| {
+        // Of each instance alike.
+        let mut misses = vec![0u32; object.sources().len()];
+        let mut is_kept = |touch: &usize| {
+            let is_miss = object.touches()[*touch].pattern() == ContactPattern::None;
+            let misses = &mut misses[object.source_of(*touch)];
+            *misses += u32::from(is_miss);
             // Every tenth part of the misses, in turn.
-            !is_miss || f64::from(misses % 10) >= 10.0 * AVOIDED
-        });
-    }
-    aimed
+            !is_miss || f64::from(*misses % 10) >= 10.0 * AVOIDED
+        };
+        object.select((0..object.len()).filter(|touch| is_kept(touch)))
+    })
 }
 
 /// The way to touch objects that the report does not use otherwise: at their true size, where it is known, by the
@@ -275,7 +275,7 @@ fn ways_table(context: &Context, by_approach: &ByApproach) -> Table {
         caption: format!(
             "The first two were trained on {} full touches of each object, which took more approaches than the {} that \
              the others were trained on. Each gives up after its model's limit of touches.",
-            context.first().map_or(0, |split| split.train.objects.first().map_or(0, |object| object.touches.len())),
+            context.first().map_or(0, |split| split.train.objects.first().map_or(0, |object| object.len())),
             context.settings.approaches
         ),
         command: context.settings.command.clone(),

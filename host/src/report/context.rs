@@ -209,7 +209,7 @@ pub(super) fn touch(
         (0..count.div_ceil(CHUNK)).into_par_iter().map(chunk).collect::<Result<_>>()?;
     let approaches = chunks.iter().flatten().map(|sample| sample.1).sum();
     let touches = chunks.into_iter().flatten().map(|sample| sample.0).collect();
-    Ok((ObjectTouches { name: name.into(), touches }, approaches))
+    Ok((ObjectTouches::in_turn(name, touches, &capture::numbered(scenes), 0), approaches))
 }
 
 /// The bytes of an ensemble compiled with 16-bit leaves: what the chip would run.
@@ -230,4 +230,32 @@ pub(super) fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>
 /// than any difference that decides, and several times faster to compute than by the trainer's own trees.
 pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
     compile::compile(ensemble, &compile::Settings { leaf: compile::Leaf::F32, ..compile::Settings::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::{Candidate, Margins};
+    use crate::several_meshes::meshes;
+
+    #[test]
+    fn what_a_fold_states_of_objects_with_several_meshes_is_what_fresh_touches_give() {
+        let (place, objects) = (tempfile::tempdir().unwrap(), meshes());
+        let settings = Settings { touches: 2_000, ..Settings::quick(vec!["meshes".into()], 1) };
+        let cache = Cache::open(place.path(), &settings, &objects, false).unwrap();
+        let context = Context::new(&settings, &objects, &cache, &()).unwrap();
+        let Split { train, test } = context.fold(0).unwrap();
+        assert_eq!(test.several().into_values().collect::<Vec<_>>(), [2; 3]);
+        let ensemble = context.train(&train, &context.ours()).unwrap();
+        let fresh = context.touch(3_000, 9).unwrap().into_iter().map(|(object, _)| object).collect();
+        let accuracy = |dataset: &Dataset| {
+            let margins = Margins::new(Candidate::Full(&ensemble), dataset).unwrap();
+            margins.curve(10, 500, 1).unwrap().accuracy(10).value
+        };
+        let (stated, measured) = (accuracy(&test), accuracy(&Dataset::new(fresh)));
+        // Groups of ten that share no touch.
+        let cases = test.len() as f64 / 10.0;
+        let error = (measured * (1.0 - measured)).max(1.0 / cases).sqrt() / cases.sqrt();
+        assert!((stated - measured).abs() <= 3.0 * error, "{stated} stated, {measured} measured");
+    }
 }

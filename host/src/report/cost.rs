@@ -9,7 +9,7 @@ use crate::ensemble::train;
 use crate::error::{CompileProblem, Error, Problem, Result};
 use crate::evaluate::{Candidate, Margins, parity};
 use crate::page::axis::{Axis, short_number};
-use crate::page::chart::{Chart, Mark, Shape, Side, Stroke};
+use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
@@ -56,7 +56,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
     let settings = context.settings;
     let first = context.first()?;
     let touches: Vec<Touch> =
-        first.test.objects.iter().flat_map(|object| object.touches.iter().take(1_000)).copied().collect();
+        first.test.objects.iter().flat_map(|object| object.touches().iter().take(1_000)).copied().collect();
     let mut members = Vec::new();
     let mut add =
         |name: &str, ensemble: &Ensemble, leaves: &[Leaf], layouts: &[Option<compile::Layout>]| -> Result<()> {
@@ -204,7 +204,7 @@ fn figure(
     let low = members.iter().map(|member| member.at_10).fold(1.0, f64::min);
     let high = members.iter().map(|member| member.at_10).fold(0.0, f64::max);
     let x = Axis::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.6);
-    let y = Axis::percent((low * 20.0).floor() / 20.0, ((high + 0.02) * 20.0).ceil() / 20.0);
+    let y = Axis::percent((low * 20.0).floor() / 20.0, (((high + 0.02) * 20.0).ceil() / 20.0).min(1.0));
     let mut chart = Chart::new(unit, x, "accuracy after 10 touches", y).sized(660, 400);
     let mut data = Records::new(["model", "leaf", "layout", unit, "accuracy after 10 touches"]);
     let mut by_cost: Vec<&Member> = members.iter().collect();
@@ -222,26 +222,26 @@ fn figure(
     }
     steps.push((all().fold(0.0, f64::max), best));
     chart.marks.push(Mark::Line { points: steps.clone(), color: color::GRAY, stroke: Stroke::Dashed });
-    let mut labelled: Vec<(f64, f64)> = Vec::new();
+    let (paper, ours) = ((color::PAPER, Shape::Ring), (color::OURS, Shape::Disc));
+    for (name, (color, shape)) in [("the paper's method", paper), ("ours", ours)] {
+        chart.legend(name, color, None, Some(shape));
+    }
+    chart.legend("the frontier", color::GRAY, Some(Stroke::Dashed), None);
+    let mut named: Vec<String> = Vec::new();
     for member in &by_cost {
         let at = (cost(member), member.at_10);
-        let (color, shape) = if member.paper { (color::PAPER, Shape::Ring) } else { (color::OURS, Shape::Disc) };
+        let (color, shape) = if member.paper { paper } else { ours };
         chart.marks.push(Mark::Dots { points: vec![at], color, shape });
-        // A label only where there is room for it.
-        let near =
-            |other: &(f64, f64)| (other.0 / at.0).ln().abs() < 1.15 && (other.1 - at.1).abs() < (high - low) * 0.07;
-        if !labelled.iter().any(near) {
-            let text = if member.paper {
-                format!("paper, {}", member.leaf)
-            } else {
-                let trees = member.name.split(',').next().unwrap_or_default();
-                // Leaves of one byte and of two hardly differ, so both share the label.
-                format!("{trees}, {}", member.layout)
-            };
-            let side =
-                if at.0.ln() > (all().fold(0.0, f64::max)).ln() - 1.5 { Side::UpperLeft } else { Side::LowerRight };
-            chart.marks.push(Mark::Text { at, text, color, side });
-            labelled.push(at);
+        let text = if member.paper {
+            member.leaf.clone()
+        } else {
+            let trees = member.name.split(',').next().unwrap_or_default();
+            // Leaves of one byte and of two hardly differ, so both share the note.
+            format!("{trees}, {}", member.layout)
+        };
+        if !named.contains(&text) {
+            chart.marks.push(Mark::Note { at, text: text.clone(), color });
+            named.push(text);
         }
         data.push([
             member.name.as_str().into(),
@@ -254,7 +254,10 @@ fn figure(
     Ok(Figure {
         id: id.into(),
         title: format!("Accuracy against {unit}"),
-        caption: "Dashed: the frontier, the best accuracy up to each cost.".into(),
+        caption:
+            "Dashed: the frontier, the best accuracy up to each cost. Points are named where there is room; the table \
+                  below has all of them."
+                .into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,

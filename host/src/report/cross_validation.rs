@@ -64,7 +64,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     let bytes = [compiled_f32(&paper)?.bytes, compiled(&ours)?.bytes];
     let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
     let settings = context.settings;
-    let fewest = split.test.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
+    let fewest = split.test.fewest_in_sequence();
     let most = MOST.min(largest_group(fewest));
     let tested = |candidate, seconds| -> Result<MethodFold> {
         let margins = Margins::new(candidate, &split.test)?;

@@ -54,7 +54,7 @@ fn rows(descriptor: Descriptor, data: &Dataset) -> Result<Vec<Vec<[f32; 2]>>> {
         .iter()
         .map(|object| {
             let row = |touch| <[f32; 2]>::try_from(feature_row(descriptor, touch)).ok();
-            object.touches.par_iter().map(row).collect::<Option<Vec<_>>>().ok_or_else(|| {
+            object.touches().par_iter().map(row).collect::<Option<Vec<_>>>().ok_or_else(|| {
                 let features = descriptor.feature_count();
                 ReportProblem::NotTwoFeatures { descriptor: descriptor.name().into(), features }.into()
             })
@@ -199,19 +199,17 @@ fn grow(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touches::ObjectTouches;
+    use crate::touches::{ObjectTouches, Source};
     use palpate_shared::Touch;
 
     /// Two objects whose curvature lies around 0 and around 40 ms, with the same slopes.
     fn data(count: u32, offset: u32) -> Dataset {
-        let object = |name: &str, bend: u32| ObjectTouches {
-            name: name.into(),
-            touches: (0..count)
-                .map(|k| {
-                    let spread = (k * 7_919 + offset) % 60_000;
-                    Touch::from_micros([0, 100_000 + spread + bend, 200_000 + (k * 104_729) % 50_000])
-                })
-                .collect(),
+        let object = |name: &str, bend: u32| {
+            let touch = |k| {
+                let spread = (k * 7_919 + offset) % 60_000;
+                Touch::from_micros([0, 100_000 + spread + bend, 200_000 + (k * 104_729) % 50_000])
+            };
+            ObjectTouches::new(name, (0..count).map(touch).collect(), Source::Object)
         };
         Dataset::new(vec![object("a", 0), object("b", 30_000)])
     }
@@ -222,7 +220,7 @@ mod tests {
         let (model, width) = density_model(Descriptor::Curvature, &train, &held).unwrap();
         assert!(WIDTHS.contains(&width));
         // Where only one object ever is, its margin is higher by the floor's logarithm; where both are, about equal.
-        let margin = |object: usize, k: usize| model.margins(&train.objects[object].touches[k]);
+        let margin = |object: usize, k: usize| model.margins(&train.objects[object].touches()[k]);
         let mut right = 0;
         for object in 0..2 {
             for k in 0..1_000 {

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::evaluate::{Candidate, Margins};
 use crate::mesh::Object;
 use crate::page::axis::Axis;
-use crate::page::chart::{Chart, Mark, Shape, Side};
+use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records};
@@ -44,15 +44,11 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
 
     let of = |&instances: &usize| -> Result<Instances> {
         // The same number of touches of a kind, however many instances share it.
-        let part = |data: &Dataset, kind: usize, from: usize, to: usize| data.objects[kind].touches[from..to].to_vec();
-        let gathered = |from: &dyn Fn(usize) -> (usize, usize)| {
-            let objects = (0..felt[0].objects.len()).map(|kind| ObjectTouches {
-                name: felt[0].objects[kind].name.clone(),
-                touches: (0..instances).flat_map(|k| part(&felt[k], kind, from(k).0, from(k).1)).collect(),
-            });
-            Dataset::new(objects.collect())
-        };
-        let training = gathered(&|_| (0, count / instances));
+        let gathered = (0..felt[0].objects.len()).map(|kind| {
+            let parts = felt[..instances].iter().map(|data| data.objects[kind].select(0..count / instances));
+            ObjectTouches::joined(&felt[0].objects[kind].name, &parts.collect::<Vec<_>>())
+        });
+        let training = Dataset::new(gathered.collect());
         let ensemble = context.train(&training, &context.ours())?;
         let bytes = compiled(&ensemble)?.bytes;
         let model = compile::open(&bytes)?;
@@ -63,13 +59,7 @@ pub(super) fn measure(context: &Context) -> Result<Vec<Instances>> {
         };
         let unseen: Vec<Vec<f64>> = tested.iter().map(&accuracies).collect::<Result<_>>()?;
         // Groups of a seen kind stay within one instance too.
-        let seen = (0..instances).map(|k| {
-            let objects = felt[k]
-                .objects
-                .iter()
-                .map(|object| ObjectTouches { name: object.name.clone(), touches: object.touches[count..].to_vec() });
-            accuracies(&Dataset::new(objects.collect()))
-        });
+        let seen = (0..instances).map(|k| accuracies(&felt[k].each(|object| object.select(count..object.len()))));
         let seen: Vec<Vec<f64>> = seen.collect::<Result<_>>()?;
         let column = |rows: &[Vec<f64>], index: usize| rows.iter().map(|row| row[index]).collect::<Vec<f64>>();
         Ok(Instances {
@@ -127,20 +117,12 @@ pub(super) fn section(context: &Context, results: &[Instances]) -> Result<Sectio
         chart.series(&format!("new, {at} touches"), color, shape, &unseen);
         chart.line(&format!("known, {at} touches"), color, crate::page::chart::Stroke::Dashed, &seen);
     }
-    if let Some(first) = results.first().and_then(|result| result.unseen.first()) {
-        let spread = mean_deviation(first).1;
-        if first.len() > 1 && spread > 0.0 {
-            let text = "bars: standard deviation over instances".to_string();
-            chart.marks.push(Mark::Text { at: (1.0, 0.04), text, color: color::GRAY, side: Side::Right });
-        }
-    }
     section.figure(Figure {
         id: "generalization".into(),
         title: "Accuracy against the number of training instances".into(),
-        caption:
-            "Solid: instances never touched. Dashed: other touches of the instances trained on. Each group of touches \
-                  is of one instance."
-                .into(),
+        caption: "Solid: instances never touched. Dashed: other touches of the instances trained on. Bars are one \
+                  standard deviation over instances. Each group of touches is of one instance."
+            .into(),
         command: settings.command.clone(),
         panels: vec![chart.svg()?],
         data,

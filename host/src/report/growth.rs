@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
 use crate::mesh::{Mesh, Object, builtin};
 use crate::page::axis::Axis;
-use crate::page::chart::{Chart, Mark, Shape, Side};
+use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
@@ -102,9 +102,8 @@ fn touched(context: &Context, object: &Object) -> Result<Touched> {
     let count = context.settings.growth_approaches;
     let touches = capture::touches(&[scene], &object.name, &origin, 0..count + count / 4)?;
     let seconds = began.elapsed().as_secs_f64();
-    let (train, test) = touches.split_at(usize::try_from(count).unwrap_or(usize::MAX).min(touches.len()));
-    let named = |touches: &[Touch]| ObjectTouches { name: object.name.clone(), touches: touches.to_vec() };
-    Ok(Touched { train: named(train), test: named(test), seconds })
+    let count = usize::try_from(count).unwrap_or(usize::MAX).min(touches.len());
+    Ok(Touched { train: touches.select(0..count), test: touches.select(count..touches.len()), seconds })
 }
 
 fn objects_cost(context: &Context, touched: &[Touched]) -> Result<Objects> {
@@ -125,7 +124,7 @@ fn objects_cost(context: &Context, touched: &[Touched]) -> Result<Objects> {
         Leaf::I8 | Leaf::F32 => compile::compile(&ensemble, &compile::Settings::default())?.bytes.len(),
     };
     let model = compile::open(&compiled.bytes)?;
-    let touches: Vec<Touch> = test.objects.iter().flat_map(|object| &object.touches).step_by(97).copied().collect();
+    let touches: Vec<Touch> = test.touches().step_by(97).copied().collect();
     let touches: Vec<Touch> =
         touches.into_iter().filter(|touch| Refused::check(&model.trained_touches(), touch).is_ok()).collect();
     let margins = Margins::new(Candidate::Compiled(&model), &test)?;
@@ -318,10 +317,9 @@ fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {
         let mut chart = Chart::new("triangles", x(), unit, scale).sized(420, 270).titled(title);
         for &at in &points {
             let text = crate::page::axis::short_number(at.1);
-            chart.marks.push(Mark::Text { at, text, color: color::INK, side: Side::Above });
+            chart.marks.push(Mark::Note { at, text, color: color::INK });
         }
         chart.series("", color, Shape::Disc, &points);
-        chart.labels.clear();
         chart.svg()
     };
     Ok(Figure {

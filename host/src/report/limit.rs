@@ -13,7 +13,7 @@ use crate::page::chart::{Chart, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::Dataset;
 use palpate_shared::Descriptor;
 use serde::{Deserialize, Serialize};
 
@@ -71,12 +71,7 @@ pub(super) fn large(context: &Context) -> Result<Large> {
     let count = context.settings.limit_touches;
     let touched = context.touch(count, context.settings.seed.wrapping_add(0x11_1117))?;
     let part = |range: std::ops::Range<usize>| {
-        let objects = touched.iter().map(|(object, _)| ObjectTouches {
-            name: object.name.clone(),
-            touches: object.touches[range.start.min(object.touches.len())..range.end.min(object.touches.len())]
-                .to_vec(),
-        });
-        Dataset::new(objects.collect())
+        Dataset::new(touched.iter().map(|(object, _)| object.select(range.clone())).collect())
     };
     let (train, held) = (count * 85 / 100, count * 90 / 100);
     Ok(Large { train: part(0..train), held: part(train..held), test: part(held..count) })
@@ -84,11 +79,7 @@ pub(super) fn large(context: &Context) -> Result<Large> {
 
 /// The first half of each object's touches.
 fn half(data: &Dataset) -> Dataset {
-    let first = |object: &ObjectTouches| ObjectTouches {
-        name: object.name.clone(),
-        touches: object.touches[..object.touches.len() / 2].to_vec(),
-    };
-    data.with(data.objects.iter().map(first).collect())
+    data.each(|object| object.select(0..object.len() / 2))
 }
 
 /// Estimates the limit and tests the first fold's models on the same groups.
@@ -133,7 +124,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let at_10 = |index: usize| candidates[index].curve[9];
     let better = |a: usize, b: usize| if at_10(b) > at_10(a) { b } else { a };
     let best = better(better(ENSEMBLE, DENSITY), OURS);
-    let tested = large.test.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
+    let tested = large.test.objects.iter().map(|object| object.len()).min().unwrap_or(0);
     Ok(Limit { captured: settings.limit_touches, tested, groups, width, candidates, best })
 }
 

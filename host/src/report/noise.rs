@@ -100,9 +100,9 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
     for kind in kinds() {
         context.check()?;
         let mut test = split.test.clone();
-        let robots = add_noise(&mut test, &kind, seed)?;
+        add_noise(&mut test, &kind, seed)?;
         for (method, candidate) in candidates.into_iter().enumerate() {
-            let margins = Margins::new(candidate, &test)?.of_robots(robots);
+            let margins = Margins::new(candidate, &test)?;
             result.kinds[method].push(margins.curve(10, settings.many_groups, seed)?.accuracy(10).value);
         }
     }
@@ -118,11 +118,9 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
 
 /// A data set with noise of `deviation` milliseconds.
 fn noisy(data: &Dataset, deviation: f64, seed: u64) -> Dataset {
-    let one = |object: &ObjectTouches| ObjectTouches {
-        name: object.name.clone(),
-        touches: noise::noisy(&object.name, &object.touches, deviation * 1e3, seed),
-    };
-    data.with(data.objects.iter().map(one).collect())
+    let mut noisy = data.clone();
+    noisy.add_noise(&noise::Noise::gaussian(deviation * 1e3), seed, 1);
+    noisy
 }
 
 /// Accuracy of a method at the level nearest to `deviation` ms: mean and deviation over folds.
@@ -145,11 +143,11 @@ pub(super) fn accuracy_at(context: &Context, folds: &[Fold], method: usize, devi
 /// touch is the sum of its three contact times, and its noise the sum of three independent ones; powers are means of
 /// squares over touches.
 fn signal_to_noise(object: &ObjectTouches, deviation: f64) -> f64 {
-    let signals = object.touches.iter().map(|touch| {
+    let signals = object.touches().iter().map(|touch| {
         let micros = touch.times().into_iter().filter_map(|time| time.micros());
         micros.map(|micros| f64::from(micros) / 1e3).sum::<f64>()
     });
-    let power = signals.map(|signal| signal * signal).sum::<f64>() / object.touches.len().max(1) as f64;
+    let power = signals.map(|signal| signal * signal).sum::<f64>() / object.len().max(1) as f64;
     10.0 * (power / (3.0 * deviation * deviation)).log10()
 }
 
@@ -368,7 +366,8 @@ mod tests {
 
     #[test]
     fn the_ratio_falls_by_six_decibels_when_noise_doubles() {
-        let object = ObjectTouches { name: "fork".into(), touches: vec![Touch::from_micros([0, 30_000, 60_000]); 3] };
+        let touches = vec![Touch::from_micros([0, 30_000, 60_000]); 3];
+        let object = ObjectTouches::new("fork", touches, crate::touches::Source::Object);
         // A signal of 90 ms against a deviation of 3 · √3 ms.
         assert!((signal_to_noise(&object, 3.0) - 20.0 * (90.0 / 27f64.sqrt()).log10()).abs() < 1e-9);
         assert!((signal_to_noise(&object, 3.0) - signal_to_noise(&object, 6.0) - 20.0 * 2f64.log10()).abs() < 1e-9);

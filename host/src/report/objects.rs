@@ -2,7 +2,10 @@
 
 use super::context::Context;
 use super::statistics::{density, quantile};
+use super::view;
 use crate::error::Result;
+use crate::mesh::facts::Facts;
+use crate::mesh::{Instance, Object};
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
@@ -21,6 +24,19 @@ pub(super) fn section(context: &Context) -> Result<Section> {
         Picture { name: object.name.clone(), png: render::thumbnail(object.mesh(), 240), line }
     });
     section.blocks.push(Block::Pictures(pictures.collect()));
+    for object in context.objects {
+        for instance in object.instances() {
+            let facts = Facts::of(&instance.mesh);
+            let complaints = facts.complaints(object.millimeters);
+            if complaints.is_empty() {
+                continue;
+            }
+            let length =
+                context.settings.capture.length_of(object, instance).unwrap_or(context.settings.capture.length);
+            let verdict = view::verdict(&facts, length, &context.settings.capture.probe);
+            section.warning(format!("{}: {} As it is: {verdict}.", instance.name, complaints.join(" ")));
+        }
+    }
     section.figure(densities(context)?);
     let mut data = Records::new(["object", "triangles", "full touches", "approaches", "share of full touches"]);
     for (object, &approaches) in context.objects.iter().zip(&captured.approaches) {
@@ -46,6 +62,21 @@ pub(super) fn section(context: &Context) -> Result<Section> {
     Ok(section)
 }
 
+/// The names of the objects with a mesh that should be repaired before it is touched.
+pub(super) fn to_repair(context: &Context) -> Vec<String> {
+    let capture = &context.settings.capture;
+    let is_broken = |object: &Object, instance: &Instance| {
+        let facts = Facts::of(&instance.mesh);
+        let length = capture.length_of(object, instance).unwrap_or(capture.length);
+        view::verdict(&facts, length, &capture.probe).starts_with("repair")
+    };
+    let objects = context.objects.iter();
+    objects
+        .filter(|object| object.instances().any(|instance| is_broken(object, instance)))
+        .map(|object| object.name.clone())
+        .collect()
+}
+
 /// κ = t1 − 2·t2 + t3 in milliseconds.
 fn curvature(touch: &Touch) -> Option<f64> {
     let [a, b, c] = touch.times().map(|time| time.micros().map(f64::from));
@@ -55,7 +86,7 @@ fn curvature(touch: &Touch) -> Option<f64> {
 fn densities(context: &Context) -> Result<Figure> {
     let captured = context.captured()?;
     let values: Vec<Vec<f64>> =
-        captured.data.objects.iter().map(|object| object.touches.iter().filter_map(curvature).collect()).collect();
+        captured.data.objects.iter().map(|object| object.touches().iter().filter_map(curvature).collect()).collect();
     // The middle nine tenths of every object fit.
     let ends = values.iter().flat_map(|values| [quantile(values, 0.05).abs(), quantile(values, 0.95).abs()]);
     let reach = ends.fold(1.0, f64::max).min(400.0);

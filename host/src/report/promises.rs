@@ -153,10 +153,8 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64) -> Result<Vec<Sequ
     let dataset =
         calibrate::fresh(model, &objects, &origin, &settings, &mut calibrate::Fresh::default(), context.progress)?;
     // The model's objects are the context's, in the same order.
-    let mut supplies: Vec<Supply<'_>> = (0..names.len())
-        .zip(&dataset.objects)
-        .map(|(object, of)| Supply::new(object, &of.name, &of.touches, objects[object].1.len(), 1, seed))
-        .collect();
+    let mut supplies: Vec<Supply<'_>> =
+        (0..names.len()).zip(&dataset.objects).map(|(object, of)| Supply::new(object, of, seed)).collect();
     let wanted = vec![settings.sequences / names.len().max(1); names.len()];
     let until = Until { margin: strictest(), max_touches: MAX_TOUCHES };
     follow(model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, context.progress)

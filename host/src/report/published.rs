@@ -140,14 +140,19 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
     let (mean, low, high) = summary.difference_at_10;
     let points = |value: f64| crate::page::axis::number(value * 100.0, 1);
     let interval = match (low, high) {
-        (Some(low), Some(high)) => format!(" (95 % interval {} to {}, paired over folds)", points(low), points(high)),
+        (Some(low), Some(high)) => format!(
+            " (95 % interval {} to {}, paired over folds, which share training touches)",
+            points(low),
+            points(high)
+        ),
         _ => String::new(),
     };
     Table {
         id: "published".into(),
         title: "Accuracy, recall and touches".into(),
         caption: format!(
-            "The paper's meshes are not ours: it used ten ShapeNet models that cannot be had here, so its numbers \
+            "The paper is the publication of the method that is compared with ours: 1000 trees on the three contact times of \
+             full touches (see `docs/words.md`). The paper's meshes are not ours: it used ten ShapeNet models that cannot be had here, so its numbers \
              cannot be compared with the others directly; the columns beside them share their objects and touches. ± is \
              one standard deviation over {} folds. At ten touches ours is right {} points more often than the paper's \
              method{interval}. Touches until sure and the limit are measured on the large capture.",

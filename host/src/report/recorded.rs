@@ -10,7 +10,7 @@ use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use crate::progress;
-use crate::touches::{Dataset, ObjectTouches, Origin, checksum, files};
+use crate::touches::{Dataset, Origin, checksum, files};
 use std::path::Path;
 
 /// Compares the recorded touches, if there are any, with as many approaches as other sections make, by the probe of the
@@ -22,8 +22,7 @@ pub(super) fn measure(context: &Context) -> Result<Option<Comparison>> {
     let origin = Origin { approaches: true, real: settings.real, ..settings.capture.clone() };
     let touched = |(object, scenes): (&crate::mesh::Object, &Vec<_>)| {
         progress::check(context.progress)?;
-        let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
-        Ok(ObjectTouches { name: object.name.clone(), touches })
+        capture::touches(scenes, &object.name, &origin, 0..settings.approaches)
     };
     let simulated = context.objects.iter().zip(context.all_scenes()).map(touched).collect::<Result<_>>()?;
     let simulated = Dataset { origin: Some(origin.clone()), ..Dataset::new(simulated) };

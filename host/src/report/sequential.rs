@@ -146,12 +146,10 @@ fn trade(context: &Context, sequences: &Sequences) -> Result<Figure> {
         chart.marks.push(Mark::Line { points: sure.clone(), color, stroke: Stroke::Solid });
         chart.marks.push(Mark::Dots { points: sure.clone(), color, shape });
         chart.marks.push(Mark::Line { points: fixed.clone(), color, stroke: Stroke::Dashed });
-        // The lines fall steeply, so each is named in its upper part.
-        let label = |at: Option<&(f64, f64)>, text: String, side| at.map(|&at| Mark::Text { at, text, color, side });
-        let side = crate::page::chart::Side::Left;
-        chart.marks.extend(label(sure.get(5), format!("{name}, when sure"), side));
-        let side = crate::page::chart::Side::Right;
-        chart.marks.extend(label(fixed.get(if index == 0 { 1 } else { 7 }), format!("{name}, fixed number"), side));
+        chart.legend(format!("{name}, when sure"), color, Some(Stroke::Solid), Some(shape));
+        if !fixed.is_empty() {
+            chart.legend(format!("{name}, fixed number"), color, Some(Stroke::Dashed), None);
+        }
         for s in stopped {
             data.push([
                 (*name).into(),
@@ -242,9 +240,7 @@ fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
             }
             chart.marks.push(Mark::Area { points: outline.clone(), base: 0.0, color, opacity: 0.15 });
             chart.marks.push(Mark::Line { points: outline, color, stroke: Stroke::Thin });
-            let at = ((30 * width) as f64 * 0.55, top * (0.9 - 0.14 * index as f64));
-            let text = format!("{method}: {}", number(mean, 1));
-            chart.marks.push(Mark::Text { at, text, color, side: crate::page::chart::Side::Right });
+            chart.legend(format!("{method}: {}", number(mean, 1)), color, Some(Stroke::Thin), None);
         }
         panels.push(chart.svg()?);
     }

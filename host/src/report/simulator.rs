@@ -3,7 +3,7 @@
 use super::context::Context;
 use crate::error::Result;
 use crate::page::axis::Axis;
-use crate::page::chart::{Chart, Mark, Shape, Side};
+use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
@@ -166,11 +166,14 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
     ]);
     for (index, engine) in engines.iter().enumerate() {
         let at = (engine.rate, shown(engine.largest_error));
-        let color = if index == 1 { color::OURS } else { color::GRAY };
-        chart.marks.push(Mark::Dots { points: vec![at], color, shape: Shape::Disc });
-        // Points of equal error stand side by side, so every other label goes above.
-        let side = if index % 2 == 0 { Side::UpperLeft } else { Side::LowerRight };
-        chart.marks.push(Mark::Text { at, text: engine.name.clone(), color, side });
+        let (color, shape) = [
+            (color::GREEN, Shape::Triangle),
+            (color::OURS, Shape::Disc),
+            (color::PURPLE, Shape::Square),
+            (color::PAPER, Shape::Ring),
+        ][index % 4];
+        chart.marks.push(Mark::Dots { points: vec![at], color, shape });
+        chart.legend(&engine.name, color, None, Some(shape));
         data.push([
             engine.name.as_str().into(),
             Cell::Number(engine.rate, 0),

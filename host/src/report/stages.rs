@@ -139,6 +139,13 @@ pub fn report_on(
 
     let summary = published::summary(&context, &folds, &noisy, &limit, &sequences);
     let mut first = Section::new("summary", "The paper's numbers compared with ours");
+    let damaged = objects::to_repair(&context);
+    if !damaged.is_empty() {
+        first.warning(format!(
+            "the figures are of meshes that should be repaired first: {}. The section on the objects says why.",
+            damaged.join(", ")
+        ));
+    }
     first.table(published::table(&context, &summary));
     let mut costs = cost::section(&context, &members)?;
     simulator::add(&context, &engines, &mut costs)?;

@@ -31,7 +31,9 @@ pub(crate) fn wilson(successes: f64, trials: f64) -> (f64, f64) {
 }
 
 /// The mean of the paired differences `b − a` and its two-sided 95 % interval by Student's t over pairs: folds that both
-/// methods saw. Not a number for fewer than two pairs.
+/// methods saw. Not a number for fewer than two pairs. Folds share most of their training touches, so that their differences
+/// are not independent and the interval is narrower than one of 95 % (Nadeau and Bengio, Inference for the generalization
+/// error, Machine Learning 52, 2003).
 pub(crate) fn paired_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| b - a).collect();
     let pairs = differences.len() as f64;

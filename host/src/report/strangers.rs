@@ -11,8 +11,8 @@ use crate::page::chart::{Chart, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
-use crate::strangers::{LeftOut, Sets, Settings, Shapes, captured, leave_one_out};
-use crate::touches::{Dataset, Origin};
+use crate::strangers::{LeftOut, Sets, Settings, captured, leave_one_out};
+use crate::touches::{Dataset, ObjectTouches, Origin};
 use palpate_shared::format::Held;
 use serde::{Deserialize, Serialize};
 
@@ -28,14 +28,15 @@ const MOST: usize = 120;
 const WAYS: [(&str, Option<Held>); 3] =
     [("off", None), ("likely", Some(Held::Likely)), ("certain", Some(Held::Certain))];
 
-/// What was measured: without and with a background column; none where there are too few touches to calibrate on.
+/// What was measured: without and with a background column; or why nothing was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Measured {
-    columns: Option<[Column; 2]>,
+pub(super) enum Measured {
+    Columns([Column; 2]),
+    Not(String),
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Column {
+pub(super) struct Column {
     ways: Vec<Way>,
 }
 
@@ -58,7 +59,10 @@ struct Way {
 pub(super) fn measure(context: &Context) -> Result<Measured> {
     let settings = context.settings;
     if context.objects.len() < 3 {
-        return Ok(Measured { columns: None });
+        let objects = context.objects.len();
+        return Ok(Measured::Not(format!(
+            "it takes at least three objects, of which one is left out, and there are {objects}"
+        )));
     }
     let counts = if settings.quick { QUICK } else { TOUCHES };
     let touched = |index: usize| -> Result<Dataset> {
@@ -71,12 +75,18 @@ pub(super) fn measure(context: &Context) -> Result<Measured> {
     let origin = Origin { seed: settings.seed, ..settings.capture.clone() };
     let background = background(context, &origin)?;
     let shapes = [captured(settings.other_shapes, &origin, context.progress)?];
-    let columns = match [None, Some(&background)].map(|background| column(context, sets, background, &shapes)) {
-        [Ok(without), Ok(with)] => Some([without, with]),
-        [Err(error), _] | [_, Err(error)] if is_too_few(&error) => None,
-        [Err(error), _] | [_, Err(error)] => return Err(error),
-    };
-    Ok(Measured { columns })
+    let column = |background| column(context, sets, background, &shapes);
+    // The second is not measured in vain.
+    match column(None).and_then(|without| Ok([without, column(Some(&background))?])) {
+        Ok(columns) => Ok(Measured::Columns(columns)),
+        Err(error) if is_too_few(&error) => Ok(Measured::Not(format!(
+            "the test of fit could not be calibrated so that at most 2 % of known objects are taken for unknown, from {} \
+             touches of each object: {}",
+            counts[1],
+            error.problem().map(ToString::to_string).unwrap_or_default()
+        ))),
+        Err(error) => Err(error),
+    }
 }
 
 fn is_too_few(error: &Error) -> bool {
@@ -90,14 +100,11 @@ fn background(context: &Context, origin: &Origin) -> Result<Dataset> {
     let touches = shapes * PER_SHAPE;
     let object = builtin::background(shapes, origin.seed)?;
     let scenes = capture::scenes(&[&object], origin, context.progress)?;
-    let touches = scenes.iter().map(|scenes| capture::touches(scenes, &object.name, origin, 0..touches as u64));
-    let touches: Vec<Vec<_>> = touches.collect::<Result<_>>()?;
-    let objects =
-        touches.into_iter().map(|touches| crate::touches::ObjectTouches { name: object.name.clone(), touches });
-    Ok(Dataset::new(objects.collect()))
+    let objects = scenes.iter().map(|scenes| capture::touches(scenes, &object.name, origin, 0..touches as u64));
+    Ok(Dataset::new(objects.collect::<Result<_>>()?))
 }
 
-fn column(context: &Context, sets: Sets<'_>, background: Option<&Dataset>, shapes: &[Shapes]) -> Result<Column> {
+fn column(context: &Context, sets: Sets<'_>, background: Option<&Dataset>, shapes: &[ObjectTouches]) -> Result<Column> {
     let training = train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() };
     let held = WAYS.map(|(_, held)| held);
     let settings = Settings { seed: context.settings.seed, ..Settings::default() };
@@ -130,12 +137,12 @@ fn way(found: &[LeftOut]) -> Way {
 /// The figure and the tables.
 pub(super) fn section(context: &Context, measured: &Measured) -> Result<Section> {
     let mut section = Section::new("strangers", "Objects that the model does not know");
-    let Some(columns) = &measured.columns else {
-        section.text(
-            "Not measured: it takes at least three objects, and enough touches to promise that at most 2 % of known \
-             objects are taken for unknown.",
-        );
-        return Ok(section);
+    let columns = match measured {
+        Measured::Columns(columns) => columns,
+        Measured::Not(why) => {
+            section.text(format!("Not measured: {why}."));
+            return Ok(section);
+        }
     };
     let [_, with] = columns;
     let at = |way: &Way, touches: usize| number(100.0 * way.detected.get(touches - 1).copied().unwrap_or(0.0), 0);

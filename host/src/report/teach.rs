@@ -138,8 +138,8 @@ pub(crate) fn promise(taught: &Taught) -> String {
     let Needed { sequences, of_each, approaches } = taught.promise;
     let recorded = taught.objects.iter().map(|object| object.approaches).min().unwrap_or(0);
     let what = format!(
-        "To promise 1 % wrong names takes {sequences} sequences without an error, {of_each} of each object: about \
-         {approaches} approaches that the object was not taught with"
+        "To promise 1 % wrong names takes {sequences} sequences that end with a name, none of them a wrong one, {of_each} of \
+         each object: about {approaches} approaches that the object was not taught with, or more"
     );
     if recorded < approaches + LEAST {
         format!("No promise can be made yet. {what}, and {recorded} were recorded in all.")

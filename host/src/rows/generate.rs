@@ -1,95 +1,98 @@
 //! Rows at which an ensemble decides: made from its splits.
 
-use crate::ensemble::{Ensemble, Node, Tree};
+use crate::ensemble::{Ensemble, Node, Threshold};
 
 /// Values at which a comparison may go wrong, for every feature.
 const SPECIAL: [f32; 9] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 0.0, -0.0, 1e-42, -1e-42];
 
-/// Rows that lead to every split of the ensemble, with its feature at the threshold, one step to each side of it
-/// (`step` says which values these are), and missing; and rows with one feature missing, infinite or subnormal. The other
+/// Rows that lead to every split of the ensemble, with its feature at the threshold, one step to each side of it, and
+/// missing; and rows with one feature missing, infinite or subnormal, or one that stands for a missing value. The other
 /// features are those of `rows` in turn, as far as the way to the split allows.
-pub fn generate(ensemble: &Ensemble, rows: &[f32], step: impl Fn(usize, f32) -> [f32; 3], mut see: impl FnMut(&[f32])) {
+///
+/// `around` gives the last value below a threshold of a feature, the first at or above it, and the one after that.
+pub fn generate(
+    ensemble: &Ensemble,
+    rows: &[f64],
+    around: impl Fn(usize, Threshold) -> [f64; 3],
+    mut see: impl FnMut(&[f64]),
+) {
     let features = ensemble.inputs.count();
     let zeros = vec![0.0; features];
-    let given: Vec<&[f32]> = rows.chunks_exact(features).collect();
+    let given: Vec<&[f64]> = rows.chunks_exact(features).collect();
     let mut turn = 0;
     let mut next = || {
         turn += 1;
         given.get(turn % given.len().max(1)).copied().unwrap_or(&zeros)
     };
-    for tree in &ensemble.trees {
-        for (split, bounds) in splits(tree, features) {
-            let &Node::Split { feature, threshold, .. } = split else { continue };
+    for tree in 0..ensemble.trees.len() {
+        let mut waiting = vec![(0, vec![Bounds::ALL; features])];
+        while let Some((index, bounds)) = waiting.pop() {
+            let node = ensemble.trees.get(tree).and_then(|tree| tree.nodes.get(index));
+            let (Some(&Node::Split { feature, left, right, .. }), Some(threshold)) =
+                (node, ensemble.threshold(tree, index))
+            else {
+                continue;
+            };
+            let values = around(feature, threshold);
+            let [last, first, _] = values;
             let mut row = next().to_vec();
             bounds.iter().zip(&mut row).for_each(|(bounds, value)| *value = bounds.clamp(*value));
-            for value in step(feature, threshold).into_iter().chain([f32::NAN]) {
+            for value in values.into_iter().chain([f64::NAN]) {
                 row[feature] = value;
                 see(&row);
             }
+            let (mut of_left, mut of_right) = (bounds.clone(), bounds);
+            of_left[feature].last = of_left[feature].last.min(last);
+            of_right[feature].first = of_right[feature].first.max(first);
+            waiting.extend([(right, of_right), (left, of_left)]);
         }
     }
+    let sentinel = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);
+    let special = SPECIAL.into_iter().chain(sentinel.into_iter().flatten());
+    let special: Vec<f64> = special.map(f64::from).collect();
     for feature in 0..features {
-        for value in SPECIAL {
+        for &value in &special {
             let mut row = next().to_vec();
             row[feature] = value;
             see(&row);
         }
     }
-    for value in SPECIAL {
+    for value in special {
         see(&vec![value; features]);
     }
 }
 
-/// Which values of a feature lead to a node: at least `low`, below `high`.
+/// Which values of a feature lead to a node: from `first` to `last`.
 #[derive(Clone, Copy)]
 struct Bounds {
-    low: f32,
-    high: f32,
+    first: f64,
+    last: f64,
 }
 
 impl Bounds {
-    const ALL: Self = Self { low: f32::NEG_INFINITY, high: f32::INFINITY };
+    const ALL: Self = Self { first: f64::NEG_INFINITY, last: f64::INFINITY };
 
     /// The value, or the nearest that leads to the node.
-    fn clamp(self, value: f32) -> f32 {
-        if self.low == f32::NEG_INFINITY && self.high == f32::INFINITY {
+    fn clamp(self, value: f64) -> f64 {
+        if self.first == f64::NEG_INFINITY && self.last == f64::INFINITY {
             return value;
         }
         // A missing value may go elsewhere: something in between instead.
-        let value = if value.is_nan() { self.low.max(self.high.next_down()) } else { value };
-        if value < self.low {
-            self.low
-        } else if value >= self.high {
-            self.high.next_down()
+        let value = if value.is_nan() { self.first.max(self.last) } else { value };
+        if value < self.first {
+            self.first
+        } else if value > self.last {
+            self.last
         } else {
             value
         }
     }
 }
 
-/// The splits of a tree, each with the bounds of every feature on the way to it.
-fn splits(tree: &Tree, features: usize) -> impl Iterator<Item = (&Node, Vec<Bounds>)> {
-    let mut waiting = vec![(0, vec![Bounds::ALL; features])];
-    std::iter::from_fn(move || {
-        loop {
-            let (index, bounds) = waiting.pop()?;
-            let node = tree.nodes.get(index)?;
-            if let &Node::Split { feature, threshold, left, right, .. } = node {
-                let mut of_left = bounds.clone();
-                of_left[feature].high = of_left[feature].high.min(threshold);
-                let mut of_right = bounds.clone();
-                of_right[feature].low = of_right[feature].low.max(threshold);
-                waiting.extend([(right, of_right), (left, of_left)]);
-                return Some((node, bounds));
-            }
-        }
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::{Inputs, Origin, Output};
+    use crate::ensemble::{Inputs, Origin, Output, Tree};
 
     #[test]
     fn every_split_is_reached_and_decided_both_ways() {
@@ -116,10 +119,14 @@ mod tests {
         };
         let mut reached = std::collections::BTreeSet::new();
         let mut count = 0;
-        let around = |_, threshold: f32| [threshold.next_down(), threshold, threshold.next_up()];
+        let around = |_, threshold: Threshold| {
+            let threshold = threshold.value as f32;
+            [threshold.next_down(), threshold, threshold.next_up()].map(f64::from)
+        };
         generate(&ensemble, &[7.0, 7.0], around, |row| {
             count += 1;
-            reached.insert(ensemble.margins_of_features(row)[0].to_bits());
+            let row: Vec<f32> = row.iter().map(|&value| value as f32).collect();
+            reached.insert(ensemble.margins_of_features(&row)[0].to_bits());
         });
         assert_eq!(reached.len(), 5, "every leaf");
         assert_eq!(count, 4 * 4 + 9 * 2 + 9);

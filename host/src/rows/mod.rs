@@ -11,13 +11,13 @@ use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Key, f32_key};
 use std::path::Path;
 
-/// Rows of f32 features, NaN where one is missing.
+/// Rows of features, NaN where one is missing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
     /// Features of a row.
     pub features: usize,
-    /// Row after row.
-    pub values: Vec<f32>,
+    /// Row after row, as the file has them: models compare them as f32, or as whole numbers of units.
+    pub values: Vec<f64>,
     /// The label of each row, if a column of them was asked for.
     pub labels: Vec<String>,
     /// Whether columns were taken by their position, since the header does not hold all of the features' names.
@@ -71,8 +71,7 @@ impl Rows {
                     let column = header.get(column).unwrap_or_default().to_owned();
                     Error::at(Place::line(path, line), RowsProblem::Number { column, text: text.into() })
                 })?;
-                // As libraries do: read as f64, then rounded.
-                values.push(value as f32);
+                values.push(value);
             }
             labels.extend(label.map(|column| record.get(column).unwrap_or_default().to_owned()));
         }
@@ -93,7 +92,7 @@ impl Rows {
     }
 
     /// The rows, in order.
-    pub fn iter(&self) -> std::slice::ChunksExact<'_, f32> {
+    pub fn iter(&self) -> std::slice::ChunksExact<'_, f64> {
         self.values.chunks_exact(self.features.max(1))
     }
 }
@@ -147,9 +146,9 @@ impl Encoder {
     }
 
     /// What the model compares of a row.
-    pub fn row(&self, row: &[f32]) -> Vec<i32> {
+    pub fn row<V: Copy + Into<f64>>(&self, row: &[V]) -> Vec<i32> {
         match self {
-            Self::Real => row.iter().map(|&value| f32_key(value)).collect(),
+            Self::Real => row.iter().map(|&value| f32_key(value.into() as f32)).collect(),
             Self::Scaled(scales) => row.iter().zip(scales).map(|(&value, &scale)| whole(value, scale)).collect(),
         }
     }
@@ -157,12 +156,13 @@ impl Encoder {
 
 /// A value as a whole number of its feature's units: the nearest, halves away from zero; values beyond ±(2³¹ − 1) become
 /// that, and NaN a missing value.
-pub fn whole(value: f32, scale: f32) -> i32 {
+pub fn whole(value: impl Into<f64>, scale: f32) -> i32 {
+    let value: f64 = value.into();
     if value.is_nan() {
         return MISSING_FEATURE;
     }
     // `as` saturates; −2³¹ is a missing value.
-    ((f64::from(value) * f64::from(scale)).round() as i32).max(-i32::MAX)
+    ((value * f64::from(scale)).round() as i32).max(-i32::MAX)
 }
 
 /// The names of a model's features: those that it states, or f0, f1 and so on.
@@ -191,7 +191,7 @@ mod tests {
     fn columns_are_matched_by_name_or_else_by_position() {
         let rows = read("b,x,a\n1,9,2\n,8,inf\n", &["a", "b"], None).unwrap();
         assert_eq!((rows.values[..2].to_vec(), rows.by_position), (vec![2.0, 1.0], false));
-        assert_eq!((rows.values[2], rows.values[3].is_nan(), rows.len()), (f32::INFINITY, true, 2));
+        assert_eq!((rows.values[2], rows.values[3].is_nan(), rows.len()), (f64::INFINITY, true, 2));
         let rows = read("p,q\n1,2\n", &["a", "b"], None).unwrap();
         assert_eq!((rows.values, rows.by_position), (vec![1.0, 2.0], true));
         let rows = read("p,kind,q\n1,cup,2\n", &["a", "b"], Some("kind")).unwrap();
@@ -213,8 +213,8 @@ mod tests {
     fn whole_numbers_saturate_and_a_missing_value_stays_missing() {
         assert_eq!(whole(1.25, 10.0), 13);
         assert_eq!(whole(-1.25, 10.0), -13);
-        assert_eq!(whole(f32::NAN, 10.0), MISSING_FEATURE);
-        for value in [f32::INFINITY, 1e30] {
+        assert_eq!(whole(f64::NAN, 10.0), MISSING_FEATURE);
+        for value in [f64::INFINITY, 1e30] {
             assert_eq!((whole(value, 1.0), whole(-value, 1.0)), (i32::MAX, -i32::MAX));
         }
     }

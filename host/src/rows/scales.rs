@@ -1,7 +1,8 @@
 //! Features as whole numbers of the user's units: for chips without a float unit.
 
 use super::Rows;
-use crate::ensemble::{Ensemble, Node};
+use crate::ensemble::{Ensemble, Node, Threshold};
+use std::collections::BTreeSet;
 
 /// What whole numbers do to a feature.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -17,48 +18,88 @@ pub struct Effect {
     /// The farthest that a value can be from a threshold and still go the other way: half a unit for its rounding, and
     /// nothing where each threshold lies right between two whole units.
     pub largest_step: f64,
+    /// Whether every value of the rows that the scales were fitted to is a whole number of units, but for the digits of
+    /// f32, so that none of them goes another way; `None` without such rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub values_are_whole: Option<bool>,
 }
 
-/// The different thresholds of a feature, in order.
-fn thresholds(ensemble: &Ensemble, feature: usize) -> Vec<f32> {
-    let nodes = ensemble.trees.iter().flat_map(|tree| &tree.nodes);
-    let of_feature = nodes.filter_map(|node| match *node {
-        Node::Split { feature: own, threshold, .. } if own == feature => Some(threshold),
-        _ => None,
-    });
-    let mut thresholds: Vec<f32> = of_feature.collect();
-    thresholds.sort_unstable_by(f32::total_cmp);
-    thresholds.dedup();
+/// Thresholds of a feature that f32 cannot tell apart.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Merged {
+    /// The feature's name.
+    pub feature: String,
+    /// Its different thresholds in the file.
+    pub thresholds: usize,
+    /// Those that stay different in f32.
+    pub different: usize,
+}
+
+/// The different thresholds of a feature as the file has them, in order, each with the f32 that stands for it.
+fn thresholds(ensemble: &Ensemble, feature: usize) -> Vec<(Threshold, f32)> {
+    let mut thresholds = Vec::new();
+    for (number, tree) in ensemble.trees.iter().enumerate() {
+        for (index, node) in tree.nodes.iter().enumerate() {
+            if let &Node::Split { feature: own, threshold: single, .. } = node
+                && own == feature
+                && let Some(threshold) = ensemble.threshold(number, index)
+            {
+                thresholds.push((threshold, single));
+            }
+        }
+    }
+    thresholds.sort_unstable_by(|(a, _), (b, _)| a.value.total_cmp(&b.value).then(a.inclusive.cmp(&b.inclusive)));
+    thresholds.dedup_by_key(|(threshold, _)| (threshold.value.to_bits(), threshold.inclusive));
     thresholds
+}
+
+/// The features of which thresholds become the same in f32: values between those go another way than in the library.
+pub fn merged(ensemble: &Ensemble) -> Vec<Merged> {
+    let names = ensemble.inputs.names();
+    let of_feature = names.into_iter().enumerate().map(|(feature, name)| {
+        let thresholds = thresholds(ensemble, feature);
+        let different = thresholds.iter().map(|(_, single)| single.to_bits()).collect::<BTreeSet<_>>().len();
+        Merged { feature: name.into(), thresholds: thresholds.len(), different }
+    });
+    of_feature.filter(|merged| merged.different < merged.thresholds).collect()
 }
 
 /// A threshold of a feature that is no whole number, if there is one: such a feature needs a scale. Halves, which trainers
 /// put between whole numbers, and the f32 after a whole number, which stands for "at or below", are none.
-pub fn fraction(ensemble: &Ensemble, feature: usize) -> Option<f32> {
-    let is_fraction = |threshold: f32| {
-        let twice = 2.0 * f64::from(threshold);
+pub fn fraction(ensemble: &Ensemble, feature: usize) -> Option<f64> {
+    let is_fraction = |threshold: f64| {
+        let twice = 2.0 * threshold;
         threshold.is_finite() && (twice - twice.round()).abs() > 1e-6 * twice.abs().max(1.0)
     };
-    thresholds(ensemble, feature).into_iter().find(|&threshold| is_fraction(threshold))
+    thresholds(ensemble, feature).into_iter().map(|(threshold, _)| threshold.value).find(|&value| is_fraction(value))
 }
 
-/// What scales do to each feature that the ensemble uses.
-pub fn effects(ensemble: &Ensemble, scales: &[f32]) -> Vec<Effect> {
+/// What scales do to each feature that the ensemble uses, and to the values of `rows` if they were fitted to some.
+pub fn effects(ensemble: &Ensemble, scales: &[f32], rows: Option<&Rows>) -> Vec<Effect> {
     let names = ensemble.inputs.names();
     let effect = |(feature, (name, &scale)): (usize, (&str, &f32))| {
-        let thresholds = thresholds(ensemble, feature);
-        let units = |threshold: &f32| f64::from(*threshold) * f64::from(scale);
-        let mut cuts: Vec<f64> = thresholds.iter().map(|threshold| units(threshold).ceil()).collect();
+        let thresholds: Vec<Threshold> = thresholds(ensemble, feature).into_iter().map(|(own, _)| own).collect();
+        let mut cuts: Vec<f64> = thresholds.iter().map(|threshold| threshold.units(scale)).collect();
         cuts.dedup();
         // A value of n − 1/2 to n + 1/2 units is n. The split is below n = ⌈c⌉, so between ⌈c⌉ − 1/2 and c values go the
         // other way than they would.
-        let step = |threshold: &f32| (units(threshold).ceil() - 0.5 - units(threshold)).abs() / f64::from(scale);
-        let largest_step = thresholds.iter().filter(|threshold| threshold.is_finite()).map(step).fold(0.0, f64::max);
+        let units = |threshold: &Threshold| threshold.value * f64::from(scale);
+        let step = |threshold: &Threshold| (threshold.units(scale) - 0.5 - units(threshold)).abs() / f64::from(scale);
+        let finite = thresholds.iter().filter(|threshold| threshold.value.is_finite());
+        let largest_step = finite.map(step).fold(0.0, f64::max);
         let (thresholds, different) = (thresholds.len(), cuts.len());
-        Effect { feature: name.into(), scale, thresholds, different, largest_step }
+        let values_are_whole = rows.map(|rows| rows.iter().all(|row| is_whole(row[feature], scale.into())));
+        Effect { feature: name.into(), scale, thresholds, different, largest_step, values_are_whole }
     };
     let all = names.into_iter().zip(scales).enumerate().map(effect);
     all.filter(|effect| effect.thresholds > 0).collect()
+}
+
+/// Whether a value is a whole number of units, but for the digits of f32, in which decimals are not exact. What is
+/// missing or infinite is one.
+fn is_whole(value: f64, scale: f64) -> bool {
+    let units = value * scale;
+    !units.is_finite() || (units - units.round()).abs() <= units.abs().max(1.0) * 2.0 * f64::from(f32::EPSILON)
 }
 
 /// The most whole digits of a value in its units: as many as f32 holds.
@@ -68,20 +109,12 @@ const LARGEST: f64 = 1e7;
 /// which none is beyond ten million: f32 holds no more digits.
 pub fn fit(ensemble: &Ensemble, rows: &Rows) -> Vec<f32> {
     let of_feature = |feature: usize| {
-        let values: Vec<f64> =
-            rows.iter().map(|row| f64::from(row[feature])).filter(|value| value.is_finite()).collect();
-        let thresholds = thresholds(ensemble, feature).into_iter().map(f64::from);
+        let values: Vec<f64> = rows.iter().map(|row| row[feature]).filter(|value| value.is_finite()).collect();
+        let thresholds = thresholds(ensemble, feature).into_iter().map(|(threshold, _)| threshold.value);
         let finite = values.iter().copied().chain(thresholds.filter(|threshold| threshold.is_finite()));
         let largest = finite.map(f64::abs).fold(0.0, f64::max);
         let mut scale = 1.0;
-        let is_whole = |scale: f64| {
-            values.iter().all(|value| {
-                let units = value * scale;
-                // Decimals are not exact in f32.
-                (units - units.round()).abs() <= units.abs().max(1.0) * 2.0 * f64::from(f32::EPSILON)
-            })
-        };
-        while !is_whole(scale) && largest * scale * 10.0 <= LARGEST && scale < 1e30 {
+        while !values.iter().all(|&value| is_whole(value, scale)) && largest * scale * 10.0 <= LARGEST && scale < 1e30 {
             scale *= 10.0;
         }
         scale as f32

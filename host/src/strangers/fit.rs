@@ -1,7 +1,7 @@
 //! What touches of each object give, and how far evidence is from it.
 
-use super::FIRST;
 use super::follow::early;
+use super::{FIRST, Supply};
 use nalgebra::{DMatrix, DVector};
 use palpate_shared::format::FitTest;
 use rayon::prelude::*;
@@ -18,7 +18,8 @@ const NEAR: f64 = 0.05;
 
 /// Means and covariances of the margins of one touch, in nats.
 pub(super) struct Moments {
-    /// Of each known object.
+    /// Of each known object. Where it has several instances, or robots differ, their means are spread: what that comes to
+    /// in the mean of [`AT`] touches is in the covariance, so that no instance is taken for a stranger.
     of: Vec<(DVector<f64>, DMatrix<f64>)>,
     /// Of each of many other shapes, the mean.
     shapes: Vec<DVector<f64>>,
@@ -41,8 +42,8 @@ pub(super) struct Fit {
 
 impl Moments {
     /// Of rows of margins in units, for each known object; `shapes` are mean rows.
-    pub(super) fn new(rows: &[&[i32]], shapes: &[Vec<f64>], known: usize, objects: usize, unit: f64) -> Self {
-        let of = rows.par_iter().map(|rows| {
+    pub(super) fn new(supplies: &[Supply], shapes: &[Vec<f64>], known: usize, objects: usize, unit: f64) -> Self {
+        let of_rows = |rows: &Vec<i32>| {
             let count = (rows.len() / objects).max(1) as f64;
             let mut mean = DVector::zeros(objects);
             for row in rows.chunks_exact(objects) {
@@ -52,6 +53,21 @@ impl Moments {
             for row in rows.chunks_exact(objects) {
                 let away = DVector::from_iterator(objects, row.iter().map(|&margin| f64::from(margin) * unit)) - &mean;
                 covariance.ger(1.0 / count, &away, &away, 1.0);
+            }
+            (mean, covariance)
+        };
+        let of = supplies.par_iter().map(|supply| {
+            let pools: Vec<(DVector<f64>, DMatrix<f64>)> =
+                supply.pools.iter().filter(|rows| !rows.is_empty()).map(of_rows).collect();
+            let share = 1.0 / pools.len().max(1) as f64;
+            let (mut mean, mut covariance) = (DVector::zeros(objects), DMatrix::zeros(objects, objects));
+            for (own_mean, own_covariance) in &pools {
+                mean += own_mean * share;
+                covariance += own_covariance * share;
+            }
+            for (own_mean, _) in pools.iter().filter(|_| pools.len() > 1) {
+                let away = own_mean - &mean;
+                covariance.ger(AT * share, &away, &away, 1.0);
             }
             (mean, covariance)
         });
@@ -144,13 +160,14 @@ impl Fit {
 
 /// For each known object, and each number of touches up to `last`, the share of its sequences that are found out when
 /// the model does not use its column: at a level of misfit of `threshold`.
-pub(super) fn left_out(moments: &Moments, rows: &[&[i32]], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
+pub(super) fn left_out(moments: &Moments, supplies: &[Supply], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
     let of = |stranger: usize| {
         let objects = moments.objects;
         // With two objects, none is left that could be told from the other.
         let Some(fits) = fits(moments, Some(stranger)) else { return vec![0.0; last as usize] };
         let mut found = vec![0_usize; last as usize];
-        let sequences = rows[stranger].chunks_exact(objects * last as usize);
+        let pools = supplies[stranger].pools.iter();
+        let sequences: Vec<&[i32]> = pools.flat_map(|rows| rows.chunks_exact(objects * last as usize)).collect();
         let count = sequences.len();
         for sequence in sequences {
             let mut evidence = vec![0.0; objects];

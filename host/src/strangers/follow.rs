@@ -1,6 +1,6 @@
 //! Sequences of touches, and how badly they fit at each look.
 
-use super::{EARLY, FIRST, HALVED_AFTER, NAT};
+use super::{EARLY, FIRST, HALVED_AFTER, NAT, Supply};
 use crate::random::{self, Purpose};
 use palpate_onboard::{Model, Stopping};
 use rand::seq::SliceRandom;
@@ -78,9 +78,9 @@ impl Sequence {
     }
 }
 
-/// Puts touches in a random order.
-pub(super) fn shuffle<T>(touches: &mut [T], name: &str, seed: u64) {
-    touches.shuffle(&mut random::generator(seed, Purpose::Fit, name, 0));
+/// Puts the touches of an object's pool in a random order.
+pub(super) fn shuffle<T>(touches: &mut [T], name: &str, seed: u64, pool: u64) {
+    touches.shuffle(&mut random::generator(seed, Purpose::Fit, name, pool));
 }
 
 /// How far beyond the threshold a misfit may be after this number of touches, in nats.
@@ -89,38 +89,51 @@ pub(super) fn early(touches: u32) -> f64 {
 }
 
 /// Follows as many sequences of each object as its touches allow, each touch in one only, at most `most` of all
-/// together. A sequence that the touches end in is left out.
-pub(super) fn sequences(model: &Model<'_>, supplies: &[&[i32]], policy: &Policy, most: usize) -> Vec<Vec<Sequence>> {
+/// together: of each pool as many, in turn. A sequence that the touches end in is left out; one that a robot's touches end
+/// in ends there.
+pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy, most: usize) -> Vec<Vec<Sequence>> {
     let objects = model.object_count();
     let of_each = most.div_ceil(supplies.len().max(1));
     let limit = match policy.until {
         Until::Touches(touches) => touches,
         Until::Named { .. } => Stopping::from_model(model).max_touches(),
     };
-    let of = |rows: &&[i32]| {
-        let mut rows = rows.chunks_exact(objects);
+    let of = |supply: &Supply| {
         let mut all = Vec::new();
-        while all.len() < of_each {
-            match one(model, &mut rows, policy, limit) {
-                Some(sequence) => all.push(sequence),
-                None => break,
+        if supply.is_once {
+            let once = supply.pools.iter().take(of_each).map(|rows| {
+                let mut looks = Vec::new();
+                one(model, &mut rows.chunks_exact(objects), policy, limit, &mut looks);
+                Sequence(looks)
+            });
+            return once.filter(|sequence| !sequence.0.is_empty()).collect();
+        }
+        let mut pools: Vec<_> = supply.pools.iter().map(|rows| rows.chunks_exact(objects)).collect();
+        while all.len() < of_each && !pools.is_empty() {
+            let next = all.len() % pools.len();
+            let mut looks = Vec::new();
+            if !one(model, &mut pools[next], policy, limit, &mut looks) {
+                break;
             }
+            all.push(Sequence(looks));
         }
         all
     };
     supplies.par_iter().map(of).collect()
 }
 
+/// Follows one sequence; whether it came to its end before the touches did.
 fn one<'r>(
     model: &Model<'_>,
     rows: &mut impl Iterator<Item = &'r [i32]>,
     policy: &Policy,
     limit: u32,
-) -> Option<Sequence> {
+    looks: &mut Vec<Look>,
+) -> bool {
     let mut evidence: Vec<i64> = (0..model.object_count()).map(|object| model.prior(object).into()).collect();
-    let mut looks = Vec::new();
     for touches in 1..=limit {
-        evidence.iter_mut().zip(rows.next()?).for_each(|(sum, &margin)| *sum += i64::from(margin));
+        let Some(row) = rows.next() else { return false };
+        evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += i64::from(margin));
         let misfit = model.misfit(&evidence, touches).filter(|_| touches >= FIRST);
         let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
         let look = Look { level, is_decided: is_decided(model, &evidence) };
@@ -130,7 +143,7 @@ fn one<'r>(
             _ => {}
         }
     }
-    Some(Sequence(looks))
+    true
 }
 
 /// Whether the leader's posterior passes the model's threshold.

@@ -1,6 +1,6 @@
 //! How many strangers a test finds out: each object in turn is left out of the training.
 
-use super::{Calibrated, Settings, Shapes, calibrate};
+use super::{Calibrated, Settings, calibrate};
 use crate::compile::{self, compile};
 use crate::ensemble::train::{self, train, train_with_background};
 use crate::error::Result;
@@ -43,7 +43,7 @@ pub struct LeftOut {
 pub fn leave_one_out(
     sets: Sets<'_>,
     background: Option<&Dataset>,
-    shapes: &[Shapes],
+    shapes: &[ObjectTouches],
     training: &train::Settings,
     settings: &Settings,
     held: &[Option<Held>],
@@ -53,7 +53,7 @@ pub fn leave_one_out(
     progress.begin("leaving each object out", u64::try_from(names.len()).ok());
     let mut found = vec![Vec::new(); held.len()];
     for name in &names {
-        let others = |dataset: &Dataset| dataset.with(objects(dataset, |other| other != name));
+        let others = |dataset: &Dataset| dataset.only(|other| other != name);
         let known = others(sets.train);
         let ensemble = match background {
             None => train(&known, training, &())?,
@@ -62,7 +62,7 @@ pub fn leave_one_out(
         let compiled = compile(&ensemble, &compile::Settings::default())?;
         let model = compile::open(&compiled.bytes)?;
         let (learned, tested) = (others(sets.calibrate), others(sets.test));
-        let stranger = sets.test.with(objects(sets.test, |other| other == name));
+        let stranger = sets.test.only(|other| other == name);
         for (held, found) in held.iter().zip(&mut found) {
             let calibrated =
                 held.map(|held| calibrate(&model, &learned, shapes, &Settings { held, ..*settings })).transpose()?;
@@ -73,10 +73,6 @@ pub fn leave_one_out(
         progress::advance(progress, 1)?;
     }
     Ok(found)
-}
-
-fn objects(dataset: &Dataset, keep: impl Fn(&String) -> bool) -> Vec<ObjectTouches> {
-    dataset.objects.iter().filter(|object| keep(&object.name)).cloned().collect()
 }
 
 fn measure(

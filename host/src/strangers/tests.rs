@@ -3,6 +3,7 @@ use crate::compile::{Settings as Compilation, compile};
 use crate::ensemble::train::{self, train, train_with_background};
 use crate::error::Problem;
 use crate::evaluate::{self, Margins, SequentialSettings};
+use crate::repetitions::{assert_rare, repetitions};
 use crate::touches::synthetic;
 use palpate_onboard::{Recognizer, Stopping, Verdict};
 use std::sync::LazyLock;
@@ -29,9 +30,8 @@ static MODELS: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| {
         .map(|ensemble| compile(&ensemble, &Compilation::default()).unwrap().bytes)
 });
 
-fn shapes() -> Vec<Shapes> {
-    let others = of(4..9, 400, 7);
-    others.objects.into_iter().map(|object| Shapes { touches: object.touches, count: 1 }).collect()
+fn shapes() -> Vec<ObjectTouches> {
+    of(4..9, 400, 7).objects
 }
 
 fn calibrated(bytes: &[u8], held: Held) -> Calibrated {
@@ -71,13 +71,12 @@ fn the_chip_computes_the_misfit_that_was_learned() {
         let model = compile::open(bytes).unwrap();
         let (objects, unit) = (model.object_count(), f64::from(model.unit()));
         let supplies = supplies(&model, &of(0..KNOWN, 4_000, 2), 1).unwrap();
-        let learn: Vec<&[i32]> = supplies.iter().map(|supply| &supply.rows[..]).collect();
-        let moments = Moments::new(&learn, &of_shapes(&model, &shapes()), model.known_count(), objects, unit);
+        let moments = Moments::new(&supplies, &of_shapes(&model, &shapes()), model.known_count(), objects, unit);
         let fits = fit::fits(&moments, None).unwrap();
         let settings = Settings::default();
         let tested = stated(&model, &terms(&settings, &fits, 0.0, FIRST), &fits).unwrap();
         let tested = compile::open(&tested).unwrap();
-        for rows in &learn {
+        for rows in supplies.iter().map(|supply| &supply.pools[0]) {
             let mut sums = vec![0_i64; objects];
             for (touches, row) in (1_u32..=200).zip(rows.chunks_exact(objects)) {
                 sums.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += i64::from(margin));
@@ -98,7 +97,7 @@ fn a_background_is_a_rival_and_is_never_named() {
     assert_eq!(model.object_name(3), "background");
     let mut led = 0;
     for object in &of(4..9, 2_000, 5).objects {
-        for touches in object.touches.chunks_exact(200) {
+        for touches in object.touches().chunks_exact(200) {
             let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
             touches.iter().for_each(|touch| _ = recognizer.push(touch));
             assert!(recognizer.best() < 3);
@@ -169,4 +168,82 @@ fn what_cannot_be_calibrated_says_so() {
         strangers.err().unwrap().problem(),
         Some(Problem::Evaluate(EvaluateProblem::KnownObject { object })) if object == "object0"
     ));
+}
+
+/// Touches of the known objects for a promise, and what is promised.
+fn promised(seed: u64, held: Held, rate: f64) -> (crate::calibrate::Calibrated, Calibrated) {
+    let model = compile::open(&MODELS[0]).unwrap();
+    let promise = crate::calibrate::Settings { rate, max_touches: Some(60), seed, ..Default::default() };
+    let settings = Settings { held, alarms: 0.05, seed, ..Settings::default() };
+    calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), &shapes(), &settings, &promise, &()).unwrap()
+}
+
+/// What a model does with sequences of touches that nothing was made from, each touch in one of them: shares of the names
+/// that are wrong, and of the sequences that are unknown; and the touches used on average.
+fn on_fresh_touches(bytes: &[u8], fresh: &Dataset) -> [f64; 3] {
+    let model = compile::open(bytes).unwrap();
+    let (mut sequences, mut given, mut wrong, mut unknown, mut used) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (object, touched) in fresh.objects.iter().enumerate() {
+        let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
+        for touch in touched.touches() {
+            let Ok(verdict) = recognizer.push(touch) else { continue };
+            let (is_given, is_wrong, is_unknown) = match verdict {
+                Verdict::Undecided => continue,
+                Verdict::Recognized { object: name, .. } => {
+                    (1.0, f64::from(u8::from(usize::from(name) != object)), 0.0)
+                }
+                Verdict::Unknown => (0.0, 0.0, 1.0),
+                Verdict::GaveUp => (0.0, 0.0, 0.0),
+            };
+            (sequences, given, wrong) = (sequences + 1.0, given + is_given, wrong + is_wrong);
+            (unknown, used) = (unknown + is_unknown, used + f64::from(recognizer.touches()));
+            recognizer.reset();
+        }
+    }
+    [wrong / given, unknown / sequences, used / sequences]
+}
+
+#[test]
+fn a_promise_beside_a_test_for_strangers_is_one_of_the_model_with_its_test() {
+    let fresh = of(0..KNOWN, 60_000, 5);
+    for held in [Held::Likely, Held::Certain] {
+        let (promised, tested) = promised(1, held, 0.05);
+        let model = compile::open(&tested.bytes).unwrap();
+        assert_eq!((&promised.model, model.promise()), (&tested.bytes, Some(promised.promise)));
+        let [wrong, unknown, touches] = on_fresh_touches(&tested.bytes, &fresh);
+        assert!(wrong < 0.06 && unknown < 0.06, "{held:?}: {wrong} {unknown}");
+        // As many touches as the promise says: those of a model that waits for its test.
+        assert!((touches / promised.mean_touches - 1.0).abs() < 0.1, "{held:?}: {touches} {}", promised.mean_touches);
+        assert!((touches / tested.mean_touches - 1.0).abs() < 0.1, "{held:?}: {touches} {}", tested.mean_touches);
+        // And without a name as often: unknown, or undecided.
+        assert!(promised.undecided > 0.3 * unknown, "{held:?}: {} {unknown}", promised.undecided);
+    }
+}
+
+#[test]
+fn a_promise_made_without_a_test_is_not_stated_with_one() {
+    let model = compile::open(&MODELS[0]).unwrap();
+    let settings = crate::calibrate::Settings { rate: 0.05, ..Default::default() };
+    let promised = crate::calibrate::calibrate(&model, of(0..KNOWN, 30_000, 3), &settings, &()).unwrap().model;
+    let with = calibrated(&promised, Held::Likely).bytes;
+    assert_eq!(compile::open(&with).unwrap().promise(), None);
+    let (_, with) = self::promised(1, Held::Likely, 0.05);
+    let without = without(&compile::open(&with.bytes).unwrap()).unwrap();
+    assert_eq!(compile::open(&without).unwrap().promise(), None);
+}
+
+/// `PALPATE_REPETITIONS=200 cargo test -p palpate --lib both_shares_promised -- --nocapture` repeats it as often.
+#[test]
+fn both_shares_promised_are_kept_in_all_but_one_of_twenty_calibrations() {
+    let fresh = of(0..KNOWN, 60_000, 5);
+    let repetitions = repetitions(3);
+    let (mut wrong, mut alarms) = (0, 0);
+    for seed in 0..repetitions {
+        let (_, tested) = promised(seed, Held::Likely, 0.05);
+        let [names, unknown, _] = on_fresh_touches(&tested.bytes, &fresh);
+        wrong += u64::from(names > 0.05);
+        alarms += u64::from(unknown > 0.05);
+    }
+    assert_rare("wrong names", wrong, repetitions, 0.05);
+    assert_rare("false alarms", alarms, repetitions, 0.05);
 }

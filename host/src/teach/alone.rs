@@ -7,7 +7,7 @@ use crate::ensemble::train::{self, train};
 use crate::ensemble::{Ensemble, Origin};
 use crate::error::Result;
 use crate::progress::{self, Progress};
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches, Source};
 use palpate_onboard::Refused;
 use palpate_shared::Touch;
 use palpate_shared::format::Counted;
@@ -18,7 +18,8 @@ const COMPARED: Division = Division { parts: 5, used: 4 };
 const SHARES: [Division; 2] = [Division { parts: 4, used: 1 }, Division { parts: 2, used: 1 }];
 
 /// Trains an ensemble on the objects of `recorded` alone. Its touches are repeated under jitter, and how much is chosen by
-/// cross-validation, one jitter for all objects. There are no constants: no object has been seen much more than others.
+/// cross-validation, one jitter for all objects: the figures come from the touches that chose it among three. There are
+/// no constants: no object has been seen much more than others.
 /// The noise of `training` is not added, since the touches have their own.
 ///
 /// # Errors
@@ -36,22 +37,23 @@ pub fn alone(
     let all = recorded.objects.len();
     on_threads(settings.threads, || {
         let places: Vec<Vec<f64>> =
-            recorded.objects.iter().map(|object| places(&object.name, object.touches.len(), settings.seed)).collect();
+            recorded.objects.iter().map(|object| places(&object.name, object.len(), settings.seed)).collect();
         let fitted = |jitter: f64, is_used: &dyn Fn(f64) -> bool| -> Result<Ensemble> {
             let object = |(object, places): (&ObjectTouches, &Vec<f64>)| {
-                let used = object.touches.iter().zip(places).filter(|(_, place)| is_used(**place));
-                let touches: Vec<Touch> = used.map(|(touch, _)| *touch).collect();
-                let touches = repeated(&object.name, &touches, jitter, settings.seed);
-                ObjectTouches { name: object.name.clone(), touches }
+                let used = object.select((0..object.len()).filter(|&touch| is_used(places[touch])));
+                // Copies that are trained on, and of which no sequence is drawn.
+                let touches = repeated(&object.name, used.touches(), jitter, settings.seed);
+                ObjectTouches::new(&object.name, touches, Source::Object)
             };
-            train(&recorded.with(recorded.objects.iter().zip(&places).map(object).collect()), &training, &())
+            let objects = recorded.objects.iter().zip(&places).map(object).collect();
+            train(&Dataset { origin: recorded.origin.clone(), ..Dataset::new(objects) }, &training, &())
         };
         let held_out = |jitter: f64, division: Division| -> Result<Vec<Held>> {
-            let mut held: Vec<Held> = recorded.objects.iter().map(|object| vec![None; object.touches.len()]).collect();
+            let mut held: Vec<Held> = recorded.objects.iter().map(|object| vec![None; object.len()]).collect();
             for part in 0..division.parts {
                 let ensemble = fitted(jitter, &|place| division.uses(division.part(place), part))?;
                 for (object, (held, places)) in recorded.objects.iter().zip(held.iter_mut().zip(&places)) {
-                    let touches = object.touches.iter().zip(places).zip(held);
+                    let touches = object.touches().iter().zip(places).zip(held);
                     for ((touch, _), held) in touches.filter(|((_, place), _)| division.part(**place) == part) {
                         *held = margins(&ensemble, touch);
                     }
@@ -68,27 +70,33 @@ pub fn alone(
         let compared = compared.into_iter().collect::<Result<Vec<_>>>()?;
         let best = compared.into_iter().min_by(|a, b| loss(&a.1).total_cmp(&loss(&b.1)));
         let (jitter, held) = best.unwrap_or((1.0, Vec::new()));
-        let fewest = recorded.objects.iter().map(|object| object.touches.len()).min().unwrap_or(0);
-        let approaches = settings.approaches.min(fewest / 2).max(1);
+        let approaches = settings.approaches.min(recorded.fewest_in_sequence() / 2).max(1);
+        let sources: Vec<Vec<Vec<usize>>> = recorded.objects.iter().map(super::by_source).collect();
         let groups = |held: &[Held]| {
-            super::Groups::draw(held, (0..all).collect(), None, [settings.groups, approaches], settings.seed)
+            super::Groups::draw(
+                (held, &sources),
+                (0..all).collect(),
+                None,
+                [settings.groups, approaches],
+                settings.seed,
+            )
         };
         let none = vec![0.0; all];
         let mut curves = vec![Curve::default(); all];
         for division in SHARES {
             let drawn = groups(&held_out(jitter, division)?);
             for (index, curve) in curves.iter_mut().enumerate() {
-                let used = recorded.objects[index].touches.len() as f64 * division.share();
+                let used = recorded.objects[index].len() as f64 * division.share();
                 curve.add(used.round() as usize, drawn.named(index, &none));
             }
         }
         let drawn = groups(&held);
         let objects = recorded.objects.iter().zip(curves).enumerate().map(|(index, (object, mut curve))| {
             let named = drawn.named(index, &none);
-            curve.finish(object.touches.len(), COMPARED.share(), named);
+            curve.finish(object.len(), COMPARED.share(), named);
             TaughtObject {
                 name: object.name.clone(),
-                approaches: object.touches.len(),
+                approaches: object.len(),
                 touches: evidence[index],
                 smoothing: Smoothing { jitter, prior: 0.0 },
                 constant: 0.0,
@@ -97,7 +105,8 @@ pub fn alone(
                 curve,
             }
         });
-        let promise = Needed::new(all, approaches);
+        let taught: Vec<usize> = (0..all).collect();
+        let promise = Needed::new((&held, &sources), &taught, None, &none, settings.seed);
         let taught = Taught { approaches, objects: objects.collect(), others: None, promise };
         progress.begin("training", None);
         let mut ensemble = fitted(jitter, &|_| true)?;
@@ -117,7 +126,7 @@ fn margins(ensemble: &Ensemble, touch: &Touch) -> Option<Vec<f64>> {
 fn evidence(recorded: &Dataset, training: &train::Settings) -> Result<Vec<usize>> {
     let patterns = training.counted.unwrap_or(Counted::Full).patterns();
     let is_evidence = |touch: &&Touch| patterns.contains(touch.pattern());
-    let count = |object: &ObjectTouches| object.touches.iter().filter(is_evidence).count();
+    let count = |object: &ObjectTouches| object.touches().iter().filter(is_evidence).count();
     let evidence: Vec<usize> = recorded.objects.iter().map(count).collect();
     check::enough(recorded, &evidence)?;
     Ok(evidence)

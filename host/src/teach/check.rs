@@ -22,8 +22,7 @@ pub(super) fn check(
     if ensemble.trees.iter().any(|tree| tree.output != Output::Each) {
         return Err(TeachProblem::OneValue.into());
     }
-    let has_touches =
-        |name: &&String| known.objects.iter().any(|object| object.name == **name && !object.touches.is_empty());
+    let has_touches = |name: &&String| known.objects.iter().any(|object| object.name == **name && !object.is_empty());
     let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
     if !missing.is_empty() {
         return Err(TeachProblem::Missing { objects: missing }.into());
@@ -74,7 +73,7 @@ pub(super) fn approaches(counted: Counted, recorded: &Dataset) -> Result<()> {
 
 /// Every touch has a pose, if the descriptor needs one.
 pub(super) fn poses(descriptor: Descriptor, recorded: &Dataset) -> Result<()> {
-    let without = |object: &&ObjectTouches| object.touches.iter().any(|touch| touch.pose().is_none());
+    let without = |object: &&ObjectTouches| object.touches().iter().any(|touch| touch.pose().is_none());
     match recorded.objects.iter().find(without) {
         Some(object) if descriptor.needs_pose() => {
             Err(TeachProblem::NoPose { object: object.name.clone(), descriptor }.into())

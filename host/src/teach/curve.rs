@@ -1,7 +1,7 @@
 //! How much more approaches would help.
 
 use super::Smoothing;
-use super::balance::{Groups, Held, Named};
+use super::balance::{Held, Judged, Named};
 use super::held_out::{Division, Material};
 use crate::error::Result;
 use crate::progress::Progress;
@@ -68,18 +68,17 @@ pub(super) fn expected(points: &[Point], approaches: usize) -> f64 {
 pub(super) fn curves(
     material: &Material,
     smoothings: &[Smoothing],
-    groups: &impl Fn(&[Held]) -> Groups,
+    judged: &impl Fn(&[Held]) -> Judged,
     progress: &dyn Progress,
 ) -> Result<Vec<Curve>> {
     let all: Vec<usize> = (0..smoothings.len()).collect();
     let mut curves = vec![Curve::default(); all.len()];
     for division in SHARES {
         let held = material.held_out(&all, smoothings, 1, division, progress)?;
-        let drawn = groups(&held);
-        let constants = drawn.balanced();
+        let drawn = judged(&held);
         for (index, curve) in curves.iter_mut().enumerate() {
             let given = held[material.known_count() + index].len();
-            curve.add((given as f64 * division.share()).round() as usize, drawn.named(index, &constants));
+            curve.add((given as f64 * division.share()).round() as usize, drawn.named(index));
         }
     }
     Ok(curves)

@@ -27,10 +27,11 @@ pub use promise::Needed;
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
 use crate::ensemble::{Ensemble, Node, Origin};
 use crate::error::Result;
+use crate::evaluate::ROBOTS;
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
-use crate::touches::{Dataset, ObjectTouches};
-use balance::Groups;
+use crate::touches::{Dataset, ObjectTouches, Source};
+use balance::{Groups, Judged};
 use held_out::{Division, Material};
 use palpate_shared::Touch;
 use palpate_shared::format::TrainedTouches;
@@ -49,6 +50,8 @@ const BALANCED: Division = Division { parts: 10, used: 9 };
 const KNOWN: [usize; 2] = [12_000, 240_000];
 /// Touches of a known object that columns are fitted on where there are many objects.
 const LEAST_KNOWN: usize = 500;
+/// Touches that each of the robots makes of a known object at least, where there are enough.
+const TOUCHES_OF_A_ROBOT: usize = 250;
 /// Touches of a recorded object that are needed at least, for a part of them to say something.
 pub const LEAST: usize = 20;
 
@@ -92,7 +95,8 @@ impl Smoothing {
     }
 }
 
-/// What was found out about objects that were taught, on recorded touches that were held out. Shares are between 0 and 1.
+/// What was found out about objects that were taught, on recorded touches that were held out: from columns as from
+/// constants. Only the smoothing, one of nine, was chosen on all of them. Shares are between 0 and 1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Taught {
     /// Approaches of a group.
@@ -145,8 +149,10 @@ pub fn teach(
     let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
     on_threads(settings.threads, || {
         let known = known_touches(ensemble, known, &noise, settings.seed);
+        let sources: Vec<Vec<Vec<usize>>> = known.iter().chain(&recorded.objects).map(by_source).collect();
+        let known: Vec<Vec<Touch>> = known.iter().map(|object| object.touches().to_vec()).collect();
         let touches: Vec<(&str, &[Touch])> =
-            recorded.objects.iter().map(|object| (object.name.as_str(), &object.touches[..])).collect();
+            recorded.objects.iter().map(|object| (object.name.as_str(), object.touches())).collect();
         let material = Material::new(ensemble, descriptor, &known, &touches, settings.seed);
         let evidence: Vec<usize> = (0..touches.len()).map(|index| material.evidence(index)).collect();
         check::enough(recorded, &evidence)?;
@@ -154,24 +160,22 @@ pub fn teach(
         let all: Vec<usize> = (0..touches.len()).collect();
         progress.begin("cross-validating", Some((BALANCED.parts + curve::parts()) as u64));
         let held = material.held_out(&all, &smoothings, 1, BALANCED, progress)?;
-        let fewest = touches.iter().map(|(_, touches)| touches.len()).min().unwrap_or(0);
-        let approaches = settings.approaches.min(fewest / 2).max(1);
+        let approaches = settings.approaches.min(balance::most_approaches(recorded.fewest_in_sequence()));
         let background = ensemble.origin.background.then(|| ensemble.known_count());
-        let groups = |held: &[balance::Held]| {
-            let taught = (material.known_count()..held.len()).collect();
-            Groups::draw(held, taught, background, [settings.groups, approaches], settings.seed)
-        };
-        let drawn = groups(&held);
-        let constants = drawn.balanced();
-        let mut curves = curve::curves(&material, &smoothings, &groups, progress)?;
+        let sizes = [settings.groups, approaches];
+        let taught: Vec<usize> = (material.known_count()..held.len()).collect();
+        let judged = |held: &[balance::Held]| Judged::new((held, &sources), &taught, background, sizes, settings.seed);
+        let constants = Groups::draw((&held, &sources), taught.clone(), background, sizes, settings.seed).balanced();
+        let mut curves = curve::curves(&material, &smoothings, &judged, progress)?;
+        let drawn = judged(&held);
         let objects = recorded.objects.iter().zip(&evidence).enumerate().map(|(index, (object, &touches))| {
-            let named = drawn.named(index, &constants);
+            let named = drawn.named(index);
             let share = BALANCED.share();
             let mut curve = std::mem::take(&mut curves[index]);
-            curve.finish(object.touches.len(), share, named);
+            curve.finish(object.len(), share, named);
             TaughtObject {
                 name: object.name.clone(),
-                approaches: object.touches.len(),
+                approaches: object.len(),
                 touches,
                 smoothing: smoothings[index],
                 constant: constants[index],
@@ -180,21 +184,18 @@ pub fn teach(
                 curve,
             }
         });
-        let taught = Taught {
+        let found = Taught {
             approaches,
             objects: objects.collect(),
-            others: Some(drawn.others(&constants)),
-            promise: Needed::new(
-                material.known_count() + evidence.len() - usize::from(background.is_some()),
-                approaches,
-            ),
+            others: Some(drawn.others()),
+            promise: Needed::new((&held, &sources), &taught, background, &constants, settings.seed),
         };
         let columns = material.fitted(&smoothings);
         let mut extended = extended(ensemble, recorded, &columns, &constants);
         if let Some(bits) = settings.leaf_bits {
             round_leaves(&mut extended, bits);
         }
-        Ok((extended, taught))
+        Ok((extended, found))
     })
 }
 
@@ -209,17 +210,23 @@ fn on_threads<T: Send>(threads: Option<usize>, run: impl FnOnce() -> Result<T> +
 }
 
 /// The touches of each object that the ensemble knows, in its order, with this noise.
-fn known_touches(ensemble: &Ensemble, known: &Dataset, noise: &Noise, seed: u64) -> Vec<Vec<Touch>> {
+fn known_touches(ensemble: &Ensemble, known: &Dataset, noise: &Noise, seed: u64) -> Vec<ObjectTouches> {
     let most = (KNOWN[1] / ensemble.objects.len().max(1)).clamp(LEAST_KNOWN, KNOWN[0]);
     let of = |name: &String| {
-        let object = known.objects.iter().find(|object| object.name == *name);
-        let touches = object.map_or(&[][..], |object| &object.touches);
-        // Evenly from all of them: instances and a background's shapes stand one after the other.
-        let step = touches.len().div_ceil(most).max(1);
-        let some: Vec<Touch> = touches.iter().step_by(step).copied().collect();
-        if noise.is_none() { some } else { noise.add(name, &some, seed) }
+        let none = || ObjectTouches::new(name, Vec::new(), Source::Object);
+        let object = known.objects.iter().find(|object| object.name == *name).cloned().unwrap_or_else(none);
+        // Evenly from all of them, and from each instance and each of a background's shapes.
+        let some = object.thinned(most);
+        // A group is of one robot's touches, where robots differ.
+        let robots = (some.len() / TOUCHES_OF_A_ROBOT).clamp(1, ROBOTS);
+        if noise.is_none() { some } else { some.noisy(noise, seed, robots) }
     };
     ensemble.objects.iter().map(of).collect()
+}
+
+/// For each source of an object its touches' positions; a group is of touches of one.
+fn by_source(object: &ObjectTouches) -> Vec<Vec<usize>> {
+    object.pools().into_iter().map(|pool| pool.touches.into_iter().map(|touch| touch as usize).collect()).collect()
 }
 
 /// For each recorded object the smoothing with the least loss on held-out touches, beside the objects that the trees know.
@@ -269,7 +276,7 @@ fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], const
 /// What is evidence to a model that was also taught these objects.
 fn with(mut trained: TrainedTouches, recorded: &[ObjectTouches]) -> TrainedTouches {
     let patterns = trained.counted.patterns();
-    for touch in recorded.iter().flat_map(|object| &object.touches) {
+    for touch in recorded.iter().flat_map(ObjectTouches::touches) {
         if patterns.contains(touch.pattern()) && (touch.pose().is_some() || !trained.needs_pose) {
             trained.patterns = trained.patterns.with(touch.pattern());
             trained.largest_spread = trained.largest_spread.max(touch.spread());

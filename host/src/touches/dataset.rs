@@ -4,7 +4,7 @@ use super::checksum::checksum;
 use super::files::files;
 use super::noise::Noise;
 use super::warning::Warning;
-use super::{Entry, Format, Listing, Log, Origin, Recorded, is_log, recording};
+use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
 use palpate_shared::Touch;
@@ -18,38 +18,79 @@ pub struct Dataset {
     pub objects: Vec<ObjectTouches>,
     /// How the touches were made, where that is known: a directory without `dataset.json` does not say.
     pub origin: Option<Origin>,
-    /// How many instances the objects have that have several, by name: touch i is of instance i modulo their number.
-    /// Empty after a split, which shuffles touches.
-    pub instances: BTreeMap<String, usize>,
-    /// The recordings that the touches are from; empty for simulated touches, and where that is not known.
-    pub recorded: Vec<Recorded>,
     /// What looked wrong when the data set was read, and may be meant.
     pub warnings: Vec<Warning>,
 }
 
-/// The touches of one object.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ObjectTouches {
-    /// The object's name.
-    pub name: String,
-    /// Its touches, in the order of the file; at least one.
-    pub touches: Vec<Touch>,
-}
-
 impl Dataset {
-    /// Whether a real probe made the touches, as far as the data set states it.
-    pub fn is_recorded(&self) -> bool {
-        !self.recorded.is_empty()
-    }
-
-    /// Touches that nothing is known about: no origin, no warnings. The objects are to be sorted by name.
+    /// Touches that nothing is known about but their sources: no origin, no warnings. The objects are to be sorted by name.
     pub fn new(objects: Vec<ObjectTouches>) -> Self {
         Self { objects, ..Self::default() }
     }
 
-    /// Other touches of the same origin, such as a part of these.
-    pub fn with(&self, objects: Vec<ObjectTouches>) -> Self {
-        Self { objects, origin: self.origin.clone(), recorded: self.recorded.clone(), ..Self::default() }
+    /// Touches of the same origin: what `of` makes of each object's.
+    #[must_use]
+    pub fn each(&self, of: impl FnMut(&ObjectTouches) -> ObjectTouches) -> Self {
+        Self { objects: self.objects.iter().map(of).collect(), origin: self.origin.clone(), warnings: Vec::new() }
+    }
+
+    /// The touches of the objects whose names `keep` says.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(&str) -> bool) -> Self {
+        let objects = self.objects.iter().filter(|object| keep(&object.name)).cloned().collect();
+        Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
+    }
+
+    /// Adds noise to all touches, made by `robots` robots in turn (see [`ObjectTouches::noisy`]); the origin then states it
+    /// too.
+    pub fn add_noise(&mut self, noise: &Noise, seed: u64, robots: usize) {
+        if noise.is_none() {
+            return;
+        }
+        self.objects.iter_mut().for_each(|object| *object = object.noisy(noise, seed, robots));
+        if let Some(origin) = &mut self.origin {
+            origin.real = origin.real.and(noise);
+        }
+    }
+
+    /// Whether a real probe made touches, as far as the data set states it.
+    pub fn is_recorded(&self) -> bool {
+        self.sources().any(|(_, source)| matches!(source, Source::Recording(_)))
+    }
+
+    /// The recordings that the touches are from, with the numbers of touches that are here, in the order in which they
+    /// began; empty for simulated touches, and where that is not known.
+    pub fn recorded(&self) -> Vec<Recorded> {
+        let mut all = Vec::new();
+        for object in &self.objects {
+            for (source, touches) in object.sources().iter().zip(object.by_source()) {
+                let Source::Recording(recorded) = source else { continue };
+                let touches = touches.len() as u64;
+                // The checksum is of all of its lines.
+                let crc32 = recorded.crc32.filter(|_| touches == recorded.touches);
+                all.push(Recorded { touches, crc32, ..recorded.clone() });
+            }
+        }
+        // As text, times are in their order.
+        all.sort_by(|a, b| a.began.cmp(&b.began));
+        all
+    }
+
+    /// How many instances, recordings or logs the objects have that have several, by name: a sequence is of touches of one.
+    pub fn several(&self) -> BTreeMap<String, usize> {
+        let several = self.objects.iter().filter(|object| object.sources().len() > 1);
+        several.map(|object| (object.name.clone(), object.sources().len())).collect()
+    }
+
+    /// The most touches that a sequence of any object can have: as many as there are of one source, such as an instance, by
+    /// one robot.
+    pub fn fewest_in_sequence(&self) -> usize {
+        let pools = self.objects.iter().flat_map(ObjectTouches::pools);
+        pools.map(|pool| pool.touches.len()).min().unwrap_or(0)
+    }
+
+    fn sources(&self) -> impl Iterator<Item = (&ObjectTouches, &Source)> {
+        self.objects.iter().flat_map(|object| object.sources().iter().map(move |source| (object, source)))
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
@@ -62,7 +103,7 @@ impl Dataset {
     /// # Errors
     /// When the directory cannot be read, holds fewer than two objects or an unfinished capture; when a listed file is
     /// missing, has another number of touches than stated, or is a Parquet file with another checksum; when a file
-    /// holds no touch, and when a line or row is wrong (it is named).
+    /// holds no touch, and when a line or row is wrong, or a row is of another object (it is named).
     pub fn read(directory: &Path) -> Result<Self> {
         let dataset = Self::read_any(directory)?;
         match dataset.objects.as_slice() {
@@ -104,7 +145,7 @@ impl Dataset {
         let Some((format, name)) = format.zip(name) else {
             return Err(Error::at(Place::file(path), TouchesProblem::NoFormat));
         };
-        Ok(ObjectTouches { name: name.into(), touches: format.read(path)? })
+        Ok(ObjectTouches::new(name, format.read(path)?, Source::Object))
     }
 
     /// What a listing names.
@@ -113,25 +154,23 @@ impl Dataset {
             return Err(Error::at(Place::file(directory), TouchesProblem::Incomplete));
         }
         let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
-        let mut instances = BTreeMap::new();
-        let is_recorded = listing.is_recorded();
-        for entry in listing.objects {
+        // Text may grow while it is recorded; what is copied to another format is complete.
+        let may_grow = listing.is_recorded() && listing.origin.format == Format::Text;
+        for entry in &listing.objects {
             let path = entry.file(directory, listing.origin.format);
-            let touches = match is_recorded {
-                true => recording::read(&entry, &path, &mut warnings)?,
-                false => read_listed(&entry, listing.origin.format, &path, &mut warnings)?,
+            let touches = match may_grow {
+                true => recording::read(entry, &path, &mut warnings)?,
+                false => read_listed(entry, listing.origin.format, &path, &mut warnings)?,
             };
             // Of an object whose recording was interrupted before its first touch.
-            if is_recorded && touches.is_empty() {
+            if may_grow && touches.is_empty() {
                 continue;
             }
-            if entry.instances.len() > 1 {
-                instances.insert(entry.name.clone(), entry.instances.len());
-            }
-            objects.push(ObjectTouches { name: entry.name, touches });
+            objects
+                .push(listing.with_sources(entry, touches).map_err(|error| error.in_file(Listing::path(directory)))?);
         }
         objects.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(Self { objects, origin: Some(listing.origin), instances, recorded: listing.recorded, warnings })
+        Ok(Self { objects, origin: Some(listing.origin), warnings })
     }
 
     /// Every file of touches that there is.
@@ -149,7 +188,10 @@ impl Dataset {
         for (name, path, format) in files {
             match is_log(&path) {
                 true => logs.push(path),
-                false => _ = objects.insert(name, Found { touches: format.read(&path)?, file: path }),
+                false => {
+                    let touches = ObjectTouches::new(name.clone(), format.read(&path)?, Source::Object);
+                    objects.insert(name, Found { touches, file: path });
+                }
             }
         }
         logs.sort();
@@ -172,7 +214,7 @@ impl Dataset {
     /// Whether every approach is kept, also those that were not full touches: what the origin says or, without one,
     /// whether any touch is partial.
     pub fn holds_approaches(&self) -> bool {
-        let any_partial = || self.objects.iter().flat_map(|object| &object.touches).any(|touch| !touch.is_full());
+        let any_partial = || self.touches().any(|touch| !touch.is_full());
         self.origin.as_ref().map_or_else(any_partial, |origin| origin.approaches)
     }
 
@@ -185,13 +227,18 @@ impl Dataset {
     /// equally.
     pub fn shares(&self) -> [f64; 6] {
         let mut shares = [0.0; 6];
-        for touches in self.objects.iter().map(|object| &object.touches) {
+        for touches in self.objects.iter().map(ObjectTouches::touches) {
             let mut counts = [0_usize; 6];
             touches.iter().for_each(|touch| counts[usize::from(touch.pattern().code())] += 1);
             let all = (touches.len() * self.objects.len()).max(1) as f64;
             shares.iter_mut().zip(counts).for_each(|(share, count)| *share += count as f64 / all);
         }
         shares
+    }
+
+    /// All touches, object after object.
+    pub fn touches(&self) -> impl Iterator<Item = &Touch> + Clone {
+        self.objects.iter().flat_map(ObjectTouches::touches)
     }
 
     /// The objects' names, sorted.
@@ -201,7 +248,7 @@ impl Dataset {
 
     /// How many touches there are, of all objects together.
     pub fn len(&self) -> usize {
-        self.objects.iter().map(|object| object.touches.len()).sum()
+        self.objects.iter().map(ObjectTouches::len).sum()
     }
 
     /// Whether there is no touch at all.
@@ -238,18 +285,20 @@ fn read_listed(entry: &Entry, format: Format, path: &Path, warnings: &mut Vec<Wa
 
 /// Touches of an object, and the file that has them, or the first of several.
 struct Found {
-    touches: Vec<Touch>,
+    touches: ObjectTouches,
     file: PathBuf,
 }
 
 /// What logs hold by object, one log after the other, and what was skipped.
 fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)> {
-    let (mut objects, mut warnings) = (BTreeMap::new(), Vec::new());
+    let (mut objects, mut warnings) = (BTreeMap::<String, Found>::new(), Vec::new());
     for file in logs {
         let log = Log::read(file)?;
-        for ObjectTouches { name, touches } in log.by_object(&name_of(file))? {
-            let found = objects.entry(name).or_insert_with(|| Found { touches: Vec::new(), file: file.clone() });
-            found.touches.extend(touches);
+        for touches in log.by_object(&name_of(file))? {
+            match objects.get_mut(&touches.name) {
+                Some(found) => found.touches.append(&touches),
+                None => _ = objects.insert(touches.name.clone(), Found { touches, file: file.clone() }),
+            }
         }
         warnings.extend(log.skipped());
     }
@@ -257,7 +306,7 @@ fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)>
 }
 
 fn objects_of(found: BTreeMap<String, Found>) -> Vec<ObjectTouches> {
-    found.into_iter().map(|(name, Found { touches, .. })| ObjectTouches { name, touches }).collect()
+    found.into_values().map(|found| found.touches).collect()
 }
 
 /// The logs in a directory by their names, which end in `.mcap`, sorted.
@@ -370,7 +419,7 @@ mod tests {
     fn a_data_set_knows_the_probe_that_its_listing_states() {
         let dataset = Dataset::read(captured(Format::Text).path()).unwrap();
         assert_eq!(dataset.probe(), Some(&Probe::default()));
-        assert_eq!(dataset.with(Vec::new()).probe(), dataset.probe());
+        assert_eq!(dataset.only(|_| false).probe(), dataset.probe());
         assert_eq!(dataset.warnings, []);
     }
 
@@ -412,7 +461,7 @@ mod tests {
         let dataset = Dataset::read(directory.path()).unwrap();
         assert_eq!(dataset.warnings, [Warning::Changed { path: path.clone() }]);
         assert!(dataset.warnings[0].to_string().contains("spoon.txt: changed since its capture"));
-        assert_eq!(dataset.objects[1].touches[2].times()[1].micros(), Some(3));
+        assert_eq!(dataset.objects[1].touches()[2].times()[1].micros(), Some(3));
     }
 
     #[test]

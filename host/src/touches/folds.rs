@@ -3,12 +3,12 @@
 use crate::error::{Error, Result, TouchesProblem};
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
-use palpate_shared::Touch;
 use rand::seq::SliceRandom;
 use std::ops::Range;
 
 /// Splits the touches of every object at random: `test_share` of them for testing, the others for training, at least one
-/// for each. The same data set and seed give the same split.
+/// for each. Every instance or recording of an object gives the same share, give or take a touch. The same data set and
+/// seed give the same split.
 ///
 /// # Errors
 /// [`Setting`](crate::error::Problem::Setting) unless `test_share` is between 0 and 1; [`TouchesProblem::TooFew`] if an
@@ -26,7 +26,7 @@ pub fn split(dataset: &Dataset, test_share: f64, seed: u64) -> Result<Split> {
 }
 
 /// Fold `fold` of `folds`: every touch is a test touch in exactly one fold, and every fold tests equally many touches of
-/// an object, give or take one.
+/// an object, give or take one; so it is with each of its instances or recordings, give or take two.
 ///
 /// # Errors
 /// [`Setting`](crate::error::Problem::Setting) unless there are at least two folds, and `fold` is one of them;
@@ -52,40 +52,52 @@ pub struct Split {
 }
 
 fn enough(dataset: &Dataset, least: usize) -> Result<()> {
-    match dataset.objects.iter().find(|object| object.touches.len() < least) {
-        Some(object) => {
-            Err(TouchesProblem::TooFew { name: object.name.clone(), touches: object.touches.len(), least }.into())
-        }
+    match dataset.objects.iter().find(|object| object.len() < least) {
+        Some(object) => Err(TouchesProblem::TooFew { name: object.name.clone(), touches: object.len(), least }.into()),
         None => Ok(()),
     }
 }
 
 /// Shuffles each object's touches and takes those at the positions that `test` chooses for testing.
 fn divide(dataset: &Dataset, seed: u64, test: impl Fn(usize) -> Range<usize>) -> Split {
-    let mut split = Split { train: dataset.with(Vec::new()), test: dataset.with(Vec::new()) };
-    for ObjectTouches { name, touches } in &dataset.objects {
-        let mut order: Vec<usize> = (0..touches.len()).collect();
-        order.shuffle(&mut random::generator(seed, Purpose::Folds, name, 0));
-        let chosen = test(touches.len());
-        let of = |positions: &[usize]| positions.iter().map(|&position| touches[position]).collect::<Vec<Touch>>();
-        let train = [of(&order[..chosen.start]), of(&order[chosen.end..])].concat();
-        split.train.objects.push(ObjectTouches { name: name.clone(), touches: train });
-        split.test.objects.push(ObjectTouches { name: name.clone(), touches: of(&order[chosen]) });
+    let parts = dataset.objects.iter().map(|object| {
+        let order = shuffled(object, seed);
+        let chosen = test(order.len());
+        let train = order[..chosen.start].iter().chain(&order[chosen.end..]).copied();
+        (object.select(train), object.select(order[chosen.clone()].iter().copied()))
+    });
+    let (train, test) = parts.unzip();
+    let with = |objects| Dataset { objects, origin: dataset.origin.clone(), warnings: Vec::new() };
+    Split { train: with(train), test: with(test) }
+}
+
+/// The positions of an object's touches: those of each source in a random order, spread evenly over the whole, so that any
+/// stretch has the same share of each source.
+fn shuffled(object: &ObjectTouches, seed: u64) -> Vec<usize> {
+    let mut order = Vec::with_capacity(object.len());
+    for (source, mut touches) in (0_u64..).zip(object.by_source()) {
+        touches.shuffle(&mut random::generator(seed, Purpose::Folds, &object.name, source));
+        let all = touches.len() as u128;
+        let place = |(rank, touch): (usize, usize)| ((2 * rank as u128 + 1, all), source, touch);
+        order.extend(touches.into_iter().enumerate().map(place));
     }
-    split
+    // By (rank + ½) / number, as fractions.
+    order.sort_by(|(a, one, _), (b, other, _)| (a.0 * b.1).cmp(&(b.0 * a.1)).then(one.cmp(other)));
+    order.into_iter().map(|(.., touch)| touch).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::error::Problem;
-    use crate::touches::Origin;
+    use crate::touches::{Origin, Source};
+    use palpate_shared::Touch;
 
     /// Objects of which each touch is identified by its own time.
     fn dataset(counts: &[u32]) -> Dataset {
-        let object = |(index, &count): (usize, &u32)| ObjectTouches {
-            name: format!("object{index}"),
-            touches: (0..count).map(|i| Touch::from_micros([0, i, 9])).collect(),
+        let object = |(index, &count): (usize, &u32)| {
+            let touches = (0..count).map(|i| Touch::from_micros([0, i, 9])).collect();
+            ObjectTouches::new(format!("object{index}"), touches, Source::Object)
         };
         Dataset::new(counts.iter().enumerate().map(object).collect())
     }
@@ -101,9 +113,9 @@ mod tests {
         let all = dataset(&[100, 7, 2]);
         let split = split(&all, 0.1, 1).unwrap();
         for ((train, test), object) in split.train.objects.iter().zip(&split.test.objects).zip(&all.objects) {
-            assert_eq!(sorted([&train.touches[..], &test.touches].concat()), sorted(object.touches.clone()));
+            assert_eq!(sorted([train.touches(), test.touches()].concat()), sorted(object.touches().to_vec()));
         }
-        let tested: Vec<usize> = split.test.objects.iter().map(|object| object.touches.len()).collect();
+        let tested: Vec<usize> = split.test.objects.iter().map(|object| object.len()).collect();
         assert_eq!(tested, [10, 1, 1]);
     }
 
@@ -112,11 +124,11 @@ mod tests {
         let all = dataset(&[103, 10]);
         let folds: Vec<Split> = (0..10).map(|index| fold(&all, index, 10, 1).unwrap()).collect();
         for (object, touches) in all.objects.iter().enumerate() {
-            let tested = folds.iter().flat_map(|fold| fold.test.objects[object].touches.clone());
-            assert_eq!(sorted(tested), sorted(touches.touches.clone()));
+            let tested = folds.iter().flat_map(|fold| fold.test.objects[object].touches().to_vec());
+            assert_eq!(sorted(tested), sorted(touches.touches().to_vec()));
             for fold in &folds {
-                let both = [&fold.train.objects[object].touches[..], &fold.test.objects[object].touches].concat();
-                assert_eq!(sorted(both), sorted(touches.touches.clone()));
+                let both = [fold.train.objects[object].touches(), fold.test.objects[object].touches()].concat();
+                assert_eq!(sorted(both), sorted(touches.touches().to_vec()));
             }
         }
     }
@@ -128,7 +140,7 @@ mod tests {
         let first = split(&all, 0.1, 1).unwrap();
         assert_ne!(first, split(&all, 0.1, 2).unwrap());
         // Sweeps along an object would make neighbors alike: the test touches must not be a block.
-        assert_ne!(sorted(first.test.objects[0].touches.clone()), (0..20).map(Some).collect::<Vec<_>>());
+        assert_ne!(sorted(first.test.objects[0].touches().to_vec()), (0..20).map(Some).collect::<Vec<_>>());
     }
 
     #[test]
@@ -136,6 +148,38 @@ mod tests {
         let origin = Origin { seed: 7, ..Origin::default() };
         let split = split(&Dataset { origin: Some(origin.clone()), ..dataset(&[9, 9]) }, 0.1, 1).unwrap();
         assert_eq!((split.train.origin, split.test.origin), (Some(origin.clone()), Some(origin)));
+    }
+
+    #[test]
+    fn a_split_does_not_forget_which_touch_is_of_which_instance() {
+        let names: Vec<String> = ["mug", "cup", "bowl"].map(String::from).into();
+        let touches = |count: u32| (0..count).map(|i| Touch::from_micros([0, i, 9])).collect::<Vec<_>>();
+        let vessel = ObjectTouches::in_turn("vessel", touches(300), &names, 0);
+        let runs = [("first", 200), ("second", 50)].map(|(log, count)| (Source::Log(log.into()), count));
+        let fork = ObjectTouches::in_runs("fork", touches(250), runs.into());
+        let all = Dataset::new(vec![fork, vessel]);
+        let time = |object: &ObjectTouches, touch: usize| object.touches()[touch].times()[1].micros().unwrap();
+        let parts = (0..5).flat_map(|index| {
+            let Split { train, test } = fold(&all, index, 5, 1).unwrap();
+            [(train, 4), (test, 1)]
+        });
+        let Split { train, test } = split(&all, 0.2, 1).unwrap();
+        for (part, fifths) in parts.chain([(train, 4), (test, 1)]) {
+            let [fork, vessel] = &part.objects[..] else { panic!("{part:?}") };
+            for touch in 0..vessel.len() {
+                let name = names[time(vessel, touch) as usize % 3].clone();
+                assert_eq!(vessel.sources()[vessel.source_of(touch)], Source::Instance(name));
+            }
+            for touch in 0..fork.len() {
+                let log = if time(fork, touch) < 200 { "first" } else { "second" };
+                assert_eq!(fork.sources()[fork.source_of(touch)], Source::Log(log.into()));
+            }
+            let shares = |object: &ObjectTouches, all: &[usize]| {
+                let found = object.by_source();
+                found.iter().zip(all).all(|(touches, all)| touches.len().abs_diff(all * fifths / 5) <= 1)
+            };
+            assert!(shares(vessel, &[100; 3]) && shares(fork, &[200, 50]), "{fifths} fifths");
+        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! `dataset.json`: what a data set holds, how it was made, and whether it is complete.
 
-use super::{Format, Origin, Recorded};
+use super::{Format, Meshes, ObjectTouches, Origin, Recorded, Source};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
+use palpate_shared::Touch;
 use std::path::{Component, Path, PathBuf};
 
 /// What a data set's directory holds. The same capture writes the same bytes: no times of day, no durations. A recording
@@ -37,9 +38,18 @@ pub struct Entry {
     /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's complete file. Version 0.1.0 wrote none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crc32: Option<u32>,
-    /// The names of its instances, if it has several: sample i is of instance i modulo their number.
+    /// The names of its instances, if it has several: sample i is of instance i modulo their number, unless `counts` says
+    /// otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instances: Vec<String>,
+    /// How many touches are of each instance, one instance after the other in the file, where they are not in turn, such as
+    /// after a split.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub counts: Vec<u64>,
+    /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits. Versions
+    /// before 0.3.0 wrote none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub meshes: Vec<String>,
     /// How many millimeters a unit of its meshes is, if it was touched at its true size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub millimeters: Option<f64>,
@@ -110,6 +120,39 @@ impl Listing {
     /// When it cannot be written.
     pub fn write(&self, directory: &Path) -> Result<()> {
         output::write_json(&Self::path(directory), self)
+    }
+
+    /// The touches of a listed object, and what each of them is of.
+    pub(super) fn with_sources(&self, entry: &Entry, touches: Vec<Touch>) -> Result<ObjectTouches> {
+        let name = entry.name.clone();
+        if self.is_recorded() {
+            let recorded = self.recorded.iter().filter(|recorded| recorded.object == name).cloned();
+            let mut runs: Vec<_> = recorded.map(|one| (one.touches, Source::Recording(one))).collect();
+            if runs.is_empty() {
+                // A real probe made the touches, and nothing says when.
+                let count = touches.len() as u64;
+                let one = Recorded { object: name.clone(), touches: count, ..Recorded::default() };
+                runs.push((count, Source::Recording(one)));
+            }
+            let runs = runs.into_iter().map(|(count, source)| (source, count)).collect();
+            return Ok(ObjectTouches::in_runs(name, touches, runs));
+        }
+        if entry.counts.is_empty() {
+            let meshes = Meshes { checksums: entry.meshes.clone(), millimeters: entry.millimeters };
+            let object = ObjectTouches::in_turn(name, touches, &entry.instances, self.origin.samples().start);
+            return Ok(object.of_meshes(Some(meshes).filter(|meshes| !meshes.checksums.is_empty())));
+        }
+        let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
+        if entry.counts.len() != entry.instances.len() || stated != Some(touches.len() as u64) {
+            let message = format!(
+                "{name} has {} instances and {} touches, and counts that are not for these",
+                entry.instances.len(),
+                touches.len()
+            );
+            return Err(TouchesProblem::BadListing { message }.into());
+        }
+        let instances = entry.instances.iter().cloned().map(Source::Instance);
+        Ok(ObjectTouches::in_runs(name, touches, instances.zip(entry.counts.iter().copied()).collect()))
     }
 
     /// The objects' names.

@@ -1,7 +1,7 @@
 //! Touches out of a robot's log, which is an MCAP file: `docs/mcap.md` says what belongs in it.
 
 use super::logged::{Channels, LoggedVerdict, Message, Said};
-use super::{ObjectTouches, Warning, mcap, text};
+use super::{ObjectTouches, Source, Warning, mcap, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use palpate_shared::Touch;
@@ -147,7 +147,8 @@ impl Log {
         for logged in &self.touches {
             objects.entry(self.object(logged).unwrap_or(otherwise)).or_default().push(logged.touch);
         }
-        Ok(objects.into_iter().map(|(name, touches)| ObjectTouches { name: name.into(), touches }).collect())
+        let source = || Source::Log(self.path.clone());
+        Ok(objects.into_iter().map(|(name, touches)| ObjectTouches::new(name, touches, source())).collect())
     }
 
     /// The touches of one object: those that name it, or all if none names any; and how many others there are.

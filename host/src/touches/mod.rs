@@ -32,6 +32,7 @@
 //! # }
 //! ```
 
+mod captured;
 pub mod check;
 mod checksum;
 mod dataset;
@@ -47,6 +48,7 @@ pub mod mcap;
 #[path = "no_mcap.rs"]
 mod mcap;
 pub mod noise;
+mod object;
 mod origin;
 #[cfg(feature = "parquet")]
 pub mod parquet;
@@ -59,14 +61,17 @@ pub(crate) mod synthetic;
 pub mod text;
 mod warning;
 
+pub(crate) use captured::short;
+pub use captured::{Captured, Meshes};
 pub(crate) use checksum::checksum;
+pub use dataset::Dataset;
 pub(crate) use dataset::logs;
-pub use dataset::{Dataset, ObjectTouches};
 pub(crate) use files::files;
 pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};
 pub use logged::{Channels, LoggedVerdict, Message, Said};
+pub use object::{ObjectTouches, Pool, Source};
 pub use origin::Origin;
 pub(crate) use origin::{tenth, unit};
 pub use recording::{Recorded, Recording};

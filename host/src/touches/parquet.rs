@@ -3,6 +3,7 @@
 //! One row per touch: `object` (string), `t1`, `t2`, `t3` (seconds, null where a finger never touched), `direction` and
 //! `alignment` (lists of three, null where unknown). Row groups of about a million rows.
 
+use super::dataset::name_of;
 use super::touch_of_seconds;
 use crate::error::{Error, Place, Result, TouchesProblem};
 use bytes::Bytes;
@@ -110,30 +111,32 @@ fn column<T: DataType>(
     column.close()
 }
 
-/// Reads the touches of a file with columns `t1`, `t2`, `t3`, and, where known, `direction` and `alignment`.
+/// Reads the touches of a file with columns `t1`, `t2`, `t3`, and, where known, `direction` and `alignment`. A column
+/// `object` names the object that the file is called after, or is null.
 ///
 /// # Errors
-/// When the file cannot be read, is no Parquet, lacks a column, or a value is wrong (the row is named).
+/// When the file cannot be read, is no Parquet, lacks a column, a value is wrong, or a row is of another object (the row is
+/// named).
 pub fn read(path: &Path) -> Result<Vec<Touch>> {
     let io = |error| Error::io(path, "read the touches", error);
     let wrong = |problem| Error::at(Place::file(path), problem);
     let file = File::open(path).map_err(io)?;
     let length = file.metadata().map_err(io)?.len();
-    let touches = contained(|| read_touches(Bounded { file, length })).map_err(wrong)?;
+    let touches = contained(|| read_touches(Bounded { file, length }, &name_of(path))).map_err(wrong)?;
     if touches.is_empty() {
         return Err(wrong(TouchesProblem::NoTouches));
     }
     Ok(touches)
 }
 
-fn read_touches(file: Bounded) -> Result<Vec<Touch>, TouchesProblem> {
+fn read_touches(file: Bounded, object: &str) -> Result<Vec<Touch>, TouchesProblem> {
     let length = file.length;
     let reader = SerializedFileReader::new(file).map_err(|error| not_parquet(&error))?;
     check_ranges(reader.metadata(), length)?;
     let mut touches = Vec::new();
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(|error| not_parquet(&error))?;
-        read_group(group.as_ref(), &mut touches)?;
+        read_group(group.as_ref(), object, &mut touches)?;
     }
     Ok(touches)
 }
@@ -203,7 +206,8 @@ impl ChunkReader for Bounded {
     }
 }
 
-fn read_group(group: &dyn RowGroupReader, touches: &mut Vec<Touch>) -> Result<(), TouchesProblem> {
+fn read_group(group: &dyn RowGroupReader, object: &str, touches: &mut Vec<Touch>) -> Result<(), TouchesProblem> {
+    let mut names = Column::open(group, "object")?;
     let time = |name| Column::open(group, name)?.ok_or(TouchesProblem::NoColumn { name });
     let mut times = [time("t1")?, time("t2")?, time("t3")?];
     let [mut direction, mut alignment] = [Column::open(group, "direction")?, Column::open(group, "alignment")?];
@@ -218,11 +222,19 @@ fn read_group(group: &dyn RowGroupReader, touches: &mut Vec<Touch>) -> Result<()
         let vectors =
             |column: &mut Option<Column>| column.as_mut().map_or_else(|| Ok(vec![None; count]), Column::rows::<3>);
         let (directions, alignments) = (vectors(&mut direction)?, vectors(&mut alignment)?);
-        if [middle.len(), last.len(), directions.len(), alignments.len()].iter().any(|&rows| rows != count) {
+        let names = names.as_mut().map_or_else(|| Ok(vec![None; count]), Column::names)?;
+        if [middle.len(), last.len(), directions.len(), alignments.len(), names.len()].iter().any(|&rows| rows != count)
+        {
             return Err(not_parquet(&"columns of different length"));
         }
         if count == 0 {
             return Ok(());
+        }
+        let is_other = |name: &Option<ByteArray>| name.as_ref().is_some_and(|name| name.data() != object.as_bytes());
+        if let Some(index) = names.iter().position(is_other) {
+            let found = names[index].as_ref().map(|name| String::from_utf8_lossy(name.data()).into_owned());
+            let problem = TouchesProblem::OtherObject { found: found.unwrap_or_default(), object: object.into() };
+            return Err(TouchesProblem::Row { row: (touches.len() + index) as u64 + 1, problem: Box::new(problem) });
         }
         let times = first.iter().zip(middle).zip(last);
         for (((first, middle), last), (direction, alignment)) in times.zip(directions.iter().zip(&alignments)) {
@@ -234,7 +246,7 @@ fn read_group(group: &dyn RowGroupReader, touches: &mut Vec<Touch>) -> Result<()
     }
 }
 
-/// A column of numbers, or of lists of numbers.
+/// A column of numbers, of lists of numbers, or of names.
 struct Column {
     name: &'static str,
     reader: ColumnReader,
@@ -261,6 +273,30 @@ impl Column {
     /// The next rows: N numbers each, or none where the row is null.
     fn rows<const N: usize>(&mut self) -> Result<Vec<Option<[f64; N]>>, TouchesProblem> {
         self.read().map_err(|message| TouchesProblem::Column { name: self.name, message })
+    }
+
+    /// The next rows: a name each, or none where the row is null.
+    fn names(&mut self) -> Result<Vec<Option<ByteArray>>, TouchesProblem> {
+        self.read_names().map_err(|message| TouchesProblem::Column { name: self.name, message })
+    }
+
+    fn read_names(&mut self) -> Result<Vec<Option<ByteArray>>, String> {
+        let ColumnReader::ByteArrayColumnReader(reader) = &mut self.reader else {
+            return Err("does not hold text".into());
+        };
+        if self.lists {
+            return Err("does not hold one name per row".into());
+        }
+        let (values, definition, _) = records(reader)?;
+        if self.present == 0 {
+            return Ok(values.into_iter().map(Some).collect());
+        }
+        let mut values = values.into_iter();
+        let row = |level: &i16| match *level == self.present {
+            true => values.next().map(Some).ok_or_else(|| "fewer values than it says".to_owned()),
+            false => Ok(None),
+        };
+        definition.iter().map(row).collect()
     }
 
     fn read<const N: usize>(&mut self) -> Result<Vec<Option<[f64; N]>>, String> {
@@ -454,6 +490,60 @@ mod tests {
         }
         assert!(refused > 100 && outside > 5, "{refused} refused, {outside} of them for their columns' ranges");
         assert!(contained > 0, "the reader does not panic any more: contain nothing");
+    }
+
+    #[test]
+    fn rows_of_another_object_than_the_file_is_called_after_are_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let touches = || (0..2_000).map(|i| Ok(Touch::from_micros([0, i, 2 * i])));
+        let path = directory.path().join("fork.parquet");
+        write(&path, &File::create(&path).unwrap(), "fork", touches()).unwrap();
+        assert_eq!(read(&path).unwrap().len(), 2_000);
+        // Two row groups, the second of another object.
+        let file = File::create(&path).unwrap();
+        let schema = Arc::new(parquet::schema::parser::parse_message_type(SCHEMA).unwrap());
+        let mut writer = SerializedFileWriter::new(&file, schema, Arc::default()).unwrap();
+        for object in ["fork", "mouse"] {
+            let mut columns = writer.next_row_group().unwrap();
+            write_group(&mut columns, object, &touches().collect::<Result<Vec<_>>>().unwrap()).unwrap();
+            columns.close().unwrap();
+        }
+        writer.close().unwrap();
+        let error = read(&path).unwrap_err().to_string();
+        assert!(error.contains("fork.parquet: row 2001: a touch of \"mouse\" in the file of \"fork\""), "{error}");
+        assert!(error.ends_with("Give each object a file that is called like it."), "{error}");
+    }
+
+    /// A file of one touch, `fork.parquet`, with another column of objects.
+    fn with_objects<T: DataType>(kind: &str, values: &[T::T], levels: Option<&[i16]>) -> Result<Vec<Touch>> {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("fork.parquet");
+        let file = File::create(&path).unwrap();
+        let schema =
+            format!("message touches {{ {kind}; REQUIRED DOUBLE t1; REQUIRED DOUBLE t2; REQUIRED DOUBLE t3; }}");
+        let schema = Arc::new(parquet::schema::parser::parse_message_type(&schema).unwrap());
+        let mut writer = SerializedFileWriter::new(&file, schema, Arc::default()).unwrap();
+        let mut columns = writer.next_row_group().unwrap();
+        let mut objects = columns.next_column().unwrap().unwrap();
+        objects.typed::<T>().write_batch(values, levels, None).unwrap();
+        objects.close().unwrap();
+        for _ in 0..3 {
+            let mut times = columns.next_column().unwrap().unwrap();
+            times.typed::<DoubleType>().write_batch(&[0.5], None, None).unwrap();
+            times.close().unwrap();
+        }
+        columns.close().unwrap();
+        writer.close().unwrap();
+        read(&path)
+    }
+
+    #[test]
+    fn a_row_may_name_no_object_but_nothing_else_than_a_name() {
+        let (text, fork) = ("OPTIONAL BYTE_ARRAY object (STRING)", ByteArray::from("fork"));
+        assert_eq!(with_objects::<ByteArrayType>(text, &[fork], Some(&[1])).unwrap().len(), 1);
+        assert_eq!(with_objects::<ByteArrayType>(text, &[], Some(&[0])).unwrap().len(), 1);
+        let error = with_objects::<DoubleType>("REQUIRED DOUBLE object", &[1.0], None).unwrap_err().to_string();
+        assert!(error.contains("fork.parquet: column object: does not hold text"), "{error}");
     }
 
     #[test]

@@ -1,23 +1,28 @@
 //! A data set in memory, to the disk.
 
-use super::{Dataset, Format, Listing, checksum, files, write_touch};
-use crate::error::{CaptureProblem, Error, Place, Result};
+use super::{Dataset, Entry, Format, Listing, ObjectTouches, Source, checksum, files, write_touch};
+use crate::error::{CaptureProblem, Error, Place, Result, TouchesProblem};
 use crate::output;
 use std::path::Path;
 
 impl Dataset {
     /// Writes the data set into a directory that holds none: a file for each object and, if the origin of the touches is
-    /// known, `dataset.json`, which is written last and says that the data set is complete. Text holds poses only if the
-    /// origin says so, or is unknown.
+    /// known, `dataset.json`, which is written last and says that the data set is complete, which touches are of which
+    /// instance, and which recordings they are from. Text holds poses only if the origin says so or is unknown, or the
+    /// touches are recorded.
+    ///
+    /// Touches of instances that are not in turn, such as a part of a capture, are written one instance after the other,
+    /// those of recordings one recording after the other.
     ///
     /// `approaches` says how many approaches each object took, where that is known: it is written down as 0 where it is
     /// not, such as for a part of a capture.
     ///
     /// # Errors
-    /// [`CaptureProblem::HoldsFiles`] if the directory holds touches; when a file cannot be written.
+    /// [`CaptureProblem::HoldsFiles`] if the directory holds touches; [`TouchesProblem::Unsaid`] if an object has several
+    /// instances or logs, and there would be no `dataset.json` to say so; when a file cannot be written.
     pub fn write(&self, directory: &Path, format: Format, approaches: Option<&[u64]>) -> Result<()> {
         if !format.is_built_in() {
-            return Err(Error::at(Place::file(directory), crate::error::TouchesProblem::NoParquet));
+            return Err(Error::at(Place::file(directory), TouchesProblem::NoParquet));
         }
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
         let there = files(directory)?;
@@ -29,23 +34,42 @@ impl Dataset {
             return Err(Error::at(Place::file(directory), CaptureProblem::HoldsFiles { files: names }));
         }
         let origin = self.origin.clone().map(|origin| super::Origin { format, ..origin });
-        let poses = origin.as_ref().is_none_or(super::Origin::writes_pose);
+        let of_several = |object: &&ObjectTouches| object.sources().len() > 1;
+        if let (None, Some(several)) = (&origin, self.objects.iter().find(of_several)) {
+            let (name, sources) = (several.name.clone(), several.sources().len());
+            return Err(Error::at(Place::file(directory), TouchesProblem::Unsaid { name, sources }));
+        }
+        if let Some(object) = self.objects.iter().find(|object| object.has_robots()) {
+            return Err(Error::at(Place::file(directory), TouchesProblem::OfRobots { name: object.name.clone() }));
+        }
+        let poses = origin.as_ref().is_none_or(super::Origin::writes_pose) || self.is_recorded();
         let mut listing = Listing::new(&origin.clone().unwrap_or_default(), self.names());
+        listing.recorded = self.recorded();
+        let first = origin.as_ref().map_or(0, |origin| origin.samples().start);
         for (index, (object, entry)) in self.objects.iter().zip(&mut listing.objects).enumerate() {
+            let object = &arranged(object, first, entry);
             let path = entry.file(directory, format);
             match format {
                 Format::Text => output::write_whole(&path, |out| {
                     let mut line = String::new();
-                    for touch in &object.touches {
+                    for touch in object.touches() {
                         line.clear();
                         write_touch(&mut line, touch, poses);
                         out.write_all(line.as_bytes())?;
                     }
                     Ok(())
                 })?,
-                Format::Parquet => write_parquet(&path, &object.name, &object.touches)?,
+                Format::Parquet => write_parquet(&path, &object.name, object.touches())?,
             }
-            entry.touches = object.touches.len() as u64;
+            // A part is not told from the rest of its capture.
+            let is_whole = origin.as_ref().is_some_and(|origin| {
+                let samples = origin.samples();
+                samples.end - samples.start == object.len() as u64
+            });
+            if let Some(meshes) = object.meshes().filter(|_| is_whole) {
+                (entry.meshes, entry.millimeters) = (meshes.checksums.clone(), meshes.millimeters);
+            }
+            entry.touches = object.len() as u64;
             entry.bytes = std::fs::metadata(&path).map_err(|error| Error::io(&path, "read the touches", error))?.len();
             entry.crc32 = Some(checksum(&path)?);
             entry.approaches = match (approaches.and_then(|approaches| approaches.get(index)), &origin) {
@@ -60,6 +84,34 @@ impl Dataset {
         listing.complete = true;
         listing.write(directory)
     }
+}
+
+/// An object's touches in the order in which a listing can say what each is of, which it then says. Sample `first` is the
+/// first one.
+fn arranged(object: &ObjectTouches, first: u64, entry: &mut Entry) -> ObjectTouches {
+    let name = |source: &Source| match source {
+        Source::Object => object.name.clone(),
+        Source::Instance(name) => name.clone(),
+        Source::Log(path) => path.display().to_string(),
+        Source::Recording(_) => String::new(),
+    };
+    let count = object.sources().len() as u64;
+    let is_recorded = object.sources().iter().any(|source| matches!(source, Source::Recording(_)));
+    if count > 1 && !is_recorded {
+        entry.instances = object.sources().iter().map(name).collect();
+        let is_in_turn = |touch: usize| object.source_of(touch) as u64 == (first % count + touch as u64) % count;
+        if (0..object.len()).all(is_in_turn) {
+            return object.clone();
+        }
+        entry.counts = object.by_source().iter().map(|touches| touches.len() as u64).collect();
+    }
+    let mut by_source: Vec<_> = object.sources().iter().zip(object.by_source()).collect();
+    // As the data set lists its recordings.
+    by_source.sort_by_key(|(source, _)| match source {
+        Source::Recording(recorded) => recorded.began.clone(),
+        _ => String::new(),
+    });
+    object.select(by_source.into_iter().flat_map(|(_, touches)| touches))
 }
 
 fn lossy(name: &std::ffi::OsStr) -> String {
@@ -78,19 +130,20 @@ fn write_parquet(path: &Path, object: &str, touches: &[palpate_shared::Touch]) -
 
 #[cfg(not(feature = "parquet"))]
 fn write_parquet(path: &Path, _: &str, _: &[palpate_shared::Touch]) -> Result<()> {
-    Err(Error::at(Place::file(path), crate::error::TouchesProblem::NoParquet))
+    Err(Error::at(Place::file(path), TouchesProblem::NoParquet))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::error::Problem;
-    use crate::touches::{ObjectTouches, Origin, parse_touch};
+    use crate::touches::noise::Noise;
+    use crate::touches::{ObjectTouches, Origin, Recorded, folds, parse_touch};
 
     fn dataset(origin: Option<Origin>) -> Dataset {
         let lines = ["0 0.001 -", "- - 0", "0.000000 0.123456 12.000001 1 0 0 0 1 0"];
         let touches: Vec<_> = lines.iter().map(|line| parse_touch(line).unwrap()).collect();
-        let objects = ["cup", "fork"].map(|name| ObjectTouches { name: name.into(), touches: touches.clone() });
+        let objects = ["cup", "fork"].map(|name| ObjectTouches::new(name, touches.clone(), Source::Object));
         Dataset { origin, ..Dataset::new(objects.into()) }
     }
 
@@ -104,6 +157,93 @@ mod tests {
                 assert_eq!(Dataset::read(directory.path()).unwrap(), dataset);
             }
         }
+    }
+
+    /// Touches that are known by their times, of two instances and of three recordings.
+    fn of_several(origin: &Origin) -> [Dataset; 2] {
+        let touches =
+            |count: u32| (0..count).map(|i| palpate_shared::Touch::from_micros([0, i, 9])).collect::<Vec<_>>();
+        let names = ["mug", "glass"].map(String::from);
+        let instances = ["cup", "vase"].map(|name| ObjectTouches::in_turn(name, touches(31), &names, 0));
+        let recordings = ["cup", "vase"].map(|object| {
+            let recorded = |(began, touches): (&str, u64)| {
+                let (object, began, crc32) = (object.into(), began.into(), Some(7));
+                Recorded { object, touches, began, crc32, ..Recorded::default() }
+            };
+            let runs = [("2026-11-22T11:00:00Z", 20), ("2026-11-22T12:00:00Z", 4), ("2026-11-22T13:00:00Z", 7)];
+            let runs = runs.map(recorded).map(|one| (one.touches, Source::Recording(one))).map(|(n, one)| (one, n));
+            ObjectTouches::in_runs(object, touches(31), runs.into())
+        });
+        [instances, recordings].map(|objects| Dataset { origin: Some(origin.clone()), ..Dataset::new(objects.into()) })
+    }
+
+    /// For each object what the touches of each source are, whatever their order.
+    fn by_source(dataset: &Dataset) -> Vec<(String, Vec<palpate_shared::Touch>)> {
+        let mut all = Vec::new();
+        for object in &dataset.objects {
+            for (source, touches) in object.sources().iter().zip(object.by_source()) {
+                let source = match source {
+                    Source::Recording(recorded) => recorded.began.clone(),
+                    other => format!("{other:?}"),
+                };
+                let mut touches: Vec<_> = touches.into_iter().map(|touch| object.touches()[touch]).collect();
+                touches.sort_by_key(|touch| touch.times()[1].micros());
+                all.push((format!("{} {source}", object.name), touches));
+            }
+        }
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all
+    }
+
+    #[test]
+    fn a_copy_on_the_disk_knows_instances_and_recordings() {
+        for format in Format::ALL.into_iter().filter(|format| format.is_built_in()) {
+            let origin = Origin { touches: 31, format, ..Origin::default() };
+            for dataset in of_several(&origin) {
+                let folds::Split { train, test } = folds::split(&dataset, 0.3, 1).unwrap();
+                for (part, is_whole) in [(&dataset, true), (&train, false), (&test, false)] {
+                    let directory = tempfile::tempdir().unwrap();
+                    part.write(directory.path(), format, None).unwrap();
+                    let read = Dataset::read(directory.path()).unwrap();
+                    assert_eq!(by_source(&read), by_source(part));
+                    assert_eq!((read.recorded(), read.is_recorded()), (part.recorded(), part.is_recorded()));
+                    assert!(!is_whole || read == *part);
+                    // What a real probe made is never replaced.
+                    let settings = crate::capture::Settings { force: true, ..origin.clone().into() };
+                    let objects =
+                        ["cup", "vase"].map(|name| crate::mesh::Object::new(name, crate::mesh::Mesh::globe(6)));
+                    let again = crate::capture::capture(&objects, &settings, directory.path(), &());
+                    assert_eq!(again.is_err(), part.is_recorded(), "{again:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noise_is_stated_by_what_it_was_added_to() {
+        let origin = Origin { touches: 31, real: Noise::gaussian(3_000.0), ..Origin::default() };
+        let [mut dataset, _] = of_several(&origin);
+        dataset.add_noise(&Noise::gaussian(4_000.0), 1, 1);
+        let directory = tempfile::tempdir().unwrap();
+        dataset.write(directory.path(), Format::Text, None).unwrap();
+        assert_eq!(Dataset::read(directory.path()).unwrap().real(), Noise::gaussian(5_000.0));
+    }
+
+    #[test]
+    fn what_no_listing_could_say_is_not_written() {
+        let [instances, _] = of_several(&Origin::default());
+        let directory = tempfile::tempdir().unwrap();
+        let refused =
+            |dataset: &Dataset| match dataset.write(directory.path(), Format::Text, None).unwrap_err().problem() {
+                Some(Problem::Touches(problem)) => problem.clone(),
+                other => panic!("{other:?}"),
+            };
+        let unknown = Dataset { origin: None, ..instances.clone() };
+        assert_eq!(refused(&unknown), TouchesProblem::Unsaid { name: "cup".into(), sources: 2 });
+        let mut robots = instances;
+        robots.add_noise(&Noise { speed_bias: 0.1, ..Noise::default() }, 1, 3);
+        assert_eq!(refused(&robots), TouchesProblem::OfRobots { name: "cup".into() });
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 
     #[test]

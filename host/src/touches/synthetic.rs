@@ -1,7 +1,7 @@
 //! Made-up touches for tests: objects whose surfaces bend differently, without any mesh.
 
 use crate::random::{self, Purpose};
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches, Source};
 use palpate_shared::{ContactTime, Touch};
 use rand::{Rng, RngExt};
 
@@ -11,9 +11,22 @@ pub(crate) fn dataset(counts: &[usize], seed: u64) -> Dataset {
         let name = format!("object{index}");
         let mut random = random::generator(seed, Purpose::Synthetic, &name, 0);
         let touches = (0..count).map(|_| touch(index, &mut random)).collect();
-        ObjectTouches { name, touches }
+        ObjectTouches::new(name, touches, Source::Object)
     };
     Dataset::new(counts.iter().enumerate().map(object).collect())
+}
+
+/// Objects of which number `k` has the instances `kinds[k]`, touched in turn: each is as object number `kinds[k][i]` above.
+#[cfg(feature = "cli")]
+pub(crate) fn of_instances(kinds: &[&[usize]], count: usize, seed: u64) -> Dataset {
+    let object = |(index, kinds): (usize, &&[usize])| {
+        let name = format!("object{index}");
+        let mut random = random::generator(seed, Purpose::Synthetic, &name, 1);
+        let touches = (0..count).map(|turn| touch(kinds[turn % kinds.len()], &mut random)).collect();
+        let names: Vec<String> = kinds.iter().map(|kind| format!("kind {kind}")).collect();
+        ObjectTouches::in_turn(name, touches, &names, 0)
+    };
+    Dataset::new(kinds.iter().enumerate().map(object).collect())
 }
 
 fn touch(object: usize, random: &mut impl Rng) -> Touch {

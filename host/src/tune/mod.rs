@@ -30,7 +30,7 @@ mod tests;
 use crate::calibrate::{self, Calibrated};
 use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
 use crate::ensemble::{Ensemble, StatedProbe};
-use crate::error::{CompileProblem, Problem, Result, TuneProblem};
+use crate::error::{CalibrateProblem, CompileProblem, Problem, Result, TuneProblem};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
@@ -167,8 +167,7 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     // Other seeds than that of the training.
     let robots = [(&mut choose, 1), (&mut test, 2)]
         .map(|(part, other)| evaluate::add_noise(part, &settings.noise, settings.seed.wrapping_add(other)));
-    let [choose_robots, test_robots] = robots;
-    let (choose, test) = ((choose, choose_robots?), (test, test_robots?));
+    robots.into_iter().try_for_each(|robots| robots.map(drop))?;
     let family = family::train(&outer.train, settings, progress)?;
     progress.begin("measuring", Some(family.len() as u64));
     let mut models = Vec::new();
@@ -195,7 +194,8 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     let opened = compile::open(&model)?;
     let test = evaluated(Candidate::Compiled(&opened), &test, None, settings)?;
     let rows = models.into_iter().map(|(row, ..)| row).collect();
-    let uncalibrated = calibration.as_ref().err().cloned();
+    let fewest = dataset.objects.iter().map(|object| object.len()).min().unwrap_or(0);
+    let uncalibrated = calibration.as_ref().err().map(|problem| why(problem, fewest));
     Ok(Tuned { unlimited, rows, chosen, calibration: calibration.ok(), uncalibrated, test, model, ensemble })
 }
 
@@ -205,7 +205,7 @@ fn calibrated(
     fresh: Dataset,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<Result<Calibrated, String>> {
+) -> Result<Result<Calibrated, CalibrateProblem>> {
     let terms = calibrate::Settings {
         rate: settings.error_rate,
         noise: settings.noise,
@@ -214,15 +214,28 @@ fn calibrated(
     };
     match calibrate::calibrate(&compile::open(model)?, fresh, &terms, progress) {
         Err(error) => match error.problem() {
-            Some(Problem::Calibrate(problem)) => Ok(Err(problem.to_string())),
+            Some(Problem::Calibrate(problem)) => Ok(Err(problem.clone())),
             _ => Err(error),
         },
         Ok(calibrated) => Ok(Ok(calibrated)),
     }
 }
 
-/// Touches that are held out, and how many robots made them.
-type Held = (Dataset, usize);
+/// Why a model promises nothing, and how many touches of each object it would take, if there are `fewest` of one of them.
+fn why(problem: &CalibrateProblem, fewest: usize) -> String {
+    match *problem {
+        CalibrateProblem::TooFew { ref object, rate, found, needed, .. } if found > 0 => {
+            // Of the whole data set, not of the part that was calibrated on.
+            let problem = CalibrateProblem::TooFew { object: object.clone(), rate, found, needed, supplied: None };
+            // Names grow with the touches; a tenth more, since some are wrong.
+            let touches = 1.1 * fewest as f64 * needed as f64 / found as f64;
+            let step = 10_f64.powf(touches.log10().floor() - 1.0);
+            let touches = (touches / step).ceil() * step;
+            format!("{problem}; about {touches:.0} touches of each object would do, where there are {fewest} now")
+        }
+        _ => problem.to_string(),
+    }
+}
 
 type Measured<'e> = (Row, &'e Ensemble, Compiled);
 
@@ -231,7 +244,7 @@ type Measured<'e> = (Row, &'e Ensemble, Compiled);
 fn compiled_models<'e>(
     recipe: &Recipe,
     ensemble: &'e Ensemble,
-    choose: &Held,
+    choose: &Dataset,
     settings: &Settings,
 ) -> Result<Vec<Measured<'e>>> {
     let mut models: Vec<Measured<'e>> = Vec::new();
@@ -292,7 +305,7 @@ fn measure(
     candidate: Candidate<'_>,
     recipe: &Recipe,
     compiled: Option<(Leaf, &Compiled)>,
-    choose: &Held,
+    choose: &Dataset,
     settings: &Settings,
 ) -> Result<Row> {
     let evaluation = evaluated(candidate, choose, Some(settings.error_rate), settings)?;
@@ -314,11 +327,11 @@ fn measure(
 /// `error_rate` as [`evaluate::Settings::error_rate`].
 fn evaluated(
     candidate: Candidate<'_>,
-    (touches, robots): &Held,
+    touches: &Dataset,
     error_rate: Option<f64>,
     settings: &Settings,
 ) -> Result<Evaluation> {
-    let margins = Margins::new(candidate, touches)?.of_robots(*robots);
+    let margins = Margins::new(candidate, touches)?;
     let (fewest, approaches) = (margins.fewest_touches(), margins.fewest_approaches());
     let settings = evaluate::Settings {
         at: [10, 30].into_iter().filter(|&at| at <= fewest).collect(),

@@ -5,6 +5,9 @@
 //! per object; the best of it and what lies between them with half; and, with all of them, every spacing at the best
 //! radius, tilt and aim.
 //!
+//! The figures compare probes and promise nothing: the stopping threshold is set, and the best probe chosen, on the touches
+//! that are counted. The best of many looks somewhat better than it is.
+//!
 //! ```no_run
 //! use palpate::mesh::builtin;
 //! use palpate::tune::probe::{self, design};
@@ -25,8 +28,8 @@ use crate::mesh::Object;
 use crate::probe::approach::{Aim, Probe};
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::noise::noisy;
-use crate::touches::{Dataset, ObjectTouches, Origin};
+use crate::touches::noise::Noise;
+use crate::touches::{Dataset, Origin};
 use palpate_shared::format::{Counted, Length};
 use palpate_shared::{ContactPattern, Descriptor};
 use serde::Serialize;
@@ -403,8 +406,7 @@ impl Search<'_> {
             progress::check(self.progress)?;
             let touches = capture::touches(scenes, name, &origin, samples.clone())?;
             // Other noise for other samples.
-            let touches = if noise > 0.0 { noisy(name, &touches, noise, seed ^ samples.start) } else { touches };
-            Ok(ObjectTouches { name: name.clone(), touches })
+            Ok(touches.noisy(&Noise::gaussian(noise), seed ^ samples.start, 1))
         };
         let objects = self.objects.iter().map(touch).collect::<Result<_>>()?;
         Ok(Dataset { origin: Some(origin), ..Dataset::new(objects) })

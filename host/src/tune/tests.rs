@@ -7,7 +7,7 @@ fn quick() -> Settings {
 
 /// Full touches, waited for.
 fn full(mut dataset: Dataset) -> Dataset {
-    dataset.objects.iter_mut().for_each(|object| object.touches.retain(palpate_shared::Touch::is_full));
+    dataset.objects.iter_mut().for_each(|object| *object = object.filtered(palpate_shared::Touch::is_full));
     dataset
 }
 
@@ -115,4 +115,15 @@ fn the_model_states_the_probe_of_the_touches() {
     let settings = Settings { probe: Some(StatedProbe { probe, ..StatedProbe::default() }), ..quick() };
     let tuned = tune(&synthetic::dataset(&[300, 300], 3), &settings, &()).unwrap();
     assert_eq!(compile::open(&tuned.model).unwrap().header().spacing(), 2.0);
+}
+
+#[test]
+fn what_is_too_little_for_a_promise_is_said_with_what_would_do() {
+    // 1.1 · 1,500 · 149 / 54 is 4,552.
+    let problem = CalibrateProblem::TooFew { object: None, rate: 0.02, found: 54, needed: 149, supplied: None };
+    let said = why(&problem, 1_500);
+    assert!(said.starts_with(&problem.to_string()), "{said}");
+    assert!(said.ends_with("; about 4600 touches of each object would do, where there are 1500 now"), "{said}");
+    let problem = CalibrateProblem::OneObject;
+    assert_eq!(why(&problem, 1_500), problem.to_string());
 }

@@ -30,6 +30,16 @@ fn the_reference_comes_back_with_our_times_appended() {
 }
 
 #[test]
+fn a_mesh_far_from_its_origin_is_cast_at_where_it_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let (mesh, casts) = (directory.path().join("far.obj"), directory.path().join("casts.csv"));
+    std::fs::write(&mesh, "v 65536 -5 -5\nv 65536 5 -5\nv 65536 0 5\nf 1 2 3\n").unwrap();
+    std::fs::write(&casts, "a,65532,0,0,2,0,0\n").unwrap();
+    let arguments = command(["cast", "--as-is", "--radius", "0.5"]).args([&mesh, &casts]).output();
+    assert_eq!(stdout(arguments.unwrap()), "a,65532,0,0,2,0,0,1.75\n");
+}
+
+#[test]
 fn wrong_input_writes_nothing_and_says_why() {
     let directory = tempfile::tempdir().unwrap();
     let (mesh, casts, out) =

@@ -341,7 +341,7 @@ fn error_rates_may_be_percent_and_one_half_is_outside_their_range() {
     assert_eq!(json(&["inspect", &model, "--json"])["stopping"]["error_rate"], 0.05);
     let (code, message) = refusal(&["export", &ensemble, "-o", &model, "--error-rate", "0.5"]);
     assert_eq!(code, 2);
-    assert!(message.contains("is 0.5. Use a number of at least 1e-15 and below 0.5."), "{message}");
+    assert!(message.contains("'0.5' for '--error-rate") && message.contains("below one half"), "{message}");
     let (code, message) = refusal(&["export", &ensemble, "-o", &model, "--error-rate", "five"]);
     assert!(code == 2 && message.contains("0.05, or percent such as 5%"), "{message}");
 }
@@ -407,6 +407,34 @@ fn an_ensemble_trained_on_seconds_is_refused_at_export_with_its_feature() {
     assert_eq!(code, 1);
     assert!(message.contains("seconds.json: ") && message.contains("of curvature is neither whole"), "{message}");
     assert!(!place.path("seconds.palpate").exists());
+}
+
+#[test]
+fn a_compiled_model_such_as_a_calibrated_one_becomes_an_array() {
+    let place = Place::new();
+    let model = place.text("model.palpate");
+    let bytes = std::fs::read(&model).unwrap();
+    let exported = json(&["export", &model, "-o", &model, "--emit", "c,rust", "--json"]);
+    assert_eq!(exported["sources"], serde_json::json!([place.text("model.h"), place.text("model.rs")]));
+    let source = std::fs::read_to_string(place.path("model.h")).unwrap();
+    let array = source.split("= {").nth(1).unwrap().split('}').next().unwrap();
+    let array: Vec<u8> = array.split(',').filter_map(|byte| byte.trim().parse().ok()).collect();
+    assert_eq!(array, bytes);
+    assert!(place.path("palpate.h").exists());
+    assert_eq!(std::fs::read(&model).unwrap(), bytes, "it is what it was");
+    json(&["export", &model, "-o", &place.text("copy.palpate"), "--emit", "c", "--json"]);
+    assert_eq!(std::fs::read(place.path("copy.palpate")).unwrap(), bytes);
+    assert!(place.path("copy.h").exists());
+    for (more, expected) in [
+        (&[][..], "--emit is not given. Use c or rust"),
+        (&["--emit", "json"], "--emit is json. Use it with an ensemble"),
+        (&["--emit", "c", "--leaf", "i8"], "--leaf is given. Use it with an ensemble"),
+        (&["--emit", "c", "--error-rate", "5%"], "--error-rate is given"),
+    ] {
+        let (code, message) = refusal(&[&["export", &model, "-o", &place.text("other.palpate")], more].concat());
+        assert!(code == 2 && message.contains(expected), "{message}");
+        assert!(!place.path("other.palpate").exists());
+    }
 }
 
 #[test]

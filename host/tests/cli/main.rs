@@ -13,6 +13,7 @@ mod help;
 mod mcap;
 mod mesh;
 mod models;
+mod newcomer;
 mod objects;
 mod plan;
 mod play;

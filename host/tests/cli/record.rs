@@ -241,7 +241,7 @@ fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
     chip.join().unwrap();
     // The tenth was told, but seven were wanted.
     let expected: Vec<Touch> = (1..=5).chain(8..=9).map(touch).collect();
-    assert_eq!(Dataset::read_any(&data).unwrap().objects[0].touches, expected);
+    assert_eq!(Dataset::read_any(&data).unwrap().objects[0].touches(), expected);
     let expected = value!({
         "object": "bowl", "touches": 7, "all_touches": 7, "contacts": [0, 3, 4], "without_pose": 0, "missed": 2,
         "faults": 1, "lost": 1, "firmware": "three fingers 1.0",
@@ -284,6 +284,30 @@ fn each_touch_is_printed_and_a_second_recording_of_the_object_is_added() {
 }
 
 #[test]
+fn a_touch_that_the_chip_tells_again_from_before_the_recording_is_said_and_not_recorded() {
+    let place = tempfile::tempdir().unwrap();
+    let data = place.path().join("recorded");
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp://{}", listener.local_addr().unwrap());
+    let chip = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        // Another object was touched, and the chip switched off. It starts while the host asks who is there.
+        let mut before = DeviceEnd::new(Progress::NONE, 1);
+        before.report(event(1), &mut Fingers { greeted: Cell::new(false) }, |_| ());
+        let mut end = DeviceEnd::new(before.progress().clone(), 2);
+        end.start(|frame| stream.write_all(frame).unwrap());
+        serve(&mut stream, &mut end, &[event(4)]);
+        wait(&mut stream);
+    });
+    let directory = data.to_str().unwrap();
+    let output = run(["link", &port, "--record", directory, "--object", "bowl", "--touches", "1"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    chip.join().unwrap();
+    assert!(said.contains("warning: a touch from before this recording was told again, and not recorded"), "{said}");
+    assert_eq!(Dataset::read_any(&data).unwrap().objects[0].touches(), [touch(4)]);
+}
+
+#[test]
 fn with_the_pose_wanted_touches_without_one_are_said_and_not_recorded() {
     let place = tempfile::tempdir().unwrap();
     let data = place.path().join("recorded");
@@ -306,7 +330,7 @@ fn with_the_pose_wanted_touches_without_one_are_said_and_not_recorded() {
     assert!(said.contains("warning: a touch without a pose was not recorded"), "{said}");
     assert!(text.ends_with("not recorded: 1 touches without a pose, 0 reports lost on the way\n"), "{text}");
     let dataset = Dataset::read_any(&data).unwrap();
-    assert_eq!(dataset.objects[0].touches, [touch(3).with_pose(pose)]);
+    assert_eq!(dataset.objects[0].touches(), [touch(3).with_pose(pose)]);
     assert!(dataset.origin.unwrap().pose);
 }
 

@@ -50,6 +50,7 @@ fn every_kind_exports_and_verifies_against_its_librarys_own_margins() {
                 "class_differs",
                 "generated_rows",
                 "library_class_differs",
+                "library_class_unexplained",
                 "library_max_margin_error",
                 "max_margin_error",
                 "rows",
@@ -124,7 +125,8 @@ fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
     for (line, margins) in lines.iter().zip(margins.lines()) {
         let margins: Vec<f64> = margins.split(',').map(|margin| margin.parse().unwrap()).collect();
         let best = (0..3).fold(0, |best, object| if margins[object] > margins[best] { object } else { best });
-        assert_eq!(line["object"], ["cup", "jug", "pan"][best], "{line}");
+        assert_eq!(line["class"], ["cup", "jug", "pan"][best], "{line}");
+        assert_eq!(line.get("verdict"), None, "a row alone has a class");
         let sum: f64 = margins.iter().map(|margin| (margin - margins[best]).exp()).sum();
         assert!((line["posterior"].as_f64().unwrap() - 1.0 / sum).abs() < 1e-3, "{line}");
     }
@@ -205,6 +207,7 @@ fn a_regression_gives_its_value_and_no_verdict() {
     for (line, margin) in text.lines().zip(margins.lines()) {
         let line: Value = serde_json::from_str(line).unwrap();
         assert!((line["margins"][0].as_f64().unwrap() - margin.parse::<f64>().unwrap()).abs() < 1e-5);
+        assert_eq!(line["value"].as_f64().unwrap() as f32, line["margins"][0].as_f64().unwrap() as f32);
         assert_eq!(line.get("verdict"), None);
     }
 }
@@ -243,7 +246,7 @@ fn what_cannot_be_taken_over_is_refused_by_name_with_the_way_round() {
     for (bytes, what, way) in [
         (&b"\x80\x04\x95pickle"[..], "a Python pickle", "skl2onnx"),
         (b"CBM1....", "CatBoost's binary format", "format=\"json\""),
-        (b"PLPT....", "a compiled model already", "exported from"),
+        (b"PLPT....", "the model is truncated: 8 bytes", "foreign"),
         (b"binf....", "XGBoost's old binary format", "model.json"),
         (b"\x1f\x8b....", "compressed", "Unpack"),
         (b"<?xml version=\"1.0\"?>", "no ensemble in a format", "ONNX"),
@@ -353,4 +356,102 @@ fn equal_leaves_of_a_forest_stand_once_and_that_is_said_everywhere() {
     }
     let message = stderr(run(["export", &forest, "-o", &path("m"), "--shared-leaves", "maybe"]), 2);
     assert!(message.contains("use one of auto, yes, no"), "{message}");
+}
+
+#[test]
+fn verify_fails_where_the_library_has_another_class_that_no_rounding_explains() {
+    let (_directory, path) = place();
+    // Margins of a millionth, within what f32 leaves state but above zero without rounding.
+    let text = std::fs::read_to_string(data("xgboost-3.4-binary.json")).unwrap();
+    let mut document: Value = serde_json::from_str(&text).unwrap();
+    document["learner"]["learner_model_param"]["base_score"] = "5E-1".into();
+    let trees = document.pointer_mut("/learner/gradient_booster/model/trees").unwrap().as_array_mut().unwrap();
+    for (number, tree) in trees.iter_mut().enumerate() {
+        let leaves: Vec<bool> = tree["left_children"].as_array().unwrap().iter().map(|child| *child == -1).collect();
+        for (node, _) in leaves.into_iter().enumerate().filter(|(_, is_leaf)| *is_leaf) {
+            tree["split_conditions"][node] = if number == 0 { 1e-6.into() } else { 0.0.into() };
+        }
+    }
+    std::fs::write(path("small.json"), document.to_string()).unwrap();
+    std::fs::write(path("rows.csv"), "width,height,count,angle\n0,990,1,0\n1,991,2,\n").unwrap();
+    stdout(run(["export", &path("small.json"), "-o", &path("m"), "--leaf", "f32"]));
+    let verify = |margins: &str, code: i32| {
+        std::fs::write(path("margins.csv"), margins).unwrap();
+        let with =
+            ["verify", &path("m"), &path("small.json"), &path("rows.csv"), "--library-margins", &path("margins.csv")];
+        if code == 0 { stdout(run(with)) } else { stderr(run(with), code) }
+    };
+    verify("1e-6\n1e-6\n", 0);
+    let message = verify("1e-6\n-1e-6\n", 1);
+    assert!(message.contains("1 rows get another class") && message.contains("the first is row 2"), "{message}");
+    assert!(message.contains("of \"1\", and \"0\" by the library"), "{message}");
+    // What onnxruntime and predict_proba give.
+    let message = verify("0.4,0.6\n0.5,0.5\n", 1);
+    assert!(message.contains("look like probabilities") && message.contains("raw scores"), "{message}");
+}
+
+#[test]
+fn what_a_file_does_not_say_is_said_at_export_and_can_be_stated() {
+    let (_directory, path) = place();
+    let export = |model: &str, more: &[&str]| {
+        stdout(run([&["export", &data(model), "-o", &path("m"), "--leaf", "f32"], more].concat()))
+    };
+    let missing = "xgboost-3.2-missing-0.json";
+    assert!(export(missing, &[]).contains("which number stood for a missing value in training"));
+    let text = export(missing, &["--missing", "0"]);
+    assert!(!text.contains("which number stood for"), "{text}");
+    assert!(text.contains("0 stands for a missing value") && text.contains("f32-leaves, sentinel"), "{text}");
+    let verify = |model: &str, more: &[&str], code: i32| {
+        let name = model.rsplit_once('.').unwrap().0;
+        let (model, rows) = (data(model), data(&format!("{name}.rows.csv")));
+        let margins = data(&format!("{name}.margins.csv"));
+        let verified = run([&["verify", &path("m"), &model, &rows, "--library-margins", &margins], more].concat());
+        assert_eq!(verified.status.code(), Some(code), "{}", String::from_utf8_lossy(&verified.stderr));
+    };
+    verify(missing, &["--missing", "0"], 0);
+    export(missing, &[]);
+    verify(missing, &[], 1);
+    let stopped = "xgboost-3.2-early-stopping.json";
+    assert!(export(stopped, &[]).contains("up to the best iteration"));
+    verify(stopped, &[], 0);
+    assert!(export(stopped, &["--all-trees"]).contains("as asked"));
+    verify(stopped, &["--all-trees"], 1);
+    let poisson = "lightgbm-4.7-poisson.txt";
+    assert!(export(poisson, &[]).contains("Predicts the value e^x of the margin x"));
+    let predicted = || {
+        let text = stdout(run(["recognize", &path("m"), &data("lightgbm-4.7-poisson.rows.csv"), "--features"]));
+        text.lines().map(|line| line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap()).collect::<Vec<_>>()
+    };
+    let library = std::fs::read_to_string(data("lightgbm-4.7-poisson.predictions.csv")).unwrap();
+    for (value, library) in predicted().into_iter().zip(library.lines()) {
+        let library: f64 = library.parse().unwrap();
+        assert!((value - library).abs() < 2e-6 * library, "{value} instead of {library}");
+    }
+    let after = predicted();
+    assert!(export(poisson, &["--link", "identity"]).contains("Predicts the value, which is the margin"));
+    assert!(predicted().into_iter().zip(after).all(|(margin, value)| (margin.exp() - value).abs() < 2e-6 * value));
+    let message = stderr(run(["export", &data(missing), "-o", &path("m"), "--link", "exponential"]), 2);
+    assert!(message.contains("only a regression has one"), "{message}");
+    let text = export("lightgbm-4.7-seconds.txt", &[]);
+    assert!(text.contains("stay different in f32") && text.contains("--scale height=UNITS"), "{text}");
+    // One line for what whole numbers hold exactly.
+    let rows = data("lightgbm-4.7-seconds.rows.csv");
+    let text = export("lightgbm-4.7-seconds.txt", &["--fit-scales", &rows]);
+    assert!(text.contains("Whole units hold every value of these rows") && text.contains("height × 1"), "{text}");
+    let text = stdout(run(["inspect", &path("m")]));
+    assert!(text.contains("(per row, estimated)") && text.contains("200 rows") && !text.contains("touch"), "{text}");
+}
+
+#[test]
+fn targets_of_millions_are_no_object_of_a_million_nats() {
+    let (_directory, path) = place();
+    for size in ["large", "small"] {
+        let model = data(&format!("lightgbm-4.7-{size}-target.txt"));
+        let rows = data(&format!("lightgbm-4.7-{size}-target.rows.csv"));
+        let margins = data(&format!("lightgbm-4.7-{size}-target.margins.csv"));
+        for leaf in ["f32", "i16"] {
+            stdout(run(["export", &model, "-o", &path("m"), "--leaf", leaf]));
+            stdout(run(["verify", &path("m"), &model, &rows, "--library-margins", &margins]));
+        }
+    }
 }

@@ -43,7 +43,7 @@ fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
     let at = place.path();
     touches(&at.join("data"), &KNOWN, 3_000, 1);
     touches(&at.join("shapes"), &SHAPES, 2_000, 1);
-    touches(&at.join("fresh"), &KNOWN, 40_000, 2);
+    touches(&at.join("fresh"), &KNOWN, 60_000, 2);
     touches(&at.join("unseen"), &KNOWN, 4_000, 3);
     touches(&at.join("others"), &[("kettle", 550_000)], 4_000, 3);
     let trained =

@@ -26,8 +26,8 @@ impl<const N: usize> Recognizer<'_, N> {
     /// of several that are as good, the first.
     ///
     /// Cost: an exponential for each other object, a multiplication and an addition for each of them and each pose (936
-    /// for ten objects and 104 poses), about ten instructions for each candidate, and a division. Stack: 4 bytes per pose,
-    /// at most 416. Cannot fail.
+    /// for ten objects and 104 poses), a few instructions for each candidate, and a division. Stack: a
+    /// score for each of up to 104 poses. Cannot fail.
     pub fn next_approach(&self, candidates: impl IntoIterator<Item = u16>) -> Option<Proposal> {
         self.state().propose(self.model(), candidates)
     }
@@ -37,7 +37,9 @@ impl<const N: usize> Recognizer<'_, N> {
 fn propose(model: &Model<'_>, evidence: &[i64], candidates: impl IntoIterator<Item = u16>) -> Option<Proposal> {
     let plan = model.plan()?;
     let mut scores = [0; MOST_POSES];
-    let weights = add_up(&plan, evidence, unit(model), &mut scores);
+    // A background is never named, and nothing is known about approaches to it.
+    let known = evidence.get(..model.known_count()).unwrap_or(evidence);
+    let weights = add_up(&plan, known, unit(model), &mut scores);
     let mut proposal: Option<Proposal> = None;
     for (index, pose) in candidates.into_iter().enumerate() {
         let Some(&score) = scores.get(usize::from(pose)).filter(|_| plan.may_touch(pose)) else { continue };

@@ -49,7 +49,7 @@ impl Rivals {
 
     /// The posterior of the object that they are the rivals of: 1 / (1 + their weight).
     ///
-    /// Cost: a division of about 800 instructions, which an image that does not call this does not hold. Cannot fail.
+    /// Cost: a long division, which an image that does not call this does not hold. Cannot fail.
     pub fn posterior(self) -> Posterior {
         Posterior(ONE - ratio(self.0, ONE.saturating_add(self.0)))
     }
@@ -84,7 +84,7 @@ impl Unit {
 
 /// The object with the most evidence; the first of several.
 ///
-/// Cost: six instructions per object.
+/// Cost: a few instructions for each object.
 pub(crate) fn best(evidence: &[i64]) -> (usize, i64) {
     let mut best = (0, i64::MIN);
     for (object, &evidence) in evidence.iter().enumerate() {
@@ -111,7 +111,7 @@ pub(crate) fn rivals(evidence: &[i64], (winner, most): (usize, i64), limit: u64,
 
 /// The posterior of one object.
 ///
-/// Cost: an exponential for each object, and a division of about 800 instructions. Error: at most 2e-8 of the smaller
+/// Cost: an exponential for each object, and a long division. Error: at most 2e-8 of the smaller
 /// one of the posterior and its complement, and 2^-55.
 pub(crate) fn posterior(evidence: &[i64], object: usize, unit: Unit) -> Posterior {
     let best = best(evidence);

@@ -6,6 +6,11 @@ use core::fmt;
 /// The evidence for an object that cannot be there: no number of touches makes it the best, and its weight is 0.
 pub(crate) const IMPOSSIBLE: i64 = i64::MIN;
 
+/// Whether the evidence for an object, whatever was touched, did not begin as [`IMPOSSIBLE`].
+pub(crate) const fn is_possible(evidence: i64) -> bool {
+    evidence > IMPOSSIBLE / 2
+}
+
 /// No object is expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NothingExpected;
@@ -21,7 +26,7 @@ impl core::error::Error for NothingExpected {}
 /// The evidence before any touch, in units, for an object of this weight where the largest weight is `most`: the
 /// logarithm of their ratio, rounded down.
 ///
-/// Cost: about 700 instructions. Cannot fail; a weight of 0 is [`IMPOSSIBLE`].
+/// Cost: two logarithms and a division, bit by bit. Cannot fail; a weight of 0 is [`IMPOSSIBLE`].
 pub(crate) fn prior(weight: u32, most: u32, unit: Unit) -> i64 {
     if weight == 0 {
         return IMPOSSIBLE;

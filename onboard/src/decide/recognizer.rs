@@ -64,7 +64,8 @@ impl core::error::Error for CapacityError {}
 
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
-/// State: 8 bytes per object, and 40; and the model, which is copied: 68 bytes, not those that it is read from.
+/// State: a number of 64 bits for each object, a few more, and the model, which is copied: where its parts are, not the bytes
+/// that it is read from. The README of this crate states what it comes to.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: Model<'m>,
@@ -80,6 +81,8 @@ pub(crate) struct State<const N: usize> {
     /// Of the object that was recognized.
     rivals: Rivals,
     touches: u32,
+    /// Of these, the first ones that are no longer part of the evidence.
+    forgotten: u32,
     decided: Decided,
 }
 
@@ -107,12 +110,13 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         Ok(Self {
             model: *model,
             state: State {
-                // Not the priors yet: written into, it would be copied to its place, and a copy of this length is a call that
-                // brings in 800 bytes of code.
+                // Not the priors yet: written into, it would be copied to its place, and a copy of this length is a call
+                // to a routine that most programs have no other use for.
                 evidence: [0; N],
                 stopping,
                 rivals: Rivals::from_q56(0),
                 touches: 0,
+                forgotten: 0,
                 decided: Decided::Fresh,
             },
         })
@@ -130,8 +134,8 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// Takes in a touch.
     ///
-    /// Cost: the margins, then about 15 instructions per object and one exponential, rarely more; and with a test of fit
-    /// its own, for ten objects about 1,000 instructions. Cannot fail: evidence
+    /// Cost: the margins, then a few instructions for each object and one exponential, rarely more; and that of a test of fit, if
+    /// the model has one. Cannot fail: evidence
     /// that reaches the limits of 64 bits (after 2^33 touches at the earliest) stays there, which brings objects closer
     /// together and never makes one recognized.
     ///
@@ -183,7 +187,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     ///
     /// Cost: as the test in [`push`](Self::push).
     pub fn fit(&self) -> Fit {
-        match self.state.touches {
+        match self.state.covered() {
             0 => Fit::Fits,
             touches => strangers::fit(&self.model, self.evidence(), self.best(), touches),
         }
@@ -207,7 +211,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// The posterior of an object, of the evidence divided by the model's [temperature](Model::temperature); 0 for an
     /// object that the model does not know.
     ///
-    /// Cost: an exponential for each object, and about 1,000 instructions.
+    /// Cost: an exponential for each object, and a long division.
     pub fn posterior(&self, object: usize) -> Posterior {
         self.state.posterior(&self.model, object)
     }
@@ -221,6 +225,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// Forgets all touches, for the next object.
     pub fn reset(&mut self) {
         self.state.touches = 0;
+        self.state.forgotten = 0;
         self.state.decided = Decided::Fresh;
     }
 
@@ -229,7 +234,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the model
     /// promises was found out for its own priors, and its test of fit takes the weights' for evidence. `&[3, 0, 1]` says that there are three of the first object for each of the third, and none of the second.
     ///
-    /// Cost: about 700 instructions for each object.
+    /// Cost: two logarithms for each object, bit by bit.
     ///
     /// # Errors
     /// [`NothingExpected`], if all weights are 0; nothing changes then.
@@ -238,6 +243,8 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         let most = weights.iter().copied().max().filter(|&most| most > 0).ok_or(NothingExpected)?;
         let unit = unit(&self.model);
         self.reset();
+        // A background's stays.
+        start(&self.model, &mut self.state.evidence);
         let mut weights = weights.iter();
         for evidence in self.state.evidence.iter_mut().take(self.model.known_count()) {
             *evidence = expected::prior(weights.next().copied().unwrap_or(0), most, unit);
@@ -273,7 +280,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         }
         self.state.touches = self.state.touches.saturating_add(1);
         let best = strangers::leader(&self.model, self.evidence());
-        let fit = strangers::fit(&self.model, self.evidence(), best.0, self.state.touches);
+        let fit = strangers::fit(&self.model, self.evidence(), best.0, self.state.covered());
         let odds = self.state.stopping.odds_of(best.0, &self.model);
         let may_be_named = fit == Fit::Fits && !strangers::is_background(&self.model, self.evidence(), best.1);
         let rivals = if may_be_named { evidence::rivals(self.evidence(), best, odds, unit(&self.model)) } else { None };
@@ -318,6 +325,17 @@ impl<const N: usize> State<N> {
         self.touches
     }
 
+    /// The first touches that are no longer part of the evidence.
+    #[cfg(feature = "link")]
+    pub(crate) const fn forgotten(&self) -> u32 {
+        self.forgotten
+    }
+
+    /// The touches that the evidence is the sum of.
+    const fn covered(&self) -> u32 {
+        self.touches.saturating_sub(self.forgotten)
+    }
+
     pub(crate) const fn verdict(&self) -> Verdict {
         match self.decided {
             Decided::Fresh | Decided::Nothing => Verdict::Undecided,
@@ -334,10 +352,11 @@ impl<const N: usize> State<N> {
         if best.0 == object { evidence::rivals(evidence, best, u64::MAX, unit(model)) } else { None }
     }
 
-    /// Takes over the state of a snapshot.
-    pub(crate) const fn set(&mut self, evidence: [i64; N], touches: u32, verdict: Verdict) {
+    /// Takes over a state: evidence, touches so far, how many of these are no longer part of the evidence, and the verdict.
+    pub(crate) const fn set(&mut self, evidence: [i64; N], touches: u32, forgotten: u32, verdict: Verdict) {
         self.evidence = evidence;
         self.touches = touches;
+        self.forgotten = forgotten;
         self.decided = match verdict {
             Verdict::Undecided => Decided::Nothing,
             Verdict::Recognized { object, rivals, .. } => {

@@ -1,7 +1,8 @@
 //! A recognizer's state as bytes, so that a power cut loses no touch.
 //!
 //! The bytes are postcard's: the model's checksum, the number of touches, the verdict (0 undecided, 1 recognized,
-//! 2 unknown, 3 gave up) and its object, then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
+//! 2 unknown, 3 gave up; and 4 where touches were forgotten) and its object; the number of touches that were forgotten, if
+//! any were; then the evidence for each object; then the CRC-32 of these, four bytes, little endian.
 
 use super::recognizer::{Recognizer, State, Verdict};
 use crate::Model;
@@ -21,7 +22,7 @@ pub enum SnapshotError {
 }
 
 /// Bytes of a snapshot without its evidence, at most.
-pub const SNAPSHOT_LENGTH: usize = 16;
+pub const SNAPSHOT_LENGTH: usize = 21;
 
 impl fmt::Display for SnapshotError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -38,10 +39,13 @@ impl core::error::Error for SnapshotError {}
 /// Model, touches, verdict, object.
 type Head = (u32, u32, u8, u8);
 
+/// Beside the code of a verdict: how many touches were forgotten comes next.
+const FORGOTTEN: u8 = 4;
+
 impl<const N: usize> Recognizer<'_, N> {
     /// Writes the state to the start of `buffer`, and gives the bytes that it took.
     ///
-    /// Cost: about 60 instructions per byte. Cannot panic.
+    /// Cost: some instructions for each byte. Cannot panic.
     ///
     /// # Errors
     /// [`SnapshotError::Short`].
@@ -51,7 +55,7 @@ impl<const N: usize> Recognizer<'_, N> {
 
     /// Takes over the state of a snapshot; what was touched before is forgotten. On an error nothing changes.
     ///
-    /// Cost: about 60 instructions per byte. Cannot panic.
+    /// Cost: some instructions for each byte. Cannot panic.
     ///
     /// # Errors
     /// [`SnapshotError::Damaged`] or [`SnapshotError::OtherModel`].
@@ -65,6 +69,14 @@ impl<const N: usize> Recognizer<'_, N> {
         if model != self.model().checksum() {
             return Err(SnapshotError::OtherModel);
         }
+        let mut forgotten = 0;
+        if verdict & FORGOTTEN != 0 {
+            (forgotten, rest) = postcard::take_from_bytes(rest).map_err(|_| SnapshotError::Damaged)?;
+            // The last touch is part of the evidence.
+            if !(1..touches).contains(&forgotten) {
+                return Err(SnapshotError::Damaged);
+            }
+        }
         let mut evidence = [0; N];
         for evidence in evidence.iter_mut().take(self.model().object_count()) {
             (*evidence, rest) = postcard::take_from_bytes(rest).map_err(|_| SnapshotError::Damaged)?;
@@ -72,7 +84,7 @@ impl<const N: usize> Recognizer<'_, N> {
         if !rest.is_empty() {
             return Err(SnapshotError::Damaged);
         }
-        let verdict = match verdict {
+        let verdict = match verdict & !FORGOTTEN {
             0 => Verdict::Undecided,
             _ if touches == 0 => return Err(SnapshotError::Damaged),
             1 => {
@@ -83,7 +95,7 @@ impl<const N: usize> Recognizer<'_, N> {
             3 => Verdict::GaveUp,
             _ => return Err(SnapshotError::Damaged),
         };
-        self.state_mut().set(evidence, touches, verdict);
+        self.state_mut().set(evidence, touches, forgotten, verdict);
         // Without a touch, what was told of priors, or nothing at all.
         let mut priors = self.model().priors().iter().map(|prior| i64::from(i32::from_le_bytes(*prior)));
         if touches == 0 && evidence.iter().take(self.model().object_count()).all(|own| priors.next() == Some(*own)) {
@@ -102,8 +114,14 @@ impl<const N: usize> State<N> {
             Verdict::Unknown => (2, 0),
             Verdict::GaveUp => (3, 0),
         };
-        let head: Head = (model.checksum(), self.touches(), verdict, object);
+        let forgotten = self.forgotten();
+        let mark = if forgotten == 0 { 0 } else { FORGOTTEN };
+        let head: Head = (model.checksum(), self.touches(), verdict | mark, object);
         let mut length = postcard::to_slice(&head, buffer).map_err(|_| SnapshotError::Short)?.len();
+        if forgotten != 0 {
+            let rest = buffer.get_mut(length..).ok_or(SnapshotError::Short)?;
+            length += postcard::to_slice(&forgotten, rest).map_err(|_| SnapshotError::Short)?.len();
+        }
         let mut priors = [0; N];
         for evidence in self.evidence_or_priors(model, &mut priors) {
             let rest = buffer.get_mut(length..).ok_or(SnapshotError::Short)?;

@@ -1,6 +1,7 @@
 //! Whether the touches so far fit the object with the most evidence, or none that the model knows.
 
 use super::evidence::best;
+use super::expected::is_possible;
 use super::exponential::exp2_negative;
 use crate::model::Model;
 use palpate_shared::format::{FitTerms, FitTest, ObjectFit};
@@ -27,9 +28,9 @@ pub(crate) fn is_background(model: &Model<'_>, evidence: &[i64], most: i64) -> b
     model.background().and_then(|background| evidence.get(background)).is_some_and(|&background| background > most)
 }
 
-/// What the model's test says about `touches` touches whose evidence, priors included, is `evidence`.
+/// What the model's test says about evidence, priors included, that is the sum of `touches` touches.
 ///
-/// Cost: without a test about 30 instructions for each optional section; with one about 150, for each rival 30, a
+/// Cost: without a test a few instructions for each optional section; with one some more for each rival, a
 /// multiplication for each number of the triangle (45 for nine rivals, 55 for ten), an exponential and a 64-bit division.
 /// Cannot fail or overflow: sums saturate.
 pub(crate) fn fit(model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Fit {
@@ -49,9 +50,6 @@ pub(crate) fn fit(model: &Model<'_>, evidence: &[i64], leader: usize, touches: u
     }
 }
 
-/// Evidence below this is that for an object of weight 0, whatever was touched.
-const IMPOSSIBLE: i64 = i64::MIN / 2;
-
 impl Model<'_> {
     /// How badly the evidence for each object, priors included, of `touches` touches fits the object with the most, in 2^-16
     /// nats: what the model's test compares with its limits. `None` without a test.
@@ -67,7 +65,7 @@ impl Model<'_> {
 fn misfit(test: &FitTest<'_>, model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Option<i64> {
     let object = test.object(leader)?;
     // Of an object that cannot be there nothing is known: as if it had its mean.
-    let sum = |object: usize| evidence.get(object).copied().filter(|&sum| sum > IMPOSSIBLE);
+    let sum = |object: usize| evidence.get(object).copied().filter(|&sum| is_possible(sum));
     let own = |object: usize| sum(object).map(|sum| sum.saturating_sub(i64::from(model.prior(object))));
     let mut ahead = [0_i32; FitTest::MOST_RIVALS];
     for ((ahead, &rival), index) in ahead.iter_mut().zip(object.rivals).zip(0..) {

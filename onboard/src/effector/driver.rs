@@ -29,13 +29,15 @@ const MOST_TIMERS: usize = 16;
 /// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
 /// with a missing finger, and faults, are only seen at the first call after they are due.
 ///
-/// RAM: 180 bytes. Cannot fail or panic, whatever the edges.
+/// Cannot fail or panic, whatever the edges.
 #[derive(Clone, Debug)]
 pub struct Effector {
     settings: Settings,
     fingers: [Debounce; 3],
     /// First contacts of the touch in progress.
     contacts: [Option<u32>; 3],
+    /// The first contact of the last touch that is over.
+    began: u32,
     missing_in_a_row: [u16; 3],
     state: State,
     /// An approach may be going on whose beginning nobody has seen: at power-up, and after a touch was dropped.
@@ -79,6 +81,7 @@ impl Effector {
             settings: settings.in_range(),
             fingers: [Debounce::new(); 3],
             contacts: [None; 3],
+            began: 0,
             missing_in_a_row: [0; 3],
             state: State::Released,
             unseen: true,
@@ -105,6 +108,12 @@ impl Effector {
         self.state
     }
 
+    /// Microseconds from the first contact of the touch in progress, or else of the last one that was returned, to the last
+    /// call.
+    pub fn since_contact(&self) -> u32 {
+        after(self.now.unwrap_or(self.began), self.origin().unwrap_or(self.began))
+    }
+
     /// The level of each finger as of its last edge: whether it is closed.
     pub fn levels(&self) -> [bool; 3] {
         self.fingers.map(|finger| finger.level())
@@ -119,8 +128,7 @@ impl Effector {
     pub fn edge(&mut self, edge: Edge) -> Result<Option<Touch>, Fault> {
         self.advance(edge.at);
         if edge.after_loss {
-            self.faults.overrun = true;
-            self.abandon();
+            self.report(Fault::Overrun);
         }
         let at = self.now.unwrap_or(edge.at);
         edge.finger.of(&mut self.fingers).edge(edge.closed, at);
@@ -139,8 +147,13 @@ impl Effector {
     }
 
     /// Takes in a fault that was seen elsewhere, as by [`Watcher::sense`](super::Watcher::sense):
-    /// [`Effector::poll`] reports it in its turn.
+    /// [`Effector::poll`] reports it in its turn. [`Fault::Overrun`] drops the touch in progress.
     pub fn report(&mut self, fault: Fault) {
+        if fault == Fault::Overrun {
+            self.abandon();
+            // Also where no touch was in progress: one may have begun with what was lost.
+            self.unseen = true;
+        }
         let faults = &mut self.faults;
         let flag = match fault {
             Fault::Stuck(finger) => finger.of(&mut faults.stuck),
@@ -289,6 +302,7 @@ impl Effector {
             _ => ContactTime::MISSING,
         });
         self.contacts = [None; 3];
+        self.began = origin;
         let touch = Touch::new(times);
         self.state = if touch.is_full() { State::Complete } else { State::TimedOut };
         for (finger, time) in Finger::ALL.into_iter().zip(times) {

@@ -11,7 +11,7 @@ use palpate_shared::Touch;
 pub enum Sensed {
     /// A switch has closed or opened.
     Edge(Edge),
-    /// A pin cannot be read.
+    /// A pin cannot be read, or edges were lost.
     Fault(Fault),
     /// Nothing more has happened until this time on the [`Clock`].
     Nothing(u32),
@@ -20,7 +20,7 @@ pub enum Sensed {
 /// The pins and a queue of their edges, shared by the pins' interrupt and the main loop, as in a
 /// `critical_section::Mutex<RefCell<Option<Watcher<…>>>>`.
 ///
-/// 64 edges are 20 bounces of each finger; an edge takes 8 bytes of RAM.
+/// 64 edges are 20 bounces of each finger.
 #[derive(Debug)]
 pub struct Watcher<A, B, C, const EDGES: usize = 64> {
     fingers: Fingers<A, B, C>,
@@ -51,31 +51,32 @@ impl<A: InputPin, B: InputPin, C: InputPin, const EDGES: usize> Watcher<A, B, C,
 
     /// Call it in the interrupt of any of the three pins, after clearing the interrupt's cause.
     ///
-    /// Cost: about 100 instructions and the reading of three pins; never waits.
+    /// Cost: a few instructions and the reading of three pins; never waits.
     pub fn interrupt(&mut self, clock: &impl Clock) {
-        let Self { fingers, edges, lost, unreadable } = self;
-        // One at a time, so that none is missed where several cannot be read.
-        while let Err(fault) = fingers.read(clock.micros(), |edge| {
-            let taken = edges.push_back(Edge { after_loss: *lost, ..edge }).is_ok();
-            *lost = !taken;
-            taken
-        }) {
-            if let Some(finger) = fault.finger() {
-                *finger.of(unreadable) = true;
-            }
-        }
+        self.look(clock, false);
     }
 
     /// Call it instead of [`Watcher::interrupt`] where the interrupt was held off for longer than a contact time may be
     /// wrong, as while flash is erased: a change that is found now has happened at a time that nobody knows, and
     /// the touch is dropped with [`Fault::Overrun`].
     pub fn interrupt_late(&mut self, clock: &impl Clock) {
-        let before = (self.edges.len(), self.lost);
-        self.lost = true;
-        self.interrupt(clock);
-        if self.edges.len() == before.0 {
-            // Nothing has changed, or nothing fits.
-            self.lost = before.1 || self.edges.is_full();
+        self.look(clock, true);
+    }
+
+    /// Reads the pins. Changes that are found `late` count as those after a loss.
+    fn look(&mut self, clock: &impl Clock, late: bool) {
+        let Self { fingers, edges, lost, unreadable } = self;
+        let mut after_loss = *lost || late;
+        // One at a time, so that none is missed where several cannot be read.
+        while let Err(fault) = fingers.read(clock.micros(), |edge| {
+            let taken = edges.push_back(Edge { after_loss, ..edge }).is_ok();
+            after_loss = !taken;
+            *lost = after_loss;
+            taken
+        }) {
+            if let Some(finger) = fault.finger() {
+                *finger.of(unreadable) = true;
+            }
         }
     }
 
@@ -89,14 +90,18 @@ impl<A: InputPin, B: InputPin, C: InputPin, const EDGES: usize> Watcher<A, B, C,
         self.edges.is_empty() && !self.lost
     }
 
-    /// Call it in the main loop, with the pins' interrupt held off: what has happened, in its order. An edge that did not
-    /// fit into the queue is offered again, and [`Effector::edge`] then says [`Fault::Overrun`].
+    /// Call it in the main loop, with the pins' interrupt held off: what has happened, in its order. Of an edge that did not
+    /// fit into the queue, what is left to be seen is offered again, and [`Effector::edge`] then says [`Fault::Overrun`];
+    /// where nothing is left, as of a switch that has closed and opened again, this says so itself.
     pub fn sense(&mut self, clock: &impl Clock) -> Sensed {
         if self.lost && self.edges.is_empty() {
             self.interrupt(clock);
         }
         if let Some(finger) = Finger::ALL.into_iter().find(|finger| core::mem::take(finger.of(&mut self.unreadable))) {
             return Sensed::Fault(Fault::Unreadable(finger));
+        }
+        if self.edges.is_empty() && core::mem::take(&mut self.lost) {
+            return Sensed::Fault(Fault::Overrun);
         }
         // With the interrupt held off no edge can come between the look and the clock.
         self.edges.pop_front().map_or_else(|| Sensed::Nothing(clock.micros()), Sensed::Edge)

@@ -54,7 +54,7 @@ impl Scale {
 
     /// The touch as the model's probe would have made it, rounded to whole microseconds; the pose stays.
     ///
-    /// Cost: about 300 instructions on a Cortex-M. Cannot fail: times too long for a [`ContactTime`] become the longest.
+    /// Cost: a few products of 64 bits for each time. Cannot fail: times too long for a [`ContactTime`] become the longest.
     pub fn apply(&self, touch: &Touch) -> Touch {
         if *self == Self::IDENTITY {
             return *touch;

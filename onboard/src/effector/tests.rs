@@ -310,6 +310,58 @@ impl<'a, const N: usize> Board<'a, N> {
 }
 
 #[test]
+fn a_lost_pulse_drops_its_own_touch_at_once_and_no_later_one_and_the_chip_sleeps_again() {
+    let (levels, clock) = ([Cell::new(false), Cell::new(false), Cell::new(false)], TestClock::default());
+    let mut board = Board::<3>::start(&levels, &clock);
+    board.step(0);
+    board.step(150_000);
+    // The first finger bounces until the queue is full; then the middle one touches and lets go.
+    board.set(200_000, &[(First, true)]);
+    board.set(200_500, &[(First, false)]);
+    board.set(201_000, &[(First, true)]);
+    board.set(210_000, &[(Middle, true)]);
+    board.set(240_000, &[(Middle, false)]);
+    assert!(!board.watcher.is_idle(), "the loss is to be told");
+    board.step(250_000);
+    assert_eq!(board.outcomes, [Err(Fault::Overrun)], "at once, though nothing more is to be read");
+    assert!(board.watcher.is_idle(), "the chip may sleep");
+    // Without a middle contact the rest would be another touch than the one that was made.
+    board.set(260_000, &[(Last, true)]);
+    board.step(300_000);
+    board.set(400_000, &[(First, false), (Last, false)]);
+    board.step(401_000);
+    assert!(board.watcher.is_idle());
+    // The next one is whole.
+    for (finger, at) in [(First, 600_000), (Last, 620_000), (Middle, 640_000)] {
+        board.set(at, &[(finger, true)]);
+        board.step(at);
+    }
+    board.step(700_000);
+    assert_eq!(board.outcomes[1..], [Ok(Touch::from_micros([0, 40_000, 20_000]))]);
+    assert!(board.watcher.is_idle());
+}
+
+#[test]
+fn a_first_contact_that_is_lost_while_the_probe_rests_drops_its_touch() {
+    let (levels, clock) = ([Cell::new(false), Cell::new(false), Cell::new(false)], TestClock::default());
+    let mut board = Board::<3>::start(&levels, &clock);
+    board.step(0);
+    board.step(150_000);
+    board.set(200_000, &Finger::ALL.map(|finger| (finger, true)));
+    board.step(210_000);
+    // The openings fill the queue, and the first contact of the next approach is lost, while the main loop is busy.
+    board.set(300_000, &Finger::ALL.map(|finger| (finger, false)));
+    board.set(330_000, &[(First, true)]);
+    board.set(340_000, &[(First, false)]);
+    board.step(350_000);
+    board.set(360_000, &[(Middle, true), (Last, true)]);
+    board.step(390_000);
+    board.set(400_000, &[(Middle, false), (Last, false)]);
+    board.step(900_000);
+    assert_eq!(board.outcomes, [Ok(Touch::from_micros([0; 3])), Err(Fault::Overrun)]);
+}
+
+#[test]
 fn an_edge_found_after_the_interrupt_was_held_off_is_no_contact_time() {
     let (levels, clock) = ([Cell::new(false), Cell::new(false), Cell::new(false)], TestClock::default());
     let mut board = Board::<8>::start(&levels, &clock);
@@ -854,6 +906,6 @@ fn calibration_says_what_is_wrong() {
 
 #[test]
 fn the_driver_takes_the_ram_that_its_documentation_states() {
-    assert_eq!(size_of::<Effector>(), 180);
+    assert_eq!(size_of::<Effector>(), 184);
     assert_eq!(size_of::<Edge>(), 8);
 }

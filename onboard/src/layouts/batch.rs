@@ -21,7 +21,7 @@ const VALUES: usize = 16;
 /// A tree's leaves as words: with their shift, without their bias.
 type Words = [i32; LEAVES * VALUES];
 
-/// Room for [`Model::margins_of_rows`](crate::Model::margins_of_rows): 165 KB, so on a host rather than on a chip. What is in
+/// Room for [`Model::margins_of_rows`](crate::Model::margins_of_rows): as large as many chips' memory, so on a host rather than on a chip. What is in
 /// it between two calls is of no importance.
 pub struct Batch {
     /// Column by column, a row's ranks.

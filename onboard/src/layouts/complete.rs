@@ -31,8 +31,8 @@ pub(crate) fn check(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], leaf: 
 
 /// Adds up a group of complete trees, and moves `nodes` and `leaves` past it.
 ///
-/// Cost: six instructions per step on a Cortex-M4, seven on a Cortex-M0+, and 12 to 22 per tree; then the leaves, with
-/// twelve more per tree where they are shared.
+/// Cost: a few instructions for each step and each tree; then the leaves, with a few more for each tree where they are
+/// shared. `compile/cost.rs` of the host has the numbers, which the firmware's `evaluator` checks.
 pub(crate) fn add(
     group: &Group,
     ranks: &Ranks,

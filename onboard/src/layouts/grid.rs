@@ -16,7 +16,7 @@ pub(crate) fn cells(model: &Sections<'_>) -> Option<usize> {
 
 /// The cell that the features fall into.
 ///
-/// Cost: two binary searches, of about four instructions per step where an axis has many thresholds; then 40.
+/// Cost: two binary searches, of a load and a comparison a step where an axis has many thresholds.
 #[inline(never)]
 pub(crate) fn cell(model: &Sections<'_>, features: &[i32]) -> usize {
     let ([first, second], cuts) = model.axes_and_cuts() else { return 0 };
@@ -38,7 +38,7 @@ fn place(cuts: &[u8], &[feature, _, width, count]: &[u8; Axis::LENGTH], features
 
 /// The margins in a cell of a table, in units or as the bits of f32 values.
 ///
-/// Cost: four or five instructions per object, and 30.
+/// Cost: a few instructions for each object.
 #[inline(never)]
 pub(crate) fn read(model: &Sections<'_>, cell: usize, margins: &mut [i32]) {
     let leaves = model.leaves.get(cell * margins.len() * model.leaf.size()..).unwrap_or_default();

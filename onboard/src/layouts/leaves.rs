@@ -41,7 +41,7 @@ impl<'a> Sum<'a> {
 
     /// Adds one leaf; bytes with their bias.
     ///
-    /// Cost: eight instructions per value, and 15.
+    /// Cost: a few instructions for each value.
     pub(crate) fn add(&mut self, leaf: &[u8]) {
         let leaf_type = self.leaf;
         let margins = self.of_group();
@@ -59,7 +59,7 @@ impl<'a> Sum<'a> {
 
     /// Adds the leaves with these numbers, of `length` bytes each; bytes with their bias.
     ///
-    /// Cost: two to four instructions per value on a Cortex-M4, five on a Cortex-M0+, and twelve per leaf.
+    /// Cost: a few instructions for each value and each leaf.
     pub(crate) fn add_reached(&mut self, leaves: &[u8], reached: &[u16], length: usize) {
         let leaf_type = self.leaf;
         let margins = self.of_group();

@@ -33,7 +33,7 @@ fn start_of_all([_, slope, pair]: [usize; 3]) -> usize {
 /// The cell that the features fall into. A pattern without a code
 /// counts as no contact, and a difference that is missing although its pattern has it as the smallest.
 ///
-/// Cost: three binary searches, of about four instructions per step where an axis has many thresholds; then 80.
+/// Cost: three binary searches, of a load and a comparison a step where an axis has many thresholds.
 #[inline(never)]
 pub(crate) fn cell(model: &Sections<'_>, features: &[i32]) -> usize {
     let (axes, cuts) = model.axes_and_cuts();

@@ -53,7 +53,7 @@ impl Numbers<'_> {
 /// Adds up a group of compact trees, and moves `nodes` and `leaves` past it. A split has three bytes: column,
 /// threshold, splits in the left subtree.
 ///
-/// Cost: about twelve instructions per step, 30 per tree; then the leaves, those that are shared all together.
+/// Cost: some instructions for each step and each tree; then the leaves, those that are shared all together.
 #[inline(never)]
 pub(crate) fn add_compact(
     group: &Group,
@@ -81,7 +81,7 @@ pub(crate) fn add_compact(
 /// Adds up a group of wide trees, and moves `nodes` and `leaves` past it. A split has six bytes: feature, where a
 /// missing value goes (1 = left), the threshold's number, splits in the left subtree.
 ///
-/// Cost: about 25 instructions per step, 30 per tree; then the leaves, those that are shared all together.
+/// Cost: twice that of a compact tree's steps; then the leaves, those that are shared all together.
 #[inline(never)]
 pub(crate) fn add_wide(
     cuts: &[u8],

@@ -10,7 +10,8 @@ use palpate_shared::format::{Axis, Layout};
 /// The rank of every column; beyond the model's columns, 0.
 pub(crate) type Ranks = [u8; 256];
 
-/// Checks that every axis is of a feature that exists, that columns can be numbered in a byte, and that thresholds fill their section.
+/// Checks that every axis is of a feature that exists, that columns can be numbered in a byte, that thresholds fill their
+/// section, and that those of an axis ascend: where they do not, a rank is what one search or another makes of it.
 pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), Wrong> {
     let mut columns = 0;
     let (axes, mut cuts) = model.axes_and_cuts();
@@ -21,7 +22,10 @@ pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), Wrong>
         if axis.feature > last_feature || columns > 256 {
             return Err(wrong);
         }
-        take(&mut cuts, axis.cuts_length()).ok_or(Wrong::Section(model.offset(cuts)))?;
+        let own = take(&mut cuts, axis.cuts_length()).ok_or(Wrong::Section(model.offset(cuts)))?;
+        if !ascends(own, axis.width.into()) {
+            return Err(wrong);
+        }
     }
     // Wide splits number thresholds of four bytes throughout; the others have axes.
     let ends =
@@ -29,11 +33,24 @@ pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), Wrong>
     if ends { Ok(()) } else { Err(Wrong::Section(model.offset(cuts))) }
 }
 
+/// Whether no threshold of `width` bytes is below the one before.
+#[inline(never)]
+fn ascends(mut cuts: &[u8], width: usize) -> bool {
+    let mut last = i32::MIN;
+    while let Some(cut) = take(&mut cuts, width) {
+        let next = number_apart(cut);
+        if next < last {
+            return false;
+        }
+        last = next;
+    }
+    true
+}
+
 /// Ranks of a row of features in all of the model's columns.
 ///
-/// Cost: 9 instructions per step of a binary search in each axis's thresholds on a Cortex-M4, 11 on a Cortex-M0+, and 50 an
-/// axis; with tables built in, four a step where an axis has 63 thresholds or more, of four bytes each; about 30 per step
-/// where thresholds are not aligned.
+/// Cost: a binary search in each axis's thresholds; with tables built in, half as much where an axis has 63 thresholds or
+/// more, of four bytes each; three times as much where thresholds are not aligned.
 pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
     let mut column = 0_u8;
     let mut put = |rank: u8| {
@@ -118,6 +135,12 @@ fn ranks_among(table: &[i32; 256], count: u8, values: &[i32; ABREAST]) -> [u8; A
 fn number(cut: &[u8]) -> i32 {
     let sign = cut.last().map_or(0, |last| -i32::from(last >> 7));
     cut.iter().rfold(sign, |sum, byte| sum << 8 | i32::from(*byte))
+}
+
+/// The same in one place of the image, for what is rare.
+#[inline(never)]
+fn number_apart(cut: &[u8]) -> i32 {
+    number(cut)
 }
 
 /// The feature's value, or missing beyond the end of a row.
@@ -234,7 +257,7 @@ fn search_bytes(cuts: &[u8], width: usize, value: i32) -> u8 {
     let (mut rank, mut step) = (0_u8, 128_u8);
     while step > 0 {
         let end = usize::from(rank | step) * width;
-        if cuts.get(end.wrapping_sub(width)..end).is_some_and(|cut| number(cut) <= value) {
+        if cuts.get(end.wrapping_sub(width)..end).is_some_and(|cut| number_apart(cut) <= value) {
             rank |= step;
         }
         step >>= 1;

@@ -4,8 +4,8 @@ use palpate_shared::format::{Axis, Header, Layout, LeafType};
 
 /// Where the sections of a model are. What a layout reads from them it has checked before.
 ///
-/// No longer than 60 bytes, so that a model is copied in a few instructions; a call to copy it would bring in 800 bytes of
-/// code. So neighbors that are rarely used apart are one slice.
+/// Short enough for a model to be copied in a few instructions; a call to copy it would bring in a routine that most programs
+/// have no other use for. So neighbors that are rarely used apart are one slice.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sections<'a> {
     /// All of the model's bytes.

@@ -2,7 +2,7 @@
 
 /// Makes Q16 of f32 values' bits.
 ///
-/// Cost: about fifteen instructions for each. Cannot fail.
+/// Cost: a few instructions for each. Cannot fail.
 #[inline(never)]
 pub(crate) fn make_q16(bits: &mut [i32]) {
     for bits in bits {
@@ -12,7 +12,7 @@ pub(crate) fn make_q16(bits: &mut [i32]) {
 
 /// A finite f32, given by its bits, in Q16, rounded half away from zero and held within ±2^30. NaN is 0.
 ///
-/// Cost: about fifteen instructions, none of them in floating point. Cannot fail.
+/// Cost: a few instructions, none of them in floating point. Cannot fail.
 pub(crate) fn q16_from_f32_bits(bits: u32) -> i32 {
     const LIMIT: i32 = 1 << 30;
     let exponent = bits >> 23 & 0xff;

@@ -4,8 +4,8 @@ use super::{Model, fixed};
 use crate::bytes::AlignedTo8;
 use crate::layouts::leaves::{BLOCK, Sum};
 use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
-use palpate_shared::format::{Group, Layout};
-use palpate_shared::{Descriptor, Touch};
+use palpate_shared::format::{Group, Layout, Sentinel};
+use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
 
 impl Model<'_> {
     /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
@@ -54,13 +54,14 @@ impl Model<'_> {
 
     /// Makes Q16 of f32 values' bits.
     #[inline(always)]
-    fn make_fixed(&self, margins: &mut [i32]) {
+    pub(super) fn make_fixed(&self, margins: &mut [i32]) {
         if self.is_float() {
             fixed::make_q16(margins);
         }
     }
 
-    /// The margins of a row of features as the trainer's own f32 values, bit for bit; `false`, and nothing written,
+    /// The margins of a row of features as the trainer's own f32 values, bit for bit where [`Model::prediction`] states no
+    /// scale, and times that scale otherwise; `false`, and nothing written,
     /// unless the model has f32 leaves and `margins` is as long as there are objects.
     #[cfg(feature = "f32-leaves")]
     pub fn f32_margins_of(&self, features: &[i32], margins: &mut [f32]) -> bool {
@@ -79,6 +80,22 @@ impl Model<'_> {
     /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits. There are as
     /// many margins as objects.
     pub(super) fn sum(&self, features: &[i32], margins: &mut [i32]) {
+        match self.sentinel() {
+            Some(sentinel) => self.sum_without(sentinel, features, margins),
+            None => self.sum_as_they_are(features, margins),
+        }
+    }
+
+    /// The same of features of which some stand for a missing value.
+    // Apart: only such a model takes the room for its features on the stack.
+    #[inline(never)]
+    fn sum_without(&self, sentinel: Sentinel, features: &[i32], margins: &mut [i32]) {
+        let mut known = [MISSING_FEATURE; 256];
+        known.iter_mut().zip(features).for_each(|(known, &feature)| *known = sentinel.or_missing(feature));
+        self.sum_as_they_are(&known, margins);
+    }
+
+    fn sum_as_they_are(&self, features: &[i32], margins: &mut [i32]) {
         if !self.read_table(features, margins) {
             self.sum_trees(features, margins);
         }

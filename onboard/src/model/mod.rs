@@ -5,18 +5,20 @@ mod fixed;
 mod header;
 mod margins;
 mod optional;
+mod predict;
 mod refused;
 #[cfg(feature = "rows")]
 mod rows;
 
+pub use predict::inverse_link;
 pub use refused::Refused;
 
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
     Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
-    Section, SharedLeaves, Strangers, Tag, Temperature, TrainedNoise, TrainedProbe, TrainedTouches, take_feature,
-    take_section,
+    Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture, TrainedNoise, TrainedProbe,
+    TrainedTouches, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -29,8 +31,8 @@ pub struct Model<'a> {
     stated: Stated,
 }
 
-/// What a model states that recognition depends on. No more than 12 bytes, as [`Sections`] has no more than 52: a model of more
-/// than 64 bytes is copied by a call that takes 700 bytes of flash.
+/// What a model states that recognition depends on. Small, as [`Sections`] is: a model of more
+/// than 64 bytes is copied by a call, to a routine that most programs have no other use for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stated {
     descriptor: Option<Descriptor>,
@@ -39,8 +41,8 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. The two highest bits: whether there are
-    /// sections about strangers and of shared leaves.
+    /// Where thresholds by object stand; 0 if there are none. The three highest bits: whether there are
+    /// sections about strangers, of shared leaves and of features that stand for a missing value.
     by_object: u32,
 }
 
@@ -48,8 +50,10 @@ pub(crate) struct Stated {
 const HAS_STRANGERS: u32 = 1 << 31;
 /// The same.
 const HAS_SHARED_LEAVES: u32 = 1 << 30;
+/// The same.
+const HAS_SENTINEL: u32 = 1 << 29;
 /// What is no place in [`Stated::by_object`].
-const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES;
+const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL;
 
 impl Stated {
     /// What a model without optional sections states.
@@ -80,7 +84,7 @@ pub(crate) struct Opened {
 }
 
 impl Opened {
-    /// The model in the bytes that it was opened from; `None` if there are fewer or more of them. Cost: about 100
+    /// The model in the bytes that it was opened from; `None` if there are fewer or more of them. Cost: a few
     /// instructions. Other bytes of the same length give wrong margins, nothing worse.
     pub(crate) fn model<'a>(&self, bytes: &'a [u8]) -> Option<Model<'a>> {
         Some(Model { sections: Sections::at(bytes, &self.places)?, stated: self.stated })
@@ -95,7 +99,7 @@ impl<'a> Model<'a> {
 
     /// Opens a model, checking everything that reading it later relies on: after this nothing can fail.
     ///
-    /// Cost: about 50 instructions per byte, nearly all of them for the checksum; call it once and keep the result.
+    /// Cost: in proportion to the bytes, nearly all of it for the checksum; call it once and keep the result.
     ///
     /// # Errors
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
@@ -123,7 +127,7 @@ impl<'a> Model<'a> {
 
     /// What the model knows about objects that it does not know, if it states it.
     ///
-    /// Cost: about 30 instructions for each optional section, and 100 for its own. Cannot fail.
+    /// Cost: a few instructions for each optional section, and more for its own. Cannot fail.
     pub fn strangers(&self) -> Option<Strangers<'a>> {
         if !cfg!(feature = "strangers") || self.stated.by_object & HAS_STRANGERS == 0 {
             return None;
@@ -145,12 +149,27 @@ impl<'a> Model<'a> {
 
     /// The table that leaves are numbers of, if equal leaves stand once.
     ///
-    /// Cost: about 30 instructions for each optional section. Cannot fail.
+    /// Cost: a few instructions for each optional section. Cannot fail.
     pub fn shared_leaves(&self) -> Option<SharedLeaves<'a>> {
         if !built_in::SHARED_LEAVES || self.stated.by_object & HAS_SHARED_LEAVES == 0 {
             return None;
         }
         SharedLeaves::from_bytes(optional::find(self.optional(), Tag::SharedLeaves))
+    }
+
+    /// The features that stand for a missing value, if the model states some: they are taken as missing wherever they are.
+    ///
+    /// Cost: next to none if there are none, otherwise a few instructions for each optional section. Cannot fail.
+    pub fn sentinel(&self) -> Option<Sentinel> {
+        if !cfg!(feature = "sentinel") || self.stated.by_object & HAS_SENTINEL == 0 {
+            return None;
+        }
+        Sentinel::from_bytes(optional::find(self.optional(), Tag::Sentinel))
+    }
+
+    /// The section about what margins become; empty if there is none.
+    fn stated_prediction(&self) -> &'a [u8] {
+        optional::find(self.optional(), Tag::Prediction)
     }
 
     /// How many features a row has: 1 to 256.
@@ -204,6 +223,8 @@ impl<'a> Model<'a> {
     }
 
     /// The name of an object; empty for one that the model does not know.
+    ///
+    /// Cost: a few instructions for each object before it.
     pub fn object_name(&self, object: usize) -> &'a str {
         self.text(object.saturating_add(1))
     }
@@ -227,7 +248,7 @@ impl<'a> Model<'a> {
     /// What the weights of all other objects may come to, this one's being 1, for it to be recognized, in Q56: the
     /// model's own threshold for it. `None` if the model has one threshold for all objects, which its header states.
     ///
-    /// Cost: about 15 instructions. Cannot fail.
+    /// Cost: a few instructions. Cannot fail.
     pub fn odds_of(&self, object: usize) -> Option<u64> {
         let start = usize::try_from(self.stated.by_object & !MARKS).ok().filter(|&start| start > 0)?;
         let section = self.sections.bytes.get(start..)?;
@@ -241,7 +262,7 @@ impl<'a> Model<'a> {
 
     /// What evidence is divided by before it becomes a posterior; 1 unless the model states it.
     ///
-    /// Cost: about 30 instructions for each optional section.
+    /// Cost: a few instructions for each optional section.
     pub fn temperature(&self) -> Temperature {
         Temperature::from_bytes(optional::find(self.optional(), Tag::Temperature)).unwrap_or(Temperature::ONE)
     }
@@ -256,10 +277,15 @@ impl<'a> Model<'a> {
         PatternShares::from_bytes(optional::find(self.optional(), Tag::PatternShares))
     }
 
+    /// Which touches the model was trained on, if it states it.
+    pub fn trained_capture(&self) -> Option<TrainedCapture<'a>> {
+        TrainedCapture::from_bytes(optional::find(self.optional(), Tag::Capture), self.object_count())
+    }
+
     /// The plan of approaches, if the model has one: what [`Recognizer::next_approach`](crate::Recognizer::next_approach)
     /// proposes poses by.
     ///
-    /// Cost: about 30 instructions for each optional section.
+    /// Cost: a few instructions for each optional section.
     pub fn plan(&self) -> Option<Plan<'a>> {
         Plan::from_bytes(optional::find(self.optional(), Tag::Plan), self.object_count())
     }
@@ -296,14 +322,21 @@ impl<'a> Model<'a> {
         let mut text = self.sections.bytes.get(HEADER_LENGTH..).unwrap_or_default();
         text = text.get(..self.text_length()).unwrap_or_default();
         for _ in 0..index {
+            if text.is_empty() {
+                return "";
+            }
             next_text(&mut text);
         }
         core::str::from_utf8(next_text(&mut text)).unwrap_or_default()
     }
 }
 
-/// The next string: a byte for its length, then its UTF-8.
+/// The next string: a byte for its length, then its UTF-8. Where the text ends before the string does, nothing is left of it.
 fn next_text<'a>(text: &mut &'a [u8]) -> &'a [u8] {
     let length = usize::from(at(text, 0));
-    take(text, 1).and_then(|_| take(text, length)).unwrap_or_default()
+    let string = take(text, 1).and_then(|_| take(text, length));
+    if string.is_none() {
+        *text = &[];
+    }
+    string.unwrap_or_default()
 }

@@ -1,11 +1,11 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_SHARED_LEAVES, HAS_STRANGERS, MARKS, Stated};
+use super::{HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, MARKS, Stated};
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Layout, OddsByObject, Plan, Section, SharedLeaves, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches,
-    take_section,
+    Layout, OddsByObject, Plan, Prediction, Section, Sentinel, SharedLeaves, Strangers, Tag, TrainedNoise,
+    TrainedProbe, TrainedTouches, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
@@ -47,6 +47,11 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if built_in::SHARED_LEAVES && tag == Tag::SharedLeaves.code() => {
                 stated.by_object |= HAS_SHARED_LEAVES;
                 SharedLeaves::from_bytes(content).is_some() && !matches!(model.layout, Layout::Grid | Layout::Patterns)
+            }
+            _ if tag == Tag::Prediction.code() => Prediction::from_bytes(content).is_some(),
+            _ if cfg!(feature = "sentinel") && tag == Tag::Sentinel.code() => {
+                stated.by_object |= HAS_SENTINEL;
+                Sentinel::from_bytes(content).is_some()
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

@@ -56,7 +56,7 @@ impl core::error::Error for Refused {}
 impl Model<'_> {
     /// Whether a touch is one of those that the model was trained for.
     ///
-    /// Cost: about 40 instructions. Cannot panic.
+    /// Cost: a few instructions. Cannot panic.
     ///
     /// # Errors
     /// [`Refused`] says why it is not.
@@ -71,7 +71,7 @@ impl Model<'_> {
 impl Refused {
     /// Whether a model that was trained on such touches takes this one as evidence.
     ///
-    /// Cost: about 30 instructions.
+    /// Cost: a few instructions.
     ///
     /// # Errors
     /// [`Refused`] says why it does not.

@@ -40,9 +40,9 @@ impl Model<'_> {
         if rows.checked_mul(objects) != Some(margins.len()) || rows.checked_mul(width) != Some(features.len()) {
             return false;
         }
-        // Leaves that are numbers are not made ready.
-        let is_shared = self.shared_leaves().is_some();
-        if rows < FEW || !self.has_trees() || is_shared || !batch::is_regular(&self.sections) {
+        // Leaves that are numbers are not made ready, nor rows in which numbers stand for missing values.
+        let is_special = self.shared_leaves().is_some() || self.sentinel().is_some();
+        if rows < FEW || !self.has_trees() || is_special || !batch::is_regular(&self.sections) {
             for (row, margins) in features.chunks_exact(width).zip(margins.chunks_exact_mut(objects)) {
                 margins.fill(0);
                 self.sum(row, margins);

@@ -6,7 +6,8 @@
 //!
 //! The log is appended to. Where a record does not fit into a sector any more, the next sector is erased and goes on, so
 //! all sectors wear alike. A record counts once it has been read back; one that cannot be written, or a sector that does
-//! not erase any more, is passed over. The sector with the newest record is never erased.
+//! not erase any more, is passed over. The sector with the newest record is never erased. Each attempt to write a record
+//! has a number of its own, so that of two that are whole the newer one counts, whatever the flash said of the other.
 
 use super::record::{self, Found};
 use super::storage::{Place, Storage};
@@ -22,8 +23,12 @@ pub trait MappedFlash: NorFlash {
     fn bytes(&self) -> &[u8];
 }
 
-/// Attempts to erase a sector, or to write a record into it.
-const ATTEMPTS: u32 = 2;
+/// Attempts to erase a sector, or to read a record.
+const ATTEMPTS: usize = 2;
+
+/// Sectors that are tried for a record. Where all of them fail, one is tried for each record that follows, until one
+/// succeeds, or until the log was gone through as many times in vain: then none any more.
+const SECTORS_TRIED: usize = 4;
 
 /// The value of erased bytes.
 const ERASED: u8 = 0xff;
@@ -60,8 +65,8 @@ impl core::error::Error for FlashError {}
 
 /// Records and models in NOR flash; `RECORD` is [`record_length`](super::record_length) of the most objects, or more.
 ///
-/// Wear: a record of a ten-object model takes 70 to 250 bytes of the log, so a sector of 4 KB is erased every 17 to 50
-/// touches, and each sector of the log is in turn. RAM: `RECORD` and 30 bytes.
+/// Wear: records are appended, so a sector is erased once it is full of them, and each sector of the log is in turn; the
+/// README of the firmware states for how many touches. RAM: `RECORD` bytes, and a few numbers.
 #[derive(Debug)]
 pub struct FlashStorage<F, const RECORD: usize> {
     flash: F,
@@ -72,14 +77,18 @@ pub struct FlashStorage<F, const RECORD: usize> {
     counter: u32,
     /// Where the next record goes: behind the newest.
     next: usize,
+    /// The sector that was tried last.
+    tried: usize,
+    /// Sectors that failed since one succeeded.
+    failed: usize,
     buffer: [u8; RECORD],
 }
 
 impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
     /// Uses a flash: the first `log` bytes for records, the rest for two models. Finds the newest record.
     ///
-    /// Cost: the checksums of the first record in each sector and of all in one, about 50 instructions per byte. No erased
-    /// flash is needed: what is no record counts as nothing.
+    /// Cost: the checksums of the first record in each sector and of all in one, byte by byte. No erased
+    /// flash is needed: what is no record, read twice, counts as nothing.
     ///
     /// # Errors
     /// [`FlashError`].
@@ -100,7 +109,8 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         if RECORD > F::ERASE_SIZE || !RECORD.is_multiple_of(F::WRITE_SIZE) {
             return Err(FlashError::Record);
         }
-        let mut storage = Self { flash, log, newest: None, counter: 0, next: 0, buffer: [ERASED; RECORD] };
+        let buffer = [ERASED; RECORD];
+        let mut storage = Self { flash, log, newest: None, counter: 0, next: 0, tried: 0, failed: 0, buffer };
         // A sector that has records has one at its start.
         let newest = |storage: &Self, best: &mut Option<(u32, usize)>, sector: usize| {
             let start = sector * F::ERASE_SIZE;
@@ -126,6 +136,7 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
     /// Finds the newest record in the sector that has it.
     fn scan(&mut self, sector: usize) {
         let (mut at, end) = (sector * F::ERASE_SIZE, (sector + 1) * F::ERASE_SIZE);
+        self.tried = sector;
         while let Some(Found { counter, length, .. }) = self.record(at, end) {
             (self.newest, self.counter) = (Some(at), counter);
             at += length.next_multiple_of(F::WRITE_SIZE);
@@ -134,7 +145,7 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
     }
 
     fn record(&self, at: usize, end: usize) -> Option<Found<'_>> {
-        record::read(self.flash.bytes().get(at..end)?)
+        (0..ATTEMPTS).find_map(|_| record::read(self.flash.bytes().get(at..end)?))
     }
 
     fn is_erased(&self, from: usize, to: usize) -> bool {
@@ -154,11 +165,18 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         false
     }
 
-    /// Writes the first bytes of the buffer into erased flash, and says whether they are there.
-    fn write_buffer(&mut self, at: usize, length: usize) -> bool {
+    /// Writes the record in the buffer into erased flash, under another number than any before, and says whether it is
+    /// there: then it is the newest.
+    fn write_record(&mut self, at: usize, length: usize) -> bool {
+        self.counter = self.counter.wrapping_add(1);
+        let numbered = record::number(&mut self.buffer, self.counter);
         let (Ok(offset), Some(bytes)) = (u32::try_from(at), self.buffer.get(..length)) else { return false };
-        let written = self.flash.write(offset, bytes).is_ok();
-        written && self.flash.bytes().get(at..at + length) == Some(bytes)
+        let written = numbered.is_some() && self.flash.write(offset, bytes).is_ok();
+        let is_there = written && self.flash.bytes().get(at..at + length) == Some(bytes);
+        if is_there {
+            (self.newest, self.next, self.failed) = (Some(at), at + length, 0);
+        }
+        is_there
     }
 
     /// Where a place for models starts.
@@ -225,33 +243,35 @@ impl<F: MappedFlash, const RECORD: usize> Storage for FlashStorage<F, RECORD> {
         Some((found.counter, found.record))
     }
 
+    /// Cost: a record written and read back; where that fails, up to 4 sectors erased, twice each if they have to, and then
+    /// one for each further record, until none is tried any more before the next start.
     fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored> {
-        // Another counter also after a failure: part of that record may be in the flash.
-        self.counter = self.counter.wrapping_add(1);
-        self.buffer.fill(ERASED);
-        let length = record::write(&mut self.buffer, self.counter, fill).ok_or(NotStored)?;
-        let length = length.next_multiple_of(F::WRITE_SIZE);
         let sectors = self.log / F::ERASE_SIZE;
-        let current = self.newest.map(|newest| newest / F::ERASE_SIZE);
-        let mut at = self.next;
-        // Erased together with the newest record's sector, before it: nothing there is half erased.
-        let fits = current.is_some_and(|sector| at + length <= (sector + 1) * F::ERASE_SIZE);
-        let mut written = fits && self.is_erased(at, at + length) && self.write_buffer(at, length);
-        let mut sector = self.next.saturating_sub(1) / F::ERASE_SIZE;
-        for _ in 0..ATTEMPTS as usize * sectors {
-            if written {
-                break;
-            }
-            sector = if sector + 1 < sectors { sector + 1 } else { 0 };
-            if Some(sector) != current {
-                at = sector * F::ERASE_SIZE;
-                written = self.erase(at) && self.write_buffer(at, length);
-            }
-        }
-        if !written {
+        if self.failed >= SECTORS_TRIED * sectors {
             return Err(NotStored);
         }
-        (self.newest, self.next) = (Some(at), at + length);
-        Ok(())
+        self.buffer.fill(ERASED);
+        let length = record::write(&mut self.buffer, fill).ok_or(NotStored)?.next_multiple_of(F::WRITE_SIZE);
+        let current = self.newest.map(|newest| newest / F::ERASE_SIZE);
+        let at = self.next;
+        // A sector is erased as a whole before its first record: what is erased here can be written.
+        let fits = current.is_some_and(|sector| at + length <= (sector + 1) * F::ERASE_SIZE);
+        if fits && self.is_erased(at, at + length) && self.write_record(at, length) {
+            return Ok(());
+        }
+        for _ in 0..if self.failed == 0 { SECTORS_TRIED } else { 1 } {
+            let following = |sector| if sector + 1 < sectors { sector + 1 } else { 0 };
+            let next = following(self.tried);
+            self.tried = if Some(next) == current { following(next) } else { next };
+            let at = self.tried * F::ERASE_SIZE;
+            if self.erase(at) && self.write_record(at, length) {
+                return Ok(());
+            }
+            self.failed += 1;
+        }
+        // One of them may hold the record although it says that it does not, and sectors go by their first record: nothing
+        // newer may follow in the one before.
+        self.next = current.map_or(0, |sector| (sector + 1) * F::ERASE_SIZE);
+        Err(NotStored)
     }
 }

@@ -67,7 +67,8 @@ impl Storage for Memory<'_> {
         let counter = self.found().map_or(0, |found| found.counter).wrapping_add(1);
         let [even, odd] = &mut self.records;
         let place = if counter.is_multiple_of(2) { even } else { odd };
-        record::write(place, counter, fill).ok_or(NotStored)?;
+        record::write(place, fill).ok_or(NotStored)?;
+        record::number(place, counter).ok_or(NotStored)?;
         // The power may go at any moment from here on: the writes must not be delayed.
         compiler_fence(Ordering::SeqCst);
         Ok(())

@@ -16,7 +16,8 @@
 //! After every command, and every touch of its own, the [`Station`] stores a record (evidence, progress of the link, which
 //! model is in use), and only then says what came of it. Whenever the power goes, the chip continues from the newest
 //! record: the host repeats what is not in it, and the link ensures that nothing is counted twice. What cannot be
-//! stored is executed and reported.
+//! stored is executed and reported. The last touch of its own is in the record too, and is told again at each start until
+//! another record follows: a host takes what it has heard before for a copy.
 //!
 //! | storage | where |
 //! |---|---|
@@ -36,7 +37,7 @@ mod storage;
 
 pub use flash::{FlashError, FlashStorage, MappedFlash};
 pub use memory::Memory;
-pub use probe::{Board, Happened, ProbeSettings, ProbeStation};
+pub use probe::{Board, Happened, LONGEST_WAIT, LinkFailed, ProbeSettings, ProbeStation};
 pub use record::record_length;
 pub use serve::{ServeError, serve};
 pub use session::{PROGRAM, RecordsTooShort, Station};

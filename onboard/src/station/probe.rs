@@ -4,6 +4,7 @@ use super::session::{PROGRAM, RecordsTooShort, Station};
 use super::storage::{NoStorage, Storage};
 use crate::Model;
 use crate::effector::{Effector, Fault, Scale, Sensed, Settings, State, drain};
+use core::fmt;
 use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Refusal, TouchMessage, VerdictMessage};
 use palpate_shared::{Pose, Touch};
 
@@ -28,8 +29,8 @@ pub trait Board {
     /// The link failed.
     fn send(&mut self, frame: &[u8]) -> Result<(), Self::Error>;
 
-    /// The pose that the robot's controller last announced, and how many microseconds ago. Asked for when an approach is
-    /// over, once per touch.
+    /// The pose that the robot's controller last announced, and how many microseconds ago. Asked for once per touch, in the
+    /// step that sees it begin: when an approach is over, the next one may have been announced.
     fn pose(&mut self) -> Option<(Pose, u32)> {
         None
     }
@@ -42,7 +43,8 @@ pub struct ProbeSettings {
     pub effector: Settings,
     /// From the probe that is there to the one that the model was trained for.
     pub scale: Scale,
-    /// A pose that was announced longer ago, in microseconds, is none.
+    /// A pose that was announced longer before the first contact, in microseconds, is none; nor is one that was announced
+    /// more than [`Settings::release`] after it, which is that of the next approach.
     pub pose_lasts: u32,
     /// Whether verdicts carry what is needed to compare them with another recognizer's: 12 bytes, and a posterior.
     pub detail: bool,
@@ -71,7 +73,7 @@ pub enum Happened {
     Touched {
         /// The touch, as the model takes it; with a pose if one was announced.
         touch: Touch,
-        /// Microseconds since the pose was announced.
+        /// Microseconds from the announcement of the pose to the first contact.
         pose_age: Option<u32>,
         /// What is known now, or why the touch was not counted. A decision ends an object: the next touch begins another.
         outcome: Result<VerdictMessage, Refusal>,
@@ -92,14 +94,58 @@ impl Happened {
     }
 }
 
+/// A link that failed in a step, and what happened in the step all the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LinkFailed<E> {
+    /// What [`ProbeStation::step`] would have returned.
+    pub happened: Option<Happened>,
+    /// The link's error; the first of several.
+    pub error: E,
+}
+
+impl<E: fmt::Display> fmt::Display for LinkFailed<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.error.fmt(f)
+    }
+}
+
+impl<E: fmt::Debug + fmt::Display> core::error::Error for LinkFailed<E> {}
+
+/// The longest that a chip sleeps, in microseconds: a second.
+pub const LONGEST_WAIT: u32 = 1_000_000;
+
+/// A board whose link may fail: the first error is kept, and nothing more is sent.
+struct Line<'b, B: Board> {
+    board: &'b mut B,
+    failed: Option<B::Error>,
+}
+
+impl<B: Board> Line<'_, B> {
+    fn send(&mut self, frame: &[u8]) {
+        if self.failed.is_none() {
+            self.failed = self.board.send(frame).err();
+        }
+    }
+
+    /// Bytes from the host, as many as there are.
+    fn receive<'r>(&mut self, buffer: &'r mut [u8]) -> &'r [u8] {
+        let received = self.board.receive(buffer);
+        let count = received.unwrap_or_else(|error| {
+            self.failed.get_or_insert(error);
+            0
+        });
+        buffer.get(..count).unwrap_or_default()
+    }
+}
+
 /// Effector, recognizer, link and storage: call [`ProbeStation::step`] until nothing has happened, then sleep until an
-/// interrupt or until [`ProbeStation::due`].
+/// interrupt or for [`ProbeStation::wait`].
 ///
 /// Touches of its own fingers and touches from the host go into the same evidence. After each, what is known is stored, then
-/// told: a verdict that the host has heard survives a power cut.
+/// told: a verdict that the host has heard survives a power cut, and one that was stored is told after it.
 ///
-/// RAM: 180 bytes of effector, 800 of link, 250 and 8 per object of recognition, and the storage's. Stack: about 3 KB more
-/// than [`Recognizer::push`](crate::Recognizer::push).
+/// RAM: effector, link, recognition and the storage's. Stack: a few buffers for frames and records more than
+/// [`Recognizer::push`](crate::Recognizer::push). The README of the firmware states what both come to.
 #[derive(Debug)]
 pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
     effector: Effector,
@@ -108,6 +154,8 @@ pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
     settings: ProbeSettings,
     /// The checksum of the model that the effector is set for.
     model: u32,
+    /// What was announced before the touch in progress, and how long before; once a step has seen it begin.
+    announced: Option<Option<(Pose, u32)>>,
     started: bool,
 }
 
@@ -121,7 +169,7 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         station.set_program(settings.program);
         let end = DeviceEnd::new(progress, settings.boot.wrapping_add(starts));
         let effector = Effector::new(settings.effector);
-        let mut probe = Self { effector, station, end, settings, model: 0, started: false };
+        let mut probe = Self { effector, station, end, settings, model: 0, announced: None, started: false };
         probe.follow_model();
         Ok(probe)
     }
@@ -136,55 +184,64 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         self.effector.state()
     }
 
-    /// Microseconds from `now`, the time that [`Sensed::Nothing`] said last, until there is something to do without an
-    /// interrupt; `None`: nothing before the next edge or byte.
-    pub fn due(&self, now: u32) -> Option<u32> {
-        self.effector.due(now)
+    /// Microseconds from `now`, the time that [`Sensed::Nothing`] said last, for which there is nothing to do without an
+    /// interrupt: at most [`LONGEST_WAIT`], so that any timer can be set to it and none overflows.
+    pub fn wait(&self, now: u32) -> u32 {
+        self.effector.due(now).map_or(LONGEST_WAIT, |due| due.min(LONGEST_WAIT))
     }
 
-    /// Does what there is to do; `None` if that is nothing.
+    /// Does what there is to do, `None` if that is nothing: takes bytes from the host, then looks at the switches, so that
+    /// neither waits for the other. Of two things that happened it returns the touch or fault.
     ///
     /// # Errors
-    /// The link's. What was to be sent is lost; the host notices, and asks again for what it waits for.
-    pub fn step<B: Board>(&mut self, board: &mut B) -> Result<Option<Happened>, B::Error> {
+    /// The link's, with what happened all the same. What was to be sent is lost; the host notices, and asks again for what
+    /// it waits for.
+    pub fn step<B: Board>(&mut self, board: &mut B) -> Result<Option<Happened>, LinkFailed<B::Error>> {
+        let mut line = Line { board, failed: None };
         if !core::mem::replace(&mut self.started, true) {
-            let mut result = Ok(());
-            let mut send = |frame: &[u8]| {
-                if result.is_ok() {
-                    result = board.send(frame);
-                }
-            };
             // Boot numbers count records, so without one a start before the first touch would have that of the next start.
-            self.end.store(&mut self.station, &mut send);
-            self.end.tell(Event::Started, &mut send);
-            result?;
+            self.end.store(&mut self.station, |frame| line.send(frame));
+            self.end.start(|frame| line.send(frame));
         }
         let mut buffer = [0; 32];
-        let count = board.receive(&mut buffer)?;
-        if let Some(bytes) = buffer.get(..count).filter(|bytes| !bytes.is_empty()) {
-            let mut result = Ok(());
-            self.end.receive(bytes, &mut self.station, |frame| {
-                if result.is_ok() {
-                    result = board.send(frame);
-                }
-            });
+        let bytes = line.receive(&mut buffer);
+        if !bytes.is_empty() {
+            self.end.receive(bytes, &mut self.station, |frame| line.send(frame));
             self.follow_model();
-            return result.map(|()| Some(Happened::Heard));
         }
-        match drain(&mut self.effector, || board.sense()) {
-            Ok(None) => Ok(None),
-            Ok(Some(touch)) => self.touched(&touch, board).map(Some),
-            Err(fault) => tell(&mut self.end, fault.into(), board).map(|()| Some(Happened::Faulty(fault))),
+        let heard = (!bytes.is_empty()).then_some(Happened::Heard);
+        let sensed = drain(&mut self.effector, || line.board.sense());
+        let happened = match sensed {
+            Ok(Some(touch)) => Some(self.touched(&touch, &mut line)),
+            Ok(None) => heard,
+            Err(fault) => {
+                self.end.tell(fault.into(), |frame| line.send(frame));
+                Some(Happened::Faulty(fault))
+            }
+        };
+        if self.effector.state() != State::Touching {
+            self.announced = None;
+        } else if self.announced.is_none() {
+            self.announced = Some(self.ask_pose(line.board));
+        }
+        match line.failed {
+            None => Ok(happened),
+            Some(error) => Err(LinkFailed { happened, error }),
         }
     }
 
-    fn touched<B: Board>(&mut self, touch: &Touch, board: &mut B) -> Result<Happened, B::Error> {
+    fn touched<B: Board>(&mut self, touch: &Touch, line: &mut Line<'_, B>) -> Happened {
         let mut touch = self.settings.scale.apply(touch);
-        let announced = board.pose().filter(|(_, age)| *age <= self.settings.pose_lasts);
+        // Where the whole touch has passed since the last step, nobody has seen it begin.
+        let announced = self.announced.take().unwrap_or_else(|| self.ask_pose(line.board));
         if let Some((pose, _)) = announced {
             touch = touch.with_pose(pose);
         }
         let pose_age = announced.map(|(_, age)| age);
+        // Touches from the host may have decided: one that counts begins another object.
+        if self.station.has_decided() && self.station.model().is_some_and(|model| model.accepts(&touch).is_ok()) {
+            self.station.reset();
+        }
         let outcome = self.station.push(&touch, self.settings.detail);
         if outcome.is_ok_and(|verdict| verdict.decision != Decision::Undecided) {
             self.station.reset();
@@ -193,15 +250,17 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
             Ok(verdict) => Event::Touch { touch: TouchMessage::from(&touch), pose_age, verdict },
             Err(refusal) => Event::Refused { touch: TouchMessage::from(&touch), refusal },
         };
-        let mut result = Ok(());
-        let mut send = |frame: &[u8]| {
-            if result.is_ok() {
-                result = board.send(frame);
-            }
-        };
-        self.end.store(&mut self.station, &mut send);
-        self.end.tell(event, &mut send);
-        result.map(|()| Happened::Touched { touch, pose_age, outcome })
+        self.end.report(event, &mut self.station, |frame| line.send(frame));
+        Happened::Touched { touch, pose_age, outcome }
+    }
+
+    /// The pose of the touch in progress, or else of the last one, and how long before the first contact it was announced.
+    fn ask_pose<B: Board>(&self, board: &mut B) -> Option<(Pose, u32)> {
+        let (pose, age) = board.pose()?;
+        let since_contact = self.effector.since_contact();
+        let before = age.saturating_sub(since_contact);
+        let after = since_contact.saturating_sub(age);
+        (before <= self.settings.pose_lasts && after <= self.settings.effector.release).then_some((pose, before))
     }
 
     /// Sets the effector for the model, if that is another one than before.
@@ -212,10 +271,4 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
             self.effector.set(self.settings.effector.for_model(&model, &self.settings.scale));
         }
     }
-}
-
-fn tell<B: Board>(end: &mut DeviceEnd, event: Event, board: &mut B) -> Result<(), B::Error> {
-    let mut result = Ok(());
-    end.tell(event, |frame| result = board.send(frame));
-    result
 }

@@ -37,7 +37,7 @@ pub(super) struct Staged {
 }
 
 /// What the bytes of a record mean; goes into its checksum, so that records of other versions count as damaged.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -51,13 +51,15 @@ pub(super) struct Record<'a> {
     pub(super) evidence: &'a [u8],
 }
 
-/// Length and checksum stand before the counter and the record.
+/// Length and checksum stand before the counter and the record; the length is of both.
 const HEADER: usize = 6;
+const COUNTER: usize = 4;
 
 /// The most bytes that a record takes for models of up to `objects` objects.
 pub const fn record_length(objects: usize) -> usize {
-    // Header; counter, model, source and staging; session; an outcome takes up to 26 bytes; the snapshot.
-    HEADER + 45 + 18 + 26 * palpate_shared::link::WINDOW + crate::SNAPSHOT_LENGTH + 10 * objects
+    // Model, source, staging and the snapshot's length; session; an outcome takes up to 26 bytes; the event; the snapshot.
+    let session = 18 + 26 * palpate_shared::link::WINDOW + 67;
+    HEADER + COUNTER + 31 + session + crate::SNAPSHOT_LENGTH + 10 * objects
 }
 
 /// A record among other bytes.
@@ -84,17 +86,27 @@ pub(super) fn read(bytes: &[u8]) -> Option<Found<'_>> {
     if checksum(written) ^ VERSION != u32::from_le_bytes([c0, c1, c2, c3]) {
         return None;
     }
-    let (counter, record) = postcard::take_from_bytes(written).ok()?;
-    Some(Found { counter, record, length: HEADER + length })
+    let (counter, record) = written.split_first_chunk::<COUNTER>()?;
+    Some(Found { counter: u32::from_le_bytes(*counter), record, length: HEADER + length })
 }
 
-/// Writes the record that `fill` gives to the start of `bytes`; its length in all, or `None` if there is no room.
-pub(super) fn write(bytes: &mut [u8], counter: u32, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Option<usize> {
+/// Writes the record that `fill` gives to the start of `bytes`, without its number; its length in all, or `None` if there is
+/// no room.
+pub(super) fn write(bytes: &mut [u8], fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Option<usize> {
     let (header, body) = bytes.split_first_chunk_mut::<HEADER>()?;
-    let mut length = postcard::to_slice(&counter, body).ok()?.len();
-    length += fill(body.get_mut(length..)?)?;
-    let [c0, c1, c2, c3] = (checksum(body.get(..length)?) ^ VERSION).to_le_bytes();
+    let length = COUNTER + fill(body.get_mut(COUNTER..)?)?;
     let [l0, l1] = u16::try_from(length).ok()?.to_le_bytes();
-    *header = [l0, l1, c0, c1, c2, c3];
+    *header = [l0, l1, 0, 0, 0, 0];
     Some(HEADER + length)
+}
+
+/// Numbers the record that was written into `bytes`, which is whole then. It may be numbered again.
+pub(super) fn number(bytes: &mut [u8], counter: u32) -> Option<()> {
+    let (header, body) = bytes.split_first_chunk_mut::<HEADER>()?;
+    let [l0, l1, ..] = *header;
+    *body.first_chunk_mut::<COUNTER>()? = counter.to_le_bytes();
+    let written = body.get(..usize::from(u16::from_le_bytes([l0, l1])))?;
+    let [c0, c1, c2, c3] = (checksum(written) ^ VERSION).to_le_bytes();
+    *header = [l0, l1, c0, c1, c2, c3];
+    Some(())
 }

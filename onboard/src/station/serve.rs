@@ -4,7 +4,7 @@ use super::session::{RecordsTooShort, Station};
 use super::storage::Storage;
 use core::fmt;
 use embedded_io::{Read, Write};
-use palpate_shared::link::{DeviceEnd, Event};
+use palpate_shared::link::DeviceEnd;
 
 /// Why a chip's program has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,8 @@ impl<E> From<RecordsTooShort> for ServeError<E> {
 /// Continues from the newest record in `storage`; a loaded model is used again if it is still intact. `built_in` is a model
 /// in flash, in use until another is loaded; it may be empty.
 ///
-/// Stack: about 3 KB more than [`Recognizer::push`](crate::Recognizer::push).
+/// Stack: a few buffers for frames and records more than [`Recognizer::push`](crate::Recognizer::push); the README of the
+/// firmware states it.
 ///
 /// `boot` should be another number after each start: see [`DeviceEnd::new`]. Records count starts by themselves, so a
 /// chip that has them may give 0.
@@ -56,7 +57,11 @@ pub fn serve<const N: usize, S: Storage, T: Read + Write>(
     // Each start writes a record at its first command, so the counter is another one after each that mattered.
     let mut end = DeviceEnd::new(progress, boot.wrapping_add(starts));
     let mut written = Ok(());
-    end.tell(Event::Started, |frame| written = transport.write_all(frame));
+    end.start(|frame| {
+        if written.is_ok() {
+            written = transport.write_all(frame);
+        }
+    });
     written.map_err(ServeError::Transport)?;
     loop {
         transport.flush().map_err(ServeError::Transport)?;

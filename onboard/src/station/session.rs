@@ -167,8 +167,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
 
     /// Takes a touch into account.
     ///
-    /// Cost: [`Recognizer::push`] and about 300 instructions, and with a detail a posterior and 400 instructions per
-    /// object.
+    /// Cost: [`Recognizer::push`], and with a detail a posterior and a checksum of the evidence.
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without a usable model; [`Refusal::Pattern`], [`Refusal::Spread`], [`Refusal::NoPose`] or
@@ -190,6 +189,11 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
             self.refused = self.refused.saturating_add(1);
         }
         pushed.map_err(refusal)
+    }
+
+    /// Whether the touches so far have decided; no further one counts before a reset.
+    pub fn has_decided(&self) -> bool {
+        self.state.as_ref().is_some_and(|state| state.verdict() != Verdict::Undecided)
     }
 
     /// How many touches were not counted because the model was not trained for them, since power-up.

@@ -11,7 +11,7 @@ pub const VERSION_WITHOUT_SECTIONS: u16 = 1;
 
 /// The header's bytes, wherever they stand; every field is read from its place when asked for.
 ///
-/// Cost: about 15 instructions per field. Cannot fail: every bit pattern has a value; whether it makes sense is checked
+/// Cost: a few instructions for each field. Cannot fail: every bit pattern has a value; whether it makes sense is checked
 /// when a model is opened.
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a>(&'a [u8]);

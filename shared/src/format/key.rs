@@ -5,7 +5,7 @@ use crate::MISSING_FEATURE;
 /// An integer that stands to the keys of other values as `value` stands to those values: `a < b` in f32 is exactly
 /// `f32_key(a) < f32_key(b)`, with -0 equal to +0; NaN is a missing value.
 ///
-/// Cost: about six instructions, none of them in floating point. Cannot fail.
+/// Cost: a few instructions, none of them in floating point. Cannot fail.
 pub const fn f32_key(value: f32) -> i32 {
     let bits = value.to_bits();
     let magnitude = bits & 0x7fff_ffff;

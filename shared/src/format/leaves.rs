@@ -38,7 +38,7 @@ impl<'a> SharedLeaves<'a> {
 
     /// The number at `index` of the numbers in `leaves`; 0 beyond their end.
     ///
-    /// Cost: about eight instructions. Cannot fail.
+    /// Cost: a few instructions. Cannot fail.
     #[inline(always)]
     pub fn number(&self, leaves: &[u8], index: usize) -> u16 {
         let at = |index: usize| leaves.get(index).copied().unwrap_or_default();
@@ -47,7 +47,7 @@ impl<'a> SharedLeaves<'a> {
 
     /// The first of the numbers in `leaves` whose `length` bytes of values are not all in the table: which one it is.
     ///
-    /// Cost: about 20 instructions per number. Cannot fail.
+    /// Cost: some instructions for each number. Cannot fail.
     pub fn first_unknown(&self, leaves: &[u8], length: usize) -> Option<usize> {
         let count = leaves.len() / self.number_length();
         // Below 2^26 for at most 256 values of four bytes.

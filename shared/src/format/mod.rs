@@ -4,11 +4,13 @@
 //! header │ text │ optional sections │ base margins │ priors │ axes │ thresholds │ groups │ splits │ leaves │ CRC-32
 //! ```
 
+#[macro_use]
 mod codes;
 mod header;
 mod key;
 mod leaves;
 mod plan;
+mod prediction;
 mod promise;
 mod records;
 mod strangers;
@@ -20,12 +22,13 @@ pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_W
 pub use key::f32_key;
 pub use leaves::SharedLeaves;
 pub use plan::Plan;
+pub use prediction::{Link, Prediction, Sentinel};
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
 pub use strangers::{FitTerms, FitTest, ObjectFit, Strangers};
 pub use trained::{
-    Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_feature, take_section, write_section,
+    Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedCapture,
+    TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section, write_section,
 };
 
 /// Bytes of the checksum at the end.

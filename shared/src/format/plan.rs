@@ -32,7 +32,7 @@ impl<'a> Plan<'a> {
     /// Reads a section of a model with this many objects; `None` if there are fewer than two, if the poses are counted in
     /// another way than this crate knows, or if there are too few bytes. Bytes after those that are known are ignored.
     ///
-    /// Cost: about 40 instructions. Cannot fail otherwise.
+    /// Cost: a few instructions. Cannot fail otherwise.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
         let (&[kind, rolls, _, _], rest) = bytes.split_first_chunk::<4>()?;
         let poses = Poses::with_rolls(rolls).filter(|_| kind == 0)?;
@@ -64,7 +64,7 @@ impl<'a> Plan<'a> {
     /// The separations of two different objects in 128ths, for each pose one; none for objects that the model does not
     /// know.
     ///
-    /// Cost: about 20 instructions. Cannot fail.
+    /// Cost: a few instructions. Cannot fail.
     pub fn separations(&self, a: usize, b: usize) -> &'a [u8] {
         let poses = usize::from(self.poses.count());
         let start = Self::pair(a, b).saturating_mul(poses);
@@ -73,7 +73,7 @@ impl<'a> Plan<'a> {
 
     /// Whether an approach in the pose with this number may touch something.
     ///
-    /// Cost: about 5 instructions. Cannot fail.
+    /// Cost: a few instructions. Cannot fail.
     pub fn may_touch(&self, pose: u16) -> bool {
         let known = pose < self.poses.count();
         known && self.separations.get(usize::from(pose)).is_some_and(|&byte| byte.cast_signed() != Self::UNTOUCHED)

@@ -22,7 +22,7 @@ impl<'a> OddsByObject<'a> {
     /// What the weights of all other objects may come to, this one's being 1, for it to be recognized: in Q56. `None`
     /// beyond the objects that there are.
     ///
-    /// Cost: about ten instructions. Cannot fail.
+    /// Cost: a few instructions. Cannot fail.
     pub fn odds(&self, object: usize) -> Option<u64> {
         let odds = self.0.as_chunks::<4>().0.get(object)?;
         Some(u64::from(u32::from_le_bytes(*odds)) << 24)
@@ -222,7 +222,7 @@ impl Temperature {
 
     /// Reads a section; `None` if it is too short or out of range. Bytes after those that are known are ignored.
     ///
-    /// Cost: about ten instructions.
+    /// Cost: a few instructions.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let sharpness = u32::from_le_bytes(*bytes.first_chunk()?);
         Self::RANGE.contains(&sharpness).then_some(Self { sharpness })

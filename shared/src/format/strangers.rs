@@ -86,7 +86,7 @@ impl<'a> Strangers<'a> {
     /// Reads a section of a model with this many objects, the background included; `None` if there are too few bytes or a
     /// number makes no sense. Bytes after those that are known are ignored.
     ///
-    /// Cost: about 60 instructions, and with a test about 30 for each object. Cannot fail otherwise.
+    /// Cost: that of reading the terms, and with a test some instructions for each object. Cannot fail otherwise.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
         let (&[background, test, _, _], rest) = bytes.split_first_chunk::<4>()?;
         let background = flag(background)?;
@@ -98,7 +98,7 @@ impl<'a> Strangers<'a> {
 
     /// The section of a model that was checked when it was opened.
     ///
-    /// Cost: about 100 instructions. Cannot fail otherwise.
+    /// Cost: that of reading the terms. Cannot fail otherwise.
     pub fn opened(bytes: &'a [u8]) -> Option<Self> {
         let (&[background, test, _, _], rest) = bytes.split_first_chunk::<4>()?;
         Some(Self { background: background == 1, test: if test == 1 { FitTest::from_bytes(rest) } else { None } })
@@ -186,7 +186,7 @@ impl<'a> FitTest<'a> {
 
     /// What touches of an object give; `None` for one that has no record.
     ///
-    /// Cost: about 40 instructions. Cannot fail otherwise.
+    /// Cost: a few instructions. Cannot fail otherwise.
     pub fn object(&self, object: usize) -> Option<ObjectFit<'a>> {
         let count = usize::from(self.terms.rivals);
         let length = Self::record_length(count);

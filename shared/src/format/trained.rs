@@ -2,6 +2,7 @@
 
 use super::codes::{Counted, Length};
 use crate::pattern::Patterns;
+use core::ops::Range;
 
 /// An optional section's tag. The tag in the model also has [`MUST_UNDERSTAND`] set if a reader that does not know the
 /// section has to refuse the model.
@@ -32,6 +33,12 @@ pub enum Tag {
     Temperature,
     /// The values of leaves that stand for many: [`SharedLeaves`](super::SharedLeaves).
     SharedLeaves,
+    /// How margins of rows become a class or a value: [`Prediction`](super::Prediction).
+    Prediction,
+    /// Features that stand for a missing value: [`Sentinel`](super::Sentinel).
+    Sentinel,
+    /// [`TrainedCapture`].
+    Capture,
 }
 
 impl Tag {
@@ -50,6 +57,9 @@ impl Tag {
             Self::Promise => 10,
             Self::Temperature => 11,
             Self::SharedLeaves => 12,
+            Self::Prediction => 13,
+            Self::Sentinel => 14,
+            Self::Capture => 15,
         }
     }
 }
@@ -207,6 +217,49 @@ impl PatternShares {
     }
 }
 
+/// Which touches a model was trained on, for whoever tests it on others: 12 bytes, and 2 for each object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TrainedCapture<'a> {
+    /// 16 bits of a checksum of the capture's seed and settings; 0 if no capture is known.
+    pub settings: u16,
+    /// The samples of each object; an end of `u32::MAX` stands for that or more.
+    pub samples: Range<u32>,
+    objects: &'a [[u8; 2]],
+}
+
+/// Bytes of [`TrainedCapture`] before the objects.
+const CAPTURE: usize = 12;
+
+impl<'a> TrainedCapture<'a> {
+    /// Bytes of the section before the objects.
+    pub const LENGTH: usize = CAPTURE;
+
+    /// The section's content before the objects, of each of which a `u16` follows.
+    pub fn head(settings: u16, samples: Range<u32>) -> [u8; CAPTURE] {
+        let ([a, b], [c, d, e, f]) = (settings.to_le_bytes(), samples.start.to_le_bytes());
+        let [g, h, i, j] = samples.end.to_le_bytes();
+        [a, b, 0, 0, c, d, e, f, g, h, i, j]
+    }
+
+    /// Reads a section; `None` if it is too short for this many objects. Bytes after those that are known are ignored.
+    ///
+    /// Cost: a few instructions.
+    pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
+        let (&[a, b, _, _, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk::<CAPTURE>()?;
+        Some(Self {
+            settings: u16::from_le_bytes([a, b]),
+            samples: u32::from_le_bytes([c, d, e, f])..u32::from_le_bytes([g, h, i, j]),
+            objects: rest.as_chunks().0.get(..objects)?,
+        })
+    }
+
+    /// 16 bits of a checksum of an object's meshes, or of its first touches where no capture is known; none if nothing is
+    /// known.
+    pub fn object(&self, object: usize) -> Option<u16> {
+        self.objects.get(object).map(|bytes| u16::from_le_bytes(*bytes)).filter(|&object| object != 0)
+    }
+}
+
 /// What a model over rows states about one of its features.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feature<'a> {
@@ -219,7 +272,7 @@ pub struct Feature<'a> {
 /// Splits the first feature off the content of the section of features' names; `None` if it is not whole. What is left is
 /// in `bytes`.
 ///
-/// Cost: about 30 instructions, and the check that the name is UTF-8. Cannot fail.
+/// Cost: a few instructions, and the check that the name is UTF-8. Cannot fail.
 pub fn take_feature<'a>(bytes: &mut &'a [u8]) -> Option<Feature<'a>> {
     let (&[a, b, c, d, length], rest) = bytes.split_first_chunk()?;
     let (name, rest) = rest.split_at_checked(usize::from(length))?;
@@ -315,7 +368,7 @@ impl Section<'_> {
 
 /// Splits the first section off `bytes`; `None` if it is not whole. What is left is in `bytes`.
 ///
-/// Cost: about 30 instructions. Cannot fail.
+/// Cost: a few instructions. Cannot fail.
 pub fn take_section<'a>(bytes: &mut &'a [u8]) -> Option<Section<'a>> {
     let (&[low, high, _, _, a, b, c, d], rest) = bytes.split_first_chunk::<SECTION_HEADER_LENGTH>()?;
     let tag = u16::from_le_bytes([low, high]);
@@ -361,6 +414,16 @@ mod tests {
         for length in 0..16 {
             assert_eq!(take_section(&mut &bytes[..length]), None, "{length} bytes");
         }
+    }
+
+    #[test]
+    fn a_capture_is_read_back_as_written_and_only_whole() {
+        let bytes = [&TrainedCapture::head(7, 3..u32::MAX)[..], &[0, 0, 0x34, 0x12, 9]].concat();
+        let read = TrainedCapture::from_bytes(&bytes, 2).unwrap();
+        assert_eq!((read.settings, read.samples.clone()), (7, 3..u32::MAX));
+        assert_eq!([0, 1, 2].map(|object| read.object(object)), [None, Some(0x1234), None]);
+        assert_eq!(TrainedCapture::from_bytes(&bytes, 3), None);
+        assert_eq!(TrainedCapture::from_bytes(&bytes[..11], 0), None);
     }
 
     #[test]

@@ -81,11 +81,21 @@ pub struct Progress {
     session: u32,
     next: u32,
     outcomes: [Option<Outcome>; WINDOW],
+    /// The chip's own event that is stored with this, to be told after that.
+    untold: Option<Untold>,
+}
+
+/// An event with the numbers by which a host knows whether it has heard it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Untold {
+    boot: u32,
+    sequence: u32,
+    event: Event,
 }
 
 impl Progress {
     /// No session, nothing executed.
-    pub const NONE: Self = Self { session: 0, next: 0, outcomes: [None; WINDOW] };
+    pub const NONE: Self = Self { session: 0, next: 0, outcomes: [None; WINDOW], untold: None };
 
     /// The current session; 0 before the first.
     pub const fn session(&self) -> u32 {
@@ -107,7 +117,7 @@ impl Progress {
 
 /// The chip's end: bytes from the line in, bytes for the line out.
 ///
-/// RAM: about 500 bytes, and on the stack 350 while a frame is answered.
+/// RAM: the last outcomes, and room for the longest frame; on the stack for another one while a frame is answered.
 #[derive(Debug)]
 pub struct DeviceEnd {
     decoder: Decoder,
@@ -166,6 +176,29 @@ impl DeviceEnd {
                     }
                 }
             }
+        }
+    }
+
+    /// Tells the host that the chip has started. Before it, with the numbers that it had then, the event of the last
+    /// [`DeviceEnd::report`] if nothing was stored since: the power may have gone before it was told. A host that has heard
+    /// it takes it for a copy.
+    pub fn start(&mut self, mut send: impl FnMut(&[u8])) {
+        if let Some(Untold { boot, sequence, event }) = self.progress.untold {
+            let message = Message::Event { boot, sequence, event };
+            send(encode(&Frame { session: self.progress.session, message }, &mut [0; FRAME_MAX]));
+        }
+        self.tell(Event::Started, send);
+    }
+
+    /// Lets a device store what it knows and this event, then sends the event to the host: it is told, now or by
+    /// [`DeviceEnd::start`] after a power cut, if what it says is stored. The host is told if storing fails, once per start.
+    pub fn report(&mut self, event: Event, device: &mut impl Device, mut send: impl FnMut(&[u8])) {
+        self.progress.untold = Some(Untold { boot: self.boot, sequence: self.events, event });
+        let unstored = self.statistics.unstored;
+        store(&self.progress, &mut self.statistics, device);
+        self.tell(event, &mut send);
+        if unstored == 0 && self.statistics.unstored > 0 {
+            self.tell(Event::NotStored, &mut send);
         }
     }
 
@@ -282,6 +315,7 @@ fn execute<'a>(
         *slot = Some(outcome);
     }
     progress.next = sequence.wrapping_add(1);
+    progress.untold = None;
     store(progress, statistics, device);
     Message::Outcome { sequence, outcome }
 }

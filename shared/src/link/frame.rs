@@ -44,7 +44,7 @@ pub enum FrameError {
 /// Writes a frame into `out` and returns its bytes: 0x00, the frame, 0x00. The leading 0x00 ends whatever the line held
 /// before.
 ///
-/// Cost: about 60 instructions per byte, most of them for COBS. Returns nothing if the message is longer than any that [`Command`](super::Command)
+/// Cost: some instructions for each byte, most of them for COBS. Returns nothing if the message is longer than any that [`Command`](super::Command)
 /// and its like allow: a chunk of more than [`CHUNK`](super::CHUNK) bytes.
 pub fn encode<'o>(frame: &Frame<'_>, out: &'o mut [u8; FRAME_MAX]) -> &'o [u8] {
     let mut plain = [0; DECODED_MAX];
@@ -71,7 +71,7 @@ fn fill(frame: &Frame<'_>, plain: &mut [u8; DECODED_MAX]) -> Option<usize> {
 
 /// Takes bytes one at a time and says when they make a frame.
 ///
-/// RAM: 176 bytes.
+/// RAM: room for the longest frame, and a few numbers.
 #[derive(Debug)]
 pub struct Decoder {
     cobs: DecoderState,
@@ -96,7 +96,7 @@ impl Decoder {
 
     /// Takes a byte. Returns a frame when the byte ends one, an error when it ends something else.
     ///
-    /// Cost: about 40 instructions, and at the end of a frame about 60 for each of its bytes. Cannot panic.
+    /// Cost: a few instructions, and at the end of a frame some for each of its bytes. Cannot panic.
     pub fn feed(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         if self.done {
             (self.done, self.length) = (false, 0);

@@ -61,6 +61,9 @@ pub enum Incoming<'a> {
         event: Event,
         /// How many events before it were lost on the way.
         missed: u32,
+        /// The boot number of the start in which it happened: another one than [`HostEnd::boot`] if a start before the
+        /// current one was cut off in telling it.
+        boot: u32,
     },
 }
 
@@ -117,8 +120,8 @@ enum Phase {
     Doubting,
 }
 
-/// Starts of chips that a host remembers: an event may be late by as many.
-const BOOTS: usize = 8;
+/// Starts of chips that a host remembers: an event may be late by half as many.
+const BOOTS: usize = 16;
 
 /// From the number of a session that could not be opened to the next; odd, so that none comes again soon.
 const SESSION_STEP: u32 = 0x9e37_79b9;
@@ -159,7 +162,7 @@ impl Sent {
 /// The host's end: bytes from the line in, bytes for the line out. `now` is in microseconds on any clock that does not go
 /// back.
 ///
-/// RAM: 2 KB.
+/// RAM: a window of frames.
 #[derive(Debug)]
 pub struct HostEnd {
     settings: HostSettings,
@@ -171,6 +174,8 @@ pub struct HostEnd {
     window: [Option<Sent>; WINDOW],
     question: Option<(u8, Sent)>,
     tag: u8,
+    /// The chip's boot number when the session was opened.
+    boot: u32,
     /// The chip's boot number and the number of its next event, and those of its starts before, or of other chips: the
     /// newest first.
     boots: [Option<(u32, u32)>; BOOTS],
@@ -194,6 +199,7 @@ impl HostEnd {
             window: [None; WINDOW],
             question: None,
             tag: 0,
+            boot: 0,
             boots: [None; BOOTS],
             last_rush: None,
             doubted: 0,
@@ -213,6 +219,11 @@ impl HostEnd {
     /// The counts so far.
     pub const fn statistics(&self) -> HostStatistics {
         self.statistics
+    }
+
+    /// The chip's boot number when the session was opened; 0 before the first.
+    pub const fn boot(&self) -> u32 {
+        self.boot
     }
 
     /// Starts opening a session; [`Incoming::Opened`] says when it is. Everything in flight is dropped.
@@ -357,6 +368,10 @@ impl HostEnd {
                 let missed = sequence.wrapping_sub(expected);
                 if missed >> 31 == 1 {
                     self.statistics.repeated += 1;
+                    // A chip tells its last event again at each start: it must not be forgotten after as many.
+                    if let Some(upto) = known.and_then(|place| self.boots.get_mut(..=place)) {
+                        upto.rotate_right(1);
+                    }
                     return;
                 }
                 // A late event of a start before does not make that the newest.
@@ -375,7 +390,7 @@ impl HostEnd {
                     }
                 }
                 self.statistics.missed_events += u64::from(missed);
-                incoming(Incoming::Event { event, missed });
+                incoming(Incoming::Event { event, missed, boot });
             }
             _ => self.statistics.repeated += 1,
         }
@@ -410,8 +425,8 @@ impl HostEnd {
         incoming: &mut impl FnMut(Incoming<'_>),
     ) {
         match (self.phase, answer) {
-            (Phase::Opening, Answer::Session { .. }) if session == self.session => {
-                self.phase = Phase::Open;
+            (Phase::Opening, Answer::Session { boot, .. }) if session == self.session => {
+                (self.phase, self.boot) = (Phase::Open, boot);
                 incoming(Incoming::Opened);
             }
             // In the second case another host opened one in the meantime, or the chip was reset.

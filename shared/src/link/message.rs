@@ -49,9 +49,10 @@ pub enum Message<'a> {
     },
     /// Chip: something happened without a command.
     Event {
-        /// The chip's boot number, another one after each start.
+        /// The chip's boot number, another one after each start; of an event that was stored and perhaps not told before
+        /// the power went, that of the start in which it happened.
         boot: u32,
-        /// Counts events from 0 since the start.
+        /// Counts events from 0 since that start.
         sequence: u32,
         /// What happened.
         event: Event,
@@ -258,7 +259,7 @@ pub enum Event {
     Touch {
         /// The touch.
         touch: TouchMessage,
-        /// Microseconds between the announcement of its pose and the end of the touch.
+        /// Microseconds between the announcement of its pose and its first contact.
         pose_age: Option<u32>,
         /// What is known after it.
         verdict: VerdictMessage,
@@ -413,7 +414,7 @@ pub struct Detail {
 }
 
 impl Detail {
-    /// From the posterior of the best object in Q56 and the evidence of all. Cost: about 100 instructions per object.
+    /// From the posterior of the best object in Q56 and the evidence of all. Cost: a checksum of eight bytes for each object.
     pub fn new(posterior: u64, evidence: &[i64]) -> Self {
         let evidence = checksum_of(evidence.iter().map(|evidence| evidence.to_le_bytes()));
         Self { posterior: posterior.to_le_bytes(), evidence: evidence.to_le_bytes() }

@@ -28,7 +28,9 @@
 //! A session's number is a random number of the host's, so that two hosts never believe that the same session is theirs.
 //! Opening names the session that the host believes to be current and the chip's boot number, so that a late copy of an
 //! opening cannot open again. A boot number also comes with every event: events are counted from the chip's start, and
-//! the host notices a start even if the event that announces it was lost.
+//! the host notices a start even if the event that announces it was lost. The last event that was stored with the evidence
+//! is told again at each start, under the numbers that it had, until something else is stored: whenever the power goes, a
+//! host hears of what counts, and takes what it has heard before for a copy.
 //!
 //! An answer names the session of the host that asked, so that several hosts may listen to one chip.
 //!

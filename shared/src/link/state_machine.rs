@@ -1,5 +1,6 @@
-//! Two hosts and three chips without records against a simple specification, through everything that a line and resets can
-//! do: each touch counts at most once, and what a host believes to be counted is counted, or the host is told.
+//! Two hosts and three chips against a simple specification, through everything that a line, resets and power cuts can do:
+//! each touch counts at most once, what a host believes to be counted is counted, or the host is told, and no host hears of a
+//! chip's own touch twice.
 //!
 //! Frames are delivered in any order, twice, late (also after resets), or not at all. Both hosts hear what a chip says that
 //! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.
@@ -8,13 +9,13 @@ use super::*;
 use crate::{Pose, Touch};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
-use std::vec::Vec;
+use std::{vec, vec::Vec};
 
 const HOSTS: usize = 2;
 const CHIPS: usize = 3;
 /// Steps in one history.
 const LENGTH: usize = 300;
-/// Resets of a chip that a frame can be late by: as many as a host remembers.
+/// Resets of a chip that a frame can be late by: fewer than a host remembers.
 const LATEST: u32 = 6;
 
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +36,9 @@ enum Action {
     Lose(u16),
     /// A chip is reset and has kept nothing.
     Reset(usize),
+    /// The power goes and comes back, and a chip goes on from its record. Before that its own fingers may have touched: then
+    /// it goes after the record was stored and before anything was told.
+    Cut(usize, bool),
     /// A chip's own fingers touch.
     Touch(usize),
     /// Time passes: what is due is sent again.
@@ -52,6 +56,7 @@ fn action() -> impl Strategy<Value = Action> {
         24 => Just(Action::DeliverOldest),
         4 => any::<u16>().prop_map(Action::Lose),
         1 => chip.clone().prop_map(Action::Reset),
+        1 => (chip.clone(), any::<bool>()).prop_map(|(chip, touches)| Action::Cut(chip, touches)),
         4 => chip.prop_map(Action::Touch),
         8 => (1..60_000_u32).prop_map(Action::Wait),
     ]
@@ -64,6 +69,8 @@ struct Chip {
     life: u32,
     boot: u32,
     touches: u32,
+    /// Resets of all chips when its own fingers touched last.
+    touched: u32,
 }
 
 /// Counts touches, by the number that stands in their first contact time.
@@ -185,7 +192,7 @@ impl World {
         let chip = |number: u32| {
             let boot = scatter(number);
             let end = DeviceEnd::new(Progress::NONE, boot);
-            Chip { end, notebook: Notebook::default(), life: number, boot, touches: 0 }
+            Chip { end, notebook: Notebook::default(), life: number, boot, touches: 0, touched: 0 }
         };
         let host = |chip| Host {
             end: HostEnd::new(HostSettings { retry: 20_000, attempts: 12 }),
@@ -276,26 +283,18 @@ impl World {
                     self.under_way.swap_remove(usize::from(place) % self.under_way.len());
                 }
             }
-            Action::Reset(chip) => {
-                self.resets += 1;
-                // No line holds frames for longer than that.
-                let resets = self.resets;
-                self.under_way.retain(|frame| resets - frame.resets < LATEST);
-                let life = u32::try_from(CHIPS).unwrap() + resets;
-                let boot = scatter(life);
-                let mut end = DeviceEnd::new(Progress::NONE, boot);
-                end.tell(Event::Started, |frame| frames.push(frame.to_vec()));
-                self.chips[chip] = Chip { end, notebook: Notebook::default(), life, boot, touches: 0 };
-                self.up(chip, frames);
+            Action::Reset(chip) => self.start(chip, Progress::NONE, Notebook::default()),
+            Action::Cut(chip, touches) => {
+                // A host does not remember starts for ever, and takes for news what was told before all that it remembers.
+                if touches || self.resets - self.chips[chip].touched >= LATEST {
+                    self.touch(chip);
+                }
+                let Chip { end, notebook, .. } = &mut self.chips[chip];
+                let (progress, notebook) = (end.progress().clone(), std::mem::take(notebook));
+                self.start(chip, progress, notebook);
             }
             Action::Touch(chip) => {
-                let Chip { end, life, touches, .. } = &mut self.chips[chip];
-                *touches += 1;
-                // The event says which life it is from.
-                let touch = TouchMessage::from(&Touch::from_micros([0, *life, *touches]));
-                let verdict =
-                    VerdictMessage { decision: Decision::Undecided, best: 0, touches: *touches, detail: None };
-                end.tell(Event::Touch { touch, pose_age: None, verdict }, |frame| frames.push(frame.to_vec()));
+                let frames = self.touch(chip);
                 self.up(chip, frames);
             }
             Action::Wait(micros) => {
@@ -305,6 +304,34 @@ impl World {
                 }
             }
         }
+    }
+
+    /// A chip starts, with what it has kept.
+    fn start(&mut self, chip: usize, progress: Progress, notebook: Notebook) {
+        self.resets += 1;
+        // No line holds frames for longer than that.
+        let resets = self.resets;
+        self.under_way.retain(|frame| resets - frame.resets < LATEST);
+        let life = u32::try_from(CHIPS).unwrap() + resets;
+        let boot = scatter(life);
+        let mut end = DeviceEnd::new(progress, boot);
+        let mut frames = Vec::new();
+        end.start(|frame| frames.push(frame.to_vec()));
+        let touched = self.chips[chip].touched;
+        self.chips[chip] = Chip { end, notebook, life, boot, touches: 0, touched };
+        self.up(chip, frames);
+    }
+
+    /// A chip's own fingers touch; what it then says.
+    fn touch(&mut self, chip: usize) -> Vec<Vec<u8>> {
+        let Chip { end, notebook, life, touches, touched, .. } = &mut self.chips[chip];
+        (*touches, *touched) = (*touches + 1, self.resets);
+        // The event says which life it is from.
+        let touch = TouchMessage::from(&Touch::from_micros([0, *life, *touches]));
+        let verdict = VerdictMessage { decision: Decision::Undecided, best: 0, touches: *touches, detail: None };
+        let mut frames = Vec::new();
+        end.report(Event::Touch { touch, pose_age: None, verdict }, notebook, |frame| frames.push(frame.to_vec()));
+        frames
     }
 
     fn connect(&mut self, host: usize) {
@@ -371,7 +398,7 @@ impl World {
                         };
                         assert_eq!(answer, expected, "the answer is another question's");
                     }
-                    Incoming::Event { event, missed } => {
+                    Incoming::Event { event, missed, .. } => {
                         let (life, sequence) = match event {
                             Event::Touch { touch, .. } => (touch.times[1], touch.times[2]),
                             _ => {

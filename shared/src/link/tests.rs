@@ -210,7 +210,7 @@ impl Rig {
                     Incoming::Opened => *opened = true,
                     Incoming::Outcome { sequence, outcome } => outcomes.push((sequence, outcome)),
                     Incoming::Answer(answer) => answers.push(std::format!("{answer:?}")),
-                    Incoming::Event { event, missed } => events.push((event, missed)),
+                    Incoming::Event { event, missed, .. } => events.push((event, missed)),
                 },
             );
         }
@@ -485,6 +485,90 @@ fn a_chip_that_starts_again_loses_no_event_although_its_announcement_was_lost() 
     rig.step().unwrap();
     assert_eq!((rig.events.len(), rig.host.statistics().missed_events), (99, 2));
     assert_eq!(rig.host.statistics().repeated, 1);
+}
+
+/// A touch of the chip's own.
+fn own_touch(touches: u32) -> Event {
+    let verdict = VerdictMessage { decision: Decision::Recognized(3), best: 3, touches, detail: None };
+    Event::Touch { touch: (&touch(touches)).into(), pose_age: Some(7), verdict }
+}
+
+impl Rig {
+    /// The chip is switched off and on again, and goes on from its record.
+    fn restart(&mut self) {
+        let (touches, progress) = self.notebook.stored.clone().unwrap();
+        self.notebook.touches = touches;
+        self.boot += 1;
+        self.chip = DeviceEnd::new(progress, self.boot);
+        let (up, now) = (&mut self.up, self.now);
+        self.chip.start(|frame| up.send(frame, now));
+        self.step().unwrap();
+    }
+
+    /// The chip's own fingers touch; what it says of that arrives, or the power goes before.
+    fn touch_itself(&mut self, touches: u32, arrives: bool) {
+        let Self { up, now, chip, notebook, .. } = self;
+        let send = |frame: &[u8]| {
+            if arrives {
+                up.send(frame, *now)
+            }
+        };
+        chip.report(own_touch(touches), notebook, send);
+        self.step().unwrap();
+    }
+}
+
+#[test]
+fn a_verdict_between_whose_record_and_frame_the_power_goes_is_told_after_the_restart_and_once() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.touch_itself(1, true);
+    rig.touch_itself(2, false);
+    // It is told at each start until something else is stored, and no host hears it twice.
+    (0..40).for_each(|_| rig.restart());
+    assert_eq!(rig.events[..3], [(own_touch(1), 0), (own_touch(2), 0), (Event::Started, 0)]);
+    assert!(rig.events[3..].iter().all(|event| *event == (Event::Started, 0)), "{:?}", rig.events);
+    assert_eq!(rig.events.len(), 2 + 40);
+    assert_eq!((rig.host.statistics().missed_events, rig.host.statistics().repeated), (0, 39));
+    rig.send_touches(0..1);
+    rig.restart();
+    assert_eq!(rig.host.statistics().repeated, 39, "a command was stored since");
+    // One that was told before the power went is not told twice, and what was lost on the line is counted.
+    rig.touch_itself(3, true);
+    rig.restart();
+    rig.chip.report(own_touch(4), &mut rig.notebook, |_| ());
+    rig.touch_itself(5, false);
+    rig.restart();
+    let told: Vec<_> = rig.events[2 + 40 + 1..].iter().filter(|(event, _)| *event != Event::Started).collect();
+    assert_eq!(told, [&(own_touch(3), 0), &(own_touch(5), 1)]);
+}
+
+#[test]
+fn a_host_that_has_just_come_sees_that_an_event_is_of_a_start_before() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.touch_itself(1, true);
+    let mut host = HostEnd::new(HostSettings { retry: 20_000, attempts: 10 });
+    let (sent, events) = (core::cell::RefCell::new(Vec::new()), core::cell::RefCell::new(Vec::new()));
+    let take = |incoming: Incoming<'_>| {
+        if let Incoming::Event { event, boot, .. } = incoming {
+            events.borrow_mut().push((event, boot));
+        }
+    };
+    host.connect(9, 0, |frame: &[u8]| sent.borrow_mut().extend_from_slice(frame));
+    rig.restart();
+    let (_, progress) = rig.notebook.stored.clone().unwrap();
+    rig.chip = DeviceEnd::new(progress, 3);
+    rig.chip.start(|frame| host.receive(frame, 0, |_| (), take));
+    while !sent.borrow().is_empty() {
+        let mut answers = Vec::new();
+        rig.chip.receive(&sent.take(), &mut rig.notebook, |frame| answers.extend_from_slice(frame));
+        host.receive(&answers, 0, |frame| sent.borrow_mut().extend_from_slice(frame), take);
+    }
+    assert!(host.is_idle());
+    assert_eq!((host.boot(), events.take()), (3, vec![(own_touch(1), 1), (Event::Started, 3)]));
+    // The session was stored: there is nothing to tell again.
+    let (_, progress) = rig.notebook.stored.clone().unwrap();
+    DeviceEnd::new(progress, 4).start(|frame| host.receive(frame, 0, |_| (), take));
+    assert_eq!(events.take(), [(Event::Started, 4)]);
 }
 
 /// Lets a host and a chip talk without delay; the outcomes that the host took.

@@ -11,6 +11,7 @@ NAME.rows.csv     a header with the features' names, then 20 rows like the train
                   of the model, the numbers beside them or zero, and 20 with missing values (empty)
 NAME.margins.csv  the library's raw scores of these rows: one column per output, one for a binary model. f32 scores have as
                   many digits as distinguish them, f64 scores seventeen
+NAME.predictions.csv  of some: what the library's `predict` says, the number of a class or a value
 """
 
 import sys
@@ -66,13 +67,16 @@ def text(value):
     return repr(float(value)) if isinstance(value, np.float64) else str(value)
 
 
-def write(name, x, margins, names=NAMES):
+def write(name, x, margins, names=NAMES, predictions=None):
     margins = np.asarray(margins)
     margins = margins.reshape(len(x), -1)
     lines = [",".join(names)] + [",".join(text(value) for value in row) for row in x]
     (HERE / f"{name}.rows.csv").write_text("\n".join(lines) + "\n")
     lines = [",".join(text(value) for value in row) for row in margins]
     (HERE / f"{name}.margins.csv").write_text("\n".join(lines) + "\n")
+    if predictions is not None:
+        lines = [text(value) for value in np.asarray(predictions).reshape(len(x))]
+        (HERE / f"{name}.predictions.csv").write_text("\n".join(lines) + "\n")
     print(name, margins.dtype, margins.shape)
 
 
@@ -95,7 +99,7 @@ def make_xgboost():
     release = tuple(int(part) for part in version.split("."))
     plain = {"max_depth": 2, "eta": 0.4, "tree_method": "hist", "max_bin": 16, "seed": 1, "nthread": 1}
 
-    def save(kind, extension, classes, settings, rounds=3, missing=True, label=None):
+    def save(kind, extension, classes, settings, rounds=3, missing=True, label=None, predict=False):
         x, y = data(max(classes, 2))
         x = with_missing(x) if missing else x
         y = y if label is None else label(x, y)
@@ -106,7 +110,8 @@ def make_xgboost():
         thresholds = xgboost_thresholds(booster) if settings.get("multi_strategy") is None else json_thresholds(booster)
         test = rows(thresholds, True, max(classes, 2))
         margins = booster.predict(xgb.DMatrix(test, feature_names=NAMES), output_margin=True)
-        write(name, test, margins)
+        predictions = booster.predict(xgb.DMatrix(test, feature_names=NAMES)) if predict else None
+        write(name, test, margins, predictions=predictions)
 
     def json_thresholds(booster):
         model = json.loads(booster.save_raw("json"))["learner"]["gradient_booster"]["model"]
@@ -132,6 +137,25 @@ def make_xgboost():
         save("softmax", "json", 3, {**softprob, "objective": "multi:softmax", "base_score": 0.25}, rounds=2)
         save("poisson", "json", 0, {"objective": "count:poisson", "base_score": 2.5}, label=amount)
         save("logitraw", "ubj", 2, {**binary, "objective": "binary:logitraw"})
+    if release == (3, 2):
+        # What the file does not say: the estimator's missing value, and that it predicts with the trees up to the best round.
+        x, y = data(2, rows=800)
+        x[np.random.default_rng(5).uniform(size=x.shape) < 0.3] = 0
+        small = {"n_estimators": 3, "max_depth": 2, "random_state": 1}
+        keep = xgb.XGBClassifier(**small, missing=0.0).fit(x, y)
+        keep.get_booster().feature_names = NAMES
+        estimators = {"missing-0": (keep, rows(xgboost_thresholds(keep.get_booster()), False, 2))}
+        late = {**small, "n_estimators": 40, "learning_rate": 1.0, "early_stopping_rounds": 2}
+        stopped = xgb.XGBClassifier(**late).fit(x[:400], y[:400], eval_set=[(x[400:], y[400:])], verbose=False)
+        estimators["early-stopping"] = (stopped, rows([[]] * 4, False, 2))
+        for kind, (model, test) in estimators.items():
+            name = f"xgboost-{version}-{kind}"
+            model.save_model(HERE / f"{name}.json")
+            write(name, test, model.predict(test, output_margin=True), predictions=model.predict(test))
+        for objective in ["count:poisson", "reg:logistic"]:
+            target = amount if objective == "count:poisson" else (lambda x, y: y * 0.8 + 0.1)
+            kind = objective.replace(":", "-")
+            save(kind, "json", 0, {"objective": objective}, label=target, predict=True)
     if release == (2, 1):
         save("forest", "json", 2, {**binary, "num_parallel_tree": 3, "subsample": 0.7, "eta": 1}, rounds=2)
         save("squarederror", "ubj", 0, {"objective": "reg:squarederror"}, label=amount)
@@ -148,7 +172,8 @@ def make_lightgbm():
     plain = {"num_leaves": 4, "learning_rate": 0.4, "max_bin": 15, "verbose": -1, "seed": 1, "num_threads": 1,
              "min_data_in_leaf": 5, "deterministic": True}
 
-    def save(kind, classes, settings, rounds=3, missing=False, label=None, change=lambda x: x):
+    def save(kind, classes, settings, rounds=3, missing=False, label=None, change=lambda x: x, predict=False,
+             test=None):
         x, y = data(max(classes, 2))
         x = change(with_missing(x) if missing else x)
         y = y if label is None else label(x, y)
@@ -164,8 +189,27 @@ def make_lightgbm():
             if isinstance(feature, str) and isinstance(threshold, (int, float)):
                 at = np.float32(threshold)
                 thresholds[NAMES.index(feature)].append(at)
-        test = rows(thresholds, True, max(classes, 2))
-        write(name, test, booster.predict(test, raw_score=True))
+        test = rows(thresholds, True, max(classes, 2)) if test is None else test
+        write(name, test, booster.predict(test, raw_score=True), predictions=booster.predict(test) if predict else None)
+
+    amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
+    often_missing = lambda x: np.where(np.random.default_rng(9).uniform(size=x.shape) < 0.3, np.nan, x)
+    # What is missing says most: splits of missing values against all others, whose threshold is infinite.
+    save("missing-alone", 2, {"objective": "binary", "num_leaves": 6}, change=often_missing,
+         label=lambda x, y: np.isnan(x[:, 0]) ^ (np.isnan(x[:, 3]) & (y == 1)))
+    for objective in ["poisson", "gamma", "cross_entropy", "cross_entropy_lambda"]:
+        share = "entropy" in objective
+        save(objective, 0, {"objective": objective}, predict=True,
+             label=(lambda x, y: y * 0.8 + 0.1) if share else (lambda x, y: amount(x, y) + 0.1))
+    save("sqrt", 0, {"objective": "regression", "reg_sqrt": True}, label=lambda x, y: amount(x, y) - 4, predict=True)
+    save("large-target", 0, {"objective": "regression"}, label=lambda x, y: 1e6 * amount(x, y), predict=True)
+    save("small-target", 0, {"objective": "regression"}, label=lambda x, y: 1e-6 * amount(x, y), predict=True)
+    # Seconds since 1970: f32 holds every 128th.
+    seconds = lambda x: np.column_stack([x[:, 0], np.round(1.7e9 + x[:, 1].astype(float)), x[:, 2], x[:, 3]])
+    save("seconds", 2, {"objective": "binary", "max_bin": 60, "num_leaves": 8}, rounds=4, change=seconds,
+         test=seconds(data(2, seed=21, rows=60)[0]))
+    save("zeros-missing-deep", 2, {"objective": "binary", "zero_as_missing": True, "num_leaves": 31, "min_data_in_leaf": 2},
+         change=lambda x: np.where(np.random.default_rng(9).uniform(size=x.shape) < 0.3, 0, x), rounds=3)
 
     save("binary", 2, {"objective": "binary"}, missing=True)
     save("multiclass", 3, {"objective": "multiclass", "num_class": 3})
@@ -282,6 +326,16 @@ def make_onnx():
     amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
     words = np.array(["cup", "jug", "pan"])
     few = {"n_estimators": 3, "max_depth": 2, "random_state": 1}
+    # Ten trees that vote: five to five is a tie, which goes to the first class.
+    for kind, size in [("ties", 10), ("ties-three", 6)]:
+        x, y = data(3 if kind == "ties-three" else 2, rows=60)
+        x = np.round(x).astype(np.float32)
+        model = ensemble.RandomForestClassifier(n_estimators=size, random_state=1).fit(x, y)
+        test = np.round(data(3, seed=21, rows=300)[0]).astype(np.float32)
+        name = f"sklearn-{version}-{kind}"
+        (HERE / f"{name}.onnx").write_bytes(to_onnx(model, x[:1]).SerializeToString())
+        shares = model.predict_proba(test)
+        write(name, test, shares if shares.shape[1] > 2 else shares[:, 1], predictions=model.predict(test))
     convert("forest", ensemble.RandomForestClassifier(**few), 3, label=lambda x, y: words[y])
     convert("forest-binary", ensemble.RandomForestClassifier(**few), 2, second)
     convert("forest-regression", ensemble.RandomForestRegressor(**few), 0, label=amount)

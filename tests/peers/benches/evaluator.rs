@@ -196,7 +196,7 @@ fn touches(data: Option<&Dataset>) -> Vec<Touch> {
         return (0..ROWS).map(|_| Touch::from_micros([0; 3].map(|_: u32| random.below(100_000)))).collect();
     };
     let touch = |index: usize| {
-        let touches = &data.objects[index % data.objects.len()].touches;
+        let touches = data.objects[index % data.objects.len()].touches();
         touches[index * 7 % touches.len()]
     };
     (0..ROWS).map(touch).collect()

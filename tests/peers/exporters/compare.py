@@ -8,8 +8,9 @@ gcc-arm-none-eabi with newlib and libstdc++, qemu-system-arm, and Rust's targets
 Prints a table in Markdown: about ten minutes.
 
 *Bytes* are those of the whole image less one whose peer_class is empty: model, code, and what it calls of newlib and of the
-compiler's routines, all for size (-Os). *Instructions* are of a row: class and all, f32 values in. *Wrong* are classes that
-differ from the library's own among 200 plain rows, 200 whose values equal thresholds, 200 with missing values.
+compiler's routines (such as comparisons of floats on a chip without a float unit), all for size (-Os). The empty image is linked
+without libraries, so that it holds no such routine. *Instructions* are of a row: class and all, f32 values in. *Wrong* are
+classes that differ from the library's own among 200 plain rows, 200 whose values equal thresholds, 200 with missing values.
 """
 
 import subprocess
@@ -35,7 +36,10 @@ def enter_environment():
     sys.exit(subprocess.run([python, *sys.argv]).returncode)
 
 
-def image(chip, directory, source):
+LIBRARIES = ["-lm", "-lc", "-lgcc"]
+
+
+def image(chip, directory, source, libraries=LIBRARIES):
     """The program; its bytes in flash."""
     _, target, _, flags = chip
     common = ["-mthumb", *flags, "-Os", "-ffunction-sections", "-fdata-sections", "-DNDEBUG", "-w", *source.flags]
@@ -51,7 +55,7 @@ def image(chip, directory, source):
         objects.append(source.library(target))
     program = directory / f"{target}.elf"
     link = ["arm-none-eabi-gcc", "-mthumb", *flags, "-nostdlib", "-static", "-T", ROOT / "tests/c/mps2.ld"]
-    link += ["-Wl,--gc-sections", "-Wl,--no-warn-rwx-segments", "-Wl,-z,noexecstack", *objects, "-lm", "-lc", "-lgcc", "-o", program]
+    link += ["-Wl,--gc-sections", "-Wl,--no-warn-rwx-segments", "-Wl,-z,noexecstack", *objects, *libraries, "-o", program]
     subprocess.run(link, check=True)
     size = subprocess.run(["arm-none-eabi-size", program], check=True, capture_output=True, text=True).stdout
     text, data = size.splitlines()[1].split()[:2]
@@ -59,11 +63,11 @@ def image(chip, directory, source):
 
 
 def run(chip, program):
-    """Instructions of a plain row, and the class of every row."""
+    """Ticks of all plain rows, and the class of every row."""
     command = ["qemu-system-arm", "-machine", chip[2], "-nographic", "-icount", "shift=0"]
     command += ["-semihosting-config", "enable=on,target=native", "-kernel", program]
     done = subprocess.run(command, capture_output=True, text=True, timeout=900, stdin=subprocess.DEVNULL)
-    numbers = [int(number) for number in (done.stdout + done.stderr).split()]
+    numbers = [int(number, 16) for number in (done.stdout + done.stderr).split()]
     return numbers[0], numbers[1:]
 
 
@@ -88,16 +92,15 @@ def measure(ensemble, name, exporter, scratch):
         return None if str(refused) == "see touches" else f"refused: {refused}"
     except Exception as error:  # whatever an exporter fails with is a result
         return f"fails: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
-    nothing = directory / "nothing.c"
-    nothing.write_text("int peer_start(void) { return 0; }\nint peer_class(const float *row) { return row[0] > 0; }\n")
     cells = []
     for chip in CHIPS:
-        empty = image(chip, directory, Source([nothing]))[1]
+        empty = image(chip, directory, Source([HERE / "nothing.c"]), libraries=[])[1]
         try:
             program, size = image(chip, directory, source)
         except subprocess.CalledProcessError:
             return "its code does not compile"
-        instructions, classes = run(chip, program)
+        ticks, classes = run(chip, program)
+        instructions = ticks * 40 // len(ensemble.kinds[0][1])
         expected = ensemble.classes if source.expected is None else source.expected
         wrong, at = [], 0
         for _, rows in ensemble.kinds:
@@ -126,7 +129,10 @@ def main():
         "m2cgen": exporters.m2cgen,
         "micromlgen": exporters.micromlgen,
         "Timber": exporters.timber,
-        "emlearn": exporters.emlearn,
+        "emlearn, loadable": partial(exporters.emlearn, method="loadable"),
+        "emlearn, inline": partial(exporters.emlearn, method="inline"),
+        "emlearn, inline, whole votes": partial(exporters.emlearn, method="inline", leaf_bits=0),
+        "emlearn, inline, f32": partial(exporters.emlearn, method="inline", dtype="float"),
         "YDF (its own model)": exporters.ydf,
         "irithyll-core": exporters.irithyll,
     }
@@ -142,5 +148,6 @@ def main():
                     print(f"| {ensemble.name} | {name} | {cells} |", flush=True)
 
 
-enter_environment()
-main()
+if __name__ == "__main__":
+    enter_environment()
+    main()

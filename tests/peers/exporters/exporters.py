@@ -147,25 +147,30 @@ int peer_class(const float *row)
     return Source([write(directory, "peer.c", wrapper), directory / "model.c"])
 
 
-def emlearn(ensemble, directory):
+def emlearn(ensemble, directory, method, dtype="int16_t", leaf_bits=8):
     import emlearn as exporter
 
     if ensemble.name != "forest":
-        raise Refused("no boosted trees")
-    converted = exporter.convert(ensemble.model, method="loadable", dtype="int16_t", leaf_bits=8)
-    converted.save(file=directory / "model.h", name="model")
+        # Of all its variants the first one says so.
+        raise Refused("no boosted trees" if method == "loadable" else "see touches")
+    converted = exporter.convert(ensemble.model, method=method, dtype=dtype, leaf_bits=leaf_bits)
+    converted.save(file=directory / "model.h", name="model", include_proba=False)
     features = ensemble.rows.shape[1]
+    if dtype == "float":
+        body = f"    return model_predict(row, {features});\n"
+    else:
+        body = f"""    {dtype} features[{features}];
+    int i;
+    for (i = 0; i < {features}; i++) {{
+        features[i] = ({dtype})row[i];
+    }}
+    return model_predict(features, {features});
+"""
     wrapper = f"""#include "model.h"
 {START}
 int peer_class(const float *row)
 {{
-    int16_t features[{features}];
-    int i;
-    for (i = 0; i < {features}; i++) {{
-        features[i] = (int16_t)row[i];
-    }}
-    return model_predict(features, {features});
-}}
+{body}}}
 """
     return Source([write(directory, "peer.c", wrapper)], ["-I", exporter.includedir])
 
@@ -234,7 +239,9 @@ def export(palpate, ensemble, directory, leaf, goal):
 
 
 def ours_c(ensemble, directory, palpate, leaf, goal):
-    export(palpate, ensemble, directory, leaf, goal)
+    exported = export(palpate, ensemble, directory, leaf, goal)
+    # Rows of f32, or whole numbers.
+    key = "palpate_f32_key(row[i])" if "features" in exported else "row[i] == row[i] ? (int32_t)row[i] : INT32_MIN"
     wrapper = f"""#include "model.h"
 static palpate_model model;
 int peer_start(void)
@@ -246,7 +253,7 @@ int peer_class(const float *row)
     int32_t features[{ensemble.rows.shape[1]}], margins[{ensemble.outputs}];
     int i, best = 0;
     for (i = 0; i < {ensemble.rows.shape[1]}; i++) {{
-        features[i] = model.real != 0 ? palpate_f32_key(row[i]) : row[i] == row[i] ? (int32_t)row[i] : INT32_MIN;
+        features[i] = {key};
     }}
     palpate_margins_of(&model, features, {ensemble.rows.shape[1]}, margins);
     for (i = 1; i < {ensemble.outputs}; i++) {{
@@ -262,7 +269,8 @@ int peer_class(const float *row)
 
 def ours_rust(ensemble, directory, palpate, leaf, goal):
     exported = export(palpate, ensemble, directory, leaf, goal)
-    features = ["palpate", exported["layout"], f"{leaf}-leaves", *(["shared-leaves"] if "shared_leaves" in exported else [])]
+    features = ["palpate", exported["layout"], f"{leaf}-leaves"]
+    features += [feature for feature, key in [("shared-leaves", "shared_leaves"), ("real", "features")] if key in exported]
     return rust(ensemble, directory, directory / "model.palpate", features)
 
 

@@ -110,7 +110,7 @@ fn touches(data: Option<&Dataset>) -> Vec<Touch> {
     };
     let objects = data.objects.len();
     let touch = |index: usize| {
-        let touches = &data.objects[index % objects].touches;
+        let touches = data.objects[index % objects].touches();
         Touch::new(touches[index / objects * 7 % touches.len()].times())
     };
     (0..10_000).map(touch).collect()

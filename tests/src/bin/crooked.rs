@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let touches = capture::touches(&scene, name, &origin, 0..count)?;
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let mut lines = String::new();
-            for touch in touches {
+            for touch in touches.touches() {
                 let times = touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e6));
                 CROOKED.write(times, &mut lines, &mut rng)?;
             }

@@ -99,7 +99,7 @@ fn sweep(rounds: usize) -> Result<()> {
 
 /// What a compiled model costs and how far it is off.
 fn models(rounds: usize, models: &[(String, &Ensemble, Compiled)], test: &Dataset) -> Result<()> {
-    let touches: Vec<&Touch> = test.objects.iter().flat_map(|object| object.touches.iter().take(1000)).collect();
+    let touches: Vec<&Touch> = test.objects.iter().flat_map(|object| object.touches().iter().take(1000)).collect();
     let opened: Vec<Model<'_>> =
         models.iter().map(|(.., compiled)| compile::open(&compiled.bytes)).collect::<Result<_>>()?;
     let mut turns: Vec<Box<dyn FnMut()>> = Vec::new();

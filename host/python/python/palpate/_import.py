@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from . import _native, _sklearn
-from ._errors import InputError
+from ._errors import InputError, SettingError
 from ._native import Ensemble, Model
 
 
-def to_ensemble(model: object, names: Sequence[str] | None = None) -> Ensemble:
+def to_ensemble(
+    model: object, names: Sequence[str] | None = None, *, all_trees: bool = False, missing: float | None = None
+) -> Ensemble:
     """The trees of a model of another library: a booster or estimator of XGBoost, LightGBM or CatBoost, a forest or
     boosted trees of scikit-learn, a model of ONNX; or a file that one of them wrote, as a path.
 
     `names` are the classes', in the order of the labels. Where training stopped early, the trees up to the best round are
-    taken, as the library predicts with them.
+    taken, as the library predicts with them; with `all_trees` all of them. `missing` is the number that stood for a missing
+    value in training, beside NaN: XGBoost's boosters and files do not hold it, its estimators do. `Ensemble.notes` says what
+    to know about the trees.
+
+    Models are told apart by their class. Any other class, and one that is derived from these, is refused by name: it may
+    predict in another way.
     """
     given = None if names is None else list(names)
     if isinstance(model, Ensemble):
@@ -26,19 +36,23 @@ def to_ensemble(model: object, names: Sequence[str] | None = None) -> Ensemble:
             raise InputError("the model has names for its objects already. Leave `names` out.")
         return model
     if isinstance(model, (str, os.PathLike)):
-        return Ensemble.load(model, given)
-    library = type(model).__module__.partition(".")[0]
-    if given is None:
-        given = _classes(model)
-    for kind in type(model).__mro__:
-        library = kind.__module__.partition(".")[0]
-        if library in _READERS:
-            return _READERS[library](model, given)
-    what = f"{type(model).__module__}.{type(model).__qualname__}"
-    raise InputError(
-        f"{what} is no model whose trees can be read. Give a model of XGBoost, LightGBM, CatBoost, scikit-learn or ONNX, an "
-        "Ensemble, or a file."
-    )
+        return Ensemble.load(model, given, all_trees=all_trees, missing=missing)
+    library, name = _class(type(model))
+    reader = _READERS.get(library, {}).get(name)
+    if reader is None:
+        raise _refusal(model)
+    if missing is not None and library != "xgboost":
+        raise SettingError(f"missing is {missing}. Leave it out: a model of {library} says itself what is missing.")
+    return reader(model, _Asked(_classes(model) if given is None else given, all_trees, missing))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What a caller says about a model."""
+
+    names: list[str] | None
+    all_trees: bool
+    missing: float | None
 
 
 def compile(
@@ -53,10 +67,12 @@ def compile(
     max_touches: int = 200,
     priors: Sequence[float] | None = None,
     scales: Sequence[float] | None = None,
+    all_trees: bool = False,
+    missing: float | None = None,
 ) -> Model:
     """Compiles an ensemble, or a model of another library, to the bytes that a microcontroller reads.
 
-    `model` and `names` are as for `to_ensemble`. `leaf` is "i8", "i16" or "f32": what leaves are stored as; with "f32" the
+    `model`, `names`, `all_trees` and `missing` are as for `to_ensemble`, whose `notes` say what to know about the trees. `leaf` is "i8", "i16" or "f32": what leaves are stored as; with "f32" the
     margins of an XGBoost model stay its own, bit for bit. `layout` is "compact", "complete", "grid", "wide" or "patterns";
     without one, the best for the `goal` ("balanced", "speed" or "size") is taken.
 
@@ -72,7 +88,7 @@ def compile(
     True
     """
     return _native.compile(
-        to_ensemble(model, names),
+        to_ensemble(model, names, all_trees=all_trees, missing=missing),
         max_bytes=max_bytes,
         leaf=leaf,
         layout=layout,
@@ -84,52 +100,116 @@ def compile(
     )
 
 
+def _class(kind: type) -> tuple[str, str]:
+    """The library that a class is of, and its name there."""
+    return kind.__module__.partition(".")[0], kind.__qualname__
+
+
+def _refusal(model: object) -> InputError:
+    """Why an object of a class that no reader knows is refused, and what to do."""
+    what = f"{type(model).__module__}.{type(model).__qualname__}"
+    for kind in type(model).__mro__[1:]:
+        library, name = _class(kind)
+        if name in _READERS.get(library, {}):
+            return InputError(
+                f"{what} is derived from {library}'s {name} and may predict in another way. {_INSIDE.get(library, '')}Give "
+                f"the trees as a {name} itself, or as a file of the library."
+            )
+    library, name = _class(type(model))
+    if library in _READERS:
+        known = ", ".join(sorted(_READERS[library]))
+        return InputError(
+            f"{library}'s {name} has no trees that can be read: what it predicts is not known to be the sum of its trees. "
+            f"{_INSIDE.get(library, '')}Of {library} these are taken: {known}."
+        )
+    return InputError(
+        f"{what} is no model whose trees can be read. Give a model of XGBoost, LightGBM, CatBoost, scikit-learn or ONNX, an "
+        "Ensemble, or a file."
+    )
+
+
 def _classes(model: object) -> list[str] | None:
     """The names of a classifier's classes, where it has some."""
-    if getattr(model, "_estimator_type", "classifier") != "classifier":
-        return None
     classes = getattr(model, "classes_", None)
     if classes is None or len(classes) < 2:
         return None
     return [str(name) for name in classes]
 
 
-def _xgboost(model: Any, names: list[str] | None) -> Ensemble:
-    booster = model
+def _cut(taken: int, rounds: int) -> list[str]:
+    """The note on trees that are left out, where some are."""
+    if taken >= rounds:
+        return []
+    return [
+        f"Training stopped early: the best {taken} of {rounds} rounds are taken, as the library predicts with them. "
+        "all_trees=True takes all."
+    ]
+
+
+def _xgboost(model: Any, asked: _Asked) -> Ensemble:
+    booster, missing = model, asked.missing
     if hasattr(model, "get_booster"):
+        own = np.nan if model.missing is None else float(model.missing)
+        if missing is not None and not np.array_equal(missing, own, equal_nan=True):
+            raise SettingError(f"missing is {missing}. Leave it out: the {type(model).__name__} says that it is {own}.")
+        missing = own
+        if hasattr(model, "classes_") and model.objective == "binary:logitraw":
+            raise InputError(
+                "with objective=\"binary:logitraw\" the XGBClassifier compares margins with 0.5, not with 0, for its classes. "
+                "Train with binary:logistic, or give `model.get_booster()`, which has no classes."
+            )
         booster = model.get_booster()
-    # The estimator predicts with the trees up to the best round, where training stopped early.
-    best = None
-    if booster is not model:
-        try:
-            best = model.best_iteration
-        except AttributeError:
-            best = None
-    if best is not None and best + 1 < booster.num_boosted_rounds():
-        booster = booster[: best + 1]
-    return Ensemble.from_bytes(bytes(booster.save_raw("ubj")), names)
+    content = bytes(booster.save_raw("ubj"))
+    return Ensemble.from_bytes(content, asked.names, all_trees=asked.all_trees, missing=missing)
 
 
-def _lightgbm(model: Any, names: list[str] | None) -> Ensemble:
+def _lightgbm(model: Any, asked: _Asked) -> Ensemble:
     booster = getattr(model, "booster_", model)
-    return Ensemble.from_bytes(booster.model_to_string().encode(), names)
+    rounds = booster.current_iteration()
+    taken = booster.best_iteration if booster.best_iteration > 0 and not asked.all_trees else rounds
+    text = booster.model_to_string(num_iteration=taken)
+    return Ensemble.from_bytes(text.encode(), asked.names, notes=_cut(taken, rounds))
 
 
-def _catboost(model: Any, names: list[str] | None) -> Ensemble:
+def _catboost(model: Any, asked: _Asked) -> Ensemble:
+    # CatBoost predicts with every tree that it kept.
+    threshold = model.get_probability_threshold() if hasattr(model, "get_probability_threshold") else 0.5
+    if len(asked.names or []) == 2 and threshold not in (None, 0.5):
+        raise InputError(
+            f"the {type(model).__name__} has the probability threshold {threshold} for its second class: a model here gives "
+            "the class with the greatest margin. Call `set_probability_threshold(0.5)`, and compare posteriors yourself."
+        )
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "model.json"
         model.save_model(str(path), format="json")
-        return Ensemble.load(path, names)
+        return Ensemble.load(path, asked.names)
 
 
-def _onnx(model: Any, names: list[str] | None) -> Ensemble:
-    return Ensemble.from_bytes(model.SerializeToString(), names)
+def _onnx(model: Any, asked: _Asked) -> Ensemble:
+    return Ensemble.from_bytes(model.SerializeToString(), asked.names)
 
 
-_READERS = {
-    "catboost": _catboost,
-    "lightgbm": _lightgbm,
-    "onnx": _onnx,
-    "sklearn": _sklearn.read,
-    "xgboost": _xgboost,
+def _sklearn_trees(model: Any, asked: _Asked) -> Ensemble:
+    # Its boosted trees stop early by leaving trees out themselves, or predict with all of them.
+    return _sklearn.read(model, asked.names)
+
+
+_Reader = Callable[[Any, _Asked], Ensemble]
+
+_READERS: dict[str, dict[str, _Reader]] = {
+    "catboost": dict.fromkeys(["CatBoost", "CatBoostClassifier", "CatBoostRanker", "CatBoostRegressor"], _catboost),
+    "lightgbm": dict.fromkeys(["Booster", "LGBMClassifier", "LGBMRanker", "LGBMRegressor"], _lightgbm),
+    "onnx": {"ModelProto": _onnx},
+    "sklearn": dict.fromkeys(_sklearn.KNOWN, _sklearn_trees),
+    "xgboost": dict.fromkeys(
+        ["Booster", "XGBClassifier", "XGBRFClassifier", "XGBRFRegressor", "XGBRanker", "XGBRegressor"], _xgboost
+    ),
 }
+"""What is read, by library and class. A class that is not here is refused."""
+
+_INSIDE = {
+    "lightgbm": "A booster inside it may be `model.booster_`. ",
+    "sklearn": "Of a pipeline give the last step, and transform rows as its first steps do; of a search `best_estimator_`. ",
+    "xgboost": "A booster inside it may be `model.get_booster()`. ",
+}
+"""Where a model that can be read may be found inside one that cannot."""

@@ -10,7 +10,7 @@ from palpate._types import Meshes, Probe, Progress, Touch, Verdict
 from pandas import DataFrame
 from typing import SupportsFloat, SupportsIndex, final
 
-__all__ = ["DataSet", "Ensemble", "Model", "Recognizer", "Surface", "capture", "compile", "evaluate", "parity", "sources", "train"]
+__all__ = ["DataSet", "Ensemble", "Model", "Recognizer", "Surface", "capture", "checksums", "compile", "evaluate", "parity", "sources", "train"]
 
 @final
 class DataSet:
@@ -61,18 +61,24 @@ class DataSet:
         32767), NaN where one is missing: for training with another library. The code is the chip's.
         """
     @staticmethod
-    def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False) -> DataSet:
+    def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False, instances: ArrayLike | None = None) -> DataSet:
         """
         A data set of touches from elsewhere.
 
         `times` has three contact times per touch, in seconds on any clock, NaN for a finger that did not touch; they are
         rounded to microseconds, and the earliest becomes 0. `objects` says which of the `names` each touch is of.
-        `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it.
+        `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it. `instances` are numbers
+        that say which mesh, or recording, of its object each touch is of, where objects have several: a sequence is of one.
         """
     @property
     def holds_approaches(self, /) -> bool:
         """
         Whether every approach is kept, also those that not all three fingers touched.
+        """
+    @property
+    def instances(self, /) -> NDArray[int16]:
+        """
+        The instance, recording or log that each touch is of, from 0: a sequence is of touches of one.
         """
     @property
     def names(self, /) -> list[str]:
@@ -118,7 +124,7 @@ class DataSet:
     def to_parquet(self, /, directory: str | PathLike[str]) -> None:
         """
         Writes `<object>.parquet` for each object and, if the probe is known, `dataset.json`, into a directory that holds
-        no touches yet: what `read`, `palpate train` and pandas read.
+        no touches yet: what `read`, `palpate train` and pandas read. Which touch is of which instance or recording is kept.
         """
     def to_text(self, /, directory: str | PathLike[str]) -> None:
         """
@@ -153,23 +159,27 @@ class Ensemble:
         The features' names.
         """
     @staticmethod
-    def from_bytes(content: SupportsGetItem[int, SupportsIndex], names: SupportsGetItem[int, str] | None = None) -> Ensemble:
+    def from_bytes(content: SupportsGetItem[int, SupportsIndex], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None, notes: SupportsGetItem[int, str] = ...) -> Ensemble:
         """
-        The same from the bytes of such a file.
+        The same from the bytes of such a file. `notes` are what to know about it beyond what it says itself.
         """
     @staticmethod
-    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ...) -> Ensemble:
+    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False) -> Ensemble:
         """
         An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
         leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
         a leaf), the right child, the feature, the threshold, whether a missing value goes left, and the values. `base` is
-        what margins start from; an empty name stands for a feature that has none.
+        what margins start from; an empty name stands for a feature that has none. `link` is "identity", "logistic",
+        "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
+        largest margins names the class, otherwise the first.
         """
     @staticmethod
-    def load(path: str | PathLike[str], names: SupportsGetItem[int, str] | None = None) -> Ensemble:
+    def load(path: str | PathLike[str], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None) -> Ensemble:
         """
         Reads what `save` or `palpate train` wrote, or a model of XGBoost, LightGBM, CatBoost or ONNX; the content says
-        which. `names` are the classes'.
+        which. `names` are the classes'. Where the file says that training stopped early, the trees up to the best
+        iteration are taken, with `all_trees` all of them. `missing` is the number that stood for a missing value in
+        training, beside NaN.
         """
     def margins(self, /, rows: ArrayLike) -> NDArray[float32]:
         """
@@ -272,6 +282,11 @@ class Model:
     def objects(self, /) -> list[str]:
         """
         The objects' (classes') names, in the order of the margins.
+        """
+    def predict(self, /, rows: DataSet | ArrayLike, *, raw: bool = False) -> list[str] | NDArray[float32]:
+        """
+        The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value,
+        with `raw` the margin before the inverse link. Rows are as for `margins`.
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """
@@ -396,6 +411,12 @@ def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsInd
     DataSet(200 touches of 2 objects)
     >>> data.times.shape, bool(data.times.min() == 0.0)
     ((200, 3), True)
+    """
+
+def checksums(meshes: Meshes) -> list[tuple[str, list[str]]]:
+    """
+    The checksums of the meshes that each object is touched as, as `dataset.json` states them: the names, sorted, with those of
+    their instances. All files are read.
     """
 
 def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf: str = "i16", layout: str | None = None, goal: str = "balanced", error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 200, priors: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, scales: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None) -> Model:

@@ -78,6 +78,8 @@ class _Job:
 
     name: str
     mesh: str | Mesh = field(compare=False)
+    checksums: list[str] = field(compare=False)
+    """Of the mesh as the caller read it; empty if it could not be read."""
     digest: str
     """Of mesh, settings, version and target: what jobs are compared by."""
     options: dict[str, Any] = field(compare=False)
@@ -196,8 +198,8 @@ def capture(
     parts = -(-touches // touches_per_shard)
     store = _Store(url)
     objects = {
-        name: [_Job(name, mesh, digest, options, part, parts, url) for part in range(1, parts + 1)]
-        for name, mesh, digest in _objects(meshes, options, url, parts)
+        name: [_Job(name, mesh, checksums, digest, options, part, parts, url) for part in range(1, parts + 1)]
+        for name, mesh, checksums, digest in _objects(meshes, options, url, parts)
     }
     jobs = [job for shards in objects.values() for job in shards]
     kept = {job for job in jobs if _record(store, job) is not None} if store.files.exists(store.path("parts")) else set()
@@ -252,8 +254,11 @@ def _said(error: BaseException) -> str:
 
 def _objects(
     meshes: Meshes, options: dict[str, Any], url: str, parts: int
-) -> Iterator[tuple[str, str | Mesh, str]]:
-    """Names, meshes, and a digest of all that decides about the touches and where they go."""
+) -> Iterator[tuple[str, str | Mesh, list[str], str]]:
+    """Names, meshes, their checksums, and a digest of all that decides about the touches and where they go.
+
+    The meshes are digested as they are read: a file such as a glTF's buffer, which is beside the one that is named, counts.
+    """
     target = url if "://" in url else str(Path(url).absolute())
     setting = [repr(sorted(options.items(), key=lambda item: item[0])), _version(), target, str(parts)]
     if isinstance(meshes, Mapping):
@@ -265,7 +270,7 @@ def _objects(
                 named.append((name, os.fspath(mesh)))
                 continue
             vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, mesh.faces)
-            named.append((name, (numpy.ascontiguousarray(vertices, dtype="f4"), numpy.ascontiguousarray(faces, dtype="i8"))))
+            named.append((name, (numpy.ascontiguousarray(vertices, dtype="f8"), numpy.ascontiguousarray(faces, dtype="i8"))))
     else:
         given = [meshes] if isinstance(meshes, (str, os.PathLike)) else list(meshes)
         named = [(name, source) for name, source in _native.sources(given)]
@@ -273,18 +278,15 @@ def _objects(
         raise InputError("no meshes are given. Give a mesh at least.")
     for name, mesh in named:
         # One after the other: all meshes together may be more than fits the memory.
-        if isinstance(mesh, str):
-            path = Path(mesh)
-            content = path.read_bytes() if isinstance(meshes, Mapping) or path.is_file() else mesh.encode()
-        else:
-            import numpy
-
-            vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, mesh.faces)
-            content = numpy.asarray(vertices).tobytes() + numpy.asarray(faces).tobytes()
-        digest = hashlib.blake2b(content, digest_size=16)
-        for text in [name, *setting]:
+        try:
+            ((_, checksums),) = _native.checksums({name: mesh})
+        except PalpateError:
+            # The worker says why.
+            checksums = []
+        digest = hashlib.blake2b(digest_size=16)
+        for text in [name, *checksums, *setting]:
             digest.update(text.encode() + b"\0")
-        yield name, mesh, digest.hexdigest()
+        yield name, mesh, checksums, digest.hexdigest()
 
 
 def _version() -> str:
@@ -314,6 +316,8 @@ def _capture(job: _Job) -> None:
         _native.capture({job.name: job.mesh}, **job.options, shard=job.shard, out=out, threads=1)
         listing = json.loads((out / "dataset.json").read_text(encoding="utf-8"))
         (entry,) = listing["objects"]
+        if job.checksums and entry["meshes"] != job.checksums:
+            raise InputError(f"{job.name}: its mesh was changed during the capture. Repeat the call.")
         content = (out / f"{job.name}.txt").read_bytes()
     record = {
         "digest": job.digest,

@@ -5,7 +5,7 @@ use super::super::{dataset, train};
 use crate::Result;
 use crate::evaluate::compare::{Comparison, Cost, Settings, Share, compare};
 use crate::output;
-use crate::touches::Dataset;
+use crate::touches::{Captured, Dataset};
 use palpate_shared::Descriptor;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -44,6 +44,15 @@ pub(super) struct CompareArguments {
 pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     let recorded = super::super::checked(Dataset::read_any(&arguments.recorded)?);
     let simulated = dataset(&arguments.simulated)?;
+    if let Some((recorded, simulated)) = Captured::of(&recorded).zip(Captured::of(&simulated)) {
+        let objects = recorded.shared(&simulated).join(", ");
+        if !objects.is_empty() {
+            eprintln!(
+                "palpate: warning: both data sets hold the same simulated touches of {objects}: nothing is compared with \
+                 them. Give RECORDED touches, or capture with another seed."
+            );
+        }
+    }
     let settings = Settings {
         descriptor: arguments.descriptor,
         groups: arguments.groups,

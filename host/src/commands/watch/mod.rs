@@ -79,6 +79,7 @@ fn watch(arguments: &Arguments, port: &Port) -> Result<()> {
         None => loop {
             let update = match connection.hear(Duration::from_millis(50))? {
                 Some(Received::Event(event, missed)) => Update::Event(event, missed),
+                Some(Received::Earlier(event)) => Update::Event(event, 0),
                 _ => Update::Idle,
             };
             let asks = arguments.chip.active

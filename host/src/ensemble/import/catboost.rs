@@ -4,9 +4,9 @@
 
 use super::draft::{Draft, DraftNode, DraftTree};
 use super::unsupported;
-use crate::ensemble::nodes::after;
-use crate::ensemble::{Ensemble, Output};
+use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::EnsembleProblem;
+use palpate_shared::format::Link;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -152,6 +152,9 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if loss == "MultiClassOneVsAll" {
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
     }
+    if matches!(loss, "Poisson" | "Tweedie" | "LogLinQuantile") {
+        draft.prediction.link = Link::Exponential;
+    }
     draft.base = vec![0.0; outputs];
     if bias.len() != values && bias.len() != 1 {
         return Err(damaged(format!("scale_and_bias has {} numbers for {values} outputs", bias.len())));
@@ -204,7 +207,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// A split's feature in a row, its threshold, and where a missing value goes.
-    fn split(&self, split: &Split, tree: usize) -> Result<(usize, f32, bool)> {
+    fn split(&self, split: &Split, tree: usize) -> Result<(usize, Threshold, bool)> {
         let index = split.float_feature_index.filter(|_| matches!(split.split_type.as_str(), "FloatFeature" | ""));
         let Some(index) = index else {
             let others = &self.info.categorical_features;
@@ -218,7 +221,7 @@ impl Reader<'_> {
         let feature = feature.ok_or_else(|| damaged(format!("tree {tree}: it has no feature {index}")))?;
         // A comparison with NaN is false; or missing values count as above all borders.
         let missing_left = feature.nan_value_treatment != "AsTrue";
-        Ok((feature.flat_feature_index, after(f64::from(split.border as f32)), missing_left))
+        Ok((feature.flat_feature_index, Threshold::at_or_below(f64::from(split.border as f32)), missing_left))
     }
 
     fn leaf(&self, values: &[f64]) -> DraftNode {

@@ -1,8 +1,10 @@
 //! An ensemble in f64, as most libraries have it, on the way to f32.
 
+use super::votes;
 use super::{Imported, default_names, named};
-use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Origin, Output, Tree};
+use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree};
 use crate::error::EnsembleProblem;
+use palpate_shared::format::Prediction;
 use std::collections::BTreeSet;
 
 /// An ensemble that is being read.
@@ -19,6 +21,10 @@ pub(super) struct Draft {
     pub(super) notes: Vec<String>,
     /// Whether the library adds f32 too, in an order of its own.
     pub(super) f32_sums: bool,
+    /// How the library's `predict` makes a class or a value of margins.
+    pub(super) prediction: Prediction,
+    /// The numbers that stand for a missing value, beside NaN.
+    pub(super) sentinel: Option<[f32; 2]>,
 }
 
 /// A tree whose leaves have values in f64.
@@ -28,7 +34,7 @@ pub(super) struct DraftTree {
 }
 
 pub(super) enum DraftNode {
-    Split { feature: usize, threshold: f32, missing_left: bool, left: usize, right: usize },
+    Split { feature: usize, threshold: Threshold, missing_left: bool, left: usize, right: usize },
     Leaf(Vec<f64>),
 }
 
@@ -52,11 +58,35 @@ impl Draft {
                 *name = Inputs::default_name(index);
             }
         }
-        let rounding = self.rounding();
+        let base = self.base.clone();
+        let leaves = self.leaves();
+        if let Some(scale) = votes::count(&mut self) {
+            self.prediction.scale = scale;
+        }
+        let scale = f64::from(self.prediction.scale);
+        let rounding = self.rounding(&base, &leaves, scale);
         let objects = named(names, self.names)?;
         let base_margins = self.base.iter().map(|&base| base as f32).collect();
-        let trees = self.trees.into_iter().map(DraftTree::finish).collect();
-        let imported = Imported { kind: self.kind, rounding, notes: self.notes };
+        let mut thresholds = Vec::new();
+        let mut trees = Vec::with_capacity(self.trees.len());
+        for tree in self.trees {
+            let (tree, own) = tree.finish();
+            trees.push(tree);
+            thresholds.push(own);
+        }
+        let is_single =
+            |threshold: &Threshold| !threshold.inclusive && f64::from(threshold.value as f32) == threshold.value;
+        if thresholds.iter().flatten().all(is_single) {
+            thresholds.clear();
+        }
+        let imported = Imported {
+            kind: self.kind,
+            rounding,
+            notes: self.notes,
+            prediction: self.prediction,
+            sentinel: self.sentinel,
+            thresholds,
+        };
         let origin = Origin { imported: Some(imported), ..Origin::default() };
         let ensemble = Ensemble { inputs: Inputs::Rows(self.features), objects, base_margins, trees, origin };
         ensemble.check()?;
@@ -72,46 +102,69 @@ impl Draft {
         features.collect::<BTreeSet<_>>().len()
     }
 
-    /// The farthest that a margin in f32 can be from the same in f64: what leaves lose, and half an ulp of the largest
-    /// partial sum at each addition. NaN for leaves that are not finite, which are refused.
-    fn rounding(&self) -> f64 {
-        let lost = |value: f64| (value - f64::from(value as f32)).abs();
+    /// The values of all leaves, tree by tree.
+    fn leaves(&self) -> Vec<Vec<Vec<f64>>> {
+        let leaf = |node: &DraftNode| match node {
+            DraftNode::Leaf(values) => Some(values.clone()),
+            DraftNode::Split { .. } => None,
+        };
+        self.trees.iter().map(|tree| tree.nodes.iter().filter_map(leaf).collect()).collect()
+    }
+
+    /// The farthest that a margin in f32, times `scale`, can be from the library's, which starts from `base` and adds
+    /// `leaves`: what leaves lose, and half an ulp of the largest partial sum at each addition. NaN for leaves that are
+    /// not finite, which are refused.
+    fn rounding(&self, base: &[f64], leaves: &[Vec<Vec<f64>>], scale: f64) -> f64 {
+        let lost = |library: f64, own: f64| (library - f64::from(own as f32) * scale).abs();
         let mut worst = 0.0_f64;
-        for (object, &base) in self.base.iter().enumerate() {
+        for (object, (&base, &own)) in base.iter().zip(&self.base).enumerate() {
             let sums = if self.f32_sums { 2.0 } else { 1.0 };
-            let (mut sum, mut range) = (lost(base), base.abs());
-            for tree in &self.trees {
+            let (mut sum, mut range) = (lost(base, own), base.abs());
+            for (tree, leaves) in self.trees.iter().zip(leaves) {
                 let position = match tree.output {
                     Output::One(own) if own == object => 0,
                     Output::One(_) => continue,
                     Output::Each => object,
                 };
-                let values = tree.nodes.iter().filter_map(|node| match node {
+                let own = tree.nodes.iter().filter_map(|node| match node {
                     DraftNode::Leaf(values) => values.get(position).copied(),
                     DraftNode::Split { .. } => None,
                 });
-                let of_tree = values.fold((0.0, 0.0), |(most, largest), value: f64| {
-                    (f64::max(most, lost(value)), f64::max(largest, value.abs()))
+                let values = leaves.iter().filter_map(|values| values.get(position).copied()).zip(own);
+                let of_tree = values.fold((0.0, 0.0), |(most, largest), (value, own): (f64, f64)| {
+                    (f64::max(most, lost(value, own)), f64::max(largest, value.abs()))
                 });
                 sum += of_tree.0;
                 range += of_tree.1;
                 sum += sums * range * f64::from(f32::EPSILON) / 2.0;
             }
-            worst = worst.max(sum);
+            // Shares of votes are a product.
+            let product = if scale == 1.0 { 0.0 } else { range * f64::from(f32::EPSILON) };
+            worst = worst.max(sum + product);
         }
         worst
     }
 }
 
 impl DraftTree {
-    fn finish(self) -> Tree {
+    /// The tree in f32, and the threshold of each node as the file has it.
+    fn finish(self) -> (Tree, Vec<Threshold>) {
+        let none = Threshold::below(0.0);
         let node = |node| match node {
-            DraftNode::Split { feature, threshold, missing_left, left, right } => {
-                Node::Split { feature, threshold, missing_left, left, right }
-            }
-            DraftNode::Leaf(values) => Node::Leaf(values.into_iter().map(|value| value as f32).collect()),
+            DraftNode::Split { feature, threshold, missing_left, left, right } => match threshold.single() {
+                Some(single) => (Node::Split { feature, threshold: single, missing_left, left, right }, threshold),
+                None => {
+                    // Every number is at or below infinity, infinity too: nothing is below minus infinity.
+                    let (nothing, left, right) = (f32::NEG_INFINITY, right, left);
+                    let missing_left = !missing_left;
+                    let node = Node::Split { feature, threshold: nothing, missing_left, left, right };
+                    (node, Threshold::below(f64::NEG_INFINITY))
+                }
+            },
+            DraftNode::Leaf(values) => (Node::Leaf(values.into_iter().map(|value| value as f32).collect()), none),
         };
-        Tree { nodes: self.nodes.into_iter().map(node).collect(), output: self.output }
+        let (nodes, thresholds) = self.nodes.into_iter().map(node).unzip();
+        (Tree { nodes, output: self.output }, thresholds)
     }
 
     /// A tree of leaves that name their targets. A leaf has one value, if all leaves of the tree are for the same
@@ -150,6 +203,6 @@ impl DraftTree {
 /// A node whose leaf's values name their targets.
 #[derive(Clone)]
 pub(super) enum Targeted {
-    Split { feature: usize, threshold: f32, missing_left: bool, left: usize, right: usize },
+    Split { feature: usize, threshold: Threshold, missing_left: bool, left: usize, right: usize },
     Leaf(Vec<(usize, f64)>),
 }

@@ -1,13 +1,13 @@
 //! LightGBM's text: `save_model("model.txt")`, versions 3 and 4 of the library.
 //!
-//! A value goes left if it is at or below the threshold, in f64. What counts as missing is each split's own: nothing
-//! (NaN is 0 then), zero (and NaN), or NaN.
+//! A value goes left if it is at or below the threshold, in f64; one of infinity parts missing values from all others.
+//! What counts as missing is each split's own: nothing (NaN is 0 then), zero (and NaN), or NaN.
 
 use super::draft::{Draft, DraftNode, DraftTree};
 use super::unsupported;
-use crate::ensemble::nodes::after;
-use crate::ensemble::{Ensemble, Output};
+use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::EnsembleProblem;
+use palpate_shared::format::Link;
 use std::collections::BTreeMap;
 
 /// Why a file was refused, and the line.
@@ -84,9 +84,22 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     let mut draft = Draft { features: own, kind: format!("LightGBM text {version}"), ..Draft::default() };
     let first = objective(head.text("objective"), outputs, &mut draft)?;
     draft.base = vec![0.0; outputs + first];
-    for (index, block) in blocks.iter().enumerate() {
+    let trees: Vec<_> = blocks
+        .iter()
+        .enumerate()
+        .map(|(index, block)| tree(block, index, features, &draft.features))
+        .collect::<Result<_>>()?;
+    // Where zeros are missing in all of the splits, they are missing in a row.
+    let is_zero = |(splits, _): &(Vec<Split>, Vec<f64>)| splits.iter().all(|split| split.missing == Missing::Zero);
+    let zero_is_missing = trees.iter().all(is_zero) && trees.iter().any(|(splits, _)| !splits.is_empty());
+    if zero_is_missing {
+        draft.sentinel = Some([-ZERO, ZERO]);
+    }
+    for (index, (splits, values)) in trees.iter().enumerate() {
         let output = Output::One(index % outputs + first);
-        let nodes = tree(block, index, features, &draft.features)?;
+        let mut grower = Grower { splits, values, zero_is_missing, nodes: Vec::new() };
+        grower.grow(index, &draft.features)?;
+        let nodes = grower.nodes;
         draft.trees.push(DraftTree { nodes, output });
     }
     if head.values.contains_key("average_output") {
@@ -137,6 +150,13 @@ fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<us
     if name == "multiclassova" {
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
     }
+    draft.prediction.link = match name {
+        "poisson" | "gamma" | "tweedie" => Link::Exponential,
+        "cross_entropy" => Link::Logistic,
+        "cross_entropy_lambda" => Link::Softplus,
+        "regression" if text.split_ascii_whitespace().any(|word| word == "sqrt") => Link::Square,
+        _ => Link::Identity,
+    };
     Ok(usize::from(name == "binary"))
 }
 
@@ -158,7 +178,8 @@ enum Missing {
     NaN,
 }
 
-fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> Result<Vec<DraftNode>> {
+/// The splits of a tree, and the values of its leaves.
+fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> Result<(Vec<Split>, Vec<f64>)> {
     let leaves = block.count("num_leaves")?;
     let values: Vec<f64> = block.list("leaf_value", leaves)?;
     if leaves == 0 {
@@ -198,16 +219,14 @@ fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> 
         };
         let default_left = decision & 2 != 0;
         let threshold = thresholds[index];
-        if !threshold.is_finite() {
-            return Err(block.damaged("threshold", "is not finite"));
+        if threshold.is_nan() {
+            return Err(block.damaged("threshold", "is not a number"));
         }
         let (left, right) = (lefts[index], rights[index]);
         read.push(Split { feature, threshold, default_left, missing, left, right });
     }
     check_structure(block, &read, values.len())?;
-    let mut grower = Grower { splits: &read, values: &values, nodes: Vec::new() };
-    grower.grow(number, names)?;
-    Ok(grower.nodes)
+    Ok((read, values))
 }
 
 /// Whether every split and every leaf is reached once at most.
@@ -235,6 +254,8 @@ fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result
 struct Grower<'a> {
     splits: &'a [Split],
     values: &'a [f64],
+    /// Whether zeros are missing wherever they are, so that no split has to tell them apart.
+    zero_is_missing: bool,
     nodes: Vec<DraftNode>,
 }
 
@@ -278,9 +299,15 @@ impl Grower<'_> {
         let Split { feature, threshold, default_left, missing, left, right } = split;
         let zero_is_left = threshold >= 0.0;
         // LightGBM reads everything from -ZERO to ZERO as 0: all of it goes one way.
-        let above_zero = after(f64::from(ZERO));
-        let whole = if zero_is_left { after(threshold).max(above_zero) } else { after(threshold).min(-ZERO) };
-        let mut put = |nodes: &mut Self, at: usize, threshold: f32, missing_left: bool, sides: [Side; 2]| {
+        let zero = f64::from(ZERO);
+        let (above_zero, below_zero) = (Threshold::at_or_below(zero), Threshold::below(-zero));
+        let as_it_is = Threshold::at_or_below(threshold);
+        let whole = match zero_is_left {
+            true if threshold < zero => above_zero,
+            false if threshold >= -zero => below_zero,
+            _ => as_it_is,
+        };
+        let mut put = |nodes: &mut Self, at: usize, threshold: Threshold, missing_left: bool, sides: [Side; 2]| {
             let [left, right] = sides.map(|side| match side {
                 Side::Copy(from) => {
                     let to = nodes.reserve();
@@ -293,6 +320,7 @@ impl Grower<'_> {
         };
         let (left, right) = (Side::Copy(left), Side::Copy(right));
         match missing {
+            _ if self.zero_is_missing => put(self, to, as_it_is, default_left, [left, right]),
             Missing::NaN => put(self, to, whole, default_left, [left, right]),
             Missing::Nothing => put(self, to, whole, zero_is_left, [left, right]),
             // Zeros go where the comparison sends them.
@@ -307,9 +335,9 @@ impl Grower<'_> {
                 } else {
                     (Side::At(above), right)
                 };
-                put(self, to, -ZERO, false, [below, Side::At(zero_or_above)]);
+                put(self, to, below_zero, false, [below, Side::At(zero_or_above)]);
                 put(self, zero_or_above, above_zero, true, [side(default_left), over]);
-                put(self, above, after(threshold), default_left, [left, right]);
+                put(self, above, as_it_is, default_left, [left, right]);
             }
         }
     }

@@ -10,7 +10,8 @@
 //! [`Parts`] are trees that another program holds in memory, such as scikit-learn's in Python.
 //!
 //! All of them become an [`Ensemble`] over rows of f32 features, with the features' names and the classes' where the file
-//! has them. Comparisons are exact: `x <= t` is `x < c` with the next f32 c, whatever t's precision. How far margins can
+//! has them. Comparisons are exact: `x <= t` is `x < c` with the next f32 c, whatever t's precision; the file's own t stays
+//! in [`Imported::thresholds`], for rows of whole numbers that f32 does not hold. How far margins can
 //! be from the library's own is computed from the leaves and stated in [`Imported::rounding`]. What cannot be taken over
 //! exactly is refused by name: categorical splits, linear leaves, several targets.
 
@@ -20,12 +21,25 @@ mod lightgbm;
 mod onnx;
 mod parts;
 mod ubjson;
+mod votes;
 
 pub use parts::{PartTree, Parts};
 
 use super::{Ensemble, Imported, xgboost};
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use std::path::Path;
+
+/// What a file of another library does not say, or a user wants otherwise.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options<'a> {
+    /// Other names for the objects: one for each class, or for the one output of a regression.
+    pub names: Option<&'a [String]>,
+    /// Whether all trees are taken where the file says that training stopped early, and not those up to the best iteration.
+    pub all_trees: bool,
+    /// The number that stood for a missing value in training, beside NaN: XGBoost's `missing`, which no file holds. NaN if
+    /// there was none.
+    pub missing: Option<f32>,
+}
 
 impl Ensemble {
     /// Reads an ensemble: XGBoost's JSON, which [`Ensemble::save`] and `palpate train` write, over features of touches
@@ -49,9 +63,18 @@ impl Ensemble {
     /// # Errors
     /// As [`load`](Self::load); [`EnsembleProblem::Names`] if their number is not that of the outputs.
     pub fn load_named(path: impl AsRef<Path>, names: Option<&[String]>) -> Result<Self> {
+        Self::load_with(path, &Options { names, ..Options::default() })
+    }
+
+    /// As [`load`](Self::load), with what the file does not say.
+    ///
+    /// # Errors
+    /// As [`load_named`](Self::load_named); [`EnsembleProblem::Unsupported`] for a missing value of an ensemble over
+    /// touches.
+    pub fn load_with(path: impl AsRef<Path>, options: &Options<'_>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
-        read(path, &bytes, names)
+        read_with(path, &bytes, options)
     }
 }
 
@@ -62,6 +85,36 @@ impl Ensemble {
 /// # Errors
 /// As [`Ensemble::load`], but for reading the file.
 pub fn read(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
+    read_with(path, bytes, &Options { names, ..Options::default() })
+}
+
+/// As [`read`], with what the file does not say.
+///
+/// # Errors
+/// As [`Ensemble::load_with`], but for reading the file.
+pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
+    let mut ensemble = read_as_it_is(path, bytes, options)?;
+    if options.missing.is_some()
+        && let Some(imported) = ensemble.origin.imported.as_mut()
+    {
+        imported.notes.retain(|note| note != MISSING_UNKNOWN);
+    }
+    if let Some(missing) = options.missing.filter(|missing| !missing.is_nan()) {
+        let Some(imported) = ensemble.origin.imported.as_mut() else {
+            let what = "it is over touches, whose missing contacts no number stands for";
+            return Err(Error::at(Place::file(path), unsupported(what, "Leave the missing value out.")));
+        };
+        imported.sentinel = Some([missing; 2]);
+    }
+    Ok(ensemble)
+}
+
+/// What every file of XGBoost leaves open.
+pub(super) const MISSING_UNKNOWN: &str = "The file does not say which number stood for a missing value in training (XGBoost's \
+                                          `missing=`): only NaN is taken for one. State it if there was another.";
+
+fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
+    let names = options.names;
     let wrong = |problem| Error::at(Place::file(path), problem);
     match kind(bytes).map_err(wrong)? {
         Kind::Json => match json_kind(bytes) {
@@ -74,10 +127,10 @@ pub fn read(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensem
                 "it is a list, such as XGBoost's dump_model writes, which lacks what margins start from",
                 "Save the model with `booster.save_model(\"model.json\")`.",
             ))),
-            JsonKind::XgBoost => xgboost::from_json(path, bytes, names),
+            JsonKind::XgBoost => xgboost::from_json(path, bytes, options),
         },
         Kind::Ubjson => match ubjson::read(bytes) {
-            Ok(value) => xgboost::from_ubjson(path, value, names),
+            Ok(value) => xgboost::from_ubjson(path, value, options),
             Err(at) => Err(Error::at(
                 Place::byte(path, at),
                 EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "no UBJSON from here on".into() },
@@ -107,9 +160,11 @@ fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
         [b'{', b'i' | b'U' | b'I' | b'u' | b'l' | b'm' | b'L' | b'$' | b'#', ..] => Ok(Kind::Ubjson),
         _ if text.starts_with(b"{") || text.starts_with(b"[") => Ok(Kind::Json),
         _ if text.starts_with(b"tree\n") || text.starts_with(b"tree\r\n") => Ok(Kind::LightGbm),
-        _ if starts(b"PLPT") => {
-            refused("it is a compiled model already", "Give the ensemble that it was exported from.")
-        }
+        _ if starts(b"PLPT") => refused(
+            "it is a compiled model already",
+            "Give the ensemble that it was exported from; as source code it is written by palpate export MODEL -o MODEL \
+                 --emit c.",
+        ),
         _ if starts(b"CBM1") => refused(
             "it is CatBoost's binary format",
             "Save the model with `model.save_model(\"model.json\", format=\"json\")`.",

@@ -1,9 +1,9 @@
 //! Trees that another program holds in memory, such as scikit-learn's, which no file holds.
 
 use super::draft::{Draft, DraftNode, DraftTree};
-use crate::ensemble::nodes::after;
-use crate::ensemble::{Ensemble, Output};
+use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::{EnsembleProblem, TreeProblem};
+use palpate_shared::format::Prediction;
 
 /// An ensemble in parts: what margins start from, and the trees that are added.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +20,8 @@ pub struct Parts {
     pub trees: Vec<PartTree>,
     /// What a user should know about it, each a sentence.
     pub notes: Vec<String>,
+    /// How the library's `predict` makes a class or a value of margins.
+    pub prediction: Prediction,
 }
 
 /// A tree as columns, one entry for each node; node 0 is its root.
@@ -48,7 +50,7 @@ impl Parts {
     /// [`EnsembleProblem`] for columns of unequal length, children and features out of range, a node that is reached
     /// twice, and whatever [`Ensemble::check`] refuses.
     pub fn into_ensemble(self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
-        let Self { kind, features, names: own, base, trees, notes } = self;
+        let Self { kind, features, names: own, base, trees, notes, prediction } = self;
         let outputs = base.len();
         let trees = trees
             .into_iter()
@@ -57,7 +59,7 @@ impl Parts {
                 tree.draft(outputs).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
             })
             .collect::<Result<_, _>>()?;
-        Draft { features, names: own, base, trees, kind, notes, f32_sums: false }.finish(names)
+        Draft { features, names: own, base, trees, kind, notes, prediction, ..Draft::default() }.finish(names)
     }
 }
 
@@ -84,12 +86,7 @@ impl PartTree {
             let (feature, threshold, missing_left) =
                 (index(self.feature[at]), self.threshold[at], self.missing_left[at]);
             let (left, right) = (index(self.left[at]), index(self.right[at]));
-            if threshold == f64::INFINITY {
-                // Every number is at or below, infinity too: nothing is below minus infinity.
-                let (threshold, missing_left) = (f32::NEG_INFINITY, !missing_left);
-                return DraftNode::Split { feature, threshold, missing_left, left: right, right: left };
-            }
-            DraftNode::Split { feature, threshold: after(threshold), missing_left, left, right }
+            DraftNode::Split { feature, threshold: Threshold::at_or_below(threshold), missing_left, left, right }
         };
         let output = self.output.map_or(Output::Each, Output::One);
         Ok(DraftTree { nodes: (0..nodes).map(node).collect(), output })

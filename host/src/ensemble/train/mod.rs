@@ -214,9 +214,8 @@ pub fn train_with_background(
         let detail = "an object of the data set is called background";
         return Err(EnsembleProblem::Background { detail }.into());
     }
-    let touches = background.objects.iter().flat_map(|object| object.touches.iter().copied()).collect();
     let mut both = dataset.clone();
-    both.objects.push(ObjectTouches { name: BACKGROUND.into(), touches });
+    both.objects.push(ObjectTouches::joined(BACKGROUND, &background.objects));
     let mut ensemble = train(&both, settings, progress)?;
     ensemble.origin.background = true;
     if let Some(trained) = &mut ensemble.origin.trained {
@@ -295,10 +294,10 @@ fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
         objects => return Err(EnsembleProblem::TooManyObjects { objects }.into()),
     }
     check_names(&dataset.names())?;
-    if let Some(empty) = objects.iter().find(|object| object.touches.is_empty()) {
+    if let Some(empty) = objects.iter().find(|object| object.is_empty()) {
         return Err(EnsembleProblem::NoTouches { object: empty.name.clone() }.into());
     }
-    let posed = || objects.iter().flat_map(|object| &object.touches).any(|touch| touch.pose().is_some());
+    let posed = || objects.iter().flat_map(ObjectTouches::touches).any(|touch| touch.pose().is_some());
     if descriptor.needs_pose() && !posed() {
         return Err(EnsembleProblem::NoPose { descriptor }.into());
     }
@@ -380,9 +379,9 @@ impl<'d> Evidence<'d> {
             |touch: &Touch| counted.patterns().contains(touch.pattern()) && (touch.pose().is_some() || !needs_pose);
         let objects = dataset.objects.iter().map(|object| {
             let mut touches: Cow<'_, [Touch]> = if settings.noise.is_none() {
-                (&object.touches[..]).into()
+                object.touches().into()
             } else {
-                settings.noise.add(&object.name, &object.touches, settings.seed).into()
+                settings.noise.add(&object.name, object.touches(), settings.seed).into()
             };
             if !touches.iter().all(counts) {
                 touches.to_mut().retain(counts);

@@ -1,7 +1,7 @@
 use super::*;
 use crate::compile;
 use crate::error::{NameProblem, Problem};
-use crate::touches::{ObjectTouches, synthetic};
+use crate::touches::{ObjectTouches, Source, synthetic};
 use palpate_shared::ContactTime;
 
 fn quick() -> Settings {
@@ -38,12 +38,12 @@ fn margins_do_not_count_how_many_touches_an_object_had() {
     // The same two objects, once with equally many touches and once with ten times as many of the first.
     let even = synthetic::dataset(&[4_000, 4_000], 3);
     let mut uneven = even.clone();
-    uneven.objects[1].touches.truncate(400);
+    uneven.objects[1] = uneven.objects[1].select(0..400);
     let settings = Settings { min_child_weight: 5.0, ..quick() };
     let [even_margins, uneven_margins] = [&even, &uneven].map(|data| {
         let ensemble = train(data, &settings, &()).unwrap();
         let touches = synthetic::dataset(&[2_000, 2_000], 4);
-        let all = touches.objects.iter().flat_map(|object| &object.touches);
+        let all = touches.touches();
         let advantage = all.map(|touch| ensemble.margins(touch)).map(|m| f64::from(m[0] - m[1]));
         advantage.sum::<f64>() / 4_000.0
     });
@@ -54,7 +54,7 @@ fn margins_do_not_count_how_many_touches_an_object_had() {
 #[test]
 fn touches_with_missing_contacts_train_and_predict() {
     let dataset = synthetic::dataset(&[500, 500], 5);
-    let touches = dataset.objects.iter().flat_map(|object| &object.touches);
+    let touches = dataset.touches();
     let partial: Vec<&Touch> = touches.filter(|touch| !touch.is_full()).collect();
     assert!(partial.len() > 20);
     let ensemble = train(&dataset, &quick(), &()).unwrap();
@@ -194,7 +194,7 @@ mod xgboost {
         for counts in [[2_000, 2_000, 2_000], [2_000, 500, 1_000]] {
             let mut dataset = synthetic::dataset(&counts, 10);
             // XGBoost 1.6 has no threshold that tells a missing value from all others; hessboost has.
-            dataset.objects.iter_mut().for_each(|object| object.touches.retain(Touch::is_full));
+            dataset.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
             let [ours, theirs] = both(&dataset, &settings);
             assert_eq!(ours, theirs);
             eprintln!("{counts:?}: {} trees alike, bit for bit", ours.trees.len());
@@ -233,7 +233,7 @@ fn rounded_leaves_compile_without_any_error_and_add_up_exactly_in_f32() {
     let compiled = compile::compile(&ensemble, &compile::Settings::default()).unwrap();
     assert_eq!(compiled.margin_error, 0.0);
     let model = palpate_onboard::Model::new(&compiled.bytes).unwrap();
-    for touch in dataset.objects.iter().flat_map(|object| &object.touches) {
+    for touch in dataset.touches() {
         let mut margins = [0; 3];
         model.margins(touch, &mut margins);
         assert_eq!(ensemble.margins(touch), margins.map(|units| units as f32 * model.unit()));
@@ -273,10 +273,8 @@ fn approaches() -> Dataset {
         let mut fingers = 0..;
         Touch::new(times.map(|time| if missing(fingers.next().unwrap()) { ContactTime::MISSING } else { time }))
     };
-    let object = |name: &str, bend| ObjectTouches {
-        name: name.into(),
-        touches: (0..800).map(|index| touch(index, bend)).collect(),
-    };
+    let object =
+        |name: &str, bend| ObjectTouches::new(name, (0..800).map(|index| touch(index, bend)).collect(), Source::Object);
     Dataset::new(vec![object("cup", 100), object("fork", 400)])
 }
 
@@ -319,7 +317,7 @@ fn approaches_are_trained_on_by_their_contacts_unless_full_touches_or_all_are_as
 #[test]
 fn an_object_without_a_touch_that_counts_is_named() {
     let mut dataset = approaches();
-    dataset.objects[1].touches.retain(|touch| !touch.is_full());
+    dataset.objects[1] = dataset.objects[1].filtered(|touch| !touch.is_full());
     let error = train(&dataset, &Settings { counted: Some(Counted::Full), ..quick() }, &()).unwrap_err();
     let problem = EnsembleProblem::NothingCounts { object: "fork".into(), counted: Counted::Full };
     assert_eq!(error.problem(), Some(&Problem::Ensemble(problem)), "{error}");

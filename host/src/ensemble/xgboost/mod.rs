@@ -13,6 +13,8 @@
 //! | `palpate_probe` | optional: the probe of the training touches, a JSON object of `radius`, `spacing`, `speed`, `tilt` and `length` |
 //! | `palpate_noise` | optional: what was added to the training touches ([`Noise`](crate::touches::noise::Noise)), a JSON object |
 //! | `palpate_background` | optional: `true` where the last object is a background, which is never named |
+//! | `palpate_prediction` | optional: what the library that trained an ensemble over rows makes of margins, and which numbers stand for a missing value there, a JSON object |
+//! | `palpate_captured` | optional: the capture of the training touches ([`Captured`](crate::touches::Captured)), a JSON object |
 //! | `palpate_touches` | optional: fingerprints of the training touches, a JSON object of hexadecimal numbers by object |
 //!
 //! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
@@ -27,6 +29,7 @@ mod trees;
 mod write;
 
 use super::Ensemble;
+use super::import::Options;
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use crate::output;
 use schema::Document;
@@ -34,22 +37,22 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// Reads XGBoost's JSON.
-pub(super) fn from_json(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
+pub(super) fn from_json(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     check_booster(&serde_json::from_slice(&without_literals(bytes)).unwrap_or_default())
         .map_err(|problem| Error::at(Place::file(path), problem))?;
     let document: Document =
         serde_json::from_slice(&without_literals(bytes)).map_err(|error| not_json(path, &error))?;
-    document.into_ensemble(names, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
+    document.into_ensemble(options, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
 }
 
 /// Reads XGBoost's UBJSON, which holds the same as its JSON.
-pub(super) fn from_ubjson(path: &Path, value: serde_json::Value, names: Option<&[String]>) -> Result<Ensemble> {
+pub(super) fn from_ubjson(path: &Path, value: serde_json::Value, options: &Options<'_>) -> Result<Ensemble> {
     let wrong = |problem| Error::at(Place::file(path), problem);
     check_booster(&serde_json::from_value(value.clone()).unwrap_or_default()).map_err(wrong)?;
     let damaged =
         |error: serde_json::Error| EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
     let document: Document = serde_json::from_value(value).map_err(|error| wrong(damaged(error)))?;
-    document.into_ensemble(names, "UBJSON").map_err(wrong)
+    document.into_ensemble(options, "UBJSON").map_err(wrong)
 }
 
 /// What is looked at before the rest: a booster without trees has another schema.
@@ -113,7 +116,7 @@ impl Ensemble {
         let mut document: Document =
             serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;
         document.learner.attributes = write::attributes(&descriptor.into(), &objects, &super::Origin::default());
-        document.into_ensemble(None, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
+        document.into_ensemble(&Options::default(), "JSON").map_err(|problem| Error::at(Place::file(path), problem))
     }
 
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be

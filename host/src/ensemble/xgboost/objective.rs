@@ -1,12 +1,15 @@
 //! What XGBoost's objectives say about margins.
 
 use crate::error::EnsembleProblem;
+use palpate_shared::format::Link as Inverse;
 
 /// An objective.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Objective {
     pub(super) kind: Kind,
     pub(super) link: Link,
+    /// What makes a prediction of a margin.
+    pub(super) inverse: Inverse,
 }
 
 /// What the outputs are.
@@ -49,7 +52,12 @@ impl Objective {
             | "rank:map" => (Kind::One, Link::Identity),
             _ => return Err(EnsembleProblem::Objective { found: name.into() }),
         };
-        Ok(Self { kind, link })
+        let inverse = match (kind, link) {
+            (Kind::One, Link::Logit) => Inverse::Logistic,
+            (Kind::One, Link::Log) => Inverse::Exponential,
+            _ => Inverse::Identity,
+        };
+        Ok(Self { kind, link, inverse })
     }
 }
 

@@ -4,10 +4,11 @@ use super::objective::{Kind, Objective};
 use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, tree};
 use crate::ensemble::check::check_names;
-use crate::ensemble::import::{default_names, named};
+use crate::ensemble::import::{MISSING_UNKNOWN, Options, default_names, named};
 use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, Node, Origin};
 use crate::error::EnsembleProblem;
 use palpate_shared::Descriptor;
+use palpate_shared::format::{Link as Inverse, Prediction};
 use std::collections::{BTreeMap, BTreeSet};
 
 type Attributes = BTreeMap<String, String>;
@@ -15,11 +16,12 @@ type Attributes = BTreeMap<String, String>;
 impl Document {
     /// The ensemble in the document: over touches if it names a descriptor, else over rows. `names` are the objects'
     /// names; `kind` is JSON or UBJSON.
-    pub(super) fn into_ensemble(self, names: Option<&[String]>, kind: &str) -> Result<Ensemble, EnsembleProblem> {
+    pub(super) fn into_ensemble(self, options: &Options<'_>, kind: &str) -> Result<Ensemble, EnsembleProblem> {
+        let names = options.names;
         let version = self.version.map(|number| number.to_string()).join(".");
         let Learner { attributes, feature_names, gradient_booster, learner_model_param, objective, .. } = self.learner;
         let (forest, weights) = forest(gradient_booster)?;
-        let Objective { kind: outputs, link } = Objective::named(&objective.name)?;
+        let Objective { kind: outputs, link, inverse } = Objective::named(&objective.name)?;
         let classes = count("num_class", &learner_model_param.num_class)?;
         let targets = count("num_target", &learner_model_param.num_target)?;
         let groups = match outputs {
@@ -69,6 +71,8 @@ impl Document {
         if base_margins.iter().any(|margin| !margin.is_finite()) {
             return Err(EnsembleProblem::BaseScore { text: learner_model_param.base_score, objects: groups });
         }
+        let mut notes = Vec::new();
+        let taken = taken(&forest, &attributes, groups, options.all_trees, &mut notes)?;
         let Forest { tree_info, trees, .. } = forest;
         if trees.is_empty() {
             return Err(EnsembleProblem::NoTrees);
@@ -88,18 +92,15 @@ impl Document {
         let read = |((number, columns), group): ((usize, &TreeColumns), u64)| {
             tree(columns, group, &shape).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
         };
-        let trees = trees.iter().enumerate().zip(tree_info).map(read).collect::<Result<_, _>>()?;
+        let trees = trees.iter().enumerate().zip(tree_info).take(taken).map(read).collect::<Result<_, _>>()?;
         let mut origin = origin(&attributes)?;
         if inputs.descriptor().is_none() {
-            let mut notes = Vec::new();
-            if let Some(best) = attributes.get("best_iteration") {
-                notes.push(format!(
-                    "Training stopped early at iteration {best}. All trees are used, as by Booster.predict; XGBClassifier \
-                     uses those up to the best one: save booster[:best_iteration + 1] for that."
-                ));
+            let Rows { prediction, sentinel } = rows(&attributes, inverse)?;
+            if sentinel.is_none() {
+                notes.push(MISSING_UNKNOWN.into());
             }
             let kind = format!("XGBoost {version} {kind}");
-            origin.imported = Some(Imported { kind, rounding: 0.0, notes });
+            origin.imported = Some(Imported { kind, notes, prediction, sentinel, ..Imported::default() });
         }
         let mut ensemble = Ensemble { inputs, objects, base_margins, trees, origin };
         if let Some(weights) = weights {
@@ -109,6 +110,80 @@ impl Document {
         ensemble.check()?;
         Ok(ensemble)
     }
+}
+
+/// How many of the trees are taken: those up to the best iteration, if training stopped early and not all are asked for.
+fn taken(
+    forest: &Forest,
+    attributes: &Attributes,
+    groups: usize,
+    all: bool,
+    notes: &mut Vec<String>,
+) -> Result<usize, EnsembleProblem> {
+    let trees = forest.trees.len();
+    let Some(best) = attributes.get("best_iteration") else { return Ok(trees) };
+    let best = count("best_iteration", best)?;
+    let parallel = count("num_parallel_tree", &forest.gbtree_model_param.num_parallel_tree)?.max(1);
+    let is_each = forest.trees.iter().any(|tree| !matches!(tree.tree_param.size_leaf_vector.as_str(), "" | "0" | "1"));
+    let per_iteration = if is_each { 1 } else { groups }.saturating_mul(parallel);
+    let stated = forest.iteration_indptr.get(best.saturating_add(1)).and_then(|&end| usize::try_from(end).ok());
+    let wanted = stated.unwrap_or_else(|| best.saturating_add(1).saturating_mul(per_iteration)).min(trees);
+    if wanted == 0 || wanted == trees {
+        return Ok(trees);
+    }
+    if all {
+        notes.push(format!(
+            "Training stopped early; its best iteration was {best}, with {wanted} trees. All {trees} trees are used, as asked."
+        ));
+        return Ok(trees);
+    }
+    notes.push(format!(
+        "Training stopped early: the {wanted} trees up to the best iteration, {best}, are used, as by XGBClassifier and \
+         XGBRegressor, and not all {trees}, which Booster.predict uses. Ask for all trees to take those."
+    ));
+    Ok(wanted)
+}
+
+/// What an ensemble over rows predicts, and what stands for a missing value in it.
+#[derive(serde::Serialize, serde::Deserialize)]
+pub(super) struct StatedRows {
+    pub(super) link: String,
+    pub(super) last_of_ties: bool,
+    pub(super) scale: f32,
+    /// As text, since JSON has no infinities.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) sentinel: Option<[String; 2]>,
+}
+
+#[derive(Default)]
+struct Rows {
+    prediction: Prediction,
+    sentinel: Option<[f32; 2]>,
+}
+
+/// What the attribute says, or the objective.
+fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProblem> {
+    let name = "palpate_prediction";
+    let expected = "a JSON object of link, last_of_ties and scale";
+    let Some(text) = attributes.get(name) else {
+        return Ok(Rows { prediction: Prediction { link: inverse, ..Prediction::default() }, sentinel: None });
+    };
+    let stated: StatedRows = parsed(name, expected, text)?;
+    let wrong = |detail: String| EnsembleProblem::Attribute { name, expected, detail };
+    let link = Inverse::ALL.iter().copied().find(|link| link.name() == stated.link);
+    let link = link.ok_or_else(|| wrong(format!("the link {:?}", stated.link)))?;
+    if !(stated.scale.is_finite() && stated.scale > 0.0) {
+        return Err(wrong(format!("the scale {}", stated.scale)));
+    }
+    let number = |text: String| text.parse::<f32>().ok().filter(|number| !number.is_nan());
+    let sentinel = stated.sentinel.map(|ends| ends.map(number));
+    let sentinel = match sentinel {
+        None => None,
+        Some([Some(low), Some(high)]) if low <= high => Some([low, high]),
+        Some(_) => return Err(wrong("the sentinel is no range of numbers".into())),
+    };
+    let prediction = Prediction { link, last_of_ties: stated.last_of_ties, scale: stated.scale };
+    Ok(Rows { prediction, sentinel })
 }
 
 /// The trees, and the weight of each in a dart booster: up to 3.2 it wraps another booster, then weights stand beside the
@@ -173,6 +248,9 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
         parsed("palpate_trained", expected, text)
     });
+    let captured = attributes
+        .get("palpate_captured")
+        .map(|text| parsed("palpate_captured", "a JSON object of settings, samples and objects", text));
     let touches = attributes.get("palpate_touches").map(|text| {
         let (name, expected) = ("palpate_touches", "a JSON object of hexadecimal numbers");
         let touches: BTreeMap<String, String> = parsed(name, expected, text)?;
@@ -196,6 +274,7 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
         trained: trained.transpose()?,
         noise: noise.transpose()?,
         touches: touches.transpose()?.unwrap_or_default(),
+        captured: captured.transpose()?,
         imported: None,
     })
 }

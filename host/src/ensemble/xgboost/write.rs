@@ -1,11 +1,13 @@
 //! From an ensemble to XGBoost's schema.
 
 use super::outputs::Outputs;
+use super::read::StatedRows;
 use super::schema::{
     Document, Flag, Forest, ForestParameters, GradientBooster, Learner, LearnerParameters, NO_CONDITION, NO_PARENT,
     TreeColumns, TreeParameters,
 };
-use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Origin, Output, Tree};
+use palpate_shared::format::Prediction;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -64,6 +66,19 @@ pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -
     if let Some(descriptor) = inputs.descriptor() {
         attributes.insert("palpate_descriptor".into(), descriptor.name().into());
     }
+    if let Some(Imported { prediction, sentinel, .. }) = &origin.imported
+        && (*prediction != Prediction::default() || sentinel.is_some())
+    {
+        let stated = StatedRows {
+            link: prediction.link.name().into(),
+            last_of_ties: prediction.last_of_ties,
+            scale: prediction.scale,
+            sentinel: sentinel.map(|ends| ends.map(|end| end.to_string())),
+        };
+        if let Ok(text) = serde_json::to_string(&stated) {
+            attributes.insert("palpate_prediction".into(), text);
+        }
+    }
     // Numbers and strings are always JSON.
     if let Some(probe) = origin.probe.and_then(|probe| serde_json::to_string(&probe).ok()) {
         attributes.insert("palpate_probe".into(), probe);
@@ -76,6 +91,9 @@ pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -
     }
     if origin.background {
         attributes.insert("palpate_background".into(), "true".into());
+    }
+    if let Some(captured) = origin.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok()) {
+        attributes.insert("palpate_captured".into(), captured);
     }
     if !origin.touches.is_empty() {
         let hexadecimal = origin.touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));

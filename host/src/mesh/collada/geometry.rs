@@ -3,6 +3,7 @@
 use super::numbers::numbers;
 use super::{Wrong, children, damaged, named, unsupported, wrong};
 use crate::error::MeshProblem;
+use crate::mesh::exact::{Bounds, rounded};
 use crate::mesh::polygon::Cutter;
 use glam::DVec3;
 use roxmltree::Node;
@@ -15,6 +16,7 @@ type Find<'f, 'a, 'input> = &'f dyn Fn(Node<'a, 'input>, &str, &str) -> Result<N
 pub(super) struct Geometry {
     pub(super) vertices: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
+    bounds: Bounds,
 }
 
 impl Geometry {
@@ -90,19 +92,22 @@ impl Geometry {
         let too_many = |_| wrong(accessor, MeshProblem::TooManyVertices);
         let range = (u32::try_from(self.vertices.len()).map_err(too_many)?, u32::try_from(count).map_err(too_many)?);
         let positions = values.get(offset as usize..).unwrap_or_default().chunks(stride as usize).take(count as usize);
+        let first = self.vertices.len();
         self.vertices.extend(
             positions.map(|numbers| DVec3::from(axes.map(|axis| numbers.get(axis).copied().unwrap_or_default()))),
         );
+        self.vertices[first..].iter().for_each(|vertex| self.bounds.add(vertex.to_array()));
         Ok(range)
     }
 
     /// Appends the triangles of a primitive.
     fn add(&mut self, kind: Kind, lists: &Lists, corners: &Corners<'_, '_>) -> Result<(), Wrong> {
         let (mut cutter, mut face) = (Cutter::default(), Vec::new());
-        let Self { vertices, triangles } = self;
+        let Self { vertices, triangles, bounds } = self;
+        let offset = bounds.offset();
         // As they are kept: so a polygon is cut alike in every format.
-        let place =
-            |index: u32| vertices.get(index as usize).map_or([0.0; 3], |vertex| vertex.as_vec3().as_dvec3().to_array());
+        let kept = |vertex: &DVec3| rounded(vertex.to_array(), offset).map(f64::from);
+        let place = |index: u32| vertices.get(index as usize).map_or([0.0; 3], kept);
         for (number, indices) in lists.indices.iter().enumerate() {
             corners.take(indices, &mut face)?;
             let whole = face.as_slice();

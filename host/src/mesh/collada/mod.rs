@@ -9,7 +9,7 @@ mod geometry;
 mod numbers;
 mod transform;
 
-use super::Mesh;
+use super::exact::Moved;
 use super::placed::Placed;
 use super::words::shown;
 use crate::error::{Error, MeshProblem, Place, Result};
@@ -24,7 +24,7 @@ use std::path::Path;
 /// # Errors
 /// Where the XML is none, a number is damaged, a reference leads nowhere or in a circle, it uses what is not read, or no
 /// face is left.
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Mesh, Option<f64>)> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>)> {
     let text = text(bytes, path)?;
     let here = |problem| Error::at(Place::file(path), problem);
     let document = Document::parse(&text).map_err(|error| {
@@ -250,7 +250,7 @@ impl<'a, 'input> Scene<'a, 'input> {
             self.numbers = left;
             self.geometries.insert(geometry.id(), read);
         }
-        let Some(Geometry { vertices, triangles }) = self.geometries.get(&geometry.id()) else { return Ok(()) };
+        let Some(Geometry { vertices, triangles, .. }) = self.geometries.get(&geometry.id()) else { return Ok(()) };
         let placed = self.placed.place(vertices.iter().copied(), triangles, transform);
         placed.map_err(|problem| wrong(instance, problem))
     }

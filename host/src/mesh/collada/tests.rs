@@ -1,8 +1,9 @@
 use super::*;
+use crate::mesh::Mesh;
 use crate::mesh::samples::{self, corners};
 
 fn parse_text(text: &str) -> Result<(Mesh, Option<f64>)> {
-    parse(text.as_bytes(), Path::new("cup.dae"))
+    parse(text.as_bytes(), Path::new("cup.dae")).map(|((mesh, _), unit)| (mesh, unit))
 }
 
 fn complaint(text: &str) -> String {

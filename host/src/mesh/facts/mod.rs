@@ -4,6 +4,7 @@
 //! inside-out mesh is often a sign of a broken export, and a speck that floats beside an object makes its box larger:
 //! whoever captures from such a mesh should know.
 
+mod gaps;
 mod parts;
 mod stray;
 
@@ -29,6 +30,8 @@ pub struct Facts {
     pub contrary_edges: usize,
     /// Edges that three or more triangles share.
     pub branching_edges: usize,
+    /// The width of the widest gap that open edges leave, in the units of the file; 0 if there is none.
+    pub widest_gap: f64,
     /// The volume that it encloses, in cubic units of its file: negative if it is inside out, meaningless if it is open.
     pub volume: f64,
     /// Its parts, the one with most triangles first.
@@ -56,6 +59,7 @@ impl Facts {
             open_edges: parts.iter().map(|part| part.open_edges).sum(),
             contrary_edges: parts.iter().map(|part| part.contrary_edges).sum(),
             branching_edges,
+            widest_gap: gaps::widest(&welded),
             volume: parts.iter().map(|part| part.volume).sum(),
             parts,
             stray: stray::pieces(&welded),
@@ -114,6 +118,31 @@ impl Facts {
         let sentences =
             [self.open(), self.turned(), self.contrary(), self.branching(), self.apart(), self.size(millimeters)];
         sentences.into_iter().flatten().collect()
+    }
+
+    /// Whether the mesh can be touched as it is by fingers of a diameter (in the units of its file), in words: "usable", or
+    /// "repair first" and why. What is wrong and makes no difference to touches is no reason.
+    pub fn verdict(&self, diameter: f64) -> String {
+        let gap = (self.widest_gap >= diameter).then(|| {
+            format!(
+                "a gap is {} wide and a finger {}, so it reaches inside where a real one may find a surface",
+                short(self.widest_gap),
+                short(diameter)
+            )
+        });
+        let apart = (!self.stray.is_empty()).then(|| {
+            "what floats apart counts as part of the object, which becomes so much smaller compared with the probe"
+                .to_owned()
+        });
+        let reasons: Vec<String> = gap.into_iter().chain(apart).collect();
+        match (reasons.is_empty(), self.is_right_side_out()) {
+            (false, _) => format!("repair first: {}", reasons.join("; ")),
+            (true, true) => "usable".into(),
+            (true, false) => {
+                "usable: fingers feel a surface from both sides, and there is no gap that one of them fits through"
+                    .into()
+            }
+        }
     }
 
     fn open(&self) -> Option<String> {

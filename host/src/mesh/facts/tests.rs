@@ -158,3 +158,29 @@ fn coordinates_whose_squares_are_too_large_and_corners_on_edges_of_cells_are_in_
         assert!(Facts::of(&mesh).stray.is_empty());
     }
 }
+
+#[test]
+fn a_mesh_is_usable_unless_a_finger_fits_through_a_gap_or_pieces_float_apart() {
+    let verdict = |mesh: &Mesh, diameter| Facts::of(mesh).verdict(diameter);
+    let mut mesh = cube();
+    assert_eq!(verdict(&mesh, 0.03), "usable");
+    // Inside out, and fingers feel no difference.
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(0, 1));
+    assert!(verdict(&mesh, 0.03).starts_with("usable: fingers feel a surface from both sides"));
+    // Half a side is missing: a triangle of area 1/2 and perimeter 2 + √2.
+    mesh.triangles.remove(0);
+    let facts = Facts::of(&mesh);
+    assert!((facts.widest_gap - 2.0 / (2.0 + 2.0_f64.sqrt())).abs() < 1e-9, "{}", facts.widest_gap);
+    let said = verdict(&mesh, 0.03);
+    assert!(said.starts_with("repair first: a gap is 0.586 wide and a finger 0.0300"), "{said}");
+    assert!(verdict(&mesh, 0.7).starts_with("usable: "));
+    // A crack a thousandth wide all along an edge, which welding does not close.
+    let mut mesh = cube();
+    mesh.vertices.extend([[0.0, 0.0, 0.001], [1.0, 0.0, 0.001]]);
+    for vertex in mesh.triangles[4..6].iter_mut().flatten().filter(|vertex| **vertex < 2) {
+        *vertex += 8;
+    }
+    let facts = Facts::of(&mesh);
+    assert!(facts.open_edges > 3 && (1e-4..2e-3).contains(&facts.widest_gap), "{facts:?}");
+    assert!(verdict(&mesh, 0.03).starts_with("usable: "));
+}

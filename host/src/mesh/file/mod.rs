@@ -63,6 +63,9 @@ impl Format {
 pub struct Contents {
     /// Its mesh, in the units of the file. A COLLADA file that states its upward axis is turned so that z is up.
     pub mesh: Mesh,
+    /// What was subtracted from its coordinates: the center of a mesh that is so far from the origin (more than 16 times its
+    /// longest side) that f32 would damage it; else zeros.
+    pub moved: [f64; 3],
     /// How many millimeters its unit is, where the file says: COLLADA with a unit, glTF (meters, by its standard).
     pub millimeters: Option<f64>,
     /// Which kind of file it was.
@@ -109,8 +112,8 @@ fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Op
     let io = |source| Error::io(path, "read the mesh", source);
     let head = reader.fill_buf().map_err(io)?;
     let format = Format::of(head, length, path.extension().and_then(|extension| extension.to_str()));
-    let (mesh, millimeters) = match format {
-        Format::Obj => (obj::parse(reader, path)?, None),
+    let ((mesh, moved), millimeters) = match format {
+        Format::Obj => (obj::parse_moved(reader, path)?, None),
         Format::Stl => (stl::parse(reader, length, path)?, None),
         Format::Ply => (ply::parse(reader, path)?, None),
         Format::Gltf | Format::Collada => {
@@ -123,7 +126,7 @@ fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Op
             }
         }
     };
-    Ok(Contents { mesh, millimeters, format })
+    Ok(Contents { mesh, moved, millimeters, format })
 }
 
 #[cfg(test)]

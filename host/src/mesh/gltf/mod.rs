@@ -9,7 +9,7 @@ mod container;
 mod document;
 mod extension;
 
-use super::Mesh;
+use super::exact::Moved;
 use super::placed::Placed;
 use crate::error::{Error, MeshProblem, Place, Result};
 use accessor::Data;
@@ -23,7 +23,7 @@ use std::path::Path;
 /// # Errors
 /// Where the JSON is none, a number that it states is impossible, a file beside it cannot be read, it uses what is not
 /// read, or no face is left.
-pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<Mesh> {
+pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<Moved> {
     let parts = container::parts(bytes, path)?;
     let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
         let mut reason = error.to_string();
@@ -78,7 +78,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    fn mesh(mut self) -> Result<Mesh, MeshProblem> {
+    fn mesh(mut self) -> Result<Moved, MeshProblem> {
         let nodes = &self.document.nodes;
         let mut waiting: Vec<(u32, DAffine3)> = Vec::new();
         let add = |nodes: &[u32], transform: &DAffine3, waiting: &mut Vec<_>| {

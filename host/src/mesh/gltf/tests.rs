@@ -1,4 +1,5 @@
 use super::*;
+use crate::mesh::Mesh;
 use crate::mesh::samples::{corners, document, glb_of};
 use serde_json::{Value, json};
 
@@ -7,7 +8,7 @@ fn changed(change: impl FnOnce(&mut Value)) -> Result<Mesh> {
     let square = square();
     let mut document = document(&square, None);
     change(&mut document);
-    parse(&glb_of(&document, &buffer(&square)), Path::new("cup.glb"), None)
+    parse(&glb_of(&document, &buffer(&square)), Path::new("cup.glb"), None).map(|(mesh, _)| mesh)
 }
 
 fn square() -> Mesh {
@@ -163,7 +164,9 @@ fn a_sparse_accessor_replaces_some_elements() {
     let mut bytes = buffer(&square);
     bytes.push(2);
     [5.0_f32, 6.0, 7.0].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
-    let read = |document: &Value, bytes: &[u8]| parse(&glb_of(document, bytes), Path::new("cup.glb"), None);
+    let read = |document: &Value, bytes: &[u8]| {
+        parse(&glb_of(document, bytes), Path::new("cup.glb"), None).map(|(mesh, _)| mesh)
+    };
     assert_eq!(corners(&read(&document, &bytes).unwrap())[0][2], [5.0, 6.0, 7.0]);
     bytes[start] = 4;
     assert!(read(&document, &bytes).unwrap_err().to_string().contains("replaces its element 4"));

@@ -12,7 +12,7 @@ const MOST: u64 = 1 << 20;
 /// A header that was checked: its elements have different names and at least one property each.
 pub(super) struct Header {
     pub(super) format: PlyFormat,
-    /// The header without comments, for the parser.
+    /// The header without comments, for the parser. A text has its coordinates to all digits, whatever kind is stated.
     pub(super) text: String,
     /// How many bytes and lines it has in the file.
     pub(super) bytes: u64,
@@ -158,7 +158,12 @@ fn text(format: PlyFormat, elements: &[Element]) -> String {
     let mut text = format!("ply\nformat {format} 1.0\n");
     for Element { name, count, properties, .. } in elements {
         text += &format!("element {name} {count}\n");
-        properties.iter().for_each(|Property { name, kind, .. }| text += &format!("property {kind} {name}\n"));
+        for Property { name: property, kind, .. } in properties {
+            let is_exact =
+                format == PlyFormat::Ascii && name == "vertex" && ["x", "y", "z"].contains(&property.as_str());
+            let kind = if is_exact { "double" } else { kind };
+            text += &format!("property {kind} {property}\n");
+        }
     }
     text + "end_header\n"
 }

@@ -8,6 +8,7 @@ mod counted;
 mod header;
 
 use super::Mesh;
+use super::exact::{Bounds, Moved, rounded};
 use super::polygon::Cutter;
 use crate::error::{Error, MeshProblem, Place, Result};
 use counted::{Counted, Counts};
@@ -25,7 +26,7 @@ use std::path::Path;
 /// # Errors
 /// Where the header is none, the file ends too early or too late, a number is damaged or not finite, a face names a vertex
 /// that is not there, or no face is left.
-pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Mesh> {
+pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
     let Header { format, text, bytes, lines } = Header::read(&mut reader, path)?;
     let is_text = format == PlyFormat::Ascii;
     let counts = Counts::starting_at(bytes, lines);
@@ -63,9 +64,11 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Mesh> {
         }
     }
     let here = |problem| Error::at(Place::file(path), problem);
-    let mut mesh = Mesh { vertices: vertices.0, triangles: Vec::new() };
+    let offset = Bounds::of(faces.used(&vertices.0).chain(strips.used(&vertices.0))).offset();
+    let rounded = vertices.0.into_iter().map(|vertex| rounded(vertex, offset)).collect();
+    let mut mesh = Mesh { vertices: rounded, triangles: Vec::new() };
     faces.cut(&mut mesh).and_then(|()| strips.cut_strips(&mut mesh)).map_err(here)?;
-    mesh.usable().map_err(here)
+    Ok((mesh.usable().map_err(here)?, offset))
 }
 
 /// What takes the rows of an element, one by one.
@@ -105,13 +108,13 @@ impl<'de, C: Collect> Visitor<'de> for RowVisitor<C> {
 
 /// Places of vertices.
 #[derive(Default)]
-struct Vertices(Vec<[f32; 3]>);
+struct Vertices(Vec<[f64; 3]>);
 
 #[derive(Deserialize)]
 struct Vertex {
-    x: f32,
-    y: f32,
-    z: f32,
+    x: f64,
+    y: f64,
+    z: f64,
 }
 
 impl Collect for Vertices {
@@ -119,8 +122,8 @@ impl Collect for Vertices {
 
     fn take(&mut self, Vertex { x, y, z }: Vertex) -> Result<(), String> {
         for (axis, value) in [('x', x), ('y', y), ('z', z)] {
-            if !value.is_finite() {
-                return Err(MeshProblem::NotFinite { axis, text: value.to_string() }.to_string());
+            if !(value as f32).is_finite() {
+                return Err(MeshProblem::NotFinite { axis, text: format!("{value:e}") }.to_string());
             }
         }
         if self.0.len() >= u32::MAX as usize {
@@ -160,6 +163,12 @@ impl Collect for Corners {
 }
 
 impl Corners {
+    /// The vertices that faces name, as far as they are there.
+    fn used(&self, vertices: &[[f64; 3]]) -> impl Iterator<Item = [f64; 3]> {
+        let vertex = |&index: &i64| usize::try_from(index).ok().and_then(|index| vertices.get(index)).copied();
+        self.indices.iter().filter_map(vertex)
+    }
+
     fn cut(&self, mesh: &mut Mesh) -> Result<(), MeshProblem> {
         let Mesh { vertices, triangles } = mesh;
         let (mut cutter, mut face) = (Cutter::default(), Vec::new());

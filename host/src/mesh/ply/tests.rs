@@ -2,7 +2,7 @@ use super::*;
 use crate::mesh::samples;
 
 fn parse_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
-    parse(bytes.as_ref(), Path::new("cup.ply"))
+    parse(bytes.as_ref(), Path::new("cup.ply")).map(|(mesh, _)| mesh)
 }
 
 fn complaint(bytes: impl AsRef<[u8]>) -> String {

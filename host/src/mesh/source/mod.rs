@@ -96,22 +96,37 @@ impl Source {
             Self::Background => builtin::background(builtin::BACKGROUND_SHAPES, 1),
             Self::File { name, path, notes } => {
                 let contents = file::read(&path)?;
+                let notes = notes.into_iter().chain(moved(&path, contents.moved)).collect();
                 let object = Object::new(name, contents.mesh);
                 Ok(Object { millimeters: contents.millimeters, notes, ..object })
             }
             Self::Instances { name, files, notes } => {
                 let read = |(name, path): (String, PathBuf)| {
-                    let file::Contents { mesh, millimeters, .. } = file::read(&path)?;
-                    Ok((Instance { name, mesh }, millimeters))
+                    let file::Contents { mesh, millimeters, moved: by, .. } = file::read(&path)?;
+                    Ok((Instance { name, mesh }, (millimeters, moved(&path, by))))
                 };
                 let read = files.into_par_iter().map(read).collect::<Result<Vec<_>>>()?;
-                let (mut instances, units): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+                let (mut instances, stated): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+                let (units, moved): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
                 let object = Object::of_instances(name, instances).ok_or(MeshProblem::NoMeshes)?;
-                Ok(Object { millimeters, notes: notes.into_iter().chain(note).collect(), ..object })
+                Ok(Object {
+                    millimeters,
+                    notes: notes.into_iter().chain(moved.into_iter().flatten()).chain(note).collect(),
+                    ..object
+                })
             }
         }
     }
+}
+
+/// A note about a mesh whose coordinates count from its center.
+fn moved(path: &Path, by: [f64; 3]) -> Option<String> {
+    let [x, y, z] = by;
+    let is_moved = by != [0.0; 3];
+    is_moved.then(|| {
+        format!("{} is far from its origin: its coordinates count from its center, {x}, {y}, {z}", path.display())
+    })
 }
 
 /// The unit of an object's instances in millimeters, of which each may state its own: those that differ are scaled to the

@@ -5,6 +5,7 @@
 //! not pass for a smaller one. Normals and attributes say nothing that the corners do not.
 
 use super::Mesh;
+use super::exact::Moved;
 use super::words::{coordinate, shown};
 use crate::error::{Error, MeshProblem, Place, Result};
 use std::collections::HashMap;
@@ -35,7 +36,7 @@ fn bytes_of(count: u32) -> u64 {
 /// # Errors
 /// Where the number of triangles is not the one that the file states, a word or a number of a text is not what must stand
 /// there, a coordinate is not finite, or no face is left.
-pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Mesh> {
+pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Moved> {
     let head = reader.fill_buf().map_err(|source| Error::io(path, "read the mesh", source))?;
     let is_text = !head.is_empty() && !head.iter().take(HEADER).any(|&byte| byte == 0);
     let welder = if !is_binary(head, length) && is_text {
@@ -43,7 +44,8 @@ pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Resul
     } else {
         binary(reader, length, path)?
     };
-    welder.mesh.usable().map_err(|problem| Error::at(Place::file(path), problem))
+    let (mesh, moved) = Mesh::from_f64(&welder.vertices, welder.triangles);
+    Ok((mesh.usable().map_err(|problem| Error::at(Place::file(path), problem))?, moved))
 }
 
 fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Welder> {
@@ -67,7 +69,7 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Welder> 
             let mut vertex = [0.0; 3];
             let (axes, _) = bytes.as_chunks::<4>();
             for (axis, (value, bytes)) in vertex.iter_mut().zip(axes).enumerate() {
-                *value = f32::from_le_bytes(*bytes);
+                *value = f64::from(f32::from_le_bytes(*bytes));
                 if !value.is_finite() {
                     let problem = MeshProblem::NotFinite { axis: AXES[axis], text: value.to_string() };
                     let offset = start + 12 + 12 * number as u64 + 4 * axis as u64;
@@ -76,7 +78,7 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Welder> 
             }
             *corner = welder.corner(vertex).map_err(|problem| Error::at(Place::byte(path, start), problem))?;
         }
-        welder.mesh.triangles.push(corners);
+        welder.triangles.push(corners);
     }
     Ok(welder)
 }
@@ -95,14 +97,15 @@ fn ended(source: std::io::Error, path: &Path, offset: u64) -> Error {
 /// Makes one vertex of corners at the same place; zeros of either sign are the same.
 #[derive(Default)]
 struct Welder {
-    places: HashMap<[u32; 3], u32>,
-    mesh: Mesh,
+    places: HashMap<[u64; 3], u32>,
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
 }
 
 impl Welder {
     /// The index of the vertex at this place.
-    fn corner(&mut self, vertex: [f32; 3]) -> Result<u32, MeshProblem> {
-        let vertices = &mut self.mesh.vertices;
+    fn corner(&mut self, vertex: [f64; 3]) -> Result<u32, MeshProblem> {
+        let vertices = &mut self.vertices;
         let next = u32::try_from(vertices.len()).map_err(|_| MeshProblem::TooManyVertices)?;
         Ok(*self.places.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
             vertices.push(vertex);
@@ -185,7 +188,7 @@ impl<R: BufRead> Text<'_, R> {
                 }
                 State::Loop(3) if is(b"endloop") => State::Closed,
                 State::Closed if is(b"endfacet") => {
-                    welder.mesh.triangles.push(corners);
+                    welder.triangles.push(corners);
                     State::Solid
                 }
                 state => return Err(self.unexpected(Some(word), state.expected())),

@@ -3,7 +3,7 @@ use crate::mesh::samples;
 
 fn parse_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
     let bytes = bytes.as_ref();
-    parse(bytes, bytes.len() as u64, Path::new("cup.stl"))
+    parse(bytes, bytes.len() as u64, Path::new("cup.stl")).map(|(mesh, _)| mesh)
 }
 
 fn complaint(bytes: impl AsRef<[u8]>) -> String {

@@ -12,6 +12,9 @@ pub(crate) struct Svg {
     pub(crate) width: u32,
     /// Natural height.
     pub(crate) height: u32,
+    /// The same drawn for a phone's width, as an `<svg>` element; none where the drawing is narrow enough as it is, or
+    /// cannot be made narrower.
+    pub(crate) narrow: Option<String>,
 }
 
 /// One thing drawn in a chart, in the axes' units.
@@ -64,16 +67,21 @@ pub(crate) enum Mark {
         /// 0 nothing to 1 solid.
         opacity: f64,
     },
-    /// Text at a point, moved by whole shown pixels.
-    Text {
-        /// Where.
+    /// Text beside a point, where there is room for it; otherwise it is left out.
+    Note {
+        /// The point.
         at: (f64, f64),
         /// What.
         text: String,
         /// Its color.
         color: RGBColor,
-        /// Where it is relative to the point.
-        side: Side,
+    },
+    /// Text in a cell of a table of names; all of a chart's cells have theirs, or none has.
+    Cell {
+        /// The cell's middle.
+        at: (f64, f64),
+        /// What.
+        text: String,
     },
     /// A thin line across the chart at an x.
     Vertical(f64),
@@ -103,41 +111,35 @@ pub(crate) enum Shape {
     Square,
 }
 
-/// Where a text is relative to a point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
-    /// Left of it.
-    Left,
-    /// Right of it.
-    Right,
-    /// Above it.
-    Above,
-    /// Below it, to the right.
-    LowerRight,
-    /// Above it, to the left.
-    UpperLeft,
-    /// On it.
-    Center,
-}
-
-/// A label at the right end of a line.
-#[derive(Clone, Debug)]
-pub(crate) struct EndLabel {
-    /// The line's last y.
-    pub(crate) y: f64,
-    /// The line's mean y, which decides the order of labels whose lines end together.
-    pub(crate) mean: f64,
-    /// What the line is.
-    pub(crate) text: String,
-    /// The line's color.
+/// What a series looks like: the sample beside its name.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Key {
+    /// Its color.
     pub(crate) color: RGBColor,
+    /// How its line is drawn, if it has one.
+    pub(crate) stroke: Option<Stroke>,
+    /// What its points look like, if it has some.
+    pub(crate) shape: Option<Shape>,
 }
 
-impl EndLabel {
-    /// The label of a line through `points`; off the chart if there are none.
-    pub(crate) fn of(text: &str, color: RGBColor, points: &[(f64, f64)]) -> Self {
+/// The name of a series: at the right end of its line, or in a legend below the chart.
+#[derive(Clone, Debug)]
+pub(crate) struct Label {
+    /// What the series is.
+    pub(crate) text: String,
+    /// What it looks like.
+    pub(crate) key: Key,
+    /// The y of the line's right end, and its mean y, which decides the order of labels whose lines end together; without it the name
+    /// belongs into the legend.
+    pub(crate) end: Option<(f64, f64)>,
+}
+
+impl Label {
+    /// The label of a line through `points`, of which there is at least one.
+    fn of(text: &str, key: Key, points: &[(f64, f64)]) -> Self {
         let mean = points.iter().map(|point| point.1).sum::<f64>() / points.len().max(1) as f64;
-        Self { y: points.last().map_or(f64::NAN, |point| point.1), mean, text: text.to_string(), color }
+        let last = points.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        Self { text: text.to_string(), key, end: last.map(|last| (last.1, mean)) }
     }
 }
 
@@ -162,8 +164,9 @@ pub(crate) struct Chart {
     pub(crate) upright_names: bool,
     /// What is drawn, in order.
     pub(crate) marks: Vec<Mark>,
-    /// Labels at the right ends of lines; they are moved apart where they would collide.
-    pub(crate) labels: Vec<EndLabel>,
+    /// Names of series: at the right ends of lines, moved apart where they would collide, or in a legend below the chart
+    /// where they would take too much of it.
+    pub(crate) labels: Vec<Label>,
 }
 
 impl Chart {
@@ -195,26 +198,40 @@ impl Chart {
         self
     }
 
-    /// Adds a line with a point at each of its places and its name at its right end.
+    /// Adds a line with a point at each of its places, and its name.
     pub(crate) fn series(&mut self, name: &str, color: RGBColor, shape: Shape, points: &[(f64, f64)]) {
         let points: Vec<(f64, f64)> = points.iter().copied().filter(|point| point.1.is_finite()).collect();
         if points.is_empty() {
             return;
         }
-        self.labels.push(EndLabel::of(name, color, &points));
+        if !name.is_empty() {
+            let key = Key { color, stroke: Some(Stroke::Solid), shape: Some(shape) };
+            self.labels.push(Label::of(name, key, &points));
+        }
         self.marks.push(Mark::Line { points: points.clone(), color, stroke: Stroke::Solid });
         self.marks.push(Mark::Dots { points, color, shape });
     }
 
-    /// Adds a line, solid or dashed, with its name at its right end.
+    /// Adds a line, solid or dashed, and its name.
     pub(crate) fn line(&mut self, name: &str, color: RGBColor, stroke: Stroke, points: &[(f64, f64)]) {
         let points: Vec<(f64, f64)> = points.iter().copied().filter(|point| point.1.is_finite()).collect();
         if points.is_empty() {
             return;
         }
         if !name.is_empty() {
-            self.labels.push(EndLabel::of(name, color, &points));
+            self.labels.push(Label::of(name, Key { color, stroke: Some(stroke), shape: None }, &points));
         }
         self.marks.push(Mark::Line { points, color, stroke });
+    }
+
+    /// Adds a name to the legend below the chart.
+    pub(crate) fn legend(
+        &mut self,
+        name: impl Into<String>,
+        color: RGBColor,
+        stroke: Option<Stroke>,
+        shape: Option<Shape>,
+    ) {
+        self.labels.push(Label { text: name.into(), key: Key { color, stroke, shape }, end: None });
     }
 }

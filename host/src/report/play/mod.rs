@@ -27,6 +27,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use palpate_onboard::Model;
 use palpate_shared::format::{Counted, Length};
+use std::path::PathBuf;
 
 /// The game, compiled to WebAssembly.
 const WASM: &[u8] = include_bytes!("../../../assets/play/palpate.wasm");
@@ -82,6 +83,27 @@ impl Contender {
     pub fn new(model: CompiledModel, expected: Option<Expected>) -> Result<Self> {
         let name = about(&model.model())?;
         Ok(Self { name, model, expected })
+    }
+}
+
+/// Tells models of one name apart by the files that they came from: by the files' names, or, where those are the same too,
+/// by their paths; the same file twice is numbered.
+pub fn distinguish(contenders: &mut [Contender], files: &[PathBuf]) {
+    let stem = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let path = |file: &PathBuf| file.display().to_string();
+    let names: Vec<String> = contenders.iter().map(|contender| contender.name.clone()).collect();
+    for (index, (contender, file)) in contenders.iter_mut().zip(files).enumerate() {
+        let same = || (0..names.len()).zip(files).filter(|(other, _)| names[*other] == names[index]);
+        if same().count() < 2 {
+            continue;
+        }
+        let is_alone = |of: &dyn Fn(&PathBuf) -> String| same().filter(|(_, other)| of(other) == of(file)).count() == 1;
+        let before = same().filter(|(other, own)| *other < index && *own == file).count();
+        contender.name += &match () {
+            () if is_alone(&stem) => format!(" ({})", stem(file)),
+            () if is_alone(&path) => format!(" ({})", path(file)),
+            () => format!(" ({}, {})", path(file), before + 1),
+        };
     }
 }
 

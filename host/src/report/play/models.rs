@@ -126,25 +126,25 @@ pub fn expect(
     let touched = |surface: &Surface| -> Result<ObjectTouches> {
         progress::check(progress)?;
         let scene = [Scene::new(&surface.mesh(), surface.length)?];
-        Ok(ObjectTouches { name: surface.name.clone(), touches: touches(&scene, &surface.name, &origin, 0..TESTED.0)? })
+        touches(&scene, &surface.name, &origin, 0..TESTED.0)
     };
     let objects: Vec<ObjectTouches> =
         surfaces.par_iter().map(touched).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
     let mut dataset = Dataset { origin: Some(origin.clone()), ..Dataset::new(objects) };
-    let robots = evaluate::add_noise(&mut dataset, noise, origin.seed)?;
+    evaluate::add_noise(&mut dataset, noise, origin.seed)?;
     let contender = |model: CompiledModel| {
-        let expected = expected(&model.model(), &dataset, robots, origin.seed)?;
+        let expected = expected(&model.model(), &dataset, origin.seed)?;
         Contender::new(model, expected)
     };
     models.into_iter().map(contender).collect()
 }
 
-fn expected(model: &Model<'_>, dataset: &Dataset, robots: usize, seed: u64) -> Result<Option<Expected>> {
+fn expected(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Option<Expected>> {
     let names = compile::names(model);
     if model.descriptor().is_none() || !dataset.objects.iter().all(|object| names.contains(&object.name)) {
         return Ok(None);
     }
-    let margins = Margins::new(Candidate::Compiled(model), dataset)?.of_robots(robots);
+    let margins = Margins::new(Candidate::Compiled(model), dataset)?;
     let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: TESTED.1, seed };
     Ok(Some(Expected::from(&margins.approaches(&[], &settings)?.sequential)))
 }

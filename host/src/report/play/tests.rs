@@ -105,7 +105,7 @@ fn a_small_object_is_touched_as_it_is_but_for_a_rounding_of_its_corners() {
     let (own, page) = (scene(objects[0].mesh()), scene(&surface.mesh()));
     let origin = Origin { approaches: true, ..Origin::default() };
     let touched = |scene: Scene| crate::capture::touches(&[scene], "globe", &origin, 0..300).unwrap();
-    for (own, page) in touched(own).iter().zip(touched(page)) {
+    for (own, page) in touched(own).touches().iter().zip(touched(page).touches()) {
         assert_eq!(own.pattern(), page.pattern());
         let times = own.times().into_iter().zip(page.times());
         for (own, page) in times.filter_map(|(own, page)| Some((own.micros()?, page.micros()?))) {
@@ -150,4 +150,26 @@ fn a_trace_is_what_the_game_computes() {
         }
     }
     assert!(trace.lines().any(|line| line.contains(" 1 ")));
+}
+
+#[test]
+fn models_of_one_name_are_told_apart_by_their_files() {
+    let ensemble = Ensemble {
+        inputs: Descriptor::Curvature.into(),
+        objects: vec!["a".into(), "b".into()],
+        base_margins: vec![0.0; 2],
+        trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5, 0.0])], output: Output::Each }],
+        origin: ensemble::Origin::default(),
+    };
+    let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+    let contender = || Contender::new(CompiledModel::from_bytes(bytes.clone()).unwrap(), None).unwrap();
+    let names = |files: &[&str]| -> Vec<String> {
+        let mut contenders: Vec<Contender> = files.iter().map(|_| contender()).collect();
+        distinguish(&mut contenders, &files.iter().map(PathBuf::from).collect::<Vec<_>>());
+        contenders.into_iter().map(|contender| contender.name.replace("curvature, full touches", "~")).collect()
+    };
+    assert_eq!(names(&["a.palpate"]), ["~"]);
+    assert_eq!(names(&["small.palpate", "dir/sure.palpate"]), ["~ (small)", "~ (sure)"]);
+    assert_eq!(names(&["x/m.palpate", "y/m.palpate", "n.palpate"]), ["~ (x/m.palpate)", "~ (y/m.palpate)", "~ (n)"]);
+    assert_eq!(names(&["m.palpate", "m.palpate"]), ["~ (m.palpate, 1)", "~ (m.palpate, 2)"]);
 }

@@ -29,7 +29,7 @@ pub fn trace(surfaces: &[Surface], contenders: &[Contender], settings: &Settings
             let noisy = |(index, touch): (u64, &Touch)| {
                 settings.noise.add(&surface.name, std::slice::from_ref(touch), (seed << 32) + index).pop()
             };
-            let sensed: Vec<Touch> = (0..).zip(&captured).filter_map(noisy).collect();
+            let sensed: Vec<Touch> = (0..).zip(captured.touches()).filter_map(noisy).collect();
             let models: Vec<_> = contenders.iter().map(|contender| contender.model.model()).collect();
             let recognizer = |model| Recognizer::<256>::new(model, Stopping::from_model(model));
             let too_many = |error: CapacityError| EvaluateProblem::TooManyObjects {

@@ -39,6 +39,12 @@ impl Default for Settings {
     }
 }
 
+/// Whether a mesh can be touched as it is, in words, if its longest side has this length and the probe these fingers.
+pub fn verdict(facts: &Facts, length: f64, probe: &Probe) -> String {
+    let unit = f64::from((facts.high - facts.low).max_element()) / length;
+    facts.verdict(2.0 * probe.radius * unit)
+}
+
 /// How many approaches are drawn at most to find the touches.
 const MOST_APPROACHES: u64 = 200_000;
 
@@ -174,6 +180,7 @@ fn html(
                     div { dt { "Full touches" } dd { (format!("{share:.1} % of {} approaches", grouped(drawn.tried as usize))) } }
                 }
                 @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
+                p { (object.name) ": " (verdict(facts, settings.length, &settings.probe)) "." }
                 fieldset {
                     legend { "Show" }
                     @for (id, label, on) in [

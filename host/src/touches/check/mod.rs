@@ -10,7 +10,7 @@ pub use summary::{ObjectSummary, Quantiles, Summary};
 use super::checksum::{Checked, checksum};
 use super::dataset::name_of;
 use super::warning::channels_said;
-use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Warning, is_log, logs, text};
+use super::{Entry, Format, Listing, Log, Origin, Warning, is_log, logs, text};
 use crate::error::{Error, Place, Problem, Result, TouchesProblem};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
@@ -63,7 +63,7 @@ impl Check {
             logged(directory, &mut objects, &mut findings)?;
             return Ok(match objects.is_empty() {
                 true => Self { findings: findings.0, summary: Summary::of(&[], None) },
-                false => Self::of_objects(directory, &objects, None, findings),
+                false => Self::of_objects(directory, &objects, None, true, findings),
             });
         }
         let listing = match Listing::read(directory) {
@@ -75,17 +75,30 @@ impl Check {
             }
         };
         let origin = listing.as_ref().map(|listing| listing.origin.clone());
+        let is_recorded = listing.as_ref().is_some_and(Listing::is_recorded);
         let objects = match listing {
             Some(listing) => listed(directory, listing, &mut findings)?,
             None => found(directory, &mut findings)?,
         };
-        Ok(Self::of_objects(directory, &objects, origin, findings))
+        Ok(Self::of_objects(directory, &objects, origin, is_recorded, findings))
     }
 
     /// What is wrong with objects beside what was when they were read.
-    fn of_objects(directory: &Path, objects: &[Read], origin: Option<Origin>, mut findings: Findings) -> Self {
+    fn of_objects(
+        directory: &Path,
+        objects: &[Read],
+        origin: Option<Origin>,
+        is_recorded: bool,
+        mut findings: Findings,
+    ) -> Self {
         match objects {
             [] => findings.problem(directory, TouchesProblem::NoObjects),
+            // Objects are recorded one after the other, and one is enough to teach or to compare.
+            [one] if is_recorded => findings.note(
+                directory,
+                &format!("only {} has been recorded", one.name),
+                "Record other objects into the same directory to train on them alone.",
+            ),
             [one] => findings.problem(directory, TouchesProblem::OneObject { name: one.name.clone() }),
             _ => {}
         }
@@ -197,7 +210,8 @@ fn logged(path: &Path, objects: &mut Vec<Read>, findings: &mut Findings) -> Resu
     if let Some(Warning::SkippedChannels { channels, .. }) = skipped {
         findings.note(path, &format!("skipped {}", channels_said(&channels)), "Nothing needs to be done about them.");
     }
-    for ObjectTouches { name, touches } in found {
+    for object in found {
+        let (name, touches) = (object.name.clone(), object.touches().to_vec());
         // Findings name the object beside the log, where the log is not called like it.
         let path = if name == name_of(path) { path.into() } else { path.join(&name) };
         objects.push(Read { name, path, touches, approaches: None, is_logged: true });

@@ -143,3 +143,16 @@ fn the_published_format_survives_reading_and_writing_to_the_byte() {
     let again: Vec<Touch> = text::touches(posed.as_bytes(), Path::new("cup.txt")).collect::<Result<_>>().unwrap();
     assert_eq!(lines(&again), posed);
 }
+
+#[test]
+fn a_recording_of_one_object_is_no_reason_to_end_with_1() {
+    let directory = captured();
+    std::fs::remove_file(directory.path().join("spoon.txt")).unwrap();
+    change(directory.path(), |listing| {
+        listing.objects.retain(|entry| entry.name == "fork");
+        listing.recorded.push(crate::touches::Recorded { object: "fork".into(), touches: 30, ..Default::default() });
+    });
+    let (wrong, notes) = said(directory.path());
+    assert_eq!(wrong, [""; 0]);
+    assert!(notes.iter().any(|note| note.contains("only fork has been recorded")), "{notes:?}");
+}

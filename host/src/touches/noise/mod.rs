@@ -140,7 +140,8 @@ impl fmt::Display for Noise {
             }
         }
         for (finger, early) in (1..).zip(self.bent) {
-            say(early != 0.0, format!("finger {finger} early by {} ms", ms(early)));
+            let side = if early > 0.0 { "early" } else { "late" };
+            say(early != 0.0, format!("finger {finger} {side} by {} ms", ms(early.abs())));
         }
         say(self.speed != 1.0, format!("a speed of {} times the nominal one", self.speed));
         say(self.speed_error > 0.0, format!("speed off by up to {} % per touch", percent(self.speed_error)));
@@ -270,13 +271,13 @@ impl Noise {
     /// noise, seed, name, and each touch with its position. Noise that [`check`](Self::check) refuses gives touches
     /// without meaning.
     pub fn add(&self, name: &str, touches: &[Touch], seed: u64) -> Vec<Touch> {
-        self.by(name, touches, seed, |index| index)
+        self.add_by(name, touches, seed, |index| index)
     }
 
     /// The same with touches of `robots` robots in turn: touch i is made by robot i modulo `robots`, and a robot's bias
     /// is the same for every object. 0 is taken as 1.
     pub fn add_by_robots(&self, name: &str, touches: &[Touch], seed: u64, robots: usize) -> Vec<Touch> {
-        self.by(name, touches, seed, |index| index % robots.max(1) as u64)
+        self.add_by(name, touches, seed, |index| index % robots.max(1) as u64)
     }
 
     /// A touch with this noise, whose random numbers come from `random`; made by a robot of its own. For touches that are
@@ -311,7 +312,8 @@ impl Noise {
         }
     }
 
-    fn by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
+    /// The same with touch i made by robot `robot(i)`.
+    pub(super) fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
         // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
         // version 0.1.0, and no other setting changes it.
         let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);

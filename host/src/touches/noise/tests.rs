@@ -218,6 +218,12 @@ fn noise_is_said_in_words() {
 }
 
 #[test]
+fn a_late_finger_is_not_said_to_be_early_by_a_negative_time() {
+    let noise = Noise { bent: [0.0, -4_311.0, 2_000.0], ..Noise::default() };
+    assert_eq!(noise.to_string(), "finger 2 late by 4.311 ms, finger 3 early by 2 ms");
+}
+
+#[test]
 fn levels_and_ranges_are_read() {
     let range = |least, largest| Ok(Deviation { least, largest });
     assert_eq!("5ms".parse(), range(5_000.0, 5_000.0));

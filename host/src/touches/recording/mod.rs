@@ -297,7 +297,10 @@ fn admit(listing: Listing, origin: Option<&Origin>) -> Result<Listing, TouchesPr
         let (objects, touches) = (listing.names().join(", "), listing.objects.iter().map(|entry| entry.touches).sum());
         return Err(TouchesProblem::HoldsSimulated { objects, touches });
     }
-    let differences = origin.map_or_else(Vec::new, |origin| differences(&listing.origin, origin));
+    let mut differences = origin.map_or_else(Vec::new, |origin| differences(&listing.origin, origin));
+    if listing.origin.format != Format::Text {
+        differences.push(format!("format is {} there and text here", listing.origin.format.name()));
+    }
     match differences.is_empty() {
         true => Ok(listing),
         false => Err(TouchesProblem::OtherRecording { differences: differences.join(", ") }),

@@ -4,8 +4,9 @@
 //! with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches' density, which
 //! is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum likelihood with a
 //! weak preference for probes that are not very crooked, by Nelder–Mead from several starts). Full and partial touches count, and approaches that touched nothing; where
-//! the pose was recorded, each touch is compared with approaches in its pose. Intervals are of
-//! 95 %, by profile likelihood.
+//! the pose was recorded, each touch is compared with approaches in its pose. Intervals are those of 95 % by profile
+//! likelihood (Wilks' theorem), made wider by experience: the tables are simulated and smoothed. What the simulation does
+//! not know, such as a finger that is bent aside, is in no interval.
 //!
 //! Only differences of contact times are recorded, so an offset of all three fingers alike cannot be told, and changes
 //! nothing: offsets are relative to the first finger's.
@@ -124,7 +125,7 @@ pub fn fit(
     progress: &dyn Progress,
 ) -> Result<Fit> {
     let of: Vec<usize> = recorded.objects.iter().map(|own| place(&own.name, objects)).collect::<Result<_>>()?;
-    let touches = || recorded.objects.iter().flat_map(|object| &object.touches);
+    let touches = || recorded.touches();
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
     let found = touches().chain(plate.into_iter().flatten()).filter(useful).count();
     if found < LEAST {
@@ -134,8 +135,8 @@ pub fn fit(
     let kept = kept(recorded);
     let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
         name: &own.name,
-        touches: own.touches.iter().map(Observed::of).collect(),
-        in_poses: posed::in_poses(&own.name, &own.touches, &scenes[object], settings),
+        touches: own.touches().iter().map(Observed::of).collect(),
+        in_poses: posed::in_poses(&own.name, own.touches(), &scenes[object], settings),
         kept,
     });
     let evidence = Evidence {
@@ -166,7 +167,7 @@ fn place(name: &str, objects: &[Object]) -> Result<usize> {
 /// Which approaches were recorded, as far as the touches say: every one if some touched nothing, only full touches if
 /// there are no others.
 fn kept(recorded: &Dataset) -> Kept {
-    let any = |is: fn(&Touch) -> bool| recorded.objects.iter().flat_map(|object| &object.touches).any(is);
+    let any = |is: fn(&Touch) -> bool| recorded.touches().any(is);
     match (any(Touch::is_empty), any(|touch| !touch.is_full())) {
         (true, _) => Kept::All,
         (false, true) => Kept::Contacts,
@@ -191,7 +192,7 @@ fn simulated(
     let one = |(object, scenes): (&Object, &Vec<_>)| {
         let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
         progress::advance(progress, 1)?;
-        Ok(Densities::new(&object.name, &touches))
+        Ok(Densities::new(&object.name, touches.touches()))
     };
     let densities = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
     Ok((densities, scenes))

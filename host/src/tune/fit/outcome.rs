@@ -10,7 +10,8 @@ use palpate_shared::format::Length;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
 
-/// A value, and between what it is with a probability of 95 %; an end is none where the recordings do not tell it.
+/// A value and its interval, which holds the true one in about 95 of 100 fits, if probe and objects are as they are
+/// simulated; an end is none where the recordings do not tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     /// The likeliest value.
@@ -151,7 +152,7 @@ impl Fit {
             if self.presses > 0 { format!(" and {} presses on a plate", self.presses) } else { String::new() };
         let mut text = format!(
             "# Found by `palpate probe fit` from {} approaches to {}{presses}.\n\
-             # Behind each value, between what it is with a probability of 95 %.\n",
+             # Behind each value its 95 % interval, which supposes that probe and objects are as they are simulated.\n",
             self.recorded,
             self.objects.join(", "),
         );

@@ -3,7 +3,7 @@
 use super::*;
 use crate::error::Problem;
 use crate::mesh::builtin;
-use crate::touches::ObjectTouches;
+use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
@@ -71,12 +71,12 @@ fn approaches(object: &Object, count: usize, seed: u64, probe: &Crooked) -> Vec<
     let touches = capture::touches(&scenes[0], &object.name, &origin, 0..count as u64).unwrap();
     let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ object.name.len() as u64);
     let times = |touch: &Touch| touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3));
-    touches.iter().map(|touch| record(times(touch), probe, &mut numbers)).collect()
+    touches.touches().iter().map(|touch| record(times(touch), probe, &mut numbers)).collect()
 }
 
 fn recorded(objects: &[Object], count: usize, seed: u64, probe: &Crooked) -> Dataset {
     let one =
-        |object: &Object| ObjectTouches { name: object.name.clone(), touches: approaches(object, count, seed, probe) };
+        |object: &Object| ObjectTouches::new(&object.name, approaches(object, count, seed, probe), Source::Object);
     Dataset::new(objects.iter().map(one).collect())
 }
 
@@ -142,7 +142,7 @@ fn recorded_poses_tell_the_slope_as_well() {
         let scenes = capture::scenes(&[object], &origin, &()).unwrap();
         let poses = capture::touches(&scenes[0], &object.name, &origin, 0..250).unwrap();
         let with = |(touch, posed): (&Touch, &Touch)| touch.with_pose(posed.pose().unwrap());
-        own.touches = own.touches.iter().zip(&poses).map(with).collect();
+        own.edit(|touches| *touches = touches.iter().zip(poses.touches()).map(with).collect());
     }
     let found = fitted(&posed, None);
     near(&found, &BENT, [0.06, 3.0, 0.5]);
@@ -192,7 +192,7 @@ fn one_object_is_enough_for_a_fit_with_wider_intervals() {
 #[test]
 fn full_touches_alone_do_not_tell_what_is_missed() {
     let mut full = recorded(&objects(), 900, 10, &BENT);
-    full.objects.iter_mut().for_each(|object| object.touches.retain(Touch::is_full));
+    full.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
     let found = fitted(&full, None);
     assert_eq!(found.missed, None);
     assert!(
@@ -207,7 +207,7 @@ fn full_touches_alone_do_not_tell_what_is_missed() {
 #[test]
 fn approaches_that_touched_nothing_need_not_be_recorded() {
     let mut contacts = recorded(&objects(), 500, 11, &BENT);
-    contacts.objects.iter_mut().for_each(|object| object.touches.retain(|touch| !touch.is_empty()));
+    contacts.objects.iter_mut().for_each(|object| *object = object.filtered(|touch| !touch.is_empty()));
     near(&fitted(&contacts, Some(&plate(60, &BENT))), &BENT, [0.05, 1.2, 0.3]);
 }
 
@@ -231,7 +231,7 @@ fn a_recorded_object_without_a_mesh_is_named() {
 fn a_recording_under_a_wrong_name_is_named_with_the_right_one() {
     let mut wrong = recorded(&objects(), 300, 14, &BENT);
     let fork = other("fork");
-    wrong.objects[1].touches = approaches(&fork, 300, 14, &BENT);
+    wrong.objects[1].edit(|touches| *touches = approaches(&fork, 300, 14, &BENT));
     let all = [objects(), vec![fork]].concat();
     let found = fit(&wrong, &all, None, &settings(), &()).unwrap();
     let expected = Suspect::OtherObject { object: "mouse".into(), looks_like: "fork".into() };
@@ -249,8 +249,8 @@ fn a_recording_under_a_wrong_name_is_named_with_the_right_one() {
 #[test]
 fn two_objects_in_one_recording_are_named_with_the_place() {
     let mut two = recorded(&objects(), 300, 15, &BENT);
-    let watch = two.objects[2].touches.clone();
-    two.objects[0].touches.splice(180.., watch[..120].iter().copied());
+    let watch = two.objects[2].touches().to_vec();
+    two.objects[0].edit(|touches| _ = touches.splice(180.., watch[..120].iter().copied()));
     let found = fitted(&two, None);
     let [Suspect::TwoObjects { object, other, from: Some(from), to: Some(to), .. }] = &found.suspects[..] else {
         panic!("{:?}", found.suspects)
@@ -259,7 +259,7 @@ fn two_objects_in_one_recording_are_named_with_the_place() {
     assert!(from.abs_diff(181) < 15 && *to > 290, "{from} to {to}");
     // And if they are mixed.
     let mut mixed = recorded(&objects(), 300, 15, &BENT);
-    (0..300).step_by(3).for_each(|index| mixed.objects[0].touches[index] = watch[index]);
+    mixed.objects[0].edit(|touches| (0..300).step_by(3).for_each(|index| touches[index] = watch[index]));
     let found = fitted(&mixed, None);
     assert!(
         matches!(&found.suspects[..], [Suspect::TwoObjects { object, other, .. }] if object == "bowl" && other == "wristwatch"),
@@ -273,7 +273,7 @@ fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
     let mut moved = recorded(&objects(), 300, 16, &BENT);
     let after = Crooked { late: [0.0, -12.0, 6.0], ..BENT };
     let changed = approaches(&objects()[0], 400, 17, &after);
-    moved.objects[0].touches.splice(150.., changed[..250].iter().copied());
+    moved.objects[0].edit(|touches| _ = touches.splice(150.., changed[..250].iter().copied()));
     let found = fitted(&moved, None);
     let suspect = found.suspects.iter().find(|suspect| matches!(suspect, Suspect::Changed { .. }));
     let Some(Suspect::Changed { object, from, what }) = suspect else { panic!("{:?}", found.suspects) };
@@ -284,7 +284,7 @@ fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
 #[test]
 fn a_mesh_of_another_shape_is_like_no_recording() {
     let mut other = recorded(&objects(), 300, 18, &BENT);
-    other.objects[1].touches = approaches(&self::other("spoon"), 300, 18, &BENT);
+    other.objects[1].edit(|touches| *touches = approaches(&self::other("spoon"), 300, 18, &BENT));
     let found = fitted(&other, None);
     assert!(found.suspects.iter().any(|suspect| suspect.to_string().starts_with("mouse: ")), "{:?}", found.suspects);
 }

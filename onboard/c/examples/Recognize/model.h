@@ -3,7 +3,7 @@
 #ifndef MODEL_MODEL_H
 #define MODEL_MODEL_H
 
-/* What of palpate.h this model needs. For several models in one program: define these before including the first. */
+/* What of palpate.h this model needs. For several models in one file: define these before including the first. */
 #ifndef PALPATE_LAYOUTS
 #define PALPATE_LAYOUTS PALPATE_COMPLETE
 #endif
@@ -25,9 +25,14 @@
 #endif
 #include "palpate.h"
 
-#if (PALPATE_LAYOUTS & PALPATE_COMPLETE) == 0 || (PALPATE_LEAVES & PALPATE_I8) == 0 || \
-    PALPATE_STRANGERS < 0 || PALPATE_SHARED < 0 || PALPATE_MAX_OBJECTS < 2
-#error "this model needs PALPATE_COMPLETE in PALPATE_LAYOUTS, PALPATE_I8 in PALPATE_LEAVES, PALPATE_STRANGERS 0 or more, PALPATE_SHARED 0 or more, and room for 2 objects"
+#if (PALPATE_LAYOUTS & PALPATE_COMPLETE) == 0
+#error "model MODEL: before the first model is included, #define PALPATE_LAYOUTS (PALPATE_COMPLETE | those of the others)"
+#endif
+#if (PALPATE_LEAVES & PALPATE_I8) == 0
+#error "model MODEL: before the first model is included, #define PALPATE_LEAVES (PALPATE_I8 | those of the others)"
+#endif
+#if PALPATE_MAX_OBJECTS < 2
+#error "model MODEL: before the first model is included, #define PALPATE_MAX_OBJECTS 2"
 #endif
 
 /* palpate_open(&model, model_model, sizeof model_model) */

@@ -55,7 +55,7 @@ fn main() -> ! {
     loop {
         let Ok(happened) = station.step(&mut chip);
         if happened.is_none() {
-            // On a board: also until ProbeStation::due. Here time passes when the host says so.
+            // On a board: also for ProbeStation::wait. Here time passes when the host says so.
             chip::sleep_unless(|| chip.0.is_ready() || !pins::is_idle());
         }
     }

@@ -79,7 +79,7 @@ fn main() -> ! {
     {
         loop {
             let _ = black_box(station.step(&mut Anything));
-            black_box(station.due(0));
+            black_box(station.wait(0));
         }
     }
     loop {

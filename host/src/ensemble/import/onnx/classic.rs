@@ -3,6 +3,7 @@
 use super::wire::Node;
 use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
 use crate::ensemble::import::unsupported;
+use palpate_shared::format::Link;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Reads the trees into `draft`; returns the number of features that they use, counted to the last.
@@ -43,6 +44,7 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
     }
     let divisor = divisor(text(node, "aggregate_function").unwrap_or("SUM"), order.len())?;
     weights.divide(divisor);
+    weights.complete(draft, order.len());
     let mut most = 0;
     let mut seen = vec![false; count];
     for tree in order {
@@ -51,7 +53,7 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
         };
         add_tree(draft, root, &mut seen, |at| {
             if is_leaf(at) {
-                return Ok(Targeted::Leaf(weights.of.remove(&(trees[at], ids[at])).unwrap_or_default()));
+                return Ok(Targeted::Leaf(weights.leaf(trees[at], ids[at])));
             }
             let child = |id: i64| {
                 let place = places.get(&(tree, id)).copied();
@@ -72,6 +74,10 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
 /// Leaves' values by tree and node, for the outputs of the draft.
 struct Weights {
     of: HashMap<(i64, i64), Vec<(usize, f64)>>,
+    /// Whether leaves hold shares of votes for the second of two classes.
+    votes: bool,
+    /// What a tree's votes for both classes come to, where leaves are to have those for the first one too.
+    all: Option<f64>,
 }
 
 impl Weights {
@@ -97,7 +103,16 @@ impl Weights {
                     "Train a model for each target.",
                 ));
             }
-            draft.base = if base.is_empty() { vec![0.0] } else { base.to_vec() };
+            draft.base = match base {
+                [] => vec![0.0],
+                [one] => vec![*one],
+                _ => return Err(damaged(format!("base_values has {} numbers for 1 target", base.len()))),
+            };
+            match transform {
+                "NONE" => {}
+                "LOGISTIC" => draft.prediction.link = Link::Logistic,
+                other => draft.notes.push(format!("The file's post_transform is {other}: values are those before it.")),
+            }
             Map::Same
         };
         let outputs = draft.base.len();
@@ -112,11 +127,36 @@ impl Weights {
                     }
                     slot.push((target, value));
                 }
-                Map::Second => slot.push((1, value)),
-                Map::Votes => slot.extend([(0, -value), (1, value)]),
+                Map::Second | Map::Votes => slot.push((1, value)),
             }
         }
-        Ok(Self { of })
+        Ok(Self { of, votes: matches!(map, Map::Votes), all: None })
+    }
+
+    /// Gives leaves the votes for the first class as well. Where a tree's can be told, margins are shares of all trees'
+    /// votes from 0 on; otherwise those of the first class start from 1.
+    fn complete(&mut self, draft: &mut Draft, trees: usize) {
+        if !self.votes {
+            return;
+        }
+        let all = 1.0 / trees.max(1) as f64;
+        let shares = || self.of.values().map(|values| values.iter().map(|(_, value)| value).sum::<f64>());
+        if draft.base.iter().all(|&base| base == 0.0) && shares().all(|share| share <= all * (1.0 + 1e-6)) {
+            self.all = Some(all);
+        } else {
+            draft.base[0] = 1.0 - draft.base[1];
+        }
+    }
+
+    /// What a leaf adds to each output that it names.
+    fn leaf(&mut self, tree: i64, node: i64) -> Vec<(usize, f64)> {
+        let mut values = self.of.remove(&(tree, node)).unwrap_or_default();
+        if self.votes {
+            let second: f64 = values.iter().map(|(_, value)| value).sum();
+            let first = self.all.map_or(-second, |all| (all - second).max(0.0));
+            values = vec![(0, first), (1, second)];
+        }
+        values
     }
 
     fn divide(&mut self, divisor: f64) {
@@ -162,7 +202,7 @@ fn classes(
             [base] => *base,
             _ => return Err(damaged("base_values has two numbers, but leaves are for one class")),
         };
-        draft.base = vec![if is_votes { 1.0 - base } else { 0.0 }, base];
+        draft.base = vec![0.0, base];
         return Ok(if is_votes { Map::Votes } else { Map::Second });
     }
     draft.base = match base {

@@ -10,8 +10,7 @@ mod wire;
 
 use super::draft::{Draft, DraftTree, Targeted};
 use super::unsupported;
-use crate::ensemble::nodes::{after, from};
-use crate::ensemble::{Ensemble, MAX_FEATURES, MAX_OBJECTS};
+use crate::ensemble::{Ensemble, MAX_FEATURES, MAX_OBJECTS, Threshold};
 use crate::error::EnsembleProblem;
 use wire::{Attribute, Graph, Node};
 
@@ -40,8 +39,12 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     let others = ensembles.count();
     if others > 0 {
         return Err(unsupported(
-            format!("it has {} tree ensembles", others + 1),
-            "Convert the model without splitting it (onnxmltools: without `split`).",
+            format!(
+                "it has {} tree ensembles, whose answers are put together by something else: weights, votes, probabilities",
+                others + 1
+            ),
+            "Of AdaBoost, Bagging, Voting, Stacking, OneVsRest or a calibrated classifier, give a forest or boosted trees \
+             trained in its place. A single model that onnxmltools split has to be converted without `split`.",
         ));
     }
     let harmless = |node: &&Node<'_>| !is_ensemble(node) && !HARMLESS.contains(&node.operation);
@@ -91,7 +94,7 @@ fn columns(graph: &Graph<'_>, ensemble: &Node<'_>) -> Result<Option<usize>> {
 /// A comparison: the threshold of `x < threshold`, whether it is the false branch that is left then, and where a missing
 /// value goes.
 struct Comparison {
-    threshold: f32,
+    threshold: Threshold,
     swapped: bool,
     missing_left: bool,
 }
@@ -111,10 +114,10 @@ fn comparison(mode: &str, value: f64, missing_is_true: bool) -> Result<Compariso
         return Err(damaged("a threshold is not a number"));
     }
     let (threshold, swapped) = match mode {
-        "LEQ" => (after(value), false),
-        "LT" => (from(value), false),
-        "GTE" => (from(value), true),
-        "GT" => (after(value), true),
+        "LEQ" => (Threshold::at_or_below(value), false),
+        "LT" => (Threshold::below(value), false),
+        "GTE" => (Threshold::below(value), true),
+        "GT" => (Threshold::at_or_below(value), true),
         _ => {
             return Err(unsupported(
                 format!("it splits on categories (BRANCH_{mode})"),

@@ -3,12 +3,12 @@
 #![no_main]
 
 use embassy_executor::Spawner;
-use embassy_futures::select::{Either3, select3};
+use embassy_futures::select::select3;
 use embassy_rp::gpio::{Input, Pull};
 use embassy_rp::peripherals::UART0;
 use embassy_rp::uart::{BufferedInterruptHandler, BufferedUart, Config, Error};
 use embassy_rp::{bind_interrupts, clocks::RoscRng};
-use embassy_time::{Duration, Instant, Timer};
+use embassy_time::Instant;
 use embedded_io_async::BufRead;
 use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 use palpate_onboard::station::{Board, NoStorage, ProbeSettings, ProbeStation};
@@ -65,22 +65,18 @@ impl Board for Pico {
 }
 
 impl Pico {
-    /// Sleeps until a switch moves, a byte comes, or `due` microseconds are over.
-    async fn sleep(&mut self, due: Option<u32>) -> Result<(), Error> {
+    /// Sleeps until a switch moves, a byte comes, or `wait` microseconds are over.
+    async fn sleep(&mut self, wait: u32) -> Result<(), Error> {
         let Self { watcher, uart, received, count } = self;
         // Levels and not edges: one that changed while nobody waited wakes at once.
         let [a, b, c] = watcher.is_high();
         let (first, middle, last) = watcher.pins();
         let moved = select3(turn(first, a), turn(middle, b), turn(last, c));
-        let wait = Timer::after(due.map_or(Duration::MAX, |due| Duration::from_micros(due.into())));
-        match select3(moved, uart.fill_buf(), wait).await {
-            Either3::Second(bytes) => {
-                let bytes = bytes?;
-                *count = bytes.len().min(received.len());
-                received.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
-                uart.consume(*count);
-            }
-            Either3::First(_) | Either3::Third(()) => {}
+        if let Some(bytes) = palpate_embassy::sleep(moved, uart.fill_buf(), wait).await {
+            let bytes = bytes?;
+            *count = bytes.len().min(received.len());
+            received.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+            uart.consume(*count);
         }
         watcher.interrupt(&Micros);
         Ok(())
@@ -105,13 +101,12 @@ async fn main(_spawner: Spawner) {
     let settings = ProbeSettings { boot: RoscRng.next_u32(), program: PROGRAM, ..ProbeSettings::default() };
     let Ok(mut station) = ProbeStation::<OBJECTS>::open(MODEL, NoStorage, settings) else { return };
     loop {
-        match station.step(&mut pico) {
-            Ok(Some(_)) => {}
+        // What could not be sent the host asks for again.
+        let happened = station.step(&mut pico).unwrap_or_else(|failed| failed.happened);
+        if happened.is_none() {
+            let wait = station.wait(Micros.micros());
             // What was garbled on the line is missing, and the host sends it again.
-            Ok(None) | Err(_) => {
-                let due = station.due(Micros.micros());
-                let _ = pico.sleep(due).await;
-            }
+            let _ = pico.sleep(wait).await;
         }
     }
 }

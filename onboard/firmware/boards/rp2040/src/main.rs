@@ -102,7 +102,7 @@ fn run() -> Option<Infallible> {
     loop {
         let Ok(happened) = station.step(&mut pico);
         match happened {
-            None => shared::sleep(|now| station.due(now)),
+            None => shared::sleep(|now| station.wait(now)),
             Some(touched @ Happened::Touched { .. }) => led.set_state(touched.recognized().is_some().into()).ok()?,
             Some(_) => {}
         }

@@ -97,13 +97,13 @@ pub fn while_nobody_looks(act: impl FnOnce()) {
     });
 }
 
-/// Sleeps until an interrupt, or until `due` of [`ProbeStation`](palpate_onboard::station::ProbeStation) says.
-pub fn sleep(due: impl FnOnce(u32) -> Option<u32>) {
+/// Sleeps until an interrupt, or for as long as `wait` of [`ProbeStation`](palpate_onboard::station::ProbeStation) says.
+pub fn sleep(wait: impl FnOnce(u32) -> u32) {
     critical_section::with(|cs| {
         let busy = within(cs, |shared| {
-            // At least once per second, and never so soon that the alarm is missed.
-            let due = due(shared.clock.micros()).unwrap_or(u32::MAX).clamp(20, 1_000_000);
-            let set = shared.alarm.schedule(due.micros()).is_ok();
+            // Never so soon that the alarm is missed.
+            let wait = wait(shared.clock.micros()).max(20);
+            let set = shared.alarm.schedule(wait.micros()).is_ok();
             !(set && shared.watcher.is_idle() && shared.received.is_empty())
         });
         // With interrupts held back none can come between the look and the sleep; a pending one ends the sleep.

@@ -32,9 +32,16 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 #[cfg(feature = "palpate")]
 mod peer {
     use super::{CLASSES, FEATURES, best};
-    use palpate_onboard::shared::MISSING_FEATURE;
-    use palpate_onboard::shared::format::{Key, f32_key};
     use palpate_onboard::{Model, include_model};
+
+    #[cfg(feature = "real")]
+    use palpate_onboard::shared::format::f32_key as key;
+
+    /// A model of whole numbers.
+    #[cfg(not(feature = "real"))]
+    fn key(value: f32) -> i32 {
+        if value.is_nan() { palpate_onboard::shared::MISSING_FEATURE } else { value as i32 }
+    }
 
     static mut MODEL: Option<Model<'static>> = None;
 
@@ -54,13 +61,8 @@ mod peer {
         let Some(model) = (unsafe { &*(&raw const MODEL) }) else { return -1 };
         // SAFETY: so says the caller.
         let row = unsafe { core::slice::from_raw_parts(row, FEATURES) };
-        let whole = |value: f32| if value.is_nan() { MISSING_FEATURE } else { value as i32 };
         let mut features = [0; FEATURES];
-        if model.key() == Key::Real {
-            features.iter_mut().zip(row).for_each(|(feature, &value)| *feature = f32_key(value));
-        } else {
-            features.iter_mut().zip(row).for_each(|(feature, &value)| *feature = whole(value));
-        }
+        features.iter_mut().zip(row).for_each(|(feature, &value)| *feature = key(value));
         let mut margins = [0; CLASSES];
         model.margins_of(&features, &mut margins);
         best(&margins)

@@ -1,0 +1,80 @@
+//! Predictions of a model over rows: the class of each row, or its value.
+
+use super::Candidate;
+use super::together::AT_ONCE;
+use crate::error::{Result, RowsProblem};
+use crate::rows::Encoder;
+use palpate_onboard::inverse_link;
+use rayon::prelude::*;
+
+/// What a model makes of rows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Predicted {
+    /// The class of each row, as its position among the model's.
+    Classes(Vec<usize>),
+    /// The value of each row.
+    Values(Vec<f32>),
+}
+
+/// The class with the largest margin, and of several the first or the last.
+pub fn class_of(margins: &[f64], last_of_ties: bool) -> usize {
+    let better =
+        |class: usize, best: usize| margins[class] > margins[best] || last_of_ties && margins[class] == margins[best];
+    (1..margins.len()).fold(0, |best, class| if better(class, best) { class } else { best })
+}
+
+/// Predicts as the library does that trained the model: classes by the largest margin, or the values of a regression, with
+/// `raw` before their inverse link. `values` are rows of as many features as the model has. A compiled model is asked as on
+/// a chip, and gives the same bits.
+///
+/// # Errors
+/// [`RowsProblem`] for a model over touches, or rows of another number of features.
+pub fn predict<V: Copy + Into<f64> + Sync>(
+    candidate: Candidate<'_>,
+    values: &[V],
+    features: usize,
+    raw: bool,
+) -> Result<Predicted> {
+    let (wanted, outputs) = match candidate {
+        Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.len()),
+        Candidate::Compiled(model) => (model.feature_count(), model.object_count()),
+    };
+    if candidate.is_of_touches() {
+        return Err(RowsProblem::Touches.into());
+    }
+    if features != wanted {
+        return Err(RowsProblem::Columns { found: features, wanted, missing: String::new() }.into());
+    }
+    let rows = values.par_chunks_exact(features).with_min_len(AT_ONCE / 16);
+    Ok(match candidate {
+        Candidate::Full(ensemble) => {
+            let prediction = ensemble.prediction();
+            let margins = |row: &[V]| {
+                let row: Vec<f32> = row.iter().map(|&value| value.into() as f32).collect();
+                ensemble.margins_of_features(&row)
+            };
+            if outputs == 1 {
+                let link = |margin| if raw { margin } else { inverse_link(prediction.link, margin) };
+                Predicted::Values(rows.map(|row| link(margins(row)[0])).collect())
+            } else {
+                let nats = |row: &[V]| margins(row).into_iter().map(f64::from).collect::<Vec<_>>();
+                Predicted::Classes(rows.map(|row| class_of(&nats(row), prediction.last_of_ties)).collect())
+            }
+        }
+        Candidate::Compiled(model) => {
+            let encoder = Encoder::of(model);
+            if outputs == 1 {
+                let value = |row: &[V]| {
+                    let row = encoder.row(row);
+                    if raw { model.predict_raw(&row) } else { model.predict_value(&row) }
+                };
+                Predicted::Values(rows.map(|row| value(row).unwrap_or_default()).collect())
+            } else {
+                let class = |margins: &mut Vec<i32>, row: &[V]| {
+                    model.predict_class(&encoder.row(row), margins).unwrap_or_default()
+                };
+                Predicted::Classes(rows.map_init(|| vec![0; outputs], class).collect())
+            }
+        }
+    })
+}

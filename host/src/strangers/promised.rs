@@ -1,0 +1,95 @@
+//! A test of fit and a promised error rate together.
+//!
+//! Which names are given depends on the test: it holds some back and ends sequences. How often known objects are taken
+//! for unknown depends on the thresholds: the later names are given, the longer there is for a false alarm. So both are
+//! found in an order in which neither makes the other untrue, each on touches of its own:
+//!
+//! ```text
+//! an eighth ─────► thresholds without a test, made stricter (no promise)
+//! three eighths ─► the test under these: at most so many false alarms, by Learn-then-Test
+//! half ──────────► looser thresholds under the test: at most so many wrong names, by Learn-then-Test
+//! ```
+//!
+//! A looser threshold gives a name no later, in every single sequence, so there are no more false alarms than were tested.
+
+use super::{Calibrated, Settings, calibrate, tested_means, without};
+use crate::calibrate::{self, STRICTEST, add_noise, calibrate_from, odds_of};
+use crate::compile::{self, Restated, restate};
+use crate::error::{CalibrateProblem, Problem, Result};
+use crate::mesh::BACKGROUND;
+use crate::progress::Progress;
+use crate::touches::folds::split;
+use crate::touches::{Dataset, ObjectTouches};
+use palpate_onboard::{Model, Stopping};
+use palpate_shared::format::Tag;
+
+/// The share of touches that the promise is tested on, and of the others the share that thresholds begin with.
+const PROMISED: f64 = 0.5;
+const BEGUN: f64 = 0.25;
+/// How much stricter than the first thresholds sequences are followed, in nats: room for the loosest that keeps the
+/// promise, as far as fewer touches say where it is.
+const STRICTER: f64 = 0.5;
+/// The confidence of the first thresholds, which promise nothing: that of an estimate.
+const EVEN: f64 = 0.5;
+
+/// Gives a model a test of fit, or replaces the one that it has, and thresholds that keep a promised error rate with that
+/// test: a sequence that ends as unknown is one without a name, and a name is given when the test lets it be. `promise.noise`
+/// is added to touches and shapes. Each of the two shares is kept with its own confidence.
+///
+/// # Errors
+/// As [`strangers::calibrate`](fn@super::calibrate) and [`calibrate::calibrate`](fn@crate::calibrate::calibrate).
+pub fn calibrate_with_promise(
+    model: &Model<'_>,
+    dataset: &Dataset,
+    shapes: &[ObjectTouches],
+    settings: &Settings,
+    promise: &calibrate::Settings,
+    progress: &dyn Progress,
+) -> Result<(calibrate::Calibrated, Calibrated)> {
+    let untested = without(model)?;
+    let untested = compile::open(&untested)?;
+    let halves = split(dataset, PROMISED, promise.seed)?;
+    let parts = split(&halves.train, BEGUN, promise.seed)?;
+    let strictest = strictest(&untested, parts.test, promise, progress)?;
+    let max_touches = promise.max_touches.unwrap_or(Stopping::from_model(&untested).max_touches());
+    let begun = Restated {
+        odds: Some(odds_of(strictest)),
+        max_touches: Some(max_touches),
+        sections: vec![(Tag::ThresholdsByObject, None)],
+        ..Restated::default()
+    };
+    let begun = restate(&untested, &begun)?;
+    let mut learned = parts.train;
+    add_noise(&untested, &mut learned, &promise.noise, max_touches, promise.seed);
+    let noisy = |shapes: &ObjectTouches| {
+        // Each touch is by a robot of its own: only the means of shapes count.
+        let robots = shapes.len().max(1);
+        shapes.clone().renamed(BACKGROUND).noisy(&promise.noise, promise.seed, robots)
+    };
+    let shapes: Vec<ObjectTouches> =
+        if promise.noise.is_none() { shapes.to_vec() } else { shapes.iter().map(noisy).collect() };
+    let tested = calibrate(&compile::open(&begun)?, &learned, &shapes, settings)?;
+    let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(strictest), progress)?;
+    let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
+    let tested = Calibrated { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
+    Ok((promised, tested))
+}
+
+/// The margin in nats that thresholds begin with.
+fn strictest(
+    untested: &Model<'_>,
+    part: Dataset,
+    promise: &calibrate::Settings,
+    progress: &dyn Progress,
+) -> Result<f64> {
+    let settings = calibrate::Settings { confidence: EVEN, ..promise.clone() };
+    match calibrate::calibrate(untested, part, &settings, progress) {
+        Ok(calibrated) => Ok(calibrated.margins.values().copied().fold(0.0, f64::max) + STRICTER),
+        Err(error) => match error.problem() {
+            Some(Problem::Calibrate(CalibrateProblem::TooFew { .. } | CalibrateProblem::NotKept { .. })) => {
+                Ok(((1.0 - promise.rate) / promise.rate).ln() + STRICTEST[0])
+            }
+            _ => Err(error),
+        },
+    }
+}

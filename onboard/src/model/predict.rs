@@ -1,0 +1,183 @@
+//! A row to a class or a value, as the library that trained the model predicts it.
+
+use super::Model;
+use crate::decide::exp2_negative;
+use palpate_shared::format::{Link, Prediction, f32_key};
+
+impl Model<'_> {
+    /// The class of a row: that with the largest margin, and of several the first, or the last where
+    /// [`Prediction::last_of_ties`] says so. With f32 leaves their sums are compared as they are. `None`, and nothing
+    /// written, if `margins` is shorter than there are classes; it then holds what [`Model::margins_of`] gives.
+    ///
+    /// A model over touches has verdicts instead, but is answered in the same way.
+    ///
+    /// Cost: that of the margins, and a few instructions for each class. Cannot fail otherwise.
+    pub fn predict_class(&self, features: &[i32], margins: &mut [i32]) -> Option<usize> {
+        let margins = margins.get_mut(..self.object_count())?;
+        margins.fill(0);
+        self.sum(features, margins);
+        let last_of_ties = self.prediction().last_of_ties;
+        let (mut best, mut most) = (0, i32::MIN);
+        for (class, &sum) in margins.iter().take(self.known_count()).enumerate() {
+            let sum = if self.is_float() { f32_key(f32::from_bits(sum.cast_unsigned())) } else { sum };
+            if sum > most || last_of_ties && sum == most {
+                (best, most) = (class, sum);
+            }
+        }
+        self.make_fixed(margins);
+        Some(best)
+    }
+
+    /// The value of a row before the inverse link: the margin of a model with one output, times
+    /// [`Prediction::scale`]. `None` for a model with several outputs.
+    ///
+    /// With f32 leaves it is the sum times the scale, rounded once; otherwise the margin as f32 times the product of
+    /// [`Model::unit`] and the scale as f32: three roundings, each of 2^-24 of the value at most.
+    ///
+    /// Cost: that of the margins, and three operations of floating point. Cannot fail otherwise.
+    pub fn predict_raw(&self, features: &[i32]) -> Option<f32> {
+        if self.object_count() != 1 {
+            return None;
+        }
+        let mut margin = [0];
+        self.sum(features, &mut margin);
+        let ([margin], scale) = (margin, self.prediction().scale);
+        Some(if self.is_float() {
+            f32::from_bits(margin.cast_unsigned()) * scale
+        } else {
+            margin as f32 * (self.unit() * scale)
+        })
+    }
+
+    /// The value of a row as the library predicts it: [`Model::predict_raw`] after the model's inverse link, see
+    /// [`inverse_link`]. `None` for a model with several outputs.
+    pub fn predict_value(&self, features: &[i32]) -> Option<f32> {
+        self.predict_raw(features).map(|margin| inverse_link(self.prediction().link, margin))
+    }
+
+    /// How margins become a class or a value: the [default](Prediction::default) unless the model states it.
+    ///
+    /// Cost: a few instructions for each optional section.
+    pub fn prediction(&self) -> Prediction {
+        Prediction::from_bytes(self.stated_prediction()).unwrap_or_default()
+    }
+}
+
+/// The value that a margin stands for.
+///
+/// Error, relative to the result, where it is no less than 2^-126: [`Link::Exponential`] 1e-7, [`Link::Logistic`] 3e-7,
+/// [`Link::Softplus`] 5e-7, [`Link::Square`] 6e-8. Of a NaN it is NaN. Cost: a power in integers, and a few operations in f32, which
+/// take most of the time on chips without a float unit. Cannot fail.
+pub fn inverse_link(link: Link, margin: f32) -> f32 {
+    match link {
+        Link::Identity => margin,
+        Link::Exponential => exp(margin),
+        Link::Square => {
+            let square = margin * margin;
+            if margin < 0.0 { -square } else { square }
+        }
+        Link::Logistic if margin >= 0.0 => 1.0 / (1.0 + exp(-margin)),
+        Link::Logistic => {
+            let power = exp(margin);
+            power / (1.0 + power)
+        }
+        Link::Softplus if margin > 0.0 => margin + ln_1p(exp(-margin)),
+        Link::Softplus => ln_1p(exp(margin)),
+    }
+}
+
+/// log2 e in Q39.
+const LOG2_E: u64 = 793_129_986_396;
+
+/// e^x from a power of two in fixed point.
+fn exp(x: f32) -> f32 {
+    if x.is_nan() {
+        return x;
+    }
+    if x > 89.0 {
+        return f32::INFINITY;
+    }
+    if x < -104.0 {
+        return 0.0;
+    }
+    let bits = x.to_bits();
+    let exponent = (bits >> 23) & 0xff;
+    let mantissa = u64::from(bits & 0x7f_ffff | 0x80_0000);
+    // |x| · log2 e in Q32; that of a subnormal number is 0 either way.
+    let magnitude = (mantissa * LOG2_E).checked_shr(157_u32.saturating_sub(exponent)).unwrap_or(0);
+    let (whole, fraction) = (magnitude >> 32, magnitude & 0xffff_ffff);
+    // Below 151, since |x| is at most 104.
+    let whole = i32::try_from(whole).unwrap_or(0);
+    // 2^-fraction · 2^whole, the fraction not below 0.
+    let (whole, fraction) = match (x > 0.0, fraction) {
+        (true, 0) => (whole, 0),
+        (true, fraction) => (whole + 1, (1 << 32) - fraction),
+        (false, fraction) => (-whole, fraction),
+    };
+    // From 2^23 to 2^24, which f32 holds exactly.
+    let power = (exp2_negative(fraction) + (1 << 31)) >> 32;
+    let power = u32::try_from(power).unwrap_or(0) as f32;
+    // In two steps, of which the first is exact.
+    let half = (whole - 24) / 2;
+    power * power_of_two(half) * power_of_two(whole - 24 - half)
+}
+
+/// 2^exponent, for exponents of a normal number.
+const fn power_of_two(exponent: i32) -> f32 {
+    f32::from_bits(((127 + exponent) << 23).cast_unsigned())
+}
+
+/// ln(1 + e) for e from 0 to 1: twice the area tangent of e / (2 + e), which is at most a third.
+fn ln_1p(e: f32) -> f32 {
+    let s = e / (2.0 + e);
+    let t = s * s;
+    let mut sum = 1.0 / 13.0;
+    for term in [1.0 / 11.0, 1.0 / 9.0, 1.0 / 7.0, 1.0 / 5.0, 1.0 / 3.0, 1.0] {
+        sum = sum * t + term;
+    }
+    2.0 * s * sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverse_links_are_within_the_stated_error() {
+        let mut worst = [0.0_f64; 5];
+        let spread = (0..200_000).map(|step| (f64::from(step) / 1000.0 - 100.0) as f32);
+        let small = (1..200).flat_map(|step| [1e-30_f32, 1e-6, 1e-3].map(|unit| unit * step as f32));
+        for x in spread.chain(small.clone()).chain(small.map(|x| -x)).chain([0.0, -0.0]) {
+            let exact = f64::from(x);
+            for &link in Link::ALL {
+                let expected = match link {
+                    Link::Identity => exact,
+                    Link::Exponential => exact.exp(),
+                    Link::Square => exact * exact.abs(),
+                    Link::Logistic => 1.0 / (1.0 + (-exact).exp()),
+                    Link::Softplus => exact.max(0.0) + (-exact.abs()).exp().ln_1p(),
+                };
+                if expected.abs() < f64::from(f32::MIN_POSITIVE) || expected.abs() > f64::from(f32::MAX) {
+                    continue;
+                }
+                let error = (f64::from(inverse_link(link, x)) - expected).abs() / expected.abs();
+                let slot = &mut worst[usize::from(link.code())];
+                *slot = slot.max(error);
+            }
+        }
+        let stated = [0.0, 3e-7, 1e-7, 6e-8, 5e-7];
+        assert!(worst.iter().zip(stated).all(|(worst, stated)| *worst <= stated), "{worst:?}");
+    }
+
+    #[test]
+    fn inverse_links_of_the_ends_are_their_limits() {
+        let at = |x: f32| Link::ALL.iter().map(move |&link| inverse_link(link, x)).collect::<std::vec::Vec<_>>();
+        let infinity = f32::INFINITY;
+        assert_eq!(at(infinity), [infinity, 1.0, infinity, infinity, infinity]);
+        assert_eq!(at(-infinity), [-infinity, 0.0, 0.0, -infinity, 0.0]);
+        assert_eq!(at(0.0)[..4], [0.0, 0.5, 1.0, 0.0]);
+        assert!(at(f32::NAN).into_iter().all(f32::is_nan));
+        assert_eq!(inverse_link(Link::Exponential, 88.73), infinity);
+        assert_eq!(inverse_link(Link::Exponential, -103.0), f32::from_bits(1));
+    }
+}

@@ -1,0 +1,129 @@
+//! What a model over rows predicts: how a margin becomes a value, which class wins a tie, and which numbers stand for a
+//! missing value.
+
+use crate::MISSING_FEATURE;
+
+codes! {
+    /// What turns the margin of a regression into the value that its library predicts.
+    Link {
+        /// The margin itself.
+        Identity = 0, "identity";
+        /// 1 / (1 + e^-x): of targets between 0 and 1.
+        Logistic = 1, "logistic";
+        /// e^x: of positive targets, as with Poisson, gamma or Tweedie losses.
+        Exponential = 2, "exponential";
+        /// x · |x|: of targets whose square root was learned.
+        Square = 3, "square";
+        /// ln(1 + e^x).
+        Softplus = 4, "softplus";
+    }
+}
+
+/// How margins of a model over rows become a class or a value: 8 bytes. A model without this section has the
+/// [default](Prediction::default).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prediction {
+    /// What turns a scaled margin into a value.
+    pub link: Link,
+    /// Whether the last of several largest margins names the class, and not the first.
+    pub last_of_ties: bool,
+    /// What a margin is multiplied by to be the library's: positive and finite.
+    pub scale: f32,
+}
+
+impl Default for Prediction {
+    fn default() -> Self {
+        Self { link: Link::Identity, last_of_ties: false, scale: 1.0 }
+    }
+}
+
+impl Prediction {
+    /// Bytes of the section.
+    pub const LENGTH: usize = 8;
+
+    /// The section's content.
+    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
+        let [a, b, c, d] = self.scale.to_le_bytes();
+        [self.link.code(), self.last_of_ties.into(), 0, 0, a, b, c, d]
+    }
+
+    /// Reads a section; `None` for a link that does not exist, a scale that is not positive and finite, or too few bytes.
+    /// Bytes after those that are known are ignored.
+    ///
+    /// Cost: a few instructions. Cannot fail otherwise.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (&[link, ties, _, _, a, b, c, d], _) = bytes.split_first_chunk()?;
+        let scale = u32::from_le_bytes([a, b, c, d]);
+        // Positive and finite, without floating point.
+        if ties > 1 || scale.wrapping_sub(1) >= f32::INFINITY.to_bits() - 1 {
+            return None;
+        }
+        Some(Self { link: Link::from_code(link)?, last_of_ties: ties == 1, scale: f32::from_bits(scale) })
+    }
+}
+
+/// Features that stand for a missing value, as the library took them in training: 8 bytes. Both ends belong to them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sentinel {
+    /// The least: a whole number, or the key of an f32 value.
+    pub low: i32,
+    /// The largest.
+    pub high: i32,
+}
+
+impl Sentinel {
+    /// Bytes of the section.
+    pub const LENGTH: usize = 8;
+
+    /// The section's content.
+    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
+        let [[a, b, c, d], [e, f, g, h]] = [self.low.to_le_bytes(), self.high.to_le_bytes()];
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// Reads a section; `None` if it is too short or its ends are in the wrong order. Bytes after those that are known
+    /// are ignored.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (&[a, b, c, d, e, f, g, h], _) = bytes.split_first_chunk()?;
+        let (low, high) = (i32::from_le_bytes([a, b, c, d]), i32::from_le_bytes([e, f, g, h]));
+        (low <= high).then_some(Self { low, high })
+    }
+
+    /// The feature, or [`MISSING_FEATURE`] if it stands for a missing value.
+    pub const fn or_missing(self, feature: i32) -> i32 {
+        if self.low <= feature && feature <= self.high { MISSING_FEATURE } else { feature }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sections_are_read_back_and_what_makes_no_sense_is_refused() {
+        for &link in Link::ALL {
+            for last_of_ties in [false, true] {
+                let prediction = Prediction { link, last_of_ties, scale: 64.0 };
+                assert_eq!(Prediction::from_bytes(&prediction.to_bytes()), Some(prediction));
+            }
+        }
+        let bytes = Prediction::default().to_bytes();
+        assert_eq!(Prediction::from_bytes(&bytes[..7]), None);
+        for (at, wrong) in [(0, 5), (1, 2)] {
+            let mut bytes = bytes;
+            bytes[at] = wrong;
+            assert_eq!(Prediction::from_bytes(&bytes), None, "byte {at}");
+        }
+        for scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(Prediction::from_bytes(&Prediction { scale, ..Prediction::default() }.to_bytes()), None);
+        }
+        let sentinel = Sentinel { low: -3, high: 3 };
+        assert_eq!(Sentinel::from_bytes(&sentinel.to_bytes()), Some(sentinel));
+        assert_eq!(Sentinel::from_bytes(&Sentinel { low: 1, high: 0 }.to_bytes()), None);
+        assert_eq!(Sentinel::from_bytes(&sentinel.to_bytes()[..7]), None);
+        assert_eq!(
+            [-4, -3, 0, 3, 4].map(|x| sentinel.or_missing(x)),
+            [-4, MISSING_FEATURE, MISSING_FEATURE, MISSING_FEATURE, 4]
+        );
+    }
+}

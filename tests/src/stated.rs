@@ -1,0 +1,129 @@
+//! Numbers in READMEs, held against measurements.
+//!
+//! `PALPATE_RESTATE=1` writes what was measured in the place of what is stated, so that a README follows the code.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// A README whose numbers are measured.
+pub struct Readme {
+    path: PathBuf,
+    text: String,
+    wrong: Vec<String>,
+}
+
+impl Readme {
+    /// Reads one, by its path in the repository.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn open(path: &str) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        Self { path, text, wrong: Vec::new() }
+    }
+
+    /// Holds the first number in a cell of a table against a measurement, which may differ by so many percent. `row` is the first
+    /// cell, as it stands there; `column` is counted from 0, that cell.
+    ///
+    /// # Panics
+    /// If there is not one such cell with a number.
+    pub fn cell(&mut self, row: &str, column: usize, measured: u64, percent: u64) {
+        let start = format!("| {row} |");
+        let lines: Vec<usize> = self.text.match_indices(&start).map(|(at, _)| at).collect();
+        let [line] = lines[..] else { panic!("{}: {} rows {start}", self.path.display(), lines.len()) };
+        let mut at = line;
+        for _ in 0..=column {
+            at += self.text[at..].find('|').expect("a cell") + 1;
+        }
+        let end = at + self.text[at..].find('|').expect("the end of a cell");
+        self.hold(&format!("{row}, column {column}"), at..end, measured, percent);
+    }
+
+    /// Holds the first number after a text, which stands there once, in the same way.
+    ///
+    /// # Panics
+    /// If the text does not stand there once, with a number in its paragraph after it.
+    pub fn after(&mut self, before: &str, measured: u64, percent: u64) {
+        let places: Vec<usize> = self.text.match_indices(before).map(|(at, _)| at + before.len()).collect();
+        let [at] = places[..] else { panic!("{}: {} times {before:?}", self.path.display(), places.len()) };
+        let end = self.text[at..].find("\n\n").map_or(self.text.len(), |length| at + length);
+        self.hold(before, at..end, measured, percent);
+    }
+
+    fn hold(&mut self, what: &str, within: Range<usize>, measured: u64, percent: u64) {
+        let is_digit = |byte: u8| byte.is_ascii_digit() || byte == b',';
+        let bytes = &self.text.as_bytes()[within.clone()];
+        let first = bytes.iter().position(u8::is_ascii_digit);
+        let start = within.start + first.unwrap_or_else(|| panic!("{}: no number: {what}", self.path.display()));
+        let mut end =
+            start + self.text.as_bytes()[start..within.end].iter().take_while(|byte| is_digit(**byte)).count();
+        // A comma at the end belongs to the sentence.
+        end -= usize::from(self.text.as_bytes()[end - 1] == b',');
+        let stated: u64 = self.text[start..end].replace(',', "").parse().expect("digits");
+        if std::env::var_os("PALPATE_RESTATE").is_some() {
+            self.text.replace_range(start..end, &with_commas(measured));
+        } else if stated.abs_diff(measured) * 100 > percent * measured {
+            self.wrong.push(format!("{what}: states {stated}, measured {measured}"));
+        }
+    }
+
+    /// Whether all numbers held: what is stated, or was changed, is right.
+    ///
+    /// # Panics
+    /// If one did not, or the file cannot be written.
+    pub fn finish(self) {
+        let path = self.path.display();
+        assert!(
+            self.wrong.is_empty(),
+            "{path}:\n{}\nwith PALPATE_RESTATE=1 this test writes what it measures",
+            self.wrong.join("\n")
+        );
+        if std::env::var_os("PALPATE_RESTATE").is_some() {
+            std::fs::write(&self.path, &self.text).unwrap_or_else(|error| panic!("{path}: {error}"));
+        }
+    }
+}
+
+/// Thousands set apart.
+fn with_commas(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Where a comment states a number of instructions, or of bytes of code, flash, stack or RAM: the words.
+pub fn measured_in(comment: &str) -> Vec<String> {
+    const NUMBERS: [&str; 14] = [
+        "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "fifteen", "dozen",
+        "hundred",
+    ];
+    let words: Vec<&str> = comment.split_whitespace().collect();
+    let is_number = |word: &str| {
+        let word = word.trim_matches(|character: char| !character.is_alphanumeric());
+        word.starts_with(|first: char| first.is_ascii_digit()) || NUMBERS.contains(&word)
+    };
+    let found = words.iter().enumerate().filter(|(index, word)| {
+        let next =
+            |ahead: usize| words.get(index + ahead).map_or("", |word| word.trim_matches(['.', ',', ';', ':', ')']));
+        let is_memory = |ahead: usize| {
+            matches!(next(ahead), "bytes" | "KB")
+                && next(ahead + 1) == "of"
+                && matches!(next(ahead + 2), "code" | "flash" | "stack" | "RAM" | "state")
+        };
+        is_number(word) && (next(1) == "instructions" || next(2) == "instructions" || next(1) == "KB" || is_memory(1))
+    });
+    let of_memory = ["RAM:", "Stack:", "State:"].iter().filter_map(|start| {
+        let sentence = comment.split_once(start)?.1.split_once(". ").map_or(comment, |(sentence, _)| sentence);
+        let counts = sentence.split_whitespace().zip(sentence.split_whitespace().skip(1));
+        counts.into_iter().find(|(number, unit)| is_number(number) && unit.starts_with("bytes"))
+    });
+    let of_memory: Vec<String> = of_memory.map(|(number, unit)| format!("{number} {unit}")).collect();
+    found.map(|(index, _)| words[index..(index + 3).min(words.len())].join(" ")).chain(of_memory).collect()
+}
