@@ -97,7 +97,7 @@
 pub mod error;
 pub mod output;
 pub mod progress;
-mod random;
+pub mod random;
 #[cfg(all(test, feature = "train"))]
 mod repetitions;
 
@@ -126,18 +126,7 @@ pub mod play;
 
 pub mod chip;
 
-#[cfg(feature = "cli")]
-pub mod page;
-#[cfg(feature = "cli")]
-pub mod report;
-#[cfg(feature = "cli")]
-pub mod run;
-
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub mod commands;
-
-#[cfg(all(test, feature = "cli"))]
+#[cfg(all(test, feature = "objects", feature = "train"))]
 mod several_meshes;
 
 pub use error::{Error, Result};

@@ -30,7 +30,7 @@ pub fn remove_leftovers(directory: &Path) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Io`] naming the file.
-pub(crate) fn lock(directory: &Path) -> Result<Option<File>> {
+pub fn lock(directory: &Path) -> Result<Option<File>> {
     let path = directory.join(".lock");
     let io = |error| Error::io(&path, "lock the directory", error);
     let file = File::options().write(true).create(true).truncate(false).open(&path).map_err(io)?;

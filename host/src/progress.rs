@@ -31,7 +31,7 @@ impl Progress for () {}
 ///
 /// # Errors
 /// [`Error::Cancelled`].
-pub(crate) fn advance(progress: &dyn Progress, steps: u64) -> Result<()> {
+pub fn advance(progress: &dyn Progress, steps: u64) -> Result<()> {
     progress.advance(steps);
     check(progress)
 }
@@ -40,6 +40,6 @@ pub(crate) fn advance(progress: &dyn Progress, steps: u64) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Cancelled`].
-pub(crate) fn check(progress: &dyn Progress) -> Result<()> {
+pub fn check(progress: &dyn Progress) -> Result<()> {
     if progress.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
 }

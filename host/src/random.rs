@@ -8,8 +8,7 @@ use rand::rngs::ChaCha8Rng;
 /// What random numbers are for. Each purpose has its own streams, so that drawing more for one changes no other, and
 /// what is drawn for two of them at the same seed is independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "some purposes are the report's, one is the trainer's"))]
-pub(crate) enum Purpose {
+pub enum Purpose {
     /// Which touches train and which test.
     Folds,
     /// Gaussian noise on contact times.
@@ -76,7 +75,8 @@ impl Purpose {
 
 /// A generator for sample `index` of `name`: other seeds, purposes, names or indices give other numbers, whatever was
 /// drawn before and on whichever thread.
-pub(crate) fn generator(seed: u64, purpose: Purpose, name: &str, index: u64) -> ChaCha8Rng {
+#[must_use]
+pub fn generator(seed: u64, purpose: Purpose, name: &str, index: u64) -> ChaCha8Rng {
     // FNV-1a spreads purpose, name and index over 64 bits, which choose one of ChaCha's independent streams.
     let bytes = purpose.mark().into_iter().chain(name.bytes()).chain(index.to_le_bytes());
     let stream = bytes

@@ -68,7 +68,7 @@ pub fn calibrate_fresh(
 ///
 /// # Errors
 /// As [`calibrate_fresh`].
-pub(crate) fn fresh(
+pub fn fresh(
     model: &Model<'_>,
     objects: &[(&str, &[Scene])],
     origin: &Origin,

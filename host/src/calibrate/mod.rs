@@ -45,16 +45,14 @@ mod walk;
 
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
-#[cfg(feature = "cli")]
-pub(crate) use fresh::fresh;
+pub use fresh::fresh;
 pub use fresh::{Fresh, calibrate_fresh};
 pub use model::{Calibrated, OfObject, Settings, Worse, added_bytes, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{STRICTEST, add_noise, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
-#[cfg(feature = "cli")]
-pub(crate) use temperature::temperature;
+pub use temperature::temperature;
 /// What the promised rate is of, in words.
 pub fn of_what(per: Per) -> &'static str {
     match per {

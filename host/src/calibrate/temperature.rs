@@ -14,7 +14,7 @@ const HALVINGS: usize = 24;
 /// What margins have to be divided by for the posteriors of single touches to explain their objects best: the least mean
 /// negative log-likelihood, each object weighted equally. `known` are the indices of the data set's objects in the model.
 /// 1 if no touch is evidence.
-pub(crate) fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
+pub fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
     let rows = |(touched, &object): (&ObjectTouches, &usize)| {
         let evidence = touched.touches().iter().filter(|touch| model.accepts(touch).is_ok());
         let evidence: Vec<&Touch> = evidence.take(MOST).collect();

@@ -157,7 +157,7 @@ fn entry(object: &Object, origin: &Origin) -> Entry {
 }
 
 /// The scenes of each object's instances, built side by side.
-pub(crate) fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
+pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
     let scene = |(object, instance): (&Object, &Instance)| {
         progress::check(progress)?;
         let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
@@ -195,7 +195,7 @@ pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64
 }
 
 /// Names for an object's instances of which only the scenes are known.
-pub(crate) fn numbered(scenes: &[Scene]) -> Vec<String> {
+pub fn numbered(scenes: &[Scene]) -> Vec<String> {
     (1..=scenes.len()).map(|number| number.to_string()).collect()
 }
 

@@ -135,7 +135,7 @@ pub struct Trained {
 
 impl Trained {
     /// What the chip's model states of [`Trained::shares`].
-    pub(crate) fn pattern_shares(&self) -> Option<PatternShares> {
+    pub fn pattern_shares(&self) -> Option<PatternShares> {
         // `as` saturates.
         self.shares.map(|shares| PatternShares(shares.map(|share| (share * 65_535.0).round() as u16)))
     }

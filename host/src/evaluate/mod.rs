@@ -76,8 +76,7 @@ pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
 pub use poses::{ByPose, Stock};
 pub use promise::{Finding, PromiseCheck, by_theory};
 pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
-#[cfg(feature = "cli")]
-pub(crate) use sequential::significant;
+pub use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};
 pub use switch::{Rule, Stopped, Switched};

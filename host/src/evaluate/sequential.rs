@@ -255,7 +255,7 @@ pub(super) struct Stated {
 }
 
 /// A stored threshold holds an error rate to about sixteen digits; nine say what was meant.
-pub(crate) fn significant(rate: f64) -> f64 {
+pub fn significant(rate: f64) -> f64 {
     format!("{rate:.8e}").parse().unwrap_or(rate)
 }
 

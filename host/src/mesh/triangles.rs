@@ -114,7 +114,7 @@ impl Mesh {
 
     /// The mesh with each axis scaled.
     #[cfg(test)]
-    pub(crate) fn stretched(mut self, factors: [f32; 3]) -> Self {
+    pub fn stretched(mut self, factors: [f32; 3]) -> Self {
         self.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= factors[axis]));
         self
     }

@@ -37,7 +37,6 @@
 
 pub mod approach;
 pub mod cast;
-#[cfg(feature = "cli")]
 pub mod file;
 pub mod scene;
 pub mod sweep;

@@ -63,10 +63,10 @@ mod warning;
 
 pub(crate) use captured::short;
 pub use captured::{Captured, Meshes};
-pub(crate) use checksum::checksum;
+pub use checksum::checksum;
 pub use dataset::Dataset;
 pub(crate) use dataset::logs;
-pub(crate) use files::files;
+pub use files::files;
 pub use format::Format;
 pub use listing::{Entry, Listing};
 pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};

@@ -153,7 +153,7 @@ impl Settings {
 const LENGTH: f64 = 10.0;
 
 /// The longest side of the median object in millimeters, by its first instance.
-pub(crate) fn median_length(objects: &[Object]) -> Option<f64> {
+pub fn median_length(objects: &[Object]) -> Option<f64> {
     let length = |object: &Object| object.instances().next().and_then(|instance| object.true_length(instance));
     let mut lengths: Vec<f64> = objects.iter().map(length).collect::<Option<_>>()?;
     lengths.sort_by(f64::total_cmp);
@@ -161,7 +161,7 @@ pub(crate) fn median_length(objects: &[Object]) -> Option<f64> {
 }
 
 /// The same probe where what was a unit is `unit`; lengths are rounded to hundredths.
-pub(crate) fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
+pub fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
     let scaled = |length: f64| hundredths(length * unit);
     let Probe { radius, spacing, speed, tilt } = *probe;
     Probe { radius: scaled(radius), spacing: scaled(spacing), speed: scaled(speed), tilt }

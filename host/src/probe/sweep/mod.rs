@@ -8,7 +8,6 @@ pub mod budget;
 mod disc;
 pub mod narrow;
 mod pack;
-#[cfg(feature = "experiments")]
 pub mod precision;
 mod tree;
 

@@ -69,7 +69,6 @@ impl Earliest {
     }
 
     /// Distances that exclude none of this many triangles.
-    #[cfg(feature = "experiments")]
     pub(super) fn at_once(count: u32) -> Self {
         Self { places: [0.0; LANES], left: all(count) }
     }

@@ -43,9 +43,7 @@ mod suspects;
 #[cfg(all(test, feature = "objects"))]
 mod tests;
 mod timer;
-
-#[cfg(feature = "cli")]
-pub(crate) use outcome::between;
+pub use outcome::between;
 pub use outcome::{Estimate, Fit, Warning};
 pub use suspects::Suspect;
 

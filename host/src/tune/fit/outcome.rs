@@ -196,7 +196,7 @@ fn with_interval(estimate: &Estimate) -> String {
 }
 
 /// An interval in words: "1.0 to 1.2", "at most 3".
-pub(crate) fn between(estimate: &Estimate, scale: f64, digits: usize) -> String {
+pub fn between(estimate: &Estimate, scale: f64, digits: usize) -> String {
     let number = |value: f64| {
         let text = format!("{:.digits$}", scale * value);
         // No minus before a zero.

@@ -298,7 +298,6 @@ fn a_fit_is_the_same_on_any_number_of_threads_and_read_back_as_written() {
     };
     let found = with(1);
     assert_eq!(found, with(3));
-    #[cfg(feature = "cli")]
     {
         let file = crate::probe::file::ProbeFile::parse(&found.toml(), "probe.toml".as_ref()).unwrap();
         let (written, real) = (file.real, found.real());

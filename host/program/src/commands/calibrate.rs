@@ -1,0 +1,210 @@
+use super::noise::NoiseArguments;
+use super::numbers::{count, error_rate, share};
+use super::probe::ProbeArguments;
+use super::progress::Bar;
+use super::strangers::{Found, StrangersArguments};
+use palpate::Result;
+use palpate::calibrate::{self, Calibrated, Per, Settings, Worse};
+use palpate::compile::{self, CompiledModel};
+use palpate::error::{CalibrateProblem, Error, Place};
+use palpate::output;
+use palpate::strangers;
+use palpate::touches::noise::Noise;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. Those that it states to be trained on are refused. 100,000 sequences at an error rate of 1 % take some 50 touches each; with fewer touches there are fewer sequences, which leaves more of the error rate unused. No touch is used twice.
+
+A name that is given and wrong is an error. A sequence that ends at the limit of touches without a name is undecided: neither right nor wrong. With --per average the rate is that of all names given, with objects touched equally often (or as often as the model's priors say); with name that of each name, when it is given, for which each name gets a threshold of its own, learned on a third of the sequences and tested on the others; with object that of the names given to each object, which needs more touches. The rates of all names, or objects, are kept at once with the stated probability.
+
+With --active each next approach is one in the pose that the plan proposes. A sequence that proposes a pose whose approaches are used up ends the object's sequences, so more approaches are needed for as many sequences.
+
+The thresholds are found by Learn-then-Test: from strict to loose, up to the last at which so few errors have a probability of at most 5 % (--confidence) if the rate were higher than promised. So of calibrations on touches captured anew at most 5 % give a model that breaks its promise. The model then states what it promises, and a temperature that makes its posteriors ones to believe.
+
+With --strangers the model also gets a test of whether touches fit any object that it knows: at most 2 % of known objects' sequences end as unknown. The error rate is then that of the model with its test; the test is found on three eighths of the touches, the thresholds under it on half of them, so more touches are needed. likely costs hardly a touch and finds out about half of what the model does not know before it gets a name; certain finds out nearly all of what can be found out, and takes as many touches as that needs. A model with a background column (`palpate train --background`) finds out more. Objects that feel like a known one are not found out.
+
+Examples:
+  palpate capture builtin -o fresh --approaches --touches 100000 --seed 3
+  palpate calibrate model.palpate fresh -o calibrated.palpate
+  palpate calibrate model.palpate fresh -o names.palpate --per name
+  palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
+  palpate calibrate model.palpate fresh -o noisy.palpate --noise 0..5ms
+  palpate evaluate calibrated.palpate unseen --json | jq .promise
+  palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
+pub(crate) struct Arguments {
+    /// Compiled model
+    model: PathBuf,
+    /// Directory that `palpate capture` filled
+    directory: PathBuf,
+    /// Where to write the calibrated model
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// The error rate to promise, such as 0.01 or 1%
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
+    error_rate: f64,
+    /// Of what: of all names on average, of each name, or of the names given to each object
+    #[arg(long, value_parser = per, default_value = "average", value_name = "average|name|object")]
+    per: Per,
+    /// The probability that the promise is kept
+    #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
+    confidence: f64,
+    /// The most sequences, of all objects together
+    #[arg(long, default_value = "100000", value_name = "N", value_parser = count)]
+    sequences: u64,
+    /// Touches after which recognizers give up [default: the model's own limit]
+    #[arg(long, value_name = "N")]
+    max_touches: Option<u32>,
+    /// Make every approach where the model's plan says (see `palpate plan`): the promise holds for a robot that goes there
+    #[arg(long)]
+    active: bool,
+    /// Seed of the order of the touches, and of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print what was found as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    strangers: StrangersArguments,
+    #[command(flatten)]
+    probe: ProbeArguments,
+    #[command(flatten)]
+    noise: NoiseArguments,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let dataset = super::dataset(&arguments.directory)?;
+    let trained_on = compiled.trained_on(&dataset);
+    if !trained_on.is_empty() {
+        let objects = trained_on.into_iter().map(String::from).collect();
+        return Err(Error::at(Place::file(&arguments.directory), CalibrateProblem::TrainedOn { objects }));
+    }
+    let file = arguments.probe.read()?;
+    arguments.probe.of_dataset(file.as_ref(), &dataset)?;
+    let settings = Settings {
+        rate: arguments.error_rate,
+        per: arguments.per,
+        confidence: arguments.confidence,
+        sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
+        max_touches: arguments.max_touches,
+        noise: arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?),
+        active: arguments.active,
+        seed: arguments.seed,
+    };
+    let wrong = |error: palpate::Error| error.in_file(&arguments.directory);
+    let (calibrated, found) = match arguments.strangers.held() {
+        None => {
+            let untested = strangers::without(&compiled.model())?;
+            let calibrated = calibrate::calibrate(&compile::open(&untested)?, dataset, &settings, &Bar::new());
+            (calibrated.map_err(wrong)?, None)
+        }
+        Some(held) => {
+            let test = strangers::Settings {
+                held,
+                sequences: settings.sequences,
+                confidence: settings.confidence,
+                seed: settings.seed,
+                ..Default::default()
+            };
+            let shapes = arguments.strangers.shapes(&dataset)?;
+            let both =
+                strangers::calibrate_with_promise(&compiled.model(), &dataset, &shapes, &test, &settings, &Bar::new());
+            let (calibrated, tested) = both.map_err(wrong)?;
+            (calibrated, Some(Found::new(&test, &tested)))
+        }
+    };
+    output::write_bytes(&arguments.output, &calibrated.model)?;
+    if arguments.json {
+        return output::print_json_about(&arguments.output, &Both { calibrated: &calibrated, strangers: &found });
+    }
+    let strangers = found.map_or_else(String::new, |found| found.text() + "\n");
+    let text = format!("{}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
+    output::print_about(&arguments.output, &text)
+}
+
+/// What was found.
+#[derive(serde::Serialize)]
+struct Both<'c> {
+    #[serde(flatten)]
+    calibrated: &'c Calibrated,
+    /// About strangers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strangers: &'c Option<Found>,
+}
+
+fn written(path: &std::path::Path, calibrated: &Calibrated) -> String {
+    format!("{}: {} bytes", path.display(), calibrated.model.len())
+}
+
+fn text(calibrated: &Calibrated) -> String {
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let mut text = format!(
+        "Promised: at most {} % of {} wrong, with a probability of {} %.\n",
+        super::percent(calibrated.promised),
+        calibrate::of_what(calibrated.promise.per),
+        super::percent(calibrated.confidence),
+    );
+    // Writing to a string cannot fail.
+    _ = writeln!(
+        text,
+        "{} sequences: of the names given {} wrong, {} without a name; {:.1} {} each.",
+        calibrated.sequences,
+        percent(calibrated.error),
+        percent(calibrated.undecided),
+        calibrated.mean_approaches.unwrap_or(calibrated.mean_touches),
+        calibrated.counted,
+    );
+    let width = calibrated.margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
+    if calibrated.errors.is_empty() {
+        let margin = calibrated.margins.values().next().copied().unwrap_or(f64::NAN);
+        _ = writeln!(
+            text,
+            "Names are given {margin:.2} nats ahead of all others; uncalibrated it would be {:.2}.",
+            calibrated.uncalibrated_margin
+        );
+    } else {
+        _ = writeln!(text, "\n{:width$} {:>8} {:>8}", "", "wrong", "nats");
+        for (name, margin) in &calibrated.margins {
+            let error = calibrated.errors.get(name).map_or("–".into(), |&error| percent(error));
+            _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
+        }
+        _ = writeln!(text, "Uncalibrated, names are given at {:.2} nats.", calibrated.uncalibrated_margin);
+    }
+    _ = writeln!(text, "Temperature of the posteriors that are shown: {:.2}", calibrated.temperature);
+    text + &worse(calibrated)
+}
+
+/// A warning of objects that a rate of other names hides.
+fn worse(calibrated: &Calibrated) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let worse = calibrated.worse();
+    let given = |of: &Worse| of.given.map(|share| format!("{} of those given to {}", percent(share), of.object));
+    let named = |of: &Worse| of.named.map(|share| format!("{} where {} is named", percent(share), of.object));
+    let shares: Vec<String> = worse.iter().flat_map(|of| [given(of), named(of)]).flatten().collect();
+    if shares.is_empty() {
+        return String::new();
+    }
+    let rate = super::percent(calibrated.promised);
+    let what = match calibrated.promise.per {
+        Per::Average => "of all names, and not of each object's",
+        Per::Name => "of each name when it is given, and not of those given to each object",
+        Per::Object => "of the names given to each object, and not of each name",
+    };
+    let hidden = calibrated
+        .objects
+        .values()
+        .any(|of| 2 * of.given < calibrated.sequences as u64 / calibrated.objects.len() as u64);
+    let undecided = if hidden { " An object that mostly stays undecided has few names among all." } else { "" };
+    format!(
+        "warning: the {rate} % are {what}: {} are wrong.{undecided} Promise it of each with --per object or --per name.\n",
+        shares.join(", ")
+    )
+}
+
+fn per(name: &str) -> Result<Per, String> {
+    Per::ALL.iter().copied().find(|per| per.name() == name).ok_or_else(|| "use one of average, name, object".to_owned())
+}

@@ -1,0 +1,121 @@
+//! `palpate data compare`.
+
+use super::super::progress::Bar;
+use super::super::{dataset, train};
+use palpate::Result;
+use palpate::evaluate::compare::{Comparison, Cost, Settings, Share, compare};
+use palpate::output;
+use palpate::touches::{Captured, Dataset};
+use palpate_shared::Descriptor;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+RECORDED is a data set that a real probe made, SIMULATED one of `palpate capture`, with --approaches if every approach was recorded. Objects are matched by their names.
+
+A classifier is trained to tell recorded from simulated touches of an object, and tested on others: 50 % is guessing, so the simulation is right as far as the touches tell. Every feature is compared as well, and accuracy: a model trained on the simulated touches is tested on simulated and on recorded ones.
+
+Examples:
+  palpate capture meshes/ -o simulated --approaches --probe probe.toml
+  palpate data compare recorded simulated
+  palpate data compare recorded simulated --descriptor oriented --json")]
+pub(super) struct CompareArguments {
+    /// The recorded touches
+    #[arg(value_name = "RECORDED")]
+    recorded: PathBuf,
+    /// The simulated touches
+    #[arg(value_name = "SIMULATED")]
+    simulated: PathBuf,
+    /// Which features touches are compared by, such as oriented where the pose was recorded
+    #[arg(long, value_parser = train::descriptor, value_name = "times|curvature|gravity|oriented", default_value = "curvature")]
+    descriptor: Descriptor,
+    /// Groups of approaches to draw for each object
+    #[arg(long, value_name = "N", default_value_t = Settings::default().groups)]
+    groups: usize,
+    /// Seed of the folds and of the drawing
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print the comparison as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
+    let recorded = super::super::checked(Dataset::read_any(&arguments.recorded)?);
+    let simulated = dataset(&arguments.simulated)?;
+    if let Some((recorded, simulated)) = Captured::of(&recorded).zip(Captured::of(&simulated)) {
+        let objects = recorded.shared(&simulated).join(", ");
+        if !objects.is_empty() {
+            eprintln!(
+                "palpate: warning: both data sets hold the same simulated touches of {objects}: nothing is compared with \
+                 them. Give RECORDED touches, or capture with another seed."
+            );
+        }
+    }
+    let settings = Settings {
+        descriptor: arguments.descriptor,
+        groups: arguments.groups,
+        seed: arguments.seed,
+        ..Settings::default()
+    };
+    let compared = compare(&recorded, &simulated, &settings, &Bar::new())
+        .map_err(|error| if error.exit_code() == 1 { error.in_file(&arguments.recorded) } else { error })?;
+    if arguments.json { output::print_json(&compared) } else { output::print(&text(&compared)) }
+}
+
+/// A share in percent with its interval.
+fn percent(share: &Share) -> String {
+    format!("{:.0} % ({:.0} to {:.0})", 100.0 * share.value, 100.0 * share.low, 100.0 * share.high)
+}
+
+fn text(compared: &Comparison) -> String {
+    let told = &compared.told_apart;
+    let mut text = format!(
+        "A classifier tells recorded from simulated touches {:.1} % of the time (between {:.1} and {:.1} %). 50 % is guessing.\n{}\n",
+        100.0 * told.value,
+        100.0 * told.low,
+        100.0 * told.high,
+        compared.verdict()
+    );
+    let width = compared.objects.iter().map(|own| own.name.len()).max().unwrap_or(0).max(6);
+    // Writing to a string cannot fail.
+    _ = writeln!(
+        text,
+        "\n{:width$}  {:>8}  {:>9}  {:16}  by itself, each feature is",
+        "object", "recorded", "simulated", "told apart"
+    );
+    for own in &compared.objects {
+        let [recorded, simulated] = own.touches;
+        let features = own.features.iter().map(|own| format!("{} {}", own.feature, own.words()));
+        _ = writeln!(
+            text,
+            "{:width$}  {recorded:>8}  {simulated:>9}  {:16}  {}",
+            own.name,
+            percent(&own.told_apart),
+            features.collect::<Vec<_>>().join("; ")
+        );
+    }
+    if let Some(cost) = &compared.cost {
+        text += &cost_text(cost);
+    }
+    text
+}
+
+fn cost_text(cost: &Cost) -> String {
+    let mut text = format!(
+        "\nA model of {} objects, trained on the simulated touches, is right after approaches\n{:14}",
+        cost.known, ""
+    );
+    for at in cost.simulated.keys() {
+        _ = write!(text, "{at:>8}");
+    }
+    for (name, accuracy) in [("on simulated", &cost.simulated), ("on recorded", &cost.recorded)] {
+        _ = write!(text, "\n  {name:12}");
+        for at in cost.simulated.keys() {
+            let shown = accuracy.get(at).map_or_else(|| "–".into(), |share| format!("{:.1} %", 100.0 * share.value));
+            _ = write!(text, "{shown:>8}");
+        }
+    }
+    text + &format!("\n{}\n", cost.sentence())
+}

@@ -1,0 +1,608 @@
+use super::chips::{features, instructions};
+use super::expected::PriorArguments;
+use super::numbers::error_rate;
+use super::unstated::UnstatedArguments;
+use palpate::Result;
+use palpate::compile::{self, Candidate, CompiledModel, Goal, Instructions, Language, Layout, Leaf, Settings};
+use palpate::ensemble::{Ensemble, Inputs};
+use palpate::error::Error;
+use palpate::output;
+use palpate::rows::Rows;
+use palpate::rows::scales::{self, Effect, Merged};
+use palpate_shared::format::{Link, MAGIC};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+/// Compile an ensemble to the bytes that the chip reads.
+#[derive(clap::Args)]
+#[command(after_help = "\
+ENSEMBLE is what `palpate train` saved, or a model of another library over features of any kind: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). Its content says which. `palpate verify` compares the model with it, and with the library.
+
+Leaves:
+  i16  two bytes per value: verdicts as the full model's
+  i8   one byte per value: half the size, margins within hundredths of a nat
+  f32  four bytes per value, added as the trainer adds them: the same margins
+
+Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
+
+Shared leaves: where many leaves are equal, as in forests, each stands once in a table, and a leaf is its number there; margins are the same. It is tried with every layout that walks trees.
+
+A compiled model, such as one that was calibrated, is written as source code: -o says beside which file, which becomes a copy of it; --emit what. Nothing else about it can be changed.
+
+Instructions per touch, or per row, are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
+
+Whole numbers: --scale says in which units a chip without a float unit measures a feature: --scale width=100 for hundredths. A value is its whole number of units, the nearest one; thresholds become whole numbers, too. Values beyond ±(2^31 - 1) units count as that. --fit-scales chooses the scales that hold the values of rows exactly, or to seven digits, as powers of ten. LightGBM compares f64: whole numbers that f32 does not hold, such as seconds since 1970, need --scale too.
+
+What another library's file does not say: --missing is the number that stood for a missing value in training, and --link what makes a regression's value of its margin, where the file's own link is not the one. Where training stopped early, the trees up to the best iteration are taken; --all-trees takes all.
+
+Examples:
+  palpate export ensemble.json -o model.palpate
+  palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
+  palpate export ensemble.json -o strict.palpate --error-rate 0.1%
+  palpate export ensemble.json -o kitchen.palpate --prior fork=0.3,spoon=0.3
+  palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
+  palpate export lightgbm.txt -o model.palpate --for speed
+  palpate export forest.onnx -o model.palpate --scale width=100,height=10
+  palpate export xgboost.json -o model.palpate --missing -999
+  palpate export ensemble.json -o model.palpate --emit c  # also model.h
+  palpate export sure.palpate -o sure.palpate --emit c    # sure.h alone
+  palpate export lightgbm.txt -o model.palpate --emit json
+                                                  # also model.json, for XGBoost")]
+pub(crate) struct Arguments {
+    /// Ensemble that `palpate train` or another library saved; or a compiled model, to be written as source code
+    ensemble: PathBuf,
+    /// Where to write the model
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// The classes' names, in the order of the labels, or a file with one per line [default: the file's own, or 0, 1, …]
+    #[arg(long, value_name = "A,B,…|FILE")]
+    names: Option<String>,
+    /// What leaves are stored as [default: i16; i8 for touches of more than 50 objects]
+    #[arg(long, value_parser = leaf, value_name = "i8|i16|f32")]
+    leaf: Option<Leaf>,
+    /// How trees are laid out; auto lets --for decide
+    #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid|wide|patterns")]
+    layout: LayoutChoice,
+    /// What the layout is chosen for
+    #[arg(
+        long = "for",
+        value_parser = goal,
+        default_value = "balanced",
+        value_name = "balanced|speed|size|m4f|m0+",
+        conflicts_with = "layout"
+    )]
+    goal: Goal,
+    /// Whether equal leaves stand once, in a table that a leaf is a number of: `auto` where that is smaller, and better
+    /// for what --for says
+    #[arg(long, value_parser = sharing, default_value = "auto", value_name = "auto|yes|no")]
+    shared_leaves: Sharing,
+    /// Compare whole numbers: how many units of a feature make up 1
+    #[arg(long, value_name = "FEATURE=UNITS,…", value_delimiter = ',', value_parser = scale)]
+    scale: Vec<(String, f32)>,
+    /// Compare whole numbers, in the units that the values of these rows need (CSV)
+    #[arg(long, value_name = "ROWS.csv")]
+    fit_scales: Option<PathBuf>,
+    /// The error rate, such as 0.05 or 5%, at which recognizers stop unless told otherwise
+    #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
+    error_rate: f64,
+    /// The touches after which they give up
+    #[arg(long, default_value_t = 200, value_name = "N")]
+    max_touches: u32,
+    /// Write beside it, too: an array in FILE.h with palpate.h to read it, or in FILE.rs; the trees in FILE.json, as
+    /// XGBoost's JSON
+    #[arg(long, value_name = "c|rust|json,…", value_delimiter = ',', value_parser = emitted)]
+    emit: Vec<Emitted>,
+    /// Print what was exported as JSON
+    #[arg(long)]
+    json: bool,
+    /// What makes a regression's value of its margin [default: as the file says]
+    #[arg(long, value_parser = link, value_name = "identity|logistic|exponential|square|softplus")]
+    link: Option<Link>,
+    #[command(flatten)]
+    unstated: UnstatedArguments,
+    #[command(flatten)]
+    prior: PriorArguments,
+}
+
+#[derive(Clone)]
+struct LayoutChoice(Option<Layout>);
+
+/// Whether leaves are shared; `None` leaves it open.
+#[derive(Clone)]
+struct Sharing(Option<bool>);
+
+/// What is written beside the model.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Emitted {
+    /// The compiled model as source code.
+    Source(Language),
+    /// The ensemble that it was compiled from.
+    Ensemble,
+}
+
+impl Emitted {
+    const fn extension(self) -> &'static str {
+        match self {
+            Self::Source(language) => language.extension(),
+            Self::Ensemble => "json",
+        }
+    }
+}
+
+#[derive(serde::Serialize)]
+struct Exported {
+    bytes: usize,
+    layout: &'static str,
+    leaf: &'static str,
+    /// How many different leaves there are, if equal ones stand once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shared_leaves: Option<usize>,
+    trees: usize,
+    splits: usize,
+    leaves: usize,
+    margin_error: f32,
+    instructions: Instructions,
+    /// What the layouts come to that were tried, in the same order every time.
+    candidates: Vec<Candidate>,
+    /// Features, by name, for a model over rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    features: Option<Vec<String>>,
+    classes: Vec<String>,
+    /// The prediction of a model over rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    predicts: Option<Predicts>,
+    /// Features of which thresholds become the same in f32.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    merged: Vec<Merged>,
+    /// The kind of file, if another library wrote it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    imported: Option<String>,
+    /// What a user should know about it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notes: Vec<String>,
+    /// What whole numbers do to each feature.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    scales: Vec<Effect>,
+    /// Files with source code.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    sources: Vec<PathBuf>,
+    /// The file with the trees as XGBoost's JSON.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ensemble: Option<PathBuf>,
+}
+
+/// What is written of a compiled model.
+#[derive(serde::Serialize)]
+struct Sources {
+    bytes: usize,
+    layout: &'static str,
+    leaf: &'static str,
+    sources: Vec<PathBuf>,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    if is_compiled(&arguments.ensemble) {
+        return emit_compiled(&arguments);
+    }
+    output::refuse_input(
+        &arguments.output,
+        [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten(),
+    )?;
+    let emitted = places(&arguments)?;
+    let names = arguments.names.as_deref().map(names).transpose()?;
+    let mut ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
+    set_link(&mut ensemble, arguments.link)?;
+    let (scales, fitted) = scales(&arguments, &ensemble)?;
+    let usual = match ensemble.inputs {
+        Inputs::Touches(_) => Settings::for_touches(ensemble.objects.len()),
+        Inputs::Rows(_) => Settings::default(),
+    };
+    let settings = Settings {
+        leaf: arguments.leaf.unwrap_or(usual.leaf),
+        layout: arguments.layout.0,
+        goal: arguments.goal,
+        shared_leaves: arguments.shared_leaves.0,
+        error_rate: arguments.error_rate,
+        max_touches: arguments.max_touches,
+        scales,
+        priors: arguments.prior.of(&ensemble.objects)?,
+    };
+    let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
+        1 => error.in_file(&arguments.ensemble),
+        _ => error,
+    })?;
+    output::write_bytes(&arguments.output, &compiled.bytes)?;
+    write_emitted(&emitted, &compiled.bytes, &ensemble)?;
+    let imported = ensemble.origin.imported.as_ref();
+    let exported = Exported {
+        bytes: compiled.bytes.len(),
+        layout: compiled.layout.name(),
+        leaf: settings.leaf.name(),
+        shared_leaves: compiled.shared_leaves,
+        trees: ensemble.trees.len(),
+        splits: compiled.splits,
+        leaves: compiled.leaves,
+        margin_error: compiled.margin_error,
+        instructions: compiled.instructions,
+        candidates: compiled.candidates,
+        features: match &ensemble.inputs {
+            Inputs::Rows(names) => Some(names.clone()),
+            Inputs::Touches(_) => None,
+        },
+        classes: ensemble.objects.clone(),
+        predicts: Predicts::of(&ensemble),
+        merged: if settings.scales.is_some() { Vec::new() } else { scales::merged(&ensemble) },
+        imported: imported.map(|imported| imported.kind.clone()),
+        notes: imported.map(|imported| imported.notes.clone()).unwrap_or_default(),
+        scales: settings
+            .scales
+            .as_ref()
+            .map(|scales| scales::effects(&ensemble, scales, fitted.as_ref()))
+            .unwrap_or_default(),
+        sources: emitted.iter().filter(|(kind, _)| *kind != Emitted::Ensemble).map(|(_, path)| path.clone()).collect(),
+        ensemble: emitted.into_iter().find(|(kind, _)| *kind == Emitted::Ensemble).map(|(_, path)| path),
+    };
+    if arguments.json {
+        return output::print_json_about(&arguments.output, &exported);
+    }
+    output::print_about(&arguments.output, &text(&arguments.output, &exported))
+}
+
+/// Whether a file is a compiled model, by its first bytes. Where it cannot be read, whoever reads it as an ensemble says so.
+fn is_compiled(path: &Path) -> bool {
+    let mut head = [0; MAGIC.len()];
+    // A pipe must not lose its first bytes, and is read as an ensemble.
+    let file = path.metadata().is_ok_and(|metadata| metadata.is_file()).then(|| File::open(path));
+    file.is_some_and(|file| file.and_then(|mut file| file.read_exact(&mut head)).is_ok()) && head == MAGIC
+}
+
+/// Writes a compiled model as source code.
+fn emit_compiled(arguments: &Arguments) -> Result<()> {
+    let model = &arguments.ensemble;
+    let compiled = CompiledModel::read(model)?;
+    let refuse = |name: &'static str, value: &str| {
+        Err(Error::setting(name, value, format!("it with an ensemble: {} is a compiled model", model.display())))
+    };
+    let usual = Settings::default();
+    for (name, is_given) in [
+        ("names", arguments.names.is_some()),
+        ("leaf", arguments.leaf.is_some()),
+        ("layout", arguments.layout.0.is_some()),
+        ("for", arguments.goal != usual.goal),
+        ("shared_leaves", arguments.shared_leaves.0.is_some()),
+        ("scale", !arguments.scale.is_empty()),
+        ("fit_scales", arguments.fit_scales.is_some()),
+        ("error_rate", arguments.error_rate != usual.error_rate),
+        ("max_touches", arguments.max_touches != usual.max_touches),
+        ("prior", arguments.prior.of(&compiled.names())?.is_some()),
+    ] {
+        if is_given {
+            return refuse(name, "given");
+        }
+    }
+    if arguments.emit.is_empty() {
+        return Err(Error::setting(
+            "emit",
+            "not given",
+            format!("c or rust: {} is a compiled model already", model.display()),
+        ));
+    }
+    if arguments.emit.contains(&Emitted::Ensemble) {
+        return refuse("emit", "json");
+    }
+    let emitted = places(arguments)?;
+    // The model itself may be what the source code is to stand beside.
+    if output::refuse_input(&arguments.output, [model]).is_ok() {
+        output::write_bytes(&arguments.output, compiled.bytes())?;
+    }
+    emitted.iter().try_for_each(|(emitted, path)| write_source(*emitted, path, compiled.bytes()))?;
+    let written = Sources {
+        bytes: compiled.bytes().len(),
+        layout: compiled.model().layout().name(),
+        leaf: compiled.model().leaf_type().name(),
+        sources: emitted.into_iter().map(|(_, path)| path).collect(),
+    };
+    if arguments.json {
+        return output::print_json_about(&arguments.output, &written);
+    }
+    let mut text = format!("{}: {} bytes, as it was\n", arguments.output.display(), written.bytes);
+    for source in &written.sources {
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "Source code: {}", source.display());
+    }
+    text += &features(written.layout, written.leaf, compiled.model().shared_leaves().is_some());
+    output::print_about(&arguments.output, &text)
+}
+
+/// Where the rest is to be written: beside the model, under its name.
+fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
+    let (output, mut places) = (&arguments.output, Vec::new());
+    for &emitted in &arguments.emit {
+        let path = output.with_extension(emitted.extension());
+        let taken = path == *output || path.file_name().is_some_and(|name| name == HEADER);
+        if output::is_stdout(output) || taken {
+            return Err(Error::setting(
+                "output",
+                output.display(),
+                format!(
+                    "a file beside which another one can have the extension .{} (but not {HEADER}), for --emit",
+                    emitted.extension()
+                ),
+            ));
+        }
+        output::refuse_input(&path, [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten())?;
+        places.push((emitted, path));
+    }
+    Ok(places)
+}
+
+/// The header that reads models in C.
+const HEADER: &str = "palpate.h";
+
+fn write_emitted(emitted: &[(Emitted, PathBuf)], bytes: &[u8], ensemble: &Ensemble) -> Result<()> {
+    for (emitted, path) in emitted {
+        match emitted {
+            Emitted::Ensemble => ensemble.save(path)?,
+            Emitted::Source(_) => write_source(*emitted, path, bytes)?,
+        }
+    }
+    Ok(())
+}
+
+/// Writes a model as source code; in C with the header that reads it.
+fn write_source(emitted: Emitted, path: &Path, bytes: &[u8]) -> Result<()> {
+    let Emitted::Source(language) = emitted else { return Ok(()) };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    output::write_bytes(path, compile::emit(&compile::open(bytes)?, &name, language).as_bytes())?;
+    if language == Language::C {
+        output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
+    }
+    Ok(())
+}
+
+fn emitted(name: &str) -> Result<Emitted, String> {
+    if name == "json" {
+        return Ok(Emitted::Ensemble);
+    }
+    let language = Language::ALL.into_iter().find(|language| language.name() == name);
+    language.map(Emitted::Source).ok_or_else(|| "use c, rust or json".to_owned())
+}
+
+/// Names from the command line: a file's lines, if there is such a file, else what commas separate.
+fn names(text: &str) -> Result<Vec<String>> {
+    let path = Path::new(text);
+    if !path.is_file() {
+        return Ok(text.split(',').map(|name| name.trim().to_owned()).collect());
+    }
+    let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, "read the names", source))?;
+    Ok(text.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect())
+}
+
+/// The prediction of a model over rows.
+#[derive(serde::Serialize)]
+struct Predicts {
+    /// "class" or "value".
+    what: &'static str,
+    /// What makes a value of a margin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    link: Option<&'static str>,
+    /// Whether the last of several largest margins names the class.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    last_of_ties: bool,
+    /// The least and the largest of the numbers that stand for a missing value, beside NaN.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    missing: Option<[f32; 2]>,
+}
+
+impl Predicts {
+    fn of(ensemble: &Ensemble) -> Option<Self> {
+        let imported = ensemble.origin.imported.as_ref()?;
+        let is_value = ensemble.objects.len() == 1;
+        Some(Self {
+            what: if is_value { "value" } else { "class" },
+            link: is_value.then(|| imported.prediction.link.name()),
+            last_of_ties: imported.prediction.last_of_ties,
+            missing: imported.sentinel,
+        })
+    }
+
+    fn text(&self) -> String {
+        let what = match self.link {
+            None if self.last_of_ties => "the class with the largest margin, of several the last".into(),
+            None => "the class with the largest margin, of several the first".into(),
+            Some(link) => format!("{}{}", formula(link), if link == "identity" { "" } else { " of the margin x" }),
+        };
+        let missing = match self.missing {
+            None => String::new(),
+            Some([low, high]) if low == high => format!("; {low} stands for a missing value"),
+            Some([low, high]) => format!("; {low:e} to {high:e} stands for a missing value"),
+        };
+        format!("Predicts {what}{missing}\n")
+    }
+}
+
+/// What a link makes of a margin.
+pub(super) fn formula(link: &str) -> &'static str {
+    match link {
+        "logistic" => "the value 1 / (1 + e^-x)",
+        "exponential" => "the value e^x",
+        "square" => "the value x |x|",
+        "softplus" => "the value ln(1 + e^x)",
+        _ => "the value, which is the margin",
+    }
+}
+
+/// Takes another link than the file's, of a regression.
+fn set_link(ensemble: &mut Ensemble, link: Option<Link>) -> Result<()> {
+    let Some(link) = link else { return Ok(()) };
+    let is_value = ensemble.objects.len() == 1;
+    match ensemble.origin.imported.as_mut().filter(|_| is_value) {
+        Some(imported) => imported.prediction.link = link,
+        None => return Err(Error::setting("link", link.name(), "none: only a regression has one")),
+    }
+    Ok(())
+}
+
+fn link(name: &str) -> Result<Link, String> {
+    let found = Link::ALL.iter().copied().find(|link| link.name() == name);
+    found.ok_or_else(|| "use one of identity, logistic, exponential, square, softplus".to_owned())
+}
+
+/// The scale of each feature, if whole numbers are asked for, and the rows that they were fitted to.
+fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>>, Option<Rows>)> {
+    if arguments.scale.is_empty() && arguments.fit_scales.is_none() {
+        return Ok((None, None));
+    }
+    let names = ensemble.inputs.names();
+    let rows = arguments.fit_scales.as_deref().map(|path| super::verify::read_rows(path, &names, None)).transpose()?;
+    let mut scales = rows.as_ref().map_or_else(|| vec![1.0; names.len()], |rows| scales::fit(ensemble, rows));
+    for (name, scale) in &arguments.scale {
+        let Some(index) = names.iter().position(|own| own == name) else {
+            return Err(Error::setting("scale", format!("{name}={scale}"), format!("a feature: {}", names.join(", "))));
+        };
+        scales[index] = *scale;
+    }
+    // A feature that nothing was said about is taken as it is, which only whole thresholds can be.
+    for (index, name) in names.iter().enumerate() {
+        let is_named = arguments.scale.iter().any(|(own, _)| own == name);
+        if let Some(threshold) =
+            scales::fraction(ensemble, index).filter(|_| arguments.fit_scales.is_none() && !is_named)
+        {
+            let allowed = format!("a scale for {name} too, which has the threshold {threshold}, or --fit-scales");
+            return Err(Error::setting("scale", "incomplete", allowed));
+        }
+    }
+    Ok((Some(scales), rows))
+}
+
+fn text(path: &Path, exported: &Exported) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    if let (Some(kind), Some(features)) = (&exported.imported, &exported.features) {
+        _ = writeln!(text, "{kind}: {} features, {}", features.len(), classes(&exported.classes));
+    }
+    let shared = exported.shared_leaves.map_or(String::new(), |count| format!(", {count} different"));
+    _ = writeln!(
+        text,
+        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}{shared}), margins within {:.2e}{}",
+        path.display(),
+        exported.bytes,
+        exported.trees,
+        exported.splits,
+        exported.leaves,
+        exported.layout,
+        exported.leaf,
+        exported.margin_error,
+        if exported.predicts.is_some() { " of the library's" } else { " nats" },
+    );
+    if exported.candidates.len() > 1 {
+        _ = writeln!(text, "{:16} {:>9} {:>12} {:>12}", "layout", "bytes", "Cortex-M4F", "Cortex-M0+");
+        for candidate in &exported.candidates {
+            let Candidate { layout, shared_leaves, bytes, instructions, .. } = candidate;
+            let m0_plus = instructions.m0_plus.map_or_else(|| "unknown".into(), |number| number.to_string());
+            let is_chosen = layout.name() == exported.layout && *shared_leaves == exported.shared_leaves.is_some();
+            let mark = if is_chosen { " *" } else { "" };
+            let name = format!("{}{}", layout.name(), if *shared_leaves { ", shared" } else { "" });
+            _ = writeln!(text, "{name:16} {bytes:>9} {:>12} {m0_plus:>12}{mark}", instructions.m4f);
+        }
+    }
+    let each = if exported.features.is_some() { "row" } else { "touch" };
+    _ = writeln!(text, "Instructions per {each}, estimated: {}", instructions(exported.instructions));
+    text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
+    for Merged { feature, thresholds, different } in &exported.merged {
+        _ = writeln!(
+            text,
+            "{feature}: of {thresholds} thresholds {different} stay different in f32, so that values between the others go \
+             another way than in the library; --scale {feature}=UNITS compares whole numbers instead"
+        );
+    }
+    text += &effects(&exported.scales);
+    for source in &exported.sources {
+        _ = writeln!(text, "Source code: {}", source.display());
+    }
+    if let Some(path) = &exported.ensemble {
+        _ = writeln!(text, "The trees, as XGBoost's JSON: {}", path.display());
+    }
+    for note in &exported.notes {
+        _ = writeln!(text, "Note: {note}");
+    }
+    let has_sentinel = exported.predicts.as_ref().is_some_and(|predicts| predicts.missing.is_some());
+    let features = features(exported.layout, exported.leaf, exported.shared_leaves.is_some());
+    if has_sentinel { text + features.trim_end() + ", sentinel\n" } else { text + &features }
+}
+
+/// What whole numbers do: of features that they hold exactly only how many there are.
+fn effects(all: &[Effect]) -> String {
+    let mut text = String::new();
+    let is_exact = |effect: &&Effect| effect.values_are_whole == Some(true) && effect.different == effect.thresholds;
+    let exact: Vec<String> =
+        all.iter().filter(is_exact).map(|effect| format!("{} × {}", effect.feature, effect.scale)).collect();
+    if !exact.is_empty() {
+        _ = writeln!(
+            text,
+            "Whole units hold every value of these rows, and all thresholds stay different: {}",
+            exact.join(", ")
+        );
+    }
+    for Effect { feature, scale, thresholds, different, largest_step, .. } in
+        all.iter().filter(|effect| !is_exact(effect))
+    {
+        _ = writeln!(
+            text,
+            "{feature}: {scale} units make up 1; of {thresholds} thresholds {different} stay different; a value within \
+             {largest_step:e} of one may go the other way"
+        );
+    }
+    text
+}
+
+fn classes(names: &[String]) -> String {
+    match names {
+        [name] => format!("one output ({name})"),
+        _ => format!("{} classes ({})", names.len(), names.join(", ")),
+    }
+}
+
+fn leaf(name: &str) -> Result<Leaf, String> {
+    Leaf::ALL.iter().copied().find(|leaf| leaf.name() == name).ok_or_else(|| "use one of i8, i16, f32".to_owned())
+}
+
+fn layout(name: &str) -> Result<LayoutChoice, String> {
+    if name == "auto" {
+        return Ok(LayoutChoice(None));
+    }
+    let layout = Layout::ALL.iter().copied().find(|layout| layout.name() == name);
+    layout
+        .map(|layout| LayoutChoice(Some(layout)))
+        .ok_or_else(|| "use one of auto, compact, complete, grid, wide, patterns".to_owned())
+}
+
+fn sharing(name: &str) -> Result<Sharing, String> {
+    match name {
+        "auto" => Ok(Sharing(None)),
+        "yes" => Ok(Sharing(Some(true))),
+        "no" => Ok(Sharing(Some(false))),
+        _ => Err("use one of auto, yes, no".into()),
+    }
+}
+
+fn goal(name: &str) -> Result<Goal, String> {
+    match name {
+        "balanced" => Ok(Goal::Balanced(compile::Core::M4F)),
+        "speed" => Ok(Goal::Speed),
+        "size" => Ok(Goal::Size),
+        chip => super::chips::core(chip)
+            .map(Goal::Balanced)
+            .map_err(|_| "use one of balanced, speed, size, m4f, m0+".to_owned()),
+    }
+}
+
+fn scale(text: &str) -> Result<(String, f32), String> {
+    let (name, scale) = text.rsplit_once('=').ok_or("give FEATURE=UNITS, such as width=100")?;
+    match scale.parse::<f32>() {
+        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok((name.to_owned(), scale)),
+        _ => Err("give a positive number of units, such as width=100".into()),
+    }
+}

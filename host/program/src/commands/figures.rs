@@ -1,0 +1,371 @@
+//! The figures of an evaluation as JSON and as text.
+
+use super::percent;
+use palpate::evaluate::{ActiveFacts, Approaches, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// An evaluation, and what was asked for beside it.
+#[derive(serde::Serialize)]
+pub(super) struct Evaluated {
+    #[serde(flatten)]
+    pub(super) evaluation: Evaluation,
+    /// Robots that made the touches in turn, each with its own bias.
+    pub(super) robots: usize,
+    /// How many instances or recordings the objects have that have several: each group is of touches of one.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) instances: BTreeMap<String, usize>,
+    /// Objects whose touches are those that the model was trained on.
+    pub(super) trained_on: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) confusion: Option<Confusion>,
+    /// What the plan proposed approaches from, where it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) active: Option<ActiveFacts>,
+    /// Sequences in which the object is exchanged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) switch: Option<Switched>,
+    /// What is said to objects that the model does not know.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) strangers: Option<Strangers>,
+}
+
+/// How often each object was taken for each.
+#[derive(serde::Serialize)]
+pub(super) struct Confusion {
+    pub(super) touches: usize,
+    /// Rows.
+    pub(super) touched: Vec<String>,
+    /// Columns.
+    pub(super) recognized: Vec<String>,
+    /// Groups.
+    pub(super) counts: Vec<Vec<usize>>,
+}
+
+/// What `palpate evaluate` prints: tables, then sentences about what was asked for beside them.
+pub(super) fn text(evaluated: &Evaluated) -> String {
+    let mut text = table(&evaluated.evaluation);
+    if let Some(approaches) = &evaluated.evaluation.approaches {
+        text += &approaches_table(approaches, &evaluated.evaluation.patterns);
+    }
+    if let Some(promise) = &evaluated.evaluation.promise {
+        text += &promise_text(promise);
+    }
+    text += &above_text(&evaluated.evaluation);
+    if let Some(ActiveFacts { rolls, poses, left_out, without_approaches }) = &evaluated.active {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "Each approach is in the pose that the plan proposed, of {poses} (26 directions, {rolls} roll{} each; {left_out} \
+             never touch, {without_approaches} have no approach here).",
+            if *rolls == 1 { "" } else { "s" }
+        );
+    }
+    if evaluated.robots > 1 {
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "Each group is of touches by one of {} robots, each with its own bias.", evaluated.robots);
+    }
+    if let Some(most) = evaluated.instances.values().max() {
+        _ = writeln!(text, "Objects have up to {most} instances or recordings; each group is of touches of one.");
+    }
+    if let Some(confusion) = &evaluated.confusion {
+        text += &confusion_table(confusion);
+    }
+    if let Some(switch) = &evaluated.switch {
+        text += &switch_table(switch);
+    }
+    if let Some(strangers) = &evaluated.strangers {
+        text += &strangers_table(strangers);
+    }
+    if !evaluated.trained_on.is_empty() {
+        let objects = evaluated.trained_on.join(", ");
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "\nThe model was trained on these touches of {objects}: on others it is right less often. Capture them with \
+             another seed."
+        );
+    }
+    text
+}
+
+/// At what recognizers stop.
+fn stops(error_rate: f64, promised: Option<f64>) -> String {
+    match promised {
+        Some(rate) => format!("at a promised error rate of {rate}"),
+        None => format!("at an error rate of {error_rate}"),
+    }
+}
+
+/// Names that are wrong more often than the rate that was asked for or promised of all together.
+fn above_text(evaluation: &Evaluation) -> String {
+    let (of, above, error_rate, promised) = match &evaluation.approaches {
+        Some(Approaches { sequential: of, .. }) => {
+            (&of.error_of_given_per_object, &of.above, of.error_rate, of.promised)
+        }
+        None => {
+            let of = &evaluation.sequential;
+            (&of.error_of_given_per_object, &of.above, of.error_rate, of.promised)
+        }
+    };
+    let share = |name: &String| format!("{name} {:.1} %", 100.0 * of.get(name).copied().unwrap_or(f64::NAN));
+    match (above.is_empty(), promised) {
+        (true, _) => String::new(),
+        (false, promised) => format!(
+            "More than {} % are wrong of the names given to: {}.{}\n",
+            percent(error_rate),
+            above.iter().map(share).collect::<Vec<_>>().join(", "),
+            match promised {
+                Some(_) =>
+                    " The promise is of all names together; palpate calibrate --per object makes one of each object.",
+                None => "",
+            }
+        ),
+    }
+}
+
+/// What was promised, what was measured, whether the promise is kept, and what makes it void.
+fn promise_text(check: &PromiseCheck) -> String {
+    let of = match (check.per, &check.of) {
+        ("name", Some(name)) => format!(" of {name}, the name that is wrong most often,"),
+        ("object", Some(name)) => format!(" of the names given to {name}, the object that is mistaken most often,"),
+        _ => " of the names given".to_owned(),
+    };
+    let mut text = format!(
+        "\nPromised: at most {} % wrong ({}, {} % sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}: {}.\n",
+        percent(check.promised),
+        match check.per {
+            "name" => "each name, when it is given",
+            "object" => "each object",
+            _ => "on average",
+        },
+        percent(check.confidence),
+        check.sequences,
+        100.0 * check.error,
+        100.0 * check.standard_error,
+        match check.finding {
+            Finding::Kept => "the promise is kept".to_owned(),
+            Finding::Unclear => {
+                format!("{:.2} points above what is promised, which may be chance", 100.0 * check.exceeded_by)
+            }
+            Finding::Broken => format!("the promise is broken by {:.2} points", 100.0 * check.exceeded_by),
+            Finding::Untested => "no name was given, so nothing is known of the promise".to_owned(),
+        }
+    );
+    if !check.void.is_empty() {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "It was made for other touches than these, for which it is void: {}.",
+            check.void.join("; ")
+        );
+        if let Some(most) = check.by_theory {
+            _ = writeln!(
+                text,
+                "By theory it is at most {:.1} % with any priors, if posteriors can be believed.",
+                100.0 * most
+            );
+        }
+    }
+    text
+}
+
+/// Accuracies in percent: one row per object, one column per number of touches; then the sequential figures.
+fn table(evaluation: &Evaluation) -> String {
+    let width = evaluation.per_object.keys().map(|name| name.chars().count()).max().unwrap_or(0).max("touches".len());
+    let sequential = &evaluation.sequential;
+    let mut text = format!("{:width$}", "touches");
+    // Writing to a string cannot fail.
+    let cells = |text: &mut String, numbers: &mut dyn Iterator<Item = String>| {
+        numbers.for_each(|number| _ = write!(text, " {number:>7}"));
+    };
+    let percent = |share: &f64| format!("{:.1} %", 100.0 * share);
+    cells(&mut text, &mut evaluation.accuracy.keys().map(ToString::to_string));
+    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "of names", "undecided");
+    for (name, accuracy) in &evaluation.per_object {
+        _ = write!(text, "{name:width$}");
+        cells(&mut text, &mut accuracy.values().map(percent));
+        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        _ = writeln!(
+            text,
+            " {:>9.1} {:>9} {:>9} {:>9}",
+            of(&sequential.per_object),
+            percent(&of(&sequential.error_per_object)),
+            given(of(&sequential.error_of_given_per_object)),
+            percent(&of(&sequential.undecided_per_object))
+        );
+    }
+    _ = write!(text, "{:width$}", "all");
+    cells(&mut text, &mut evaluation.accuracy.values().map(percent));
+    _ = writeln!(
+        text,
+        " {:>9.1} {:>9} {:>9} {:>9}",
+        sequential.mean_touches,
+        percent(&sequential.error),
+        given(sequential.error_of_given),
+        percent(&sequential.undecided)
+    );
+    _ = write!(text, "{:width$}", "±");
+    cells(&mut text, &mut evaluation.accuracy_standard_error.values().map(percent));
+    _ = writeln!(
+        text,
+        " {:>9.1} {:>9}",
+        sequential.mean_touches_standard_error,
+        percent(&sequential.error_standard_error)
+    );
+    _ = write!(
+        text,
+        "\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
+         {}.\nWrong: of all sequences; of names: of those that got a name.\n{} groups per object of {} touches in all; ± is \
+         a standard error.\n",
+        stops(sequential.error_rate, sequential.promised),
+        sequential.mean_touches,
+        100.0 * sequential.error,
+        100.0 * sequential.error_standard_error,
+        100.0 * sequential.undecided,
+        sequential.max_touches,
+        evaluation.groups,
+        evaluation.touches,
+    );
+    text
+}
+
+/// A share of names given: none where no name was given.
+fn given(share: f64) -> String {
+    if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
+}
+
+/// What approaches come to: one row per object, one column per number of approaches; then the sequential figures.
+fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> String {
+    let names = approaches.per_object.keys().map(|name| name.chars().count());
+    let width = names.max().unwrap_or(0).max("approaches".len());
+    let sequential = &approaches.sequential;
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut text = format!("\n{:width$}", "approaches");
+    // Writing to a string cannot fail.
+    approaches.accuracy.keys().for_each(|at| _ = write!(text, " {at:>7}"));
+    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "of names", "undecided", "used");
+    let mut line = |name: &str, accuracy: Vec<f64>, [stop, wrong, of_given, undecided, used]: [f64; 5]| {
+        _ = write!(text, "{name:width$}");
+        accuracy.into_iter().for_each(|share| _ = write!(text, " {:>7}", percent(share)));
+        let shares = [percent(wrong), given(of_given), percent(undecided), percent(used)];
+        _ = writeln!(text, " {stop:>9.1} {:>9} {:>9} {:>9} {:>9}", shares[0], shares[1], shares[2], shares[3]);
+    };
+    for (name, accuracy) in &approaches.per_object {
+        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        let stopping = [
+            of(&sequential.per_object),
+            of(&sequential.error_per_object),
+            of(&sequential.error_of_given_per_object),
+            of(&sequential.undecided_per_object),
+            of(&approaches.used_per_object),
+        ];
+        line(name, accuracy.values().copied().collect(), stopping);
+    }
+    let stopping = [
+        sequential.mean_approaches,
+        sequential.error,
+        sequential.error_of_given,
+        sequential.undecided,
+        approaches.used,
+    ];
+    line("all", approaches.accuracy.values().copied().collect(), stopping);
+    let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {}", percent(*share)));
+    _ = writeln!(
+        text,
+        "\nStopping {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
+         wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.",
+        stops(sequential.error_rate, sequential.promised),
+        sequential.mean_approaches,
+        sequential.mean_approaches_standard_error,
+        sequential.mean_touches,
+        100.0 * sequential.error,
+        100.0 * sequential.error_standard_error,
+        100.0 * sequential.undecided,
+        shares.collect::<Vec<_>>().join(", "),
+    );
+    text
+}
+
+/// What an exchanged object comes to: one row per rule.
+fn switch_table(switch: &Switched) -> String {
+    let mut text = format!(
+        "\n{:20} {:>22} {:>8} {:>26} {:>8} {:>8}\n",
+        "forgetting", "approaches, same object", "wrong", "approaches after exchange", "wrong", "the old"
+    );
+    for (name, Rule { still, switched, old }) in
+        [("off".to_owned(), &switch.off), (format!("at {} nats", switch.nats), &switch.on)]
+    {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "{name:20} {:>22.1} {:>8} {:>26.1} {:>8} {:>8}",
+            still.mean_approaches,
+            percent(still.error),
+            switched.mean_approaches,
+            percent(switched.error),
+            percent(*old)
+        );
+    }
+    text + "Exchanged at a random approach before the verdict; wrong is any name but that of the object touched last.\n"
+}
+
+/// What is said to strangers, in percent: one row per object.
+fn strangers_table(strangers: &Strangers) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    if !strangers.has_test {
+        let named = strangers.wrong_name_per_object.iter().map(|(name, share)| format!("{name} {}", percent(*share)));
+        return format!(
+            "\nObjects that the model does not know: {} got a name, {} no verdict. The model has no test of whether touches \
+             fit an object that it knows, so it never says that one is unknown: palpate calibrate --strangers certain adds \
+             one. Got a name: {}.\n",
+            percent(strangers.wrong_name),
+            percent(strangers.undecided),
+            named.collect::<Vec<_>>().join(", ")
+        );
+    }
+    let names = strangers.detected_per_object.keys().map(|name| name.chars().count());
+    let width = names.max().unwrap_or(0).max("found out by".len());
+    let mut text = format!("\n{:width$}", "found out by");
+    // Writing to a string cannot fail.
+    strangers.detected.keys().for_each(|at| _ = write!(text, " {at:>8}"));
+    _ = writeln!(text, " {:>9}", "named");
+    let mut line = |name: &str, detected: &BTreeMap<usize, f64>, named: f64| {
+        _ = write!(text, "{name:width$}");
+        detected.values().for_each(|share| _ = write!(text, " {:>8}", percent(*share)));
+        _ = writeln!(text, " {:>9}", percent(named));
+    };
+    for (name, detected) in &strangers.detected_per_object {
+        line(name, detected, strangers.wrong_name_per_object.get(name).copied().unwrap_or(f64::NAN));
+    }
+    line("all", &strangers.detected, strangers.wrong_name);
+    let (alarms, undecided) = (percent(strangers.false_alarms), percent(strangers.undecided));
+    _ = writeln!(
+        text,
+        "\nObjects that the model does not know: the share found out by each number of touches, and the share that got a name; \
+         {undecided} got no verdict.\nOf the objects that it knows, {alarms} were taken for unknown."
+    );
+    text
+}
+
+/// Shares in percent: one row per touched object, one column per object that it was taken for.
+pub(super) fn confusion_table(confusion: &Confusion) -> String {
+    let names = confusion.touched.iter().chain(&confusion.recognized);
+    let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("7.1 %".len() + 2);
+    let s = if confusion.touches == 1 { "" } else { "es" };
+    let mut text = format!("\nTaken for, after {} touch{s}\n{:width$}", confusion.touches, "");
+    // Writing to a string cannot fail.
+    confusion.recognized.iter().for_each(|name| _ = write!(text, " {name:>width$}"));
+    text.push('\n');
+    for (name, counts) in confusion.touched.iter().zip(&confusion.counts) {
+        let groups = counts.iter().sum::<usize>().max(1) as f64;
+        _ = write!(text, "{name:width$}");
+        for &count in counts {
+            let share = if count == 0 { "–".into() } else { format!("{:.1} %", 100.0 * count as f64 / groups) };
+            _ = write!(text, " {share:>width$}");
+        }
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,129 @@
+//! `palpate probe fit`.
+
+use super::numbers::count;
+use super::probe::{SizeArguments, refuse_unstated};
+use super::progress::Bar;
+use palpate::error::TuneProblem;
+use palpate::output;
+use palpate::touches::{Origin, read_touches};
+use palpate::tune::fit::{Estimate, Fit, Settings, between, fit};
+use palpate::{Error, Result};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+RECORDED is a data set that your probe made: DIR/<object>.txt, one line per approach, of objects whose meshes you have. MESHES are these objects, matched by their names. The probe that explains the recorded touches best is written as probe.toml: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
+
+A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, tell offsets and noise better than any object: one line per press, in a file for --plate.
+
+Recordings that look wrong are named, and nothing is written: another object than the name says, two objects in one file, a probe that was moved on the way.
+
+Examples:
+  palpate probe fit recorded meshes/ -o probe.toml
+  palpate probe fit recorded meshes/ -o probe.toml --plate plate.txt
+  palpate probe fit recorded meshes/ -o fitted.toml --probe probe.toml --true-size --unit mm
+                                                  a probe with other measures
+  palpate capture meshes/ -o data --probe probe.toml --approaches")]
+pub(super) struct FitArguments {
+    /// The recorded touches: a directory with a file for each object
+    #[arg(value_name = "RECORDED")]
+    recorded: PathBuf,
+    /// The objects: `builtin` or a built-in object's name, a mesh, or a directory of meshes
+    #[arg(value_name = "MESHES", required = true)]
+    sources: Vec<String>,
+    /// Where to write the probe, such as probe.toml
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Presses on a flat plate, half a turn of the probe after each, one line per press
+    #[arg(long, value_name = "FILE")]
+    plate: Option<PathBuf>,
+    /// Write the probe although recordings look wrong
+    #[arg(long)]
+    force: bool,
+    /// Simulated approaches to each object
+    #[arg(long, value_name = "N", value_parser = count, default_value_t = Settings::default().approaches)]
+    approaches: u64,
+    /// Seed of the simulated approaches
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print what was found as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    size: SizeArguments,
+}
+
+pub(super) fn run(arguments: &FitArguments) -> Result<()> {
+    let inputs = super::files_of(&arguments.recorded).into_iter().chain(arguments.plate.clone());
+    output::refuse_input(&arguments.output, inputs)?;
+    let recorded = super::checked(palpate::touches::Dataset::read_any(&arguments.recorded)?);
+    let base = recorded.origin.clone().unwrap_or_default();
+    if recorded.origin.as_ref().is_none_or(|origin| origin.probe == Origin::default().probe) {
+        refuse_unstated(&arguments.size)?;
+    }
+    let origin = arguments.size.origin(base)?;
+    let objects = arguments.size.objects(&arguments.sources, arguments.seed)?;
+    let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
+    let settings = Settings { origin, approaches: arguments.approaches, seed: arguments.seed };
+    let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
+    let suspects: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
+    if arguments.force || suspects.is_empty() {
+        output::write_bytes(&arguments.output, found.toml().as_bytes())?;
+    }
+    if arguments.json {
+        output::print_json_about(&arguments.output, &found)?;
+    } else {
+        output::print_about(&arguments.output, &table(&found))?;
+    }
+    if !suspects.is_empty() && !arguments.force {
+        return Err(Error::from(TuneProblem::Suspects { suspects }).in_file(&arguments.recorded));
+    }
+    for suspect in suspects {
+        eprintln!("palpate: warning: {suspect}.");
+    }
+    match arguments.json {
+        true => Ok(()),
+        false => output::print_about(&arguments.output, &format!("Wrote {}\n", arguments.output.display())),
+    }
+}
+
+/// What was found, one line for each number.
+fn table(found: &Fit) -> String {
+    let [full, pairs] = found.contacts;
+    let presses = if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() };
+    let mut text = format!(
+        "{} approaches to {}: {full} with three contacts, {pairs} with two{presses}\n\n{:22}{:>10}  95 % interval\n",
+        found.recorded,
+        found.objects.join(", "),
+        "",
+        "value"
+    );
+    let mut line = |name: &str, estimate: &Estimate, scale: f64, digits: usize, unit: &str| {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "{name:22}{:>10}  {}{unit}",
+            format!("{:.digits$}{unit}", scale * estimate.value),
+            between(estimate, scale, digits)
+        );
+    };
+    line("speed over nominal", &found.speed_factor, 1.0, 3, "");
+    let zero = Estimate { value: 0.0, low: Some(0.0), high: Some(0.0) };
+    line("first finger late", &zero, 1.0, 1, " ms");
+    line("second finger late", &found.late[0], 1.0, 1, " ms");
+    line("third finger late", &found.late[1], 1.0, 1, " ms");
+    line("noise", &found.noise, 1.0, 2, " ms");
+    for (name, missed) in ["first", "second", "third"].into_iter().zip(found.missed.iter().flatten()) {
+        line(&format!("{name} finger misses"), missed, 100.0, 1, " %");
+    }
+    _ = match found.timer {
+        Some(timer) => writeln!(text, "{:22}{:>10}", "timer", format!("{timer} ms")),
+        None => writeln!(text, "{:22}{:>10}", "timer", "none found"),
+    };
+    text += "\nOffsets are relative to the first finger's: only differences of times are recorded.\n";
+    for warning in &found.warnings {
+        _ = writeln!(text, "Not told well: {warning}");
+    }
+    text
+}

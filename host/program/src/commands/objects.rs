@@ -1,0 +1,76 @@
+//! `palpate objects`.
+
+use palpate::Result;
+use palpate::mesh::Object;
+use palpate::mesh::builtin;
+use palpate::mesh::obj;
+use palpate::output;
+use palpate_report::page::render;
+use clap::builder::PossibleValuesParser;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate objects -o meshes                    ten files: meshes/bowl.obj, ...
+  palpate objects -o meshes --only fork        one of them
+  palpate objects -o meshes --picture all.png  and a picture of them
+  palpate objects -o meshes --varied 7         other proportions, from seed 7
+
+The meshes are closed, in centimeters, with z up. The same command always writes the same bytes.")]
+pub(crate) struct Arguments {
+    /// The directory to write NAME.obj into; created if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Only this object; may be given several times
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(builtin::names()))]
+    only: Vec<String>,
+    /// Vary the proportions by up to about a fifth, with this seed
+    #[arg(long, value_name = "SEED")]
+    varied: Option<u64>,
+    /// Also draw a contact sheet of the objects into this PNG file
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Print what was written as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was written for one object.
+#[derive(serde::Serialize)]
+struct Written {
+    name: String,
+    file: PathBuf,
+    vertices: usize,
+    triangles: usize,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    output::refuse_stdout(&arguments.output)?;
+    let chosen = |name: &&str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
+    let names: Vec<&str> = builtin::names().into_iter().filter(chosen).collect();
+    let made = builtin::make(&names, arguments.varied)?;
+    let written = made.iter().map(|object| write(object, &arguments)).collect::<Result<Vec<_>>>()?;
+    if let Some(picture) = &arguments.picture {
+        output::write_bytes(picture, &render::sheet(&made, 1200))?;
+    }
+    if arguments.json {
+        return output::print_json(&written);
+    }
+    let mut text = String::new();
+    for Written { file, vertices, triangles, .. } in &written {
+        let _ = writeln!(text, "{}: {vertices} vertices, {triangles} triangles", file.display());
+    }
+    if let Some(picture) = &arguments.picture {
+        let _ = writeln!(text, "{}: a picture of them", picture.display());
+    }
+    output::print(&text)
+}
+
+fn write(object: &Object, arguments: &Arguments) -> Result<Written> {
+    let file = arguments.output.join(format!("{}.obj", object.name));
+    output::write_whole(&file, |out| obj::write(object.mesh(), out))?;
+    let (vertices, triangles) = (object.mesh().vertices.len(), object.mesh().triangles.len());
+    Ok(Written { name: object.name.clone(), file, vertices, triangles })
+}

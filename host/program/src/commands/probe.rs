@@ -1,0 +1,266 @@
+//! Options for the probe and the sizes of objects.
+
+use palpate::ensemble::StatedProbe;
+use palpate::error::ProbeProblem;
+use palpate::mesh::{BACKGROUND, Object, builtin, source};
+use palpate::probe::file::ProbeFile;
+use palpate::touches::noise::Noise;
+use palpate::touches::{Dataset, Origin};
+use palpate::{Error, Result};
+use palpate_shared::format::Length;
+use std::path::PathBuf;
+
+/// The probe file.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct ProbeArguments {
+    /// The probe, as a TOML file: unit, radius, spacing, speed, and if you like tilt, timer and what a real one adds; such as probe.toml
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+}
+
+impl ProbeArguments {
+    /// What the file states, if one is given.
+    pub(crate) fn read(&self) -> Result<Option<ProbeFile>> {
+        self.probe.as_ref().map(ProbeFile::read).transpose()
+    }
+
+    /// The option as words of a command line, to repeat it.
+    pub(crate) fn words(&self) -> Vec<String> {
+        let words = self.probe.iter().flat_map(|path| ["--probe".to_owned(), path.to_string_lossy().into_owned()]);
+        words.collect()
+    }
+
+    /// The probe that a model of this data set states: that of the data set, or, where it states none, that of the file.
+    ///
+    /// # Errors
+    /// If both state one and they differ.
+    pub(crate) fn of_dataset(&self, file: Option<&ProbeFile>, dataset: &Dataset) -> Result<Option<StatedProbe>> {
+        let own = StatedProbe::of(dataset);
+        let Some(file) = file else { return Ok(own) };
+        let given = StatedProbe { probe: file.probe, unit: file.unit, ..StatedProbe::default() };
+        let name = self.probe.as_ref().map_or_else(String::new, |path| path.display().to_string());
+        if let Some(own) = own {
+            StatedProbe::compare([&name, "the data set"], [given.trained(), own.trained()])?;
+        }
+        Ok(own.or(Some(given)))
+    }
+
+    /// What is to be added to the touches of a data set: what the file says under `[real]`, without a file `usual`, and
+    /// nothing where the touches were captured with such a file and have it already.
+    ///
+    /// # Errors
+    /// If the data set was captured with another `[real]`.
+    pub(crate) fn noise(&self, file: Option<&ProbeFile>, dataset: &Dataset, usual: Noise) -> Result<Noise> {
+        let there = dataset.real();
+        let asked = file.map(|file| file.real).filter(|real| !real.is_none());
+        match asked {
+            None if there.is_none() => Ok(usual),
+            Some(real) if there.is_none() => Ok(real),
+            Some(real) if real != there => Err(ProbeProblem::Differs {
+                first: self.probe.as_ref().map_or_else(String::new, |path| path.display().to_string()),
+                second: "the data set".into(),
+                differences: format!("[real]: {real}; and {there}"),
+            }
+            .into()),
+            _ => Ok(Noise::default()),
+        }
+    }
+}
+
+/// The probe file, and whether objects keep their true sizes.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct SizeArguments {
+    #[command(flatten)]
+    pub(crate) probe: ProbeArguments,
+    #[command(flatten)]
+    pub(crate) units: UnitArguments,
+}
+
+/// Whether objects keep their true sizes, and whether they have instances.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct UnitArguments {
+    /// Touch objects at their true size, with a probe in millimeters; built-in objects, glTF and COLLADA state their unit, for others say --unit
+    #[arg(long)]
+    true_size: bool,
+    /// The unit of the meshes that do not state one: mm, cm, m or in; for one object, whatever its file states, NAME=cm; may be given several times
+    #[arg(long, value_name = "[NAME=]mm|cm|m|in", value_parser = mesh_unit, requires = "true_size")]
+    unit: Vec<(Option<String>, f64)>,
+    /// Objects with several meshes: of a directory inside a directory each mesh is an instance; with a number N, each built-in object has N varied instances
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "0", value_parser = instances)]
+    instances: Option<usize>,
+}
+
+impl UnitArguments {
+    /// The objects of the sources, with their true sizes as far as they are known.
+    pub(crate) fn objects(&self, sources: &[String], seed: u64) -> Result<Vec<Object>> {
+        let mut objects = match self.instances {
+            None => source::objects(sources)?,
+            Some(count) => self.of_instances(sources, count, seed)?,
+        };
+        tell(&objects);
+        self.add_units(&mut objects)?;
+        Ok(objects)
+    }
+
+    fn of_instances(&self, sources: &[String], count: usize, seed: u64) -> Result<Vec<Object>> {
+        if count == 0 {
+            return source::objects_of_instances(sources);
+        }
+        let (mut objects, mut others) = (Vec::new(), Vec::new());
+        let mut background = false;
+        for source in sources {
+            let names = builtin::names();
+            match source.as_str() {
+                "builtin" => objects.extend(names.map(String::from)),
+                BACKGROUND if !std::path::Path::new(BACKGROUND).exists() => background = true,
+                name if names.contains(&name) && !std::path::Path::new(name).exists() => objects.push(name.into()),
+                _ => others.push(source.clone()),
+            }
+        }
+        let varied = objects.iter().map(|name| builtin::instances(name, count, seed));
+        let mut objects: Vec<Object> = varied.collect::<Result<_>>()?;
+        if background {
+            objects.push(builtin::background(count, seed)?);
+        }
+        if !others.is_empty() {
+            objects.extend(source::objects_of_instances(&others)?);
+        }
+        objects.sort_by(|a, b| a.name.cmp(&b.name));
+        match objects.windows(2).find(|pair| pair[0].name == pair[1].name) {
+            Some(pair) => {
+                let name = pair[0].name.clone();
+                let (first, second) = ("builtin".into(), name.clone().into());
+                Err(palpate::error::MeshProblem::SameName { name, first, second }.into())
+            }
+            None => Ok(objects),
+        }
+    }
+
+    /// One object, with its true size as far as it is known.
+    pub(crate) fn object(&self, source: &str) -> Result<Object> {
+        let mut object = [source::object(source)?];
+        tell(&object);
+        self.add_units(&mut object)?;
+        let [object] = object;
+        Ok(object)
+    }
+
+    fn add_units(&self, objects: &mut [Object]) -> Result<()> {
+        for (name, millimeters) in &self.unit {
+            match name {
+                None => {
+                    objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(Some(*millimeters)))
+                }
+                Some(name) => {
+                    let known = || objects.iter().map(|object| object.name.clone()).collect::<Vec<_>>().join(", ");
+                    let Some(place) = objects.iter().position(|object| object.name == *name) else {
+                        return Err(Error::setting("unit", name, format!("the name of an object: {}", known())));
+                    };
+                    objects[place].millimeters = Some(*millimeters);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether objects are touched at their true size.
+    pub(crate) fn is_true_size(&self) -> bool {
+        self.true_size
+    }
+
+    /// The options as words of a command line, to repeat them.
+    pub(crate) fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        words.extend(self.true_size.then(|| "--true-size".to_owned()));
+        for (name, millimeters) in &self.unit {
+            let unit = UNITS.into_iter().find(|(_, own)| own == millimeters).map_or("mm", |(unit, _)| unit);
+            let name = name.as_ref().map_or_else(String::new, |name| format!("{name}="));
+            words.extend(["--unit".to_owned(), format!("{name}{unit}")]);
+        }
+        if let Some(count) = self.instances {
+            words.push("--instances".to_owned());
+            words.extend((count > 0).then(|| count.to_string()));
+        }
+        words
+    }
+}
+
+impl SizeArguments {
+    /// The objects of the sources, with their true sizes as far as they are known.
+    pub(crate) fn objects(&self, sources: &[String], seed: u64) -> Result<Vec<Object>> {
+        self.units.objects(sources, seed)
+    }
+
+    /// One object, with its true size as far as it is known.
+    pub(crate) fn object(&self, source: &str) -> Result<Object> {
+        self.units.object(source)
+    }
+
+    /// Probe and unit of a capture: those of the file, or else of `base`.
+    ///
+    /// # Errors
+    /// If the file cannot be used, or is in another unit than objects are touched in.
+    pub(crate) fn origin(&self, base: Origin) -> Result<Origin> {
+        let unit = if self.units.true_size { Length::Millimeter } else { base.unit };
+        let Some(file) = self.probe.read()? else { return Ok(Origin { unit, ..base }) };
+        let problem = |message: &str| {
+            let path = self.probe.probe.clone().unwrap_or_default();
+            Err(Error::from(ProbeProblem::BadFile { message: message.into() }).in_file(path))
+        };
+        match (unit, file.unit) {
+            (Length::Tenth, Length::Millimeter) => {
+                problem("its unit is mm, which needs objects at their true size (--true-size)")
+            }
+            (Length::Millimeter, Length::Tenth) => problem(
+                "its unit is a tenth of the object's longest side, where objects have their true size (unit = \"mm\")",
+            ),
+            _ => Ok(Origin { probe: file.probe, unit, ..base }),
+        }
+    }
+
+    /// Whether objects are touched at their true size with a probe that was not stated: the published one is in units.
+    pub(crate) fn lacks_probe(&self) -> bool {
+        self.units.true_size && self.probe.probe.is_none()
+    }
+
+    /// The options as words of a command line, to repeat them.
+    pub(crate) fn words(&self) -> Vec<String> {
+        [self.probe.words(), self.units.words()].concat()
+    }
+}
+
+/// What states a probe for objects at their true size.
+pub(crate) const IN_MILLIMETERS: &str = "a file that states it in millimeters, since the published one is in units: such as \
+     probe.toml with the lines unit = \"mm\", radius = 1.5, spacing = 15, speed = 100, one below the other";
+
+/// Refuses objects at their true size without a probe.
+pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
+    match size.lacks_probe() {
+        true => Err(Error::setting("probe", "not given", IN_MILLIMETERS)),
+        false => Ok(()),
+    }
+}
+
+/// Tells on stderr how objects were found and read, where that may surprise.
+fn tell(objects: &[Object]) {
+    for object in objects {
+        object.notes.iter().for_each(|note| eprintln!("{}: {note}", object.name));
+    }
+}
+
+/// Units of meshes, and how many millimeters they are.
+const UNITS: [(&str, f64); 4] = [("mm", 1.0), ("cm", 10.0), ("m", 1_000.0), ("in", 25.4)];
+
+fn mesh_unit(text: &str) -> Result<(Option<String>, f64), String> {
+    let (name, unit) = match text.rsplit_once('=') {
+        Some((name, unit)) => (Some(name.to_owned()), unit),
+        None => (None, text),
+    };
+    let found = UNITS.into_iter().find(|(name, _)| *name == unit);
+    found.map(|(_, millimeters)| (name, millimeters)).ok_or_else(|| "use mm, cm, m or in, or NAME=cm".to_owned())
+}
+
+fn instances(text: &str) -> Result<usize, String> {
+    let wanted = "give a number such as 20, or none; write what to touch before the option";
+    text.parse().map_err(|_| wanted.to_owned())
+}

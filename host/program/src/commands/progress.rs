@@ -1,0 +1,53 @@
+//! Progress on stderr, where it is a terminal.
+
+use palpate::progress::Progress;
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+/// Draws the current stage of a long call: a bar where the number of steps is known, else a spinner. Silent where
+/// stderr is no terminal; cleared when dropped.
+pub(crate) struct Bar(Mutex<ProgressBar>);
+
+impl Bar {
+    /// Nothing is drawn before the first stage begins.
+    pub(crate) fn new() -> Self {
+        Self(Mutex::new(ProgressBar::hidden()))
+    }
+
+    /// The bar that is drawn now.
+    pub(crate) fn current(&self) -> ProgressBar {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+impl Progress for Bar {
+    fn begin(&self, stage: &str, total: Option<u64>) {
+        let bar = match total {
+            Some(total) => {
+                let bar = ProgressBar::new(total);
+                if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {human_pos}/{human_len} {eta}") {
+                    bar.set_style(style);
+                }
+                bar
+            }
+            None => {
+                let spinner = ProgressBar::new_spinner();
+                spinner.enable_steady_tick(Duration::from_millis(100));
+                spinner
+            }
+        };
+        let bar = bar.with_message(stage.to_owned()).with_finish(ProgressFinish::AndClear);
+        std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), bar).finish_and_clear();
+    }
+
+    fn advance(&self, steps: u64) {
+        self.current().inc(steps);
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.current().finish_and_clear();
+    }
+}

@@ -1,0 +1,293 @@
+use super::expected::{self, ExpectedArguments};
+use super::numbers::error_rate;
+use palpate::Result;
+use palpate::chip::Entry;
+use palpate::compile::{self, CompiledModel};
+use palpate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
+use palpate::output;
+use palpate::touches::{Log, LogWriter, Logged, LoggedVerdict, begins_log, parse_touch};
+use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_shared::Touch;
+use palpate_shared::format::Counted;
+use palpate_shared::link::ApproachMessage;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// Recognize objects from a stream of touches.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided; recognized; unknown where the touches fit no object of the model, which only a model with a test of fit says (`palpate calibrate --strangers`); or gave-up once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
+
+FILE may be a robot's log as well (MCAP, see docs/mcap.md): its touches are taken in the order of their log times, and where the object that they name changes, the next touch is the first of another object.
+
+With --mcap touches and verdicts are written as a log, with the posterior of every object after every touch, once all touches are recognized. Foxglove shows it: plot /verdict.posteriors.fork. Touches that are not from a log are logged a second apart.
+
+With --features each line in is a row of features for a model that was exported from another library's: CSV with the features' names in the header, or as many columns as features, empty cells for missing values. Each line out is the class of that row and its posterior, or with --add-up the verdict of all rows since the last one. A regression gives the value that its library predicts, after the inverse link; with --json also the margin before it.
+
+Examples:
+  palpate recognize model.palpate data/fork.txt
+  probe | palpate recognize model.palpate
+  palpate recognize model.palpate - --json < data/fork.txt
+  palpate recognize model.palpate data/fork.txt --error-rate 5% --max-touches 30
+  palpate recognize model.palpate data/fork.txt --only fork,spoon,bowl
+  palpate recognize model.palpate data/fork.txt --prior fork=0.3,spoon=0.3
+  probe | palpate recognize planned.palpate --active
+  palpate recognize model.palpate monday.mcap
+  palpate recognize model.palpate data/fork.txt --mcap verdicts.mcap
+  palpate recognize model.palpate rows.csv --features --json
+
+The posterior is that of the model's temperature, if it was calibrated. What it promises holds for its own priors and all of its objects; `palpate evaluate` with --prior or --only says what becomes of it.")]
+pub(crate) struct Arguments {
+    /// Model that `palpate export` wrote
+    model: PathBuf,
+    /// File with touches, or a robot's log (MCAP); - is standard input
+    #[arg(default_value = "-")]
+    file: PathBuf,
+    /// The file has rows of features, not touches
+    #[arg(long)]
+    features: bool,
+    /// Add up the evidence of rows until there is a verdict, as that of touches
+    #[arg(long, requires = "features")]
+    add_up: bool,
+    /// Stop when the posterior passes one less this, such as 0.05 or 5%, instead of at the model's own thresholds; nothing is promised then
+    #[arg(long, value_name = "RATE", value_parser = error_rate)]
+    error_rate: Option<f64>,
+    /// Give up after this many touches instead of the model's limit
+    #[arg(long, value_name = "N")]
+    max_touches: Option<u32>,
+    /// Say after each touch where to touch next; the model needs a plan (see `palpate plan`)
+    #[arg(long)]
+    active: bool,
+    /// Write touches and verdicts as a log, which Foxglove shows
+    #[arg(long, value_name = "FILE", conflicts_with = "features")]
+    mcap: Option<PathBuf>,
+    /// Print one JSON object per line
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    expected: ExpectedArguments,
+}
+
+#[derive(serde::Serialize)]
+struct Line<'a> {
+    touch: u32,
+    verdict: &'static str,
+    object: &'a str,
+    posterior: f64,
+    /// Why the touch was not counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<String>,
+    /// The approach that helps most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next: Option<Entry>,
+}
+
+impl Line<'_> {
+    fn print(&self, json: bool) -> Result<()> {
+        if json {
+            // Numbers and strings are always JSON.
+            let text = serde_json::to_string(self).unwrap_or_default();
+            return output::print(&format!("{text}\n"));
+        }
+        match &self.refused {
+            Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", self.touch))?,
+            None => output::print(&format!(
+                "{:4}  {:10}  {} {:.4}\n",
+                self.touch, self.verdict, self.object, self.posterior
+            ))?,
+        }
+        self.next.as_ref().map_or(Ok(()), |next| output::print(&format!("      {next}\n")))
+    }
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let model = compiled.model();
+    let own = Stopping::from_model(&model);
+    let max_touches = arguments.max_touches.unwrap_or(own.max_touches());
+    let stopping = compile::stopping(arguments.error_rate.unwrap_or(own.error_rate()), max_touches)?;
+    // The model's own threshold stays as it is, to the last bit.
+    let stopping = if arguments.error_rate.is_none() { own.with_max_touches(max_touches) } else { stopping };
+    let too_many = |error: palpate_onboard::CapacityError| {
+        let problem = EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity };
+        Error::at(Place::file(&arguments.model), problem)
+    };
+    let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
+    if arguments.features {
+        return super::recognize_rows::run(recognizer, &arguments.file, arguments.add_up, arguments.json)
+            .map_err(|error| error.in_file(&arguments.model));
+    }
+    if model.descriptor().is_none() {
+        return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
+    }
+    if arguments.active && model.plan().is_none() {
+        return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
+    }
+    let weights = arguments.expected.weights(&compiled.names(), &expected::own_weights(&model))?;
+    let longest = compile::longest_time(&model);
+    let (active, json) = (arguments.active, arguments.json);
+    let log = arguments.mcap.as_deref().map(|log| log_to(log, &arguments, &compiled.names())).transpose()?;
+    let mut stream =
+        Stream { recognizer, model: &model, weights, longest, active, json, log, touches: 0, is_any_partial: false };
+    stream.reset();
+    let path = &arguments.file;
+    if path.as_os_str() == "-" {
+        stream.run(std::io::stdin().lock(), Path::new("standard input"))?;
+    } else {
+        let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+        stream.run(touches, path)?;
+    }
+    if model.trained_touches().counted != Counted::Full {
+        super::warn_of_full(stream.touches, stream.is_any_partial);
+    }
+    match (stream.log, &arguments.mcap) {
+        (Some(log), Some(path)) => log.finish(path),
+        _ => Ok(()),
+    }
+}
+
+/// A log of verdicts that is to become the file at `path`.
+fn log_to(path: &Path, arguments: &Arguments, objects: &[String]) -> Result<LogWriter> {
+    if output::is_stdout(path) {
+        return Err(Error::setting("mcap", "standard output", "a file: the verdicts are printed there"));
+    }
+    output::refuse_input(path, [&arguments.model, &arguments.file])?;
+    LogWriter::new(objects)
+}
+
+/// A stream of touches and what recognizes them.
+struct Stream<'m> {
+    recognizer: Recognizer<'m, 256>,
+    model: &'m Model<'m>,
+    /// How often each object is touched, if not as the model says.
+    weights: Option<Vec<u32>>,
+    /// The longest time between contacts that makes sense, in seconds.
+    longest: f64,
+    active: bool,
+    json: bool,
+    /// Where touches and verdicts are written too.
+    log: Option<LogWriter>,
+    /// How many touches there were, and whether a finger was missing in any of them.
+    touches: usize,
+    is_any_partial: bool,
+}
+
+impl<'m> Stream<'m> {
+    /// Prints a verdict for each touch; of lines, before the next line is waited for.
+    fn run(&mut self, touches: impl Read, path: &Path) -> Result<()> {
+        let mut reader = BufReader::new(touches);
+        let begin = reader.fill_buf().map_err(|source| Error::io(path, "read the touches", source))?;
+        if begins_log(begin) {
+            return self.run_log(&Log::of(reader, path)?, path);
+        }
+        let mut bytes = Vec::new();
+        for number in 1.. {
+            bytes.clear();
+            let read = reader.read_until(b'\n', &mut bytes);
+            if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
+                break;
+            }
+            let wrong = |problem: Problem| Error::at(Place::line(path, number), problem);
+            let line = std::str::from_utf8(&bytes).map_err(|_| wrong(TouchesProblem::NotText.into()))?.trim();
+            if line.is_empty() {
+                self.reset();
+                continue;
+            }
+            let touch = parse_touch(line).map_err(|problem| wrong(problem.into()))?;
+            self.check(&touch).map_err(|problem| wrong(problem.into()))?;
+            self.push(&touch, None, None)?;
+        }
+        Ok(())
+    }
+
+    /// Prints a verdict for each touch of a log.
+    fn run_log(&mut self, log: &Log, path: &Path) -> Result<()> {
+        log.skipped().iter().for_each(super::say);
+        let mut before = None;
+        for logged in log.touches() {
+            let Logged { time, touch, offset, .. } = logged;
+            let object = log.object(logged);
+            if object != before {
+                self.reset();
+            }
+            before = object;
+            self.check(touch).map_err(|problem| Error::at(Place::byte(path, *offset), problem))?;
+            self.push(touch, object, Some(*time))?;
+        }
+        Ok(())
+    }
+
+    /// Takes a touch, with what a log says of it.
+    fn push(&mut self, touch: &Touch, object: Option<&str>, time: Option<u64>) -> Result<()> {
+        self.touches += 1;
+        self.is_any_partial |= !touch.is_full();
+        let refused = self.recognizer.push(touch).err().map(|refused| refused.to_string());
+        let line = self.line(refused);
+        line.print(self.json)?;
+        if let Some(log) = &mut self.log {
+            let posteriors = (0..self.model.object_count())
+                .map(|object| (self.model.object_name(object).into(), self.recognizer.posterior(object).to_f64()));
+            let verdict = LoggedVerdict {
+                touch: line.touch,
+                verdict: line.verdict.into(),
+                object: line.object.into(),
+                posterior: line.posterior,
+                refused: line.refused,
+                posteriors: posteriors.collect(),
+            };
+            log.touch(touch, object, time)?;
+            log.verdict(&verdict)?;
+        }
+        if self.recognizer.verdict() != Verdict::Undecided {
+            self.reset();
+        }
+        Ok(())
+    }
+
+    /// Begins another object.
+    fn reset(&mut self) {
+        match &self.weights {
+            // One of them is above 0.
+            Some(weights) => _ = self.recognizer.reset_to(weights),
+            None => self.recognizer.reset(),
+        }
+    }
+
+    /// Refuses times that no object can give, such as times in milliseconds.
+    fn check(&self, touch: &Touch) -> Result<(), EvaluateProblem> {
+        let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
+        let seconds = f64::from(last) * 1e-6;
+        if seconds <= self.longest {
+            return Ok(());
+        }
+        Err(EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed: self.model.header().speed() })
+    }
+
+    /// What there is to say after a touch.
+    fn line(&self, refused: Option<String>) -> Line<'m> {
+        let best = self.recognizer.best();
+        Line {
+            touch: self.recognizer.touches(),
+            verdict: match self.recognizer.verdict() {
+                Verdict::Undecided => "undecided",
+                Verdict::Recognized { .. } => "recognized",
+                Verdict::Unknown => "unknown",
+                Verdict::GaveUp => "gave-up",
+            },
+            // Before the first counted touch no object is more likely than the others.
+            object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
+            posterior: self.recognizer.posterior(best).to_f64(),
+            refused,
+            next: self.next(),
+        }
+    }
+
+    /// The approach that helps most, where that is asked for and nothing is decided.
+    fn next(&self) -> Option<Entry> {
+        let poses =
+            self.model.plan().filter(|_| self.active && self.recognizer.verdict() == Verdict::Undecided)?.poses();
+        let proposal = self.recognizer.next_approach(0..poses.count())?;
+        Some(Entry::next(&ApproachMessage::new(proposal.pose, proposal.score, &poses.pose(proposal.pose)?)))
+    }
+}

@@ -1,0 +1,90 @@
+//! `palpate recognize --features`: rows instead of touches.
+
+use super::verify::read_rows;
+use palpate::Result;
+use palpate::error::RowsProblem;
+use palpate::evaluate::verify::margins;
+use palpate::output;
+use palpate::rows::{Encoder, feature_names};
+use palpate_onboard::{Recognizer, Verdict};
+use std::path::Path;
+
+/// What is said about a row.
+#[derive(serde::Serialize)]
+struct Line<'a> {
+    /// Counted from 1.
+    row: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<&'static str>,
+    /// The predicted class of the row, or the leading one of the rows so far.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    class: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    posterior: Option<f64>,
+    /// Rows of the same object so far, where their evidence is added.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rows: Option<u32>,
+    /// What a regression predicts, after its inverse link.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    value: Option<f32>,
+    /// The row's own, before any link.
+    margins: Vec<f64>,
+}
+
+/// Prints the class or the value of each row; where `adds_up` a verdict, of it and those before it since the last verdict.
+pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, adds_up: bool, json: bool) -> Result<()> {
+    let mut recognizer = recognizer;
+    let model = *recognizer.model();
+    if model.descriptor().is_some() {
+        return Err(RowsProblem::Touches.into());
+    }
+    let names = feature_names(&model);
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
+    let rows = read_rows(path, &names, None)?;
+    let encoder = Encoder::of(&model);
+    let has_classes = model.object_count() > 1;
+    let mut scratch = vec![0; model.object_count()];
+    for (number, row) in (1..).zip(rows.iter()) {
+        let encoded = encoder.row(row);
+        if !adds_up || recognizer.verdict() != Verdict::Undecided {
+            recognizer.reset();
+        }
+        recognizer.push_features(&encoded).map_err(|_| RowsProblem::Touches)?;
+        let own = model.predict_class(&encoded, &mut scratch).unwrap_or_default();
+        let class = if adds_up { recognizer.best() } else { own };
+        let verdict = match recognizer.verdict() {
+            Verdict::Undecided => "undecided",
+            Verdict::Recognized { .. } => "recognized",
+            Verdict::Unknown => "unknown",
+            Verdict::GaveUp => "gave-up",
+        };
+        let line = Line {
+            row: number,
+            verdict: (has_classes && adds_up).then_some(verdict),
+            class: has_classes.then(|| model.object_name(class)),
+            posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
+            rows: (has_classes && adds_up).then(|| recognizer.touches()),
+            value: model.predict_value(&encoded),
+            margins: margins(&model, &encoded),
+        };
+        print(&line, json)?;
+    }
+    Ok(())
+}
+
+fn print(line: &Line<'_>, json: bool) -> Result<()> {
+    if json {
+        // Numbers and strings are always JSON.
+        let text = serde_json::to_string(line).unwrap_or_default();
+        return output::print(&format!("{text}\n"));
+    }
+    let row = line.row;
+    match (line.verdict, line.class, line.posterior) {
+        (Some(verdict), Some(class), Some(posterior)) => {
+            output::print(&format!("{row:4}  {verdict:10}  {class} {posterior:.4}\n"))
+        }
+        (None, Some(class), Some(posterior)) => output::print(&format!("{row:4}  {class} {posterior:.4}\n")),
+        _ => output::print(&format!("{row:4}  {}\n", line.value.unwrap_or_default())),
+    }
+}

@@ -1,0 +1,108 @@
+use super::noise::NoiseArguments;
+use super::probe::{SizeArguments, refuse_unstated};
+use super::progress::Bar;
+use super::shell;
+use palpate::Result;
+use palpate::output::{print, print_json, refuse_stdout};
+use palpate_report::{self, Existing, Settings};
+use palpate::touches::Origin;
+use palpate::touches::noise::Noise;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate report                    the built-in objects, in about ten minutes
+  palpate report --quick -o quick   fewer touches, in a minute or two
+  palpate report meshes/ -o report  your own meshes
+  palpate report meshes/ --true-size --unit mm --probe probe.toml
+                                    objects as large as they are, and your probe
+  palpate report --noise 0..10ms    with our robust model trained for this noise
+  palpate report meshes/ --recorded recorded --probe probe.toml
+                                    is the simulation of your probe right?
+  palpate report --resume           continue an interrupted report")]
+pub(crate) struct Arguments {
+    /// Where objects come from: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory of meshes
+    #[arg(default_value = "builtin", value_name = "SOURCE")]
+    sources: Vec<String>,
+    /// Where the page, its figures and tables go
+    #[arg(short, long, default_value = "report", value_name = "DIR")]
+    output: PathBuf,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Fewer folds, levels and touches; the same figures
+    #[arg(long)]
+    quick: bool,
+    /// Measure growth and generalization too, which use built-in objects; the default for `builtin` alone
+    #[arg(long)]
+    growth: bool,
+    /// Recorded touches of the objects, to compare simulated ones with: by the probe of --probe, as it really is
+    #[arg(long, value_name = "DIR")]
+    recorded: Option<PathBuf>,
+    /// Continue an interrupted report of the same program with the same settings and objects
+    #[arg(long)]
+    resume: bool,
+    /// Replace results of another report or run in the same directory
+    #[arg(long)]
+    force: bool,
+    /// Print the summary as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    size: SizeArguments,
+    #[command(flatten)]
+    noise: NoiseArguments,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let Arguments { sources, output, seed, quick, growth, recorded, resume, force, json, size, noise } = arguments;
+    refuse_stdout(&output)?;
+    let compared = recorded.iter().flat_map(|path| ["--recorded".to_owned(), path.to_string_lossy().into_owned()]);
+    let compared: Vec<String> = compared.collect();
+    let command = command(&sources, seed, quick, growth, &[compared, size.words(), noise.words()].concat());
+    let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
+    let growth = settings.growth || growth;
+    refuse_unstated(&size)?;
+    let capture = size.origin(Origin::default())?;
+    let real = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
+    let noise = match real {
+        Some(real) => noise.over(real),
+        None if noise.is_given() => noise.over(Noise::default()),
+        None => settings.noise,
+    };
+    noise.check()?;
+    let real = real.unwrap_or_default();
+    let settings = Settings { command, growth, noise, real, recorded, capture, ..settings };
+    let objects = || size.objects(&settings.sources, seed);
+    let existing = Existing { resume, replace: force };
+    let written = report::report_on(&objects, &settings, &output, existing, &Bar::new())?;
+    if json {
+        return print_json(&written.summary);
+    }
+    let times = written.stages.iter().map(|(name, seconds)| format!("  {name:<18}{seconds:8.1} s\n"));
+    let page = output.join("index.html");
+    print(&format!("{}\n\n{}\n{}\n", written.sentence, times.collect::<String>(), page.display()))
+}
+
+/// The command that makes this report again, wherever it is written.
+fn command(sources: &[String], seed: u64, quick: bool, growth: bool, more: &[String]) -> String {
+    let seed = seed.to_string();
+    let words = ["palpate", "report"].into_iter().chain(sources.iter().map(String::as_str)).chain(["--seed", &seed]);
+    let switches = quick.then_some("--quick").into_iter().chain(growth.then_some("--growth"));
+    shell::command(words.chain(switches).chain(more.iter().map(String::as_str)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_of_a_report_makes_it_again() {
+        assert_eq!(command(&["builtin".into()], 1, false, false, &[]), "palpate report builtin --seed 1");
+        assert_eq!(
+            command(&["my meshes".into(), "cup.obj".into()], 2, true, true, &["--noise".into(), "0ms..5ms".into()]),
+            "palpate report 'my meshes' cup.obj --seed 2 --quick --growth --noise 0ms..5ms"
+        );
+    }
+}

@@ -1,0 +1,269 @@
+//! What a compiled model states about itself: its features, its training, what it promises.
+
+use palpate::calibrate;
+use palpate::compile;
+use palpate::evaluate;
+use palpate::rows::{Encoder, feature_names};
+use palpate::touches;
+use palpate_onboard::{Model, Stopping};
+use palpate_shared::ContactPattern;
+use palpate_shared::format::{FitTerms, Length, TrainedNoise, TrainedProbe};
+use std::collections::BTreeMap;
+
+#[derive(serde::Serialize)]
+pub(super) struct Feature {
+    pub(super) name: String,
+    pub(super) scale: Option<f32>,
+}
+
+#[derive(serde::Serialize)]
+pub(super) struct Defaults {
+    pub(super) error_rate: f64,
+    pub(super) max_touches: u32,
+}
+
+#[derive(serde::Serialize)]
+pub(super) struct Promised {
+    pub(super) error_rate: f64,
+    /// "average", "name" or "object".
+    pub(super) per: &'static str,
+    pub(super) confidence: f64,
+    /// "touches" or "approaches".
+    pub(super) counted: &'static str,
+    /// Whether each approach was in the pose that the plan proposed.
+    pub(super) active: bool,
+    pub(super) sequences: u32,
+    /// Names given in these sequences, and wrong ones of them.
+    pub(super) given: u32,
+    pub(super) wrong: u32,
+    pub(super) undecided: f64,
+    /// Touches, or approaches, of a sequence on average.
+    pub(super) mean: f64,
+    pub(super) max_touches: u32,
+    /// What was added to the touches.
+    pub(super) noise: touches::noise::Noise,
+    /// Nats by which an object has to be ahead of all others for its name to be given.
+    pub(super) margins: BTreeMap<String, f64>,
+    /// What the error rate is at most by theory, with any priors.
+    pub(super) by_theory: f64,
+}
+
+#[derive(serde::Serialize)]
+pub(super) struct Tested {
+    /// How long names are held back: "likely" or "certain".
+    pub(super) held: &'static str,
+    /// The promised share of known objects' sequences that end as unknown.
+    pub(super) promised: f64,
+    pub(super) confidence: f64,
+    pub(super) sequences: u32,
+    /// Touches before which nothing is tested, and no name is given.
+    pub(super) first_touches: u32,
+    /// Touches before which no name is given.
+    pub(super) least_touches: u32,
+    /// The misfit above which an object is unknown, after many touches, in nats.
+    pub(super) threshold: f64,
+}
+
+pub(super) fn tested(terms: &FitTerms) -> Tested {
+    Tested {
+        held: terms.held.name(),
+        promised: f64::from(terms.alarms) / 1e6,
+        confidence: f64::from(terms.confidence) / 1e6,
+        sequences: terms.sequences,
+        first_touches: terms.first,
+        least_touches: terms.least,
+        threshold: f64::from(terms.threshold) / 65_536.0,
+    }
+}
+
+#[derive(serde::Serialize)]
+pub(super) struct Probe {
+    /// Radius of a finger; null if the model does not state its probe.
+    pub(super) radius: Option<f32>,
+    pub(super) spacing: f32,
+    pub(super) speed: f32,
+    /// What lengths are measured in: "unit", a tenth of the object's longest side, or "mm".
+    pub(super) unit: &'static str,
+    /// Whether the model states its probe; otherwise the published one is assumed.
+    pub(super) stated: bool,
+}
+
+#[derive(serde::Serialize)]
+pub(super) struct Touches {
+    /// "full", "contacts" or "all".
+    pub(super) counted: &'static str,
+    pub(super) patterns: Vec<&'static str>,
+    pub(super) needs_pose: bool,
+    /// The largest time between the first and the last contact in microseconds; null if the model does not state it.
+    pub(super) largest_spread: Option<u32>,
+}
+
+#[derive(serde::Serialize)]
+pub(super) struct Noise {
+    /// Standard deviations of contact times in microseconds.
+    pub(super) least: u32,
+    pub(super) largest: u32,
+    /// The timer's resolution in microseconds; 0 for none.
+    pub(super) timer: u32,
+    /// Standard deviation of the pose in degrees; 0 for none.
+    pub(super) pose_degrees: f64,
+}
+
+/// The prediction of a model over rows.
+#[derive(serde::Serialize)]
+pub(super) struct Predicts {
+    /// "class" or "value".
+    pub(super) what: &'static str,
+    /// What makes a value of a margin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) link: Option<&'static str>,
+    /// What a margin of the model is multiplied by to be the library's.
+    pub(super) scale: f32,
+    /// Whether the last of several largest margins names the class.
+    pub(super) last_of_ties: bool,
+    /// The least and the largest of the features that stand for a missing value: whole numbers, or keys of f32 values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) missing: Option<[i32; 2]>,
+}
+
+impl Predicts {
+    pub(super) fn text(&self) -> String {
+        let what = match self.link {
+            None if self.last_of_ties => "the class with the largest margin, of several the last",
+            None => "the class with the largest margin, of several the first",
+            Some(link) => super::export::formula(link),
+        };
+        match self.missing {
+            Some([low, high]) => format!("{what}; features from {low} to {high} are missing"),
+            None => what.into(),
+        }
+    }
+}
+
+pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
+    let is_value = model.object_count() == 1;
+    let prediction = model.prediction();
+    model.descriptor().is_none().then(|| Predicts {
+        what: if is_value { "value" } else { "class" },
+        link: is_value.then(|| prediction.link.name()),
+        scale: prediction.scale,
+        last_of_ties: prediction.last_of_ties,
+        missing: model.sentinel().map(|sentinel| [sentinel.low, sentinel.high]),
+    })
+}
+
+/// The features of a model over rows.
+pub(super) fn features(model: &Model<'_>) -> Vec<Feature> {
+    let scales: Vec<Option<f32>> = match Encoder::of(model) {
+        Encoder::Real => vec![None; model.feature_count()],
+        Encoder::Scaled(scales) => scales.into_iter().map(Some).collect(),
+    };
+    feature_names(model).into_iter().zip(scales).map(|(name, scale)| Feature { name, scale }).collect()
+}
+
+/// The probe that a model states, or the one that its header assumes.
+pub(super) fn probe(model: &Model<'_>) -> Probe {
+    match model.probe() {
+        Some(TrainedProbe { radius, spacing, speed, length }) => {
+            Probe { radius: Some(radius), spacing, speed, unit: length.name(), stated: true }
+        }
+        None => {
+            let header = model.header();
+            Probe {
+                radius: None,
+                spacing: header.spacing(),
+                speed: header.speed(),
+                unit: Length::Tenth.name(),
+                stated: false,
+            }
+        }
+    }
+}
+
+pub(super) fn promised(model: &Model<'_>) -> Option<Promised> {
+    let promise = model.promise()?;
+    let stopping = Stopping::from_model(model);
+    let margin = |object| calibrate::margin_of(stopping.odds_of(object, model));
+    Some(Promised {
+        error_rate: promise.rate,
+        per: promise.per.name(),
+        confidence: promise.confidence,
+        counted: if promise.approaches { "approaches" } else { "touches" },
+        active: promise.active,
+        sequences: promise.sequences,
+        given: promise.given,
+        wrong: promise.wrong,
+        undecided: 1.0 - f64::from(promise.given) / f64::from(promise.sequences.max(1)),
+        mean: f64::from(promise.mean_thousandths) / 1e3,
+        max_touches: promise.max_touches,
+        noise: touches::noise::Noise::of_promise(&promise.noise),
+        margins: compile::names(model)
+            .into_iter()
+            .take(model.known_count())
+            .enumerate()
+            .map(|(object, name)| (name, margin(object)))
+            .collect(),
+        by_theory: evaluate::by_theory(model),
+    })
+}
+
+pub(super) fn priors<'a>(model: &Model<'a>) -> Option<BTreeMap<&'a str, f64>> {
+    let objects = 0..model.object_count();
+    let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
+    let is_flat = objects.clone().all(|object| model.prior(object) == model.prior(0));
+    (!is_flat).then(|| objects.map(|object| (model.object_name(object), prior(object))).collect())
+}
+
+pub(super) fn evidence(model: &Model<'_>) -> Touches {
+    let trained = model.trained_touches();
+    Touches {
+        counted: trained.counted.name(),
+        patterns: trained.patterns.iter().map(ContactPattern::name).collect(),
+        needs_pose: trained.needs_pose,
+        largest_spread: (trained.largest_spread < u32::MAX).then_some(trained.largest_spread),
+    }
+}
+
+pub(super) fn noise(model: &Model<'_>) -> Option<Noise> {
+    let TrainedNoise { least, largest, timer, pose } = model.noise()?;
+    Some(Noise { least, largest, timer, pose_degrees: f64::from(pose) / 1000.0 })
+}
+
+pub(super) fn pattern(model: &Model<'_>) -> Option<BTreeMap<&'static str, f64>> {
+    // Three digits: they are stored in steps of 1/65535.
+    let share = |share: u16| (f64::from(share) / 65.535).round() / 1000.0;
+    let shares = model.pattern_shares()?.0.map(share);
+    Some(ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(shares).collect())
+}
+
+/// The touches that a model was trained on.
+#[derive(serde::Serialize)]
+pub(super) struct TrainedOn {
+    /// 16 bits of a checksum of the capture's seed and settings, in hexadecimal digits; null if no capture is known.
+    pub(super) capture: Option<String>,
+    /// The first sample of each object, and the one after the last.
+    pub(super) samples: [u32; 2],
+}
+
+pub(super) fn trained_on(model: &Model<'_>) -> Option<TrainedOn> {
+    let stated = model.trained_capture()?;
+    let capture = (stated.settings != 0).then(|| format!("{:04x}", stated.settings));
+    Some(TrainedOn { capture, samples: [stated.samples.start, stated.samples.end] })
+}
+
+/// The plan of approaches.
+#[derive(serde::Serialize)]
+pub(super) struct PlanOf {
+    /// Rolls of the row of fingers for each of 26 directions.
+    pub(super) rolls: u8,
+    pub(super) poses: u16,
+    /// Poses in which nothing is ever touched.
+    pub(super) left_out: usize,
+}
+
+pub(super) fn plan(model: &Model<'_>) -> Option<PlanOf> {
+    let plan = model.plan()?;
+    let poses = plan.poses();
+    let left_out = (0..poses.count()).filter(|&pose| !plan.may_touch(pose)).count();
+    Some(PlanOf { rolls: poses.rolls(), poses: poses.count(), left_out })
+}

@@ -1,0 +1,141 @@
+//! What `palpate train` takes and says about recorded touches.
+
+use palpate::error::{Error, Place, Result, TouchesProblem};
+use palpate_report::teach::{more_approaches, page, promise};
+use palpate::teach::{Taught, TaughtObject};
+use palpate::touches::{Dataset, ObjectTouches, is_log};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Recorded touches, and what they are taught to.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct TeachArguments {
+    /// Recorded touches of objects of which there is no mesh: a directory, a file of touches called like its object,
+    /// or a robot's log (MCAP); may be given several times. Their values are added to the trees of the simulated objects; without DIRECTORY the
+    /// ensemble is trained on them alone
+    #[arg(long, value_name = "RECORDED")]
+    pub(crate) teach: Vec<PathBuf>,
+    /// Teach the recorded objects to this ensemble, trained on the objects of DIRECTORY, instead of training another one
+    #[arg(
+        long,
+        value_name = "ENSEMBLE",
+        requires = "teach",
+        requires = "directory",
+        conflicts_with_all = [
+            "preset", "descriptor", "touches", "leaves", "rounds", "depth", "eta", "min_child_weight", "bins", "trainer",
+            "probe", "noise", "timer", "debounce", "missed", "bent", "speed_error", "speed_bias", "pose_noise", "pose_bias",
+        ]
+    )]
+    pub(crate) extend: Option<PathBuf>,
+    /// Write a page that shows how well the recorded objects are recognized, and what more approaches would come to
+    #[arg(long, value_name = "FILE", requires = "teach")]
+    pub(crate) page: Option<PathBuf>,
+}
+
+impl TeachArguments {
+    /// The recorded objects of all that was given; none if nothing was.
+    pub(crate) fn read(&self) -> Result<Option<Dataset>> {
+        let mut all: Option<Dataset> = None;
+        for path in &self.teach {
+            let is_whole = path.is_dir() || is_log(path);
+            let read = if is_whole { super::checked(Dataset::read_any(path)?) } else { file(path)? };
+            match &mut all {
+                None => all = Some(read),
+                Some(all) => add(all, read, path)?,
+            }
+        }
+        Ok(all)
+    }
+
+    /// Writes the page, if one is wanted. The command that remakes it is this program's own.
+    pub(crate) fn write_page(&self, taught: Option<&Taught>) -> Result<()> {
+        let Some((path, taught)) = self.page.as_ref().zip(taught) else { return Ok(()) };
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        let command = super::shell::command(std::iter::once("palpate").chain(words.iter().map(String::as_str)));
+        page(taught, &command)?.write(path).map(drop)
+    }
+
+    /// The files that are read, none of which may be written.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let of = |path: &PathBuf| if path.is_dir() { super::files_of(path) } else { vec![path.clone()] };
+        self.teach.iter().flat_map(of).chain(self.extend.clone()).collect()
+    }
+}
+
+/// The touches of one file, as an object called like it.
+fn file(path: &Path) -> Result<Dataset> {
+    let touches = Dataset::read_file(path)?;
+    Ok(Dataset::new(vec![touches]))
+}
+
+/// Adds the objects of `read`, from `path`.
+fn add(all: &mut Dataset, read: Dataset, path: &Path) -> Result<()> {
+    if let Some(twice) = read.objects.iter().find(|object| all.objects.iter().any(|other| other.name == object.name)) {
+        return Err(Error::at(Place::file(path), TouchesProblem::RecordedTwice { name: twice.name.clone() }));
+    }
+    if let (Some(one), Some(other)) = (&all.origin, &read.origin) {
+        let stated = [one, other].map(|origin| palpate::ensemble::StatedProbe::from(origin).trained());
+        palpate::ensemble::StatedProbe::compare(["the first recording", &path.display().to_string()], stated)?;
+    }
+    all.origin = all.origin.take().or(read.origin);
+    all.objects.extend(read.objects);
+    all.objects.sort_by(|a: &ObjectTouches, b| a.name.cmp(&b.name));
+    Ok(())
+}
+
+/// What was taught, how well, and what more approaches would come to.
+pub(crate) fn text(taught: &Taught) -> String {
+    let mut text = String::new();
+    for object in &taught.objects {
+        _ = writeln!(text, "\n{}", of_object(object, taught));
+        _ = writeln!(text, "{}", table(object));
+        _ = writeln!(text, "{}", more_approaches(object));
+    }
+    if let Some(others) = taught.others {
+        _ = writeln!(
+            text,
+            "\nOf the other objects {} % are recognized after {} approaches.",
+            percent(others),
+            taught.approaches
+        );
+    }
+    _ = writeln!(text, "\n{}", promise(taught));
+    text
+}
+
+fn of_object(object: &TaughtObject, taught: &Taught) -> String {
+    let constant = match object.constant {
+        0.0 => String::new(),
+        constant => format!(", {constant:+.3} nats per touch"),
+    };
+    format!(
+        "{}: {} recorded approaches, {} of them evidence; jitter × {}, a prior of {} touches{constant}. After {} approaches \
+         {} % are recognized, and {} % as many others taken for it (recorded touches that were held out).",
+        object.name,
+        object.approaches,
+        object.touches,
+        object.smoothing.jitter,
+        object.smoothing.prior,
+        taught.approaches,
+        percent(object.recognized),
+        percent(object.taken_for_it),
+    )
+}
+
+fn table(object: &TaughtObject) -> String {
+    let mut text = format!("{:>12}  {:>10}  {:>6}", "approaches", "recognized", "error");
+    for point in &object.curve.points {
+        _ = write!(
+            text,
+            "\n{:>12}  {:>8} %  {:>4} %",
+            point.approaches,
+            percent(point.recognized),
+            percent(point.error)
+        );
+    }
+    text
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
+}

@@ -1,0 +1,20 @@
+//! What a file of another library does not say, on the command line.
+
+use palpate::ensemble::import::Options;
+
+#[derive(clap::Args)]
+pub(super) struct UnstatedArguments {
+    /// The number that stood for a missing value in training, such as 0 or -999 (XGBoost's `missing=`, which no file
+    /// holds); NaN always does
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    missing: Option<f32>,
+    /// Take all trees where training stopped early, not those up to the best iteration
+    #[arg(long)]
+    all_trees: bool,
+}
+
+impl UnstatedArguments {
+    pub(super) fn options<'a>(&self, names: Option<&'a [String]>) -> Options<'a> {
+        Options { names, all_trees: self.all_trees, missing: self.missing }
+    }
+}

@@ -1,0 +1,99 @@
+use super::progress::Bar;
+use super::unstated::UnstatedArguments;
+use palpate::Result;
+use palpate::compile::CompiledModel;
+use palpate::ensemble::Ensemble;
+use palpate::error::{Error, Place, RowsProblem};
+use palpate::evaluate::verify::{Verified, verify};
+use palpate::output;
+use palpate::rows::{Rows, read_margins};
+use std::path::PathBuf;
+
+/// Compare a model over rows with the file that it was exported from.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Every row goes through the model and through the file's own trees. So do rows that are made at every split: its feature at the threshold, one step to each side of it, and missing; and rows with features that are missing, infinite or subnormal.
+
+ROWS is a CSV file: a header with the features' names, one row per line, empty cells for missing values. Columns are matched by name, or by position if their names are others and their number is right.
+
+With --library-margins the model is also compared with the library's own raw scores of the rows: no header, one row per line, one column per output, or one column for a binary model (the score of its second class). In Python, for XGBoost: np.savetxt(\"margins.csv\", booster.predict(rows, output_margin=True), delimiter=\",\").
+
+Classes are those of the largest margin, and ties go as the library has them.
+
+The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the rounding that the model states does not explain it.
+
+Examples:
+  palpate verify model.palpate xgboost.json rows.csv
+  palpate verify model.palpate lightgbm.txt rows.csv --json
+  palpate verify model.palpate m.json rows.csv --library-margins margins.csv")]
+pub(crate) struct Arguments {
+    /// Model that `palpate export` wrote
+    model: PathBuf,
+    /// File that it was exported from
+    ensemble: PathBuf,
+    /// Rows of features
+    #[arg(value_name = "ROWS.csv")]
+    rows: PathBuf,
+    /// The library's own raw scores of the rows
+    #[arg(long, value_name = "MARGINS.csv")]
+    library_margins: Option<PathBuf>,
+    #[command(flatten)]
+    unstated: UnstatedArguments,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<()> {
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(None))?;
+    if ensemble.descriptor().is_some() {
+        return Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches));
+    }
+    let rows = read_rows(&arguments.rows, &ensemble.inputs.names(), None)?;
+    let library = arguments.library_margins.as_deref().map(read_margins).transpose()?;
+    let place = |error: Error| match (&arguments.library_margins, error.problem()) {
+        (Some(path), Some(palpate::error::Problem::Rows(problem))) if problem.is_about_margins() => error.in_file(path),
+        _ => error.in_file(&arguments.model),
+    };
+    let verified = verify(&compiled.model(), &ensemble, &rows, library.as_deref(), &Bar::new()).map_err(place)?;
+    if arguments.json {
+        output::print_json(&verified)?;
+    } else {
+        output::print(&text(&verified))?;
+    }
+    verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem))
+}
+
+/// Reads rows for features with these names; says on stderr if columns are taken by their position.
+pub(super) fn read_rows(path: &std::path::Path, features: &[&str], label: Option<&str>) -> Result<Rows> {
+    let rows = Rows::read(path, features, label)?;
+    if rows.by_position {
+        eprintln!(
+            "palpate: note: {}: columns are taken by their position, since the header does not name all features",
+            path.display()
+        );
+    }
+    Ok(rows)
+}
+
+fn text(verified: &Verified) -> String {
+    let Verified { rows, generated_rows, max_margin_error, stated_bound, class_differs, .. } = verified;
+    let mut text = format!(
+        "{rows} rows and {generated_rows} made at thresholds: margins differ by at most {max_margin_error:.2e} (the \
+         model states {stated_bound:.2e}); another class for {class_differs}\n"
+    );
+    if let (Some(error), Some(classes)) = (verified.library_max_margin_error, verified.library_class_differs) {
+        let unexplained = verified.library_class_unexplained.unwrap_or_default();
+        text += &format!(
+            "The library's own margins differ by at most {error:.2e}; another class for {classes} rows, of which the \
+             rounding that the model states does not explain {unexplained}\n"
+        );
+    }
+    if let Some((change, classes)) = verified.scaling {
+        text += &format!(
+            "Measuring in whole numbers changes the rows' margins by at most {change:.2e}, and the class of {classes}\n"
+        );
+    }
+    text
+}

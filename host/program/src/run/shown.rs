@@ -1,0 +1,246 @@
+//! What a run prints and shows on its page.
+
+use super::{AT_APPROACHES, Method, PICTURE, PLAY, Recognition, Summary, TABLE_AT, Trial};
+use palpate::capture;
+use palpate::evaluate::Approaches;
+use palpate::mesh::Object;
+use palpate_report::page::document::Picture;
+use palpate_report::page::render;
+use palpate_report::page::table::{Cell, Records};
+use palpate_report::run_page::RunMethod;
+use palpate_report::statistics::{LEAST_GROUPS, distinct_groups};
+use std::fmt::Write;
+use std::path::Path;
+
+pub(super) fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<Picture> {
+    let captured_as = |name: &str| captured.objects.iter().find(|object| object.name == name);
+    let picture = |object: &Object| Picture {
+        name: object.name.clone(),
+        png: render::thumbnail(object.mesh(), PICTURE),
+        line: captured_as(&object.name).map_or_else(String::new, |c| {
+            format!("{:.1} % of approaches are full touches", 100.0 * c.touches as f64 / c.approaches.max(1) as f64)
+        }),
+    };
+    objects.iter().map(picture).collect()
+}
+
+pub(super) fn shown(name: &str, Trial { curve, method, fewest, .. }: &Trial) -> RunMethod {
+    let touches: Vec<usize> = [1, 2, 3, 5, 7, 10, 14, 20, 30, 42, 60, 85, 120]
+        .into_iter()
+        .filter(|&n| n <= curve.most() && distinct_groups(*fewest, n) >= LEAST_GROUPS)
+        .collect();
+    let objects = method.evaluation.per_object.keys().enumerate();
+    RunMethod {
+        name: name.into(),
+        curve: touches
+            .iter()
+            .map(|&n| {
+                let accuracy = curve.accuracy(n);
+                (n, accuracy.value, accuracy.standard_error)
+            })
+            .collect(),
+        per_object: objects
+            .map(|(position, name)| {
+                (name.clone(), touches.iter().map(|&n| (n, curve.object_accuracy(position, n).value)).collect())
+            })
+            .collect(),
+    }
+}
+
+/// The table that the program prints and the page shows: the paper's method, ours where it waits for full touches, and
+/// ours where every contact is evidence, side by side.
+pub(super) fn table(summary: &Summary) -> Records {
+    let mut table = Records::new(["measure", "paper, full touches", "ours, full touches", "ours, every contact"]);
+    let both = |cell: &dyn Fn(&Method) -> Cell| [&summary.paper, &summary.full, &summary.ours].map(cell);
+    let mut row = |name: String, [paper, full, ours]: [Cell; 3]| table.push([Cell::Text(name), paper, full, ours]);
+    let rate = 100.0 * summary.ours.evaluation.sequential.error_rate;
+    let approaches = |cell: &dyn Fn(&Approaches) -> Cell| {
+        both(&|method| method.evaluation.approaches.as_ref().map_or(Cell::Missing, cell))
+    };
+    row(
+        format!("approaches to a {rate} % error rate, stopping when sure"),
+        approaches(&|of| Cell::Spread(of.sequential.mean_approaches, of.sequential.mean_approaches_standard_error, 1)),
+    );
+    let promised = |rate: Option<f64>| rate.map_or(Cell::Missing, |rate| Cell::Percent(rate, 2));
+    row("  promised".into(), approaches(&|of| promised(of.sequential.promised)));
+    row("  wrong verdicts".into(), approaches(&|of| Cell::Percent(of.sequential.error, 2)));
+    row("  undecided when touches ran out".into(), approaches(&|of| Cell::Percent(of.sequential.undecided, 2)));
+    for at in AT_APPROACHES {
+        let cell = |of: &Approaches| match (of.accuracy.get(&at), of.accuracy_standard_error.get(&at)) {
+            (Some(&accuracy), Some(&error)) => Cell::PercentSpread(accuracy, error, 1),
+            _ => Cell::Missing,
+        };
+        row(format!("accuracy after {at} approaches"), approaches(&cell));
+    }
+    row("share of approaches that are evidence".into(), approaches(&|of| Cell::Percent(of.used, 1)));
+    for at in TABLE_AT {
+        let cell = |method: &Method| {
+            let evaluation = &method.evaluation;
+            match (evaluation.accuracy.get(&at), evaluation.accuracy_standard_error.get(&at)) {
+                (Some(&accuracy), Some(&error)) => Cell::PercentSpread(accuracy, error, 1),
+                _ => Cell::Missing,
+            }
+        };
+        row(format!("accuracy after {at} touches"), both(&cell));
+    }
+    row(
+        format!("touches to a {rate} % error rate, stopping when sure"),
+        both(&|m| {
+            let sequential = &m.evaluation.sequential;
+            Cell::Spread(sequential.mean_touches, sequential.mean_touches_standard_error, 1)
+        }),
+    );
+    row("  promised".into(), both(&|m| promised(m.evaluation.sequential.promised)));
+    row("  wrong verdicts".into(), both(&|m| Cell::Percent(m.evaluation.sequential.error, 2)));
+    row("  undecided when touches ran out".into(), both(&|m| Cell::Percent(m.evaluation.sequential.undecided, 2)));
+    row(
+        format!("touches to a {rate} % error rate, a fixed number"),
+        both(&|m| {
+            m.fixed_touches.map_or_else(
+                || if m.followed_to == 0 { Cell::Missing } else { Cell::Text(format!("over {}", m.followed_to)) },
+                Cell::count,
+            )
+        }),
+    );
+    row("model bytes".into(), both(&|m| Cell::count(m.model_bytes)));
+    row("trees".into(), both(&|m| Cell::count(m.trees)));
+    row("training, seconds".into(), both(&|m| Cell::Number(m.train_seconds, 1)));
+    let captures = [&summary.capture, &summary.capture, &summary.approach_capture];
+    row("capture, seconds".into(), captures.map(|capture| Cell::Number(capture.seconds, 1)));
+    row(
+        "approaches captured per second".into(),
+        captures.map(|capture| Cell::Number(capture.approaches() as f64 / capture.seconds.max(1e-9), 0)),
+    );
+    row("largest margin error, nats".into(), both(&|m| Cell::Number(m.parity.max_margin_error, 5)));
+    row("  bound that the model states".into(), both(&|m| Cell::Number(m.parity.stated_bound, 5)));
+    row("verdicts that differ from the full model's".into(), both(&|m| Cell::count(m.parity.verdict_differs)));
+    table
+}
+
+/// What the test touches had, and what a missing accuracy means, if one is missing.
+pub(super) fn note(summary: &Summary) -> String {
+    let noise = &summary.noise;
+    let noise = match noise.is_none() {
+        true => "No noise was added to touches.".to_owned(),
+        false => format!("Ours was trained, and all are tested, with {noise}; the paper's method is trained without."),
+    };
+    [noise, calibration(summary), missing(summary)]
+        .into_iter()
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// What the promises rest on, or why there are none.
+fn calibration(summary: &Summary) -> String {
+    let ours = &summary.ours;
+    let promise = match (&ours.calibration, &ours.uncalibrated) {
+        (Some(calibrated), _) => format!(
+            "The model keeps its promise with a probability of {} %; its thresholds were found on {} sequences of {} \
+             captured for that.",
+            100.0 * calibrated.confidence,
+            calibrated.sequences,
+            calibrated.counted
+        ),
+        (None, why) => format!("The model promises nothing: {}.", why.as_deref().unwrap_or("it was not calibrated")),
+    };
+    let others = [("paper", &summary.paper), ("full touches", &summary.full)];
+    let why = |(name, method): (&str, &Method)| method.uncalibrated.as_ref().map(|why| format!(" {name}: {why}."));
+    promise + &others.into_iter().filter_map(why).collect::<String>()
+}
+
+/// What a missing accuracy means, if one is missing.
+fn missing(summary: &Summary) -> String {
+    let missing = |method: &Method| TABLE_AT.iter().any(|at| !method.evaluation.accuracy.contains_key(at));
+    if ![&summary.paper, &summary.full, &summary.ours].into_iter().any(missing) {
+        return String::new();
+    }
+    format!(
+        "– stands for an accuracy that would rest on fewer than {LEAST_GROUPS} distinct groups of test touches; capture \
+         more touches to measure it."
+    )
+}
+
+pub(super) fn facts(summary: &Summary) -> Vec<(String, String)> {
+    let touches = summary.touches;
+    let stages: Vec<_> = summary.stages.iter().map(|stage| format!("{} {:.1}", stage.name, stage.seconds)).collect();
+    [
+        ("command", summary.command.clone()),
+        ("version", summary.tool_version.into()),
+        ("seed", summary.seed.to_string()),
+        ("touches trained on", touches.train.to_string()),
+        ("touches tested on", touches.test.to_string()),
+        ("seconds in all", format!("{:.1}", summary.seconds)),
+        ("seconds of each stage", stages.join("; ")),
+    ]
+    .map(|(name, value)| (name.to_string(), value))
+    .to_vec()
+}
+
+/// The summary as the program prints it.
+pub fn text(summary: &Summary, out: &Path) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let capture = &summary.capture;
+    _ = writeln!(
+        text,
+        "Touched {} objects {} times with all three fingers, in {} approaches, and approached them {} times more, keeping \
+         every approach. Tested on a tenth of each that training never saw.\n",
+        capture.objects.len(),
+        capture.touches(),
+        capture.approaches(),
+        summary.approach_capture.approaches(),
+    );
+    let width = summary.recognized.iter().map(|r| r.touched.chars().count()).max().unwrap_or(0);
+    for recognition in &summary.recognized {
+        let Recognition { touched, recognized, touches: _, approaches, posterior } = recognition;
+        _ = match recognized {
+            Some(name) if name == touched => {
+                writeln!(
+                    text,
+                    "  {touched:width$}  recognized after {approaches:>3} approaches, posterior {posterior:.4}"
+                )
+            }
+            Some(name) => {
+                writeln!(
+                    text,
+                    "  {touched:width$}  mistaken for {name} after {approaches} approaches, posterior {posterior:.4}"
+                )
+            }
+            None => writeln!(text, "  {touched:width$}  undecided after {approaches} approaches"),
+        };
+    }
+    let table = table(summary);
+    let rows: Vec<Vec<String>> = std::iter::once(table.columns.clone())
+        .chain(table.rows.iter().map(|row| row.iter().map(Cell::shown).collect()))
+        .collect();
+    let widths: Vec<usize> =
+        (0..4).map(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)).collect();
+    _ = writeln!(text);
+    for row in &rows {
+        _ = writeln!(
+            text,
+            "{:w0$}  {:>w1$}  {:>w2$}  {:>w3$}",
+            row[0],
+            row[1],
+            row[2],
+            row[3],
+            w0 = widths[0],
+            w1 = widths[1],
+            w2 = widths[2],
+            w3 = widths[3]
+        );
+    }
+    let note = note(summary);
+    if !note.is_empty() {
+        _ = writeln!(text, "\n{note}");
+    }
+    _ = writeln!(
+        text,
+        "\n± is a standard error. {:.1} s in all. The page: {}; to touch the objects yourself: {}",
+        summary.seconds,
+        out.join("report.html").display(),
+        out.join(PLAY).display()
+    );
+    text
+}

@@ -1,0 +1,261 @@
+//! What the stages of a report share: objects, touches, folds, and the models of the first fold.
+
+use super::cache::Cache;
+use super::settings::Settings;
+use palpate::capture::{self, Sampler};
+use palpate::compile;
+use palpate::ensemble::Ensemble;
+use palpate::ensemble::train;
+use palpate::error::Result;
+use palpate::mesh::Object;
+use palpate::mesh::builtin;
+use palpate::probe::scene::Scene;
+use palpate::progress::{self, Progress};
+use palpate::touches::folds::{self, Split};
+use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate_shared::Touch;
+use rayon::prelude::*;
+use std::cell::OnceCell;
+use std::time::Instant;
+
+/// The objects' scenes and names, and what is computed from them once.
+pub(super) struct Context<'a> {
+    pub(super) settings: &'a Settings,
+    pub(super) objects: &'a [Object],
+    pub(super) cache: &'a Cache,
+    pub(super) progress: &'a dyn Progress,
+    /// Those of each object's instances.
+    scenes: Vec<Vec<Scene>>,
+    captured: OnceCell<Captured>,
+    first: OnceCell<Split>,
+    models: OnceCell<Models>,
+    kinds: OnceCell<Vec<Vec<Object>>>,
+}
+
+/// The touches that folds are made of, and what they took.
+pub(super) struct Captured {
+    pub(super) data: Dataset,
+    /// Approaches tried, for each object.
+    pub(super) approaches: Vec<u64>,
+    pub(super) seconds: f64,
+}
+
+/// The first fold's ensembles.
+pub(super) struct Models {
+    pub(super) paper: Ensemble,
+    pub(super) ours: Ensemble,
+    pub(super) noise: Ensemble,
+}
+
+/// The noise that the paper's confusion matrices are for, in microseconds.
+pub(super) const NOISE: f64 = 5_000.0;
+
+impl<'a> Context<'a> {
+    pub(super) fn new(
+        settings: &'a Settings,
+        objects: &'a [Object],
+        cache: &'a Cache,
+        progress: &'a dyn Progress,
+    ) -> Result<Self> {
+        let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &settings.capture, progress)?;
+        let (captured, first, models, kinds) = Default::default();
+        Ok(Self { settings, objects, cache, progress, scenes, captured, first, models, kinds })
+    }
+
+    /// The touches that folds are made of.
+    pub(super) fn captured(&self) -> Result<&Captured> {
+        get_or_try(&self.captured, || {
+            let began = Instant::now();
+            let touched = self.touch(self.settings.touches, self.settings.seed)?;
+            let (objects, approaches) = touched.into_iter().unzip();
+            let origin = Origin {
+                touches: self.settings.touches as u64,
+                seed: self.settings.seed,
+                ..self.settings.capture.clone()
+            };
+            let data = Dataset { origin: Some(origin), ..Dataset::new(objects) };
+            Ok(Captured { data, approaches, seconds: began.elapsed().as_secs_f64() })
+        })
+    }
+
+    /// `count` full touches of each object, and the approaches that they took.
+    pub(super) fn touch(&self, count: usize, seed: u64) -> Result<Vec<(ObjectTouches, u64)>> {
+        self.progress.begin("touching", Some((count * self.objects.len()) as u64));
+        let origin = Origin { seed, ..self.settings.capture.clone() };
+        let one = |(object, scenes): (&Object, &Vec<Scene>)| touch(scenes, &object.name, count, &origin, self.progress);
+        self.objects.iter().zip(&self.scenes).map(one).collect()
+    }
+
+    /// Fold `fold`.
+    pub(super) fn fold(&self, fold: usize) -> Result<Split> {
+        folds::fold(&self.captured()?.data, fold, self.settings.folds, self.settings.seed)
+    }
+
+    /// The first fold.
+    pub(super) fn first(&self) -> Result<&Split> {
+        get_or_try(&self.first, || self.fold(0))
+    }
+
+    /// The first fold's ensembles, kept on disk.
+    pub(super) fn models(&self) -> Result<&Models> {
+        get_or_try(&self.models, || {
+            let trained = |name: &str, settings: &train::Settings| -> Result<Ensemble> {
+                let path = self.cache.path(&format!("fold0-{name}"), "ensemble");
+                if let Ok(kept) = Ensemble::load(&path) {
+                    return Ok(kept);
+                }
+                let ensemble = self.train(&self.first()?.train, settings)?;
+                ensemble.save(&path)?;
+                Ok(ensemble)
+            };
+            Ok(Models {
+                paper: trained("paper", &self.paper())?,
+                ours: trained("ours", &self.ours())?,
+                noise: trained("noise", &self.ours_for_noise())?,
+            })
+        })
+    }
+
+    /// Instances of the ten built-in kinds, each sorted by name: the canonical ones first, then others with varied
+    /// proportions, as many as generalization needs.
+    pub(super) fn kinds(&self) -> Result<&[Vec<Object>]> {
+        let settings = self.settings;
+        let trained = settings.instances.iter().copied().max().unwrap_or(0);
+        let count = trained + settings.test_instances;
+        get_or_try(&self.kinds, || {
+            let mut names = builtin::names();
+            names.sort_unstable();
+            let is_builtin = self.settings.sources == ["builtin"];
+            let jobs: Vec<(usize, usize)> =
+                (0..count).flat_map(|k| (0..names.len()).map(move |kind| (k, kind))).collect();
+            self.progress.begin("making objects", Some(jobs.len() as u64));
+            let made = jobs.into_par_iter().map(|(instance, kind)| {
+                let object = match instance {
+                    0 if is_builtin => self.objects[kind].clone(),
+                    0 => builtin::one(names[kind])?,
+                    _ => builtin::varied(names[kind], 2_000 + instance as u64)?,
+                };
+                progress::advance(self.progress, 1)?;
+                Ok(object)
+            });
+            let made: Vec<Object> = made.collect::<Result<_>>()?;
+            Ok(made.chunks(names.len()).map(<[Object]>::to_vec).collect())
+        })
+        .map(Vec::as_slice)
+    }
+
+    /// Trains an ensemble; the context's progress is told, and may cancel it.
+    pub(super) fn train(&self, data: &Dataset, settings: &train::Settings) -> Result<Ensemble> {
+        train::train(data, settings, self.progress)
+    }
+
+    /// Stops the stage if the report was cancelled.
+    pub(super) fn check(&self) -> Result<()> {
+        progress::check(self.progress)
+    }
+
+    /// How the paper's method is trained.
+    pub(super) fn paper(&self) -> train::Settings {
+        train::Settings { rounds: self.settings.paper_rounds, seed: self.settings.seed, ..train::Settings::paper() }
+    }
+
+    /// How ours is trained.
+    pub(super) fn ours(&self) -> train::Settings {
+        train::Settings { seed: self.settings.seed, ..train::Settings::compact() }
+    }
+
+    /// How ours is trained for noise.
+    pub(super) fn ours_for_noise(&self) -> train::Settings {
+        train::Settings { noise: self.settings.noise, ..self.ours() }
+    }
+
+    /// The objects, ready to be touched: the scenes of each object's instances.
+    pub(super) fn all_scenes(&self) -> &[Vec<Scene>] {
+        &self.scenes
+    }
+
+    /// The objects, ready to be touched; of each its first instance.
+    pub(super) fn scenes(&self) -> Vec<&Scene> {
+        self.scenes.iter().filter_map(|scenes| scenes.first()).collect()
+    }
+
+    /// The objects' names.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.objects.iter().map(|object| object.name.clone()).collect()
+    }
+}
+
+/// Touches between two looks at the progress.
+const CHUNK: usize = 1_000;
+
+/// `count` full touches of an object's scenes, and the approaches that they took.
+///
+/// # Errors
+/// If the object cannot be touched with three fingers, or the report was cancelled.
+pub(super) fn touch(
+    scenes: &[Scene],
+    name: &str,
+    count: usize,
+    origin: &Origin,
+    progress: &dyn Progress,
+) -> Result<(ObjectTouches, u64)> {
+    let sampler = Sampler::of_instances(scenes, name, origin);
+    let chunk = |chunk: usize| -> Result<Vec<(Touch, u64)>> {
+        let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
+        progress::advance(progress, indices.len() as u64)?;
+        indices.map(|index| sampler.sample(index as u64)).collect()
+    };
+    let chunks: Vec<Vec<(Touch, u64)>> =
+        (0..count.div_ceil(CHUNK)).into_par_iter().map(chunk).collect::<Result<_>>()?;
+    let approaches = chunks.iter().flatten().map(|sample| sample.1).sum();
+    let touches = chunks.into_iter().flatten().map(|sample| sample.0).collect();
+    Ok((ObjectTouches::in_turn(name, touches, &capture::numbered(scenes), 0), approaches))
+}
+
+/// The bytes of an ensemble compiled with 16-bit leaves: what the chip would run.
+pub(super) fn compiled(ensemble: &Ensemble) -> Result<compile::Compiled> {
+    compile::compile(ensemble, &compile::Settings::default())
+}
+
+/// What the cell holds, made first if it holds nothing.
+pub(super) fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+    if let Some(value) = cell.get() {
+        return Ok(value);
+    }
+    let value = make()?;
+    Ok(cell.get_or_init(|| value))
+}
+
+/// The bytes of an ensemble compiled with its leaves in f32: its f32 margins rounded to whole units, which are far finer
+/// than any difference that decides, and several times faster to compute than by the trainer's own trees.
+pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
+    compile::compile(ensemble, &compile::Settings { leaf: compile::Leaf::F32, ..compile::Settings::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate::evaluate::{Candidate, Margins};
+    use crate::several_meshes::meshes;
+
+    #[test]
+    fn what_a_fold_states_of_objects_with_several_meshes_is_what_fresh_touches_give() {
+        let (place, objects) = (tempfile::tempdir().unwrap(), meshes());
+        let settings = Settings { touches: 2_000, ..Settings::quick(vec!["meshes".into()], 1) };
+        let cache = Cache::open(place.path(), &settings, &objects, false).unwrap();
+        let context = Context::new(&settings, &objects, &cache, &()).unwrap();
+        let Split { train, test } = context.fold(0).unwrap();
+        assert_eq!(test.several().into_values().collect::<Vec<_>>(), [2; 3]);
+        let ensemble = context.train(&train, &context.ours()).unwrap();
+        let fresh = context.touch(3_000, 9).unwrap().into_iter().map(|(object, _)| object).collect();
+        let accuracy = |dataset: &Dataset| {
+            let margins = Margins::new(Candidate::Full(&ensemble), dataset).unwrap();
+            margins.curve(10, 500, 1).unwrap().accuracy(10).value
+        };
+        let (stated, measured) = (accuracy(&test), accuracy(&Dataset::new(fresh)));
+        // Groups of ten that share no touch.
+        let cases = test.len() as f64 / 10.0;
+        let error = (measured * (1.0 - measured)).max(1.0 / cases).sqrt() / cases.sqrt();
+        assert!((stated - measured).abs() <= 3.0 * error, "{stated} stated, {measured} measured");
+    }
+}

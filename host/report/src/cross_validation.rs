@@ -1,0 +1,251 @@
+//! Cross-validation: accuracy against the number of touches, and confusion (the paper's figures 8 and 9).
+
+use super::confusion::{self, normalized, recall_precision};
+use super::context::{Context, compiled, compiled_f32};
+use super::run_page::method_style;
+use super::statistics::{LEAST_GROUPS, largest_group, mean_deviation};
+use palpate::compile;
+use palpate::ensemble::train;
+use palpate::error::Result;
+use palpate::evaluate::{Candidate, Margins};
+use crate::page::axis::Axis;
+use crate::page::chart::{Chart, Mark, Stroke};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::table::{Cell, Records, Table};
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// The methods compared, in the order of [`Fold::methods`].
+pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
+
+/// The longest groups.
+pub(super) const MOST: usize = 120;
+
+/// What one fold showed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Fold {
+    /// One of each of [`METHODS`].
+    pub(super) methods: Vec<MethodFold>,
+}
+
+/// What one fold showed of one method. Accuracies are after 1, 2, … touches, up to [`MOST`] or to as many as still make
+/// [enough distinct groups](super::statistics::LEAST_GROUPS).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct MethodFold {
+    /// Accuracy over the paper's ten groups per object.
+    pub(super) few: Vec<f64>,
+    /// The same for each object.
+    pub(super) few_of_object: Vec<Vec<f64>>,
+    /// Accuracy over many groups.
+    pub(super) many: Vec<f64>,
+    /// How often each object (rows) was recognized as each (columns) after ten touches, over many groups.
+    pub(super) confusion: Vec<Vec<usize>>,
+    /// Seconds of training.
+    pub(super) seconds: f64,
+}
+
+/// Trains and tests both methods on every fold that is used.
+pub(super) fn measure(context: &Context) -> Result<Vec<Fold>> {
+    (0..context.settings.folds_used)
+        .map(|fold| Ok(context.cache.stage(&format!("fold-{fold}"), || one_fold(context, fold))?.result))
+        .collect()
+}
+
+fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
+    let split = context.fold(fold)?;
+    let timed = |settings: &train::Settings| -> Result<_> {
+        let began = Instant::now();
+        Ok((context.train(&split.train, settings)?, began.elapsed().as_secs_f64()))
+    };
+    let (paper, paper_seconds) =
+        if fold == 0 { (context.models()?.paper.clone(), 0.0) } else { timed(&context.paper())? };
+    let (ours, ours_seconds) = if fold == 0 { (context.models()?.ours.clone(), 0.0) } else { timed(&context.ours())? };
+    let bytes = [compiled_f32(&paper)?.bytes, compiled(&ours)?.bytes];
+    let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
+    let settings = context.settings;
+    let fewest = split.test.fewest_in_sequence();
+    let most = MOST.min(largest_group(fewest));
+    let tested = |candidate, seconds| -> Result<MethodFold> {
+        let margins = Margins::new(candidate, &split.test)?;
+        // Other folds draw other groups.
+        let seed = settings.seed.wrapping_add(fold as u64);
+        let few = margins.curve(most, settings.groups, seed)?;
+        let many = margins.curve(most, settings.many_groups, seed)?;
+        let of_object = |position| (1..=most).map(|n| few.object_accuracy(position, n).value).collect();
+        Ok(MethodFold {
+            few: (1..=most).map(|n| few.accuracy(n).value).collect(),
+            few_of_object: (0..split.test.objects.len()).map(of_object).collect(),
+            many: (1..=most).map(|n| many.accuracy(n).value).collect(),
+            confusion: margins.confusion(10, settings.many_groups, seed)?,
+            seconds,
+        })
+    };
+    let paper = tested(Candidate::Compiled(&paper), paper_seconds)?;
+    let ours = tested(Candidate::Compiled(&ours), ours_seconds)?;
+    Ok(Fold { methods: vec![paper, ours] })
+}
+
+/// Accuracies of method `method` after `touches` touches over many groups, one for each fold.
+pub(super) fn accuracies(folds: &[Fold], method: usize, touches: usize) -> Vec<f64> {
+    folds.iter().filter_map(|fold| fold.methods[method].many.get(touches - 1).copied()).collect()
+}
+
+/// The confusion matrix of all folds together, as shares of each row.
+pub(super) fn shares(folds: &[Fold], method: usize) -> Vec<Vec<f64>> {
+    let matrices: Vec<&Vec<Vec<usize>>> = folds.iter().map(|fold| &fold.methods[method].confusion).collect();
+    normalized(&matrices)
+}
+
+/// The figures and tables.
+pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
+    let mut section = Section::new("cross-validation", "Accuracy against touches");
+    let settings = context.settings;
+    section.text(format!(
+        "Of {} folds, {} were trained and tested; a fold's models never saw its test touches. As in the paper, {} groups \
+         of each number of touches were drawn from each object's test touches. Our method is the compiled model, \
+         evaluated by the code that runs on the chip; the paper's is its ensemble with leaves in f32.",
+        settings.folds, settings.folds_used, settings.groups
+    ));
+    section.figure(overall(context, folds)?);
+    section.figure(objects(context, folds)?);
+    section.figure(confusions(context, folds)?);
+    section.table(recall(context, folds));
+    Ok(section)
+}
+
+/// Mean and deviation over folds at a number of touches.
+fn over_folds(folds: &[Fold], value: impl Fn(&Fold) -> Option<f64>) -> (f64, f64) {
+    mean_deviation(&folds.iter().filter_map(value).collect::<Vec<_>>())
+}
+
+fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
+    let levels = context.settings.levels();
+    let mut chart =
+        Chart::new("touches", Axis::logarithmic(10.0, 120.0), "accuracy", Axis::percent(0.4, 1.0)).sized(620, 400);
+    let mut data = Records::new(["method", "touches", "accuracy", "accuracy, many groups"]);
+    for (index, name) in METHODS.iter().enumerate() {
+        let (color, shape) = method_style(index);
+        let mut points = Vec::new();
+        let mut spread = Vec::new();
+        for &n in &levels {
+            let (mean, deviation) = over_folds(folds, |fold| fold.methods[index].few.get(n - 1).copied());
+            let (many, many_deviation) = over_folds(folds, |fold| fold.methods[index].many.get(n - 1).copied());
+            points.push((n as f64, mean));
+            spread.push((n as f64, mean - deviation, (mean + deviation).min(1.0)));
+            data.push([
+                (*name).into(),
+                Cell::count(n),
+                Cell::PercentSpread(mean, deviation, 1),
+                Cell::PercentSpread(many, many_deviation, 1),
+            ]);
+        }
+        chart.marks.push(Mark::Spread { points: spread, color });
+        chart.series(name, color, shape, &points);
+    }
+    Ok(Figure {
+        id: "accuracy".into(),
+        title: "Groups recognized, mean over folds (the paper's figure 8a)".into(),
+        caption: format!(
+            "Bars are one standard deviation over folds, of {} groups per object. The CSV also has the same over {} \
+             groups per object. – stands where an object's test touches make fewer than {LEAST_GROUPS} distinct groups.",
+            context.settings.groups, context.settings.many_groups
+        ),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
+}
+
+fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
+    let levels = context.settings.levels();
+    let mut panels = Vec::new();
+    let mut data = Records::new(["object", "method", "touches", "accuracy"]);
+    for (position, name) in context.names().iter().enumerate() {
+        let mut chart = Chart::new("touches", Axis::logarithmic(10.0, 120.0), "", Axis::share())
+            .sized(270, 200)
+            .titled(name.as_str());
+        for (index, method) in METHODS.iter().enumerate() {
+            let (color, _) = method_style(index);
+            let mut points = Vec::new();
+            for &n in &levels {
+                let of = |fold: &Fold| fold.methods[index].few_of_object[position].get(n - 1).copied();
+                let (mean, deviation) = over_folds(folds, of);
+                points.push((n as f64, mean));
+                data.push([
+                    name.as_str().into(),
+                    (*method).into(),
+                    Cell::count(n),
+                    Cell::PercentSpread(mean, deviation, 1),
+                ]);
+            }
+            let stroke = if index == 0 { Stroke::Dashed } else { Stroke::Solid };
+            chart.line(method, color, stroke, &points);
+        }
+        panels.push(chart.svg()?);
+    }
+    Ok(Figure {
+        id: "accuracy-objects".into(),
+        title: "The same for each object (figure 8b)".into(),
+        caption: "Mean over folds; the CSV has the standard deviations.".into(),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    })
+}
+
+fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
+    let names = context.names();
+    let mut data = Records::new(["method", "touched", "recognized as", "share"]);
+    let mut panels = Vec::new();
+    for (index, method) in METHODS.iter().enumerate() {
+        let shares = shares(folds, index);
+        let color = if index == 0 { color::PAPER } else { color::OURS };
+        let title = if index == 0 { "the paper's method" } else { "ours" };
+        panels.push(confusion::drawn(title, &names, &shares, color)?);
+        confusion::push_matrix(&mut data, method, &names, &shares);
+    }
+    Ok(Figure {
+        id: "confusion".into(),
+        title: "Which object is recognized as which after ten touches (figure 9)".into(),
+        caption: format!(
+            "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
+             groups per object and fold. Shares below half a percent are blank.",
+            context.settings.many_groups
+        ),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    })
+}
+
+fn recall(context: &Context, folds: &[Fold]) -> Table {
+    let mut data = Records::new([
+        "object",
+        "recall, paper's method",
+        "precision, paper's method",
+        "recall, ours",
+        "precision, ours",
+    ]);
+    let [paper, ours] = [0, 1].map(|method| recall_precision(&shares(folds, method)));
+    let percent = |value| Cell::Percent(value, 1);
+    for (position, name) in context.names().into_iter().enumerate() {
+        let (p, o) = (paper[position], ours[position]);
+        data.push([name.into(), percent(p.0), percent(p.1), percent(o.0), percent(o.1)]);
+    }
+    let mean = |of: &dyn Fn(usize) -> f64| percent((0..paper.len()).map(of).sum::<f64>() / paper.len().max(1) as f64);
+    data.push([
+        "mean".into(),
+        mean(&|k| paper[k].0),
+        mean(&|k| paper[k].1),
+        mean(&|k| ours[k].0),
+        mean(&|k| ours[k].1),
+    ]);
+    Table {
+        id: "recall".into(),
+        title: "Recall and precision after ten touches".into(),
+        caption: "From the matrices above. A click on a heading sorts.".into(),
+        command: context.settings.command.clone(),
+        data,
+    }
+}

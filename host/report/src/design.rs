@@ -1,0 +1,236 @@
+//! The page of a search for a probe: what it costs in approaches to build another one.
+
+use palpate::error::Result;
+use crate::page::axis::{Axis, number};
+use crate::page::chart::{Chart, Mark, Shape, Stroke};
+use crate::page::color;
+use crate::page::document::{Figure, Page, Section};
+use crate::page::table::{Cell, Records, Table};
+use palpate::probe::approach::Aim;
+use palpate::tune::probe::{Design, Trial};
+use palpate_shared::format::Length;
+
+/// The page. `command` is what remakes it.
+///
+/// # Errors
+/// If a chart cannot be drawn.
+pub(crate) fn page(design: &Design, command: &str) -> Result<Page> {
+    let mut result = Section::new("result", "The result");
+    result.text(assumed(design)).table(compared(design, command)).table(by_aim(design, command));
+    let mut trade = Section::new("spacing", "What another spacing costs");
+    trade.figure(by_spacing(design, command)?);
+    let mut tried = Section::new("tried", "What was tried");
+    tried.table(rounds(design, command));
+    Ok(Page {
+        title: "Which probe to build".into(),
+        summary: format!(
+            "{}: {} approaches to {}\u{a0}% errors, compared with {} with {}. {}",
+            described(&design.best),
+            approaches(&design.best),
+            100.0 * design.error_rate,
+            approaches(&design.published),
+            published(design).to_lowercase(),
+            match design.unit {
+                Length::Tenth => "Lengths are in units: a tenth of the object's longest side.",
+                Length::Millimeter => "Lengths are in millimeters: objects have their true sizes.",
+            }
+        ),
+        sections: vec![result, trade, tried],
+        facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
+        files: false,
+    })
+}
+
+/// What lengths are measured in.
+pub(crate) fn unit(design: &Design) -> &'static str {
+    match design.unit {
+        Length::Tenth => "units",
+        Length::Millimeter => "millimeters",
+    }
+}
+
+/// What the best probe is compared with.
+pub(crate) fn published(design: &Design) -> &'static str {
+    match design.unit {
+        Length::Tenth => "The published probe",
+        Length::Millimeter => "The published probe in millimeters, scaled to the median object",
+    }
+}
+
+/// A probe in a few words.
+pub(crate) fn described(trial: &Trial) -> String {
+    let probe = trial.probe;
+    format!(
+        "Spacing {}, radius {}, tilt ±{}°, aimed at the {}",
+        probe.spacing,
+        probe.radius,
+        probe.tilt,
+        match trial.aim.name() {
+            "mass" => "center of mass",
+            other => other,
+        }
+    )
+}
+
+/// The approaches, and whether they were enough.
+fn approaches(trial: &Trial) -> String {
+    if trial.reached {
+        number(trial.approaches, 1)
+    } else {
+        let [error, undecided] = [trial.error, trial.undecided].map(|share| number(100.0 * share, 1));
+        format!("more than {} ({error} % wrong, {undecided} % undecided)", number(trial.approaches, 0))
+    }
+}
+
+/// What the figures rest on.
+fn assumed(design: &Design) -> String {
+    format!(
+        "Every probe touched the objects {} times each in the simulator at {} {} per second, with Gaussian noise of {} \
+         ms on every contact time. A model of the descriptor {} was trained on these approaches and tested on as many \
+         others; evidence are {}. The stopping rule was varied until {} % of the verdicts on the test approaches were \
+         wrong.",
+        design.best.trained_on,
+        design.best.probe.speed,
+        unit(design),
+        design.noise / 1e3,
+        design.descriptor,
+        match design.counted {
+            "full" => "touches with all three fingers",
+            "contacts" => "approaches with at least one contact",
+            _ => "all approaches, also those that touched nothing",
+        },
+        100.0 * design.error_rate,
+    )
+}
+
+/// Columns of a table of trials.
+const COLUMNS: [&str; 14] = [
+    "round",
+    "spacing",
+    "radius",
+    "tilt (°)",
+    "aim",
+    "approaches",
+    "errors",
+    "undecided",
+    "none",
+    "outer",
+    "middle",
+    "outer and middle",
+    "both outer",
+    "all",
+];
+
+/// A trial as a row of such a table.
+fn row(name: &str, trial: &Trial) -> Vec<Cell> {
+    let probe = trial.probe;
+    let approaches = Cell::Spread(trial.approaches, trial.approaches_standard_error, 1);
+    let mut row = vec![name.into(), Cell::Number(probe.spacing, 2), Cell::Number(probe.radius, 2)];
+    row.extend([Cell::Number(probe.tilt, 0), trial.aim.name().into(), approaches, Cell::Percent(trial.error, 2)]);
+    row.push(Cell::Percent(trial.undecided, 2));
+    row.extend(COLUMNS[8..].iter().map(|pattern| match trial.patterns.get(pattern) {
+        Some(&share) => Cell::Percent(share, 1),
+        None => Cell::Missing,
+    }));
+    row
+}
+
+fn compared(design: &Design, command: &str) -> Table {
+    let mut data = Records::new(std::iter::once("probe").chain(COLUMNS.into_iter().skip(1)));
+    data.push(row("best", &design.best));
+    data.push(row("published", &design.published));
+    Table {
+        id: "best".into(),
+        title: "The best probe and the published one".into(),
+        caption:
+            "Approaches to a verdict on average, with the standard error of the drawing of sequences; the shares of \
+                  wrong verdicts and of sequences without one; the share of approaches with each contact pattern."
+                .into(),
+        command: command.into(),
+        data,
+    }
+}
+
+/// The best of the first round for each aim: what it is worth to know where the object's middle is.
+fn by_aim(design: &Design, command: &str) -> Table {
+    let mut data = Records::new(COLUMNS);
+    let round = design.rounds.first().map_or(&[][..], Vec::as_slice);
+    let of = |aim: Aim| round.iter().find(|trial| trial.aim == aim);
+    Aim::ALL.into_iter().filter_map(of).for_each(|trial| data.push(row("coarse", trial)));
+    Table {
+        id: "aims".into(),
+        title: "What it is worth to aim".into(),
+        caption:
+            "The best probe of the coarse round for each aim: box is anywhere in the bounding box, middle the box of \
+                  half its sides, mass a box of a quarter of them about the surface's center of mass. A robot that \
+                  cannot aim well should search with --aim box."
+                .into(),
+        command: command.into(),
+        data,
+    }
+}
+
+fn rounds(design: &Design, command: &str) -> Table {
+    let mut data = Records::new(COLUMNS);
+    let names = ["coarse", "finer"];
+    for (name, round) in names.into_iter().zip(&design.rounds) {
+        round.iter().for_each(|trial| data.push(row(name, trial)));
+    }
+    design.by_spacing.iter().for_each(|trial| data.push(row("last", trial)));
+    Table {
+        id: "trials".into(),
+        title: "Every probe that was tried".into(),
+        caption: "The coarse round has a quarter of the approaches per object, the finer one half of them: fewer make \
+                  weaker models. Compare within a round."
+            .into(),
+        command: command.into(),
+        data,
+    }
+}
+
+fn by_spacing(design: &Design, command: &str) -> Result<Figure> {
+    let line = &design.by_spacing;
+    let mut data = Records::new(["object", "spacing", "approaches"]);
+    let mut lines: Vec<(&str, Vec<(f64, f64)>)> =
+        vec![("all", line.iter().map(|trial| (trial.probe.spacing, trial.approaches)).collect())];
+    for name in design.best.per_object.keys() {
+        let point = |trial: &Trial| (trial.probe.spacing, trial.per_object.get(name).copied().unwrap_or(f64::NAN));
+        lines.push((name, line.iter().map(point).collect()));
+    }
+    for (name, points) in &lines {
+        points.iter().for_each(|&(x, y)| data.push([(*name).into(), Cell::Number(x, 2), Cell::Number(y, 2)]));
+    }
+    let all = || lines.iter().flat_map(|line| &line.1).map(|point| point.1).filter(|y| y.is_finite());
+    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(1.0, f64::max));
+    let spacings = || line.iter().map(|trial| trial.probe.spacing);
+    let mut chart = Chart::new(
+        format!("distance between neighboring fingers ({})", unit(design)),
+        Axis::linear(spacings().fold(f64::INFINITY, f64::min), spacings().fold(0.0, f64::max), 6),
+        "approaches to a verdict",
+        Axis::logarithmic(0.9 * low, 1.1 * high),
+    )
+    .sized(760, 480);
+    for (index, (name, points)) in lines.iter().enumerate().skip(1) {
+        let stroke = if index % 2 == 0 { Stroke::Dashed } else { Stroke::Thin };
+        chart.line(name, color::series(index), stroke, points);
+    }
+    let (name, points) = &lines[0];
+    chart.series(name, color::INK, Shape::Disc, points);
+    chart.marks.push(Mark::Vertical(design.best.probe.spacing));
+    let unreached = line.iter().filter(|trial| !trial.reached).count();
+    let note = match unreached {
+        0 => String::new(),
+        count => format!(" {count} of these probes did not reach the error rate, whatever the stopping rule."),
+    };
+    Ok(Figure {
+        id: "approaches".into(),
+        title: "Approaches against spacing, for each object".into(),
+        caption: format!(
+            "Radius, tilt and aim are those of the best probe, whose spacing the vertical line marks. One stopping rule \
+             for all objects: the error rate is that of all together.{note}"
+        ),
+        command: command.into(),
+        panels: vec![chart.svg()?],
+        data,
+    })
+}

@@ -1,0 +1,40 @@
+//! The evaluation: what is measured and shown, one section per module, written as one page with the files behind it.
+//!
+//! [`report`] measures every stage, or takes it from an interrupted report, and writes the page. [`view`] makes the page
+//! that shows an object and its touches, [`play`] the one on which objects can be touched. The page of the program's
+//! main job is also drawn here, and [`page`] draws what all of them consist of.
+
+mod approaches;
+mod cache;
+mod calibration;
+mod confusion;
+mod context;
+mod cost;
+mod cross_validation;
+mod density;
+pub mod design;
+mod generalization;
+mod growth;
+mod instructions;
+mod limit;
+mod noise;
+mod objects;
+pub mod page;
+mod plan;
+pub mod play;
+mod promises;
+mod published;
+mod recorded;
+pub mod results;
+pub mod run_page;
+mod sequential;
+mod settings;
+mod simulator;
+mod stages;
+pub mod statistics;
+mod strangers;
+pub mod teach;
+pub mod view;
+
+pub use settings::Settings;
+pub use stages::{Existing, Report, report, report_on};

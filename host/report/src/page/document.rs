@@ -1,0 +1,362 @@
+//! A page of sections: one HTML file with its style, script, drawings and pictures inside.
+
+use super::table::{Cell, Records, Table};
+use super::{chart::Svg, html};
+use palpate::error::Result;
+use palpate::output::write_bytes;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, PreEscaped, html};
+use std::path::{Path, PathBuf};
+
+/// The page's style.
+pub(crate) const STYLE: &str = include_str!("page.css");
+
+/// A figure: one or more drawings side by side, with the numbers behind them.
+#[derive(Clone, Debug)]
+pub(crate) struct Figure {
+    /// Its anchor, and its files' stem.
+    pub(crate) id: String,
+    /// What it shows.
+    pub(crate) title: String,
+    /// What to see in it, and how it was made.
+    pub(crate) caption: String,
+    /// The command that remakes it.
+    pub(crate) command: String,
+    /// Its drawings, at least one.
+    pub(crate) panels: Vec<Svg>,
+    /// The numbers drawn.
+    pub(crate) data: Records,
+}
+
+impl Figure {
+    /// All panels in one drawing on white, in rows of at most 1,160 pixels.
+    pub(crate) fn whole_svg(&self) -> Svg {
+        let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
+        let (width, height) = (cell(|panel| panel.width), cell(|panel| panel.height));
+        let columns = (1160 / width.max(1)).clamp(1, self.panels.len().max(1) as u32);
+        let rows = (self.panels.len() as u32).div_ceil(columns);
+        let (whole_width, whole_height) = (width * columns, height * rows);
+        let mut text = format!(
+            "<svg width=\"{whole_width}\" height=\"{whole_height}\" viewBox=\"0 0 {whole_width} {whole_height}\" \
+             xmlns=\"http://www.w3.org/2000/svg\">\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n"
+        );
+        for (index, panel) in (0..).zip(&self.panels) {
+            let (x, y) = (width * (index % columns), height * (index / columns));
+            text += &panel.text.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1);
+        }
+        Svg { text: text + "</svg>\n", width: whole_width, height: whole_height, narrow: None }
+    }
+}
+
+/// What a section is made of.
+#[derive(Clone, Debug)]
+pub(crate) enum Block {
+    /// A paragraph.
+    Text(String),
+    /// A paragraph about what may make the figures wrong.
+    Warning(String),
+    /// A figure.
+    Figure(Figure),
+    /// A table.
+    Table(Table),
+    /// A paragraph that is a link to a file beside the page: the file's name, and what the link says.
+    Link(String, String),
+    /// Small pictures, each with a name and a line below it.
+    Pictures(Vec<Picture>),
+}
+
+/// A small picture in the page.
+#[derive(Clone, Debug)]
+pub(crate) struct Picture {
+    /// What it shows.
+    pub(crate) name: String,
+    /// The bytes of a PNG file.
+    pub(crate) png: Vec<u8>,
+    /// A few words below it.
+    pub(crate) line: String,
+}
+
+/// A heading with what belongs below it.
+#[derive(Clone, Debug)]
+pub(crate) struct Section {
+    /// Its anchor.
+    pub(crate) id: String,
+    /// Its heading.
+    pub(crate) title: String,
+    /// What it holds.
+    pub(crate) blocks: Vec<Block>,
+}
+
+impl Section {
+    /// An empty section.
+    pub(crate) fn new(id: &str, title: &str) -> Self {
+        Self { id: id.to_string(), title: title.to_string(), blocks: Vec::new() }
+    }
+
+    /// Adds a paragraph.
+    pub(crate) fn text(&mut self, text: impl Into<String>) -> &mut Self {
+        self.blocks.push(Block::Text(text.into()));
+        self
+    }
+
+    /// Adds a paragraph about what may make the figures wrong.
+    pub(crate) fn warning(&mut self, text: impl Into<String>) -> &mut Self {
+        self.blocks.push(Block::Warning(text.into()));
+        self
+    }
+
+    /// Adds a figure.
+    pub(crate) fn figure(&mut self, figure: Figure) -> &mut Self {
+        self.blocks.push(Block::Figure(figure));
+        self
+    }
+
+    /// Adds a table.
+    pub(crate) fn table(&mut self, table: Table) -> &mut Self {
+        self.blocks.push(Block::Table(table));
+        self
+    }
+}
+
+/// A whole page.
+#[derive(Clone, Debug)]
+pub(crate) struct Page {
+    /// Its title.
+    pub(crate) title: String,
+    /// One or two sentences below the title.
+    pub(crate) summary: String,
+    /// The sections, in order.
+    pub(crate) sections: Vec<Section>,
+    /// The footer: settings and version, as name and value.
+    pub(crate) facts: Vec<(String, String)>,
+    /// Whether the files of figures and tables are written next to the page and linked.
+    pub(crate) files: bool,
+}
+
+impl Page {
+    /// All figures, in order.
+    pub(crate) fn figures(&self) -> impl Iterator<Item = &Figure> {
+        self.blocks().filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
+    }
+
+    /// All tables, in order.
+    pub(crate) fn tables(&self) -> impl Iterator<Item = &Table> {
+        self.blocks().filter_map(|block| if let Block::Table(table) = block { Some(table) } else { None })
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = &Block> {
+        self.sections.iter().flat_map(|section| &section.blocks)
+    }
+
+    /// The page as HTML.
+    pub(crate) fn html(&self) -> String {
+        let body = html! {
+            header {
+                h1 { (self.title) }
+                p.lead { (self.summary) }
+                @if self.sections.len() > 2 {
+                    nav aria-label="Sections" {
+                        @for section in &self.sections { a href={ "#section-" (section.id) } { (section.title) } " " }
+                    }
+                }
+            }
+            main {
+                @for section in &self.sections {
+                    // Figures and tables have anchors of their own, and some the same name.
+                    section id={ "section-" (section.id) } {
+                        h2 { (section.title) }
+                        @for block in &section.blocks { (self.block(block)) }
+                    }
+                }
+            }
+            footer {
+                dl { @for (name, value) in &self.facts { div { dt { (name) } dd { (value) } } } }
+            }
+            (html::script(include_str!("page.js")))
+        };
+        html::file(&self.title, &[STYLE], &body)
+    }
+
+    /// Writes the page to `path`, and with [`Page::files`] every figure's SVG and CSV and every table's CSV beside it.
+    /// The page comes last, each file whole or not at all. Returns what was written.
+    ///
+    /// # Errors
+    /// [`palpate::Error::Io`] naming the file.
+    pub(crate) fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
+        let mut written = Vec::new();
+        let mut put = |path: PathBuf, bytes: &[u8]| -> Result<()> {
+            write_bytes(&path, bytes)?;
+            written.push(path);
+            Ok(())
+        };
+        if self.files {
+            for figure in self.figures() {
+                put(path.with_file_name(format!("{}.svg", figure.id)), figure.whole_svg().text.as_bytes())?;
+                put(path.with_file_name(format!("{}.csv", figure.id)), &figure.data.csv()?)?;
+            }
+            for table in self.tables() {
+                put(path.with_file_name(format!("{}.csv", table.id)), &table.data.csv()?)?;
+            }
+        }
+        put(path.to_path_buf(), self.html().as_bytes())?;
+        Ok(written)
+    }
+
+    fn block(&self, block: &Block) -> Markup {
+        match block {
+            Block::Text(text) => html! { p { (marked(text)) } },
+            Block::Warning(text) => html! { p.warning { strong { "Warning: " } (marked(text)) } },
+            Block::Link(file, text) => html! { p { a href=(file) { (text) } } },
+            Block::Figure(figure) => html! {
+                figure id=(figure.id) {
+                    h3 { (figure.title) }
+                    div.panels {
+                        @for panel in &figure.panels { (drawing(panel, &figure.title)) }
+                    }
+                    figcaption { (marked(&figure.caption)) (self.origin(&figure.id, &figure.command, true)) }
+                }
+            },
+            Block::Table(table) => html! {
+                figure.table id=(table.id) {
+                    h3 { (table.title) }
+                    (rows(&table.data, &table.title))
+                    figcaption { (marked(&table.caption)) (self.origin(&table.id, &table.command, false)) }
+                }
+            },
+            Block::Pictures(pictures) => html! {
+                div.pictures {
+                    @for Picture { name, png, line } in pictures {
+                        div {
+                            img src={ "data:image/png;base64," (STANDARD.encode(png)) } alt=(name);
+                            strong { (name) } span { (line) }
+                        }
+                    }
+                }
+            },
+        }
+    }
+
+    /// How to remake a figure or table, and where its numbers are.
+    fn origin(&self, id: &str, command: &str, drawn: bool) -> Markup {
+        html! {
+            div.origin {
+                @if !command.is_empty() { code { (command) } }
+                @if self.files {
+                    " " a href={ (id) ".csv" } { (id) ".csv" }
+                    @if drawn { " " a href={ (id) ".svg" } { (id) ".svg" } }
+                }
+            }
+        }
+    }
+}
+
+/// A drawing, and beside it the same for a phone, of which the style shows one.
+fn drawing(panel: &Svg, title: &str) -> Markup {
+    html! {
+        div.panel.wide[panel.width > 400] style={ "--width:" (panel.width) "px" } role="img" aria-label=(title) {
+            @match &panel.narrow {
+                None => (PreEscaped(&panel.text)),
+                Some(narrow) => {
+                    div.natural { (PreEscaped(&panel.text)) }
+                    div.narrow { (PreEscaped(narrow)) }
+                }
+            }
+        }
+    }
+}
+
+/// Text of which what stands between backticks is code.
+fn marked(text: &str) -> Markup {
+    html! {
+        @for (index, part) in text.split('`').enumerate() {
+            @if index % 2 == 1 { code { (part) } } @else { (part) }
+        }
+    }
+}
+
+fn rows(data: &Records, title: &str) -> Markup {
+    // A column reads as numbers if none of its cells is words.
+    let numeric: Vec<bool> = (0..data.columns.len())
+        .map(|column| !data.rows.iter().any(|row| matches!(row[column], Cell::Text(_))))
+        .collect();
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(title) {
+            table {
+                thead {
+                    tr { @for (name, numeric) in data.columns.iter().zip(&numeric) {
+                        // A column of row headings may have no name of its own, and then nothing to click.
+                        @if name.is_empty() { td {} } @else {
+                            th scope="col" class=[numeric.then_some("number")] { button type="button" { (name) } }
+                        }
+                    } }
+                }
+                tbody {
+                    @for row in &data.rows {
+                        tr { @for (cell, numeric) in row.iter().zip(&numeric) {
+                            td class=[numeric.then_some("number")] data-value=[cell.value()] { (cell.shown()) }
+                        } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_escapes_what_it_is_given_and_holds_everything_itself() {
+        let mut section = Section::new("one", "One & only");
+        let mut data = Records::new(["name", "value"]);
+        data.push(["<b>".into(), Cell::Number(2.0, 0)]);
+        section.table(Table {
+            id: "t".into(),
+            title: "T".into(),
+            caption: "See `palpate calibrate <model>`.".into(),
+            command: "palpate report a b".into(),
+            data,
+        });
+        let page = Page {
+            title: "A <page>".into(),
+            summary: String::new(),
+            sections: vec![section],
+            facts: vec![("seed".into(), "1".into())],
+            files: true,
+        };
+        let html = page.html();
+        for part in [
+            "A &lt;page&gt;",
+            "&lt;b&gt;",
+            "One &amp; only",
+            "data-value=\"2\"",
+            "href=\"t.csv\"",
+            "palpate report a b",
+            "See <code>palpate calibrate &lt;model&gt;</code>.",
+        ] {
+            assert!(html.contains(part), "{part}");
+        }
+        for part in ["http:", "https:", "url(", "@import", "<link rel=\"stylesheet\"", "src=\"/"] {
+            assert!(!html.contains(part), "{part}");
+        }
+    }
+
+    #[test]
+    fn panels_are_tiled_into_one_drawing() {
+        let text = "<svg width=\"500\" height=\"100\"></svg>\n".into();
+        let panel = Svg { text, width: 500, height: 100, narrow: None };
+        let figure = Figure {
+            id: "f".into(),
+            title: String::new(),
+            caption: String::new(),
+            command: String::new(),
+            panels: vec![panel; 3],
+            data: Records::default(),
+        };
+        let whole = figure.whole_svg();
+        assert_eq!((whole.width, whole.height), (1000, 200));
+        assert!(whole.text.contains("<svg x=\"500\" y=\"0\"") && whole.text.contains("<svg x=\"0\" y=\"100\""));
+    }
+}

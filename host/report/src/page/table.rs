@@ -1,0 +1,195 @@
+//! Tables: shown in the page with columns that sort, and written as CSV.
+
+use super::axis::number;
+use palpate::error::{PageProblem, Result};
+
+/// One cell.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Cell {
+    /// Words.
+    Text(String),
+    /// A number and how many decimals are shown; CSV has all of them.
+    Number(f64, usize),
+    /// A number, its uncertainty, and how many decimals are shown; two columns in CSV.
+    Spread(f64, f64, usize),
+    /// A share of one, shown as a percentage with this many decimals; CSV has the share.
+    Percent(f64, usize),
+    /// A share of one and its uncertainty, shown as percentages; two columns in CSV.
+    PercentSpread(f64, f64, usize),
+    /// Not measured.
+    Missing,
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_string())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl Cell {
+    /// A whole number.
+    pub(crate) fn count(value: impl TryInto<u64>) -> Self {
+        value.try_into().map_or(Self::Missing, |value| Self::Number(value as f64, 0))
+    }
+
+    /// What the page shows.
+    pub(crate) fn shown(&self) -> String {
+        match *self {
+            Self::Text(ref text) => text.clone(),
+            Self::Number(value, decimals) => grouped(&finite(value, decimals)),
+            // One measurement has no spread.
+            Self::Spread(value, 0.0, decimals) => finite(value, decimals),
+            Self::PercentSpread(value, 0.0, decimals) => Self::Percent(value, decimals).shown(),
+            Self::Spread(value, spread, decimals) => {
+                format!("{} ± {}", finite(value, decimals), finite(spread, decimals))
+            }
+            Self::Percent(value, decimals) => format!("{}\u{a0}%", finite(value * 100.0, decimals)),
+            Self::PercentSpread(value, spread, decimals) => {
+                format!("{} ± {}\u{a0}%", finite(value * 100.0, decimals), finite(spread * 100.0, decimals))
+            }
+            Self::Missing => "–".to_string(),
+        }
+    }
+
+    /// What the column sorts by, if this is a number.
+    pub(crate) fn value(&self) -> Option<f64> {
+        match *self {
+            Self::Number(value, _)
+            | Self::Spread(value, _, _)
+            | Self::Percent(value, _)
+            | Self::PercentSpread(value, _, _) => Some(value).filter(|value| value.is_finite()),
+            Self::Text(_) | Self::Missing => None,
+        }
+    }
+
+    /// Its CSV fields: one, or value and spread.
+    fn fields(&self) -> Vec<String> {
+        let plain = |value: f64| if value.is_finite() { format!("{value}") } else { String::new() };
+        match *self {
+            Self::Text(ref text) => vec![text.clone()],
+            Self::Number(value, _) | Self::Percent(value, _) => vec![plain(value)],
+            Self::Spread(value, spread, _) | Self::PercentSpread(value, spread, _) => vec![plain(value), plain(spread)],
+            Self::Missing => vec![String::new()],
+        }
+    }
+}
+
+fn finite(value: f64, decimals: usize) -> String {
+    if value.is_finite() { number(value, decimals) } else { "–".to_string() }
+}
+
+/// Groups of three digits separated by thin spaces, from 10,000 up.
+fn grouped(text: &str) -> String {
+    let whole = text.find('.').unwrap_or(text.len());
+    let digits = text[..whole].chars().filter(char::is_ascii_digit).count();
+    if digits < 5 {
+        return text.to_string();
+    }
+    let mut out = String::new();
+    let mut left = digits;
+    for c in text[..whole].chars() {
+        out.push(c);
+        if c.is_ascii_digit() {
+            left -= 1;
+            if left > 0 && left.is_multiple_of(3) {
+                out.push('\u{202f}');
+            }
+        }
+    }
+    out + &text[whole..]
+}
+
+/// Rows under named columns: the numbers behind a figure, or a table's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Records {
+    /// The columns' names, units in parentheses.
+    pub(crate) columns: Vec<String>,
+    /// The rows, each as long as `columns`.
+    pub(crate) rows: Vec<Vec<Cell>>,
+}
+
+impl Records {
+    /// No rows yet.
+    pub(crate) fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
+        Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }
+    }
+
+    /// Adds a row; one that is too short is filled with [`Cell::Missing`].
+    pub(crate) fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
+        let mut row: Vec<Cell> = row.into_iter().collect();
+        row.resize(self.columns.len(), Cell::Missing);
+        self.rows.push(row);
+    }
+
+    /// The rows as CSV, a header line first. A column with an uncertainty becomes two.
+    ///
+    /// # Errors
+    /// If the CSV library refuses, which it has no reason to.
+    pub(crate) fn csv(&self) -> Result<Vec<u8>> {
+        let spread: Vec<bool> = (0..self.columns.len())
+            .map(|c| self.rows.iter().any(|row| matches!(row[c], Cell::Spread(..) | Cell::PercentSpread(..))))
+            .collect();
+        let bug = |reason: String| PageProblem::Csv { reason };
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let header = self
+            .columns
+            .iter()
+            .zip(&spread)
+            .flat_map(|(name, &spread)| std::iter::once(name.clone()).chain(spread.then(|| format!("{name} ±"))));
+        writer.write_record(header).map_err(|e| bug(e.to_string()))?;
+        for row in &self.rows {
+            let fields = row.iter().zip(&spread).flat_map(|(cell, &spread)| {
+                let mut fields = cell.fields();
+                fields.resize(1 + usize::from(spread), String::new());
+                fields
+            });
+            writer.write_record(fields).map_err(|e| bug(e.to_string()))?;
+        }
+        Ok(writer.into_inner().map_err(|e| bug(e.to_string()))?)
+    }
+}
+
+/// A table in the page.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    /// Its anchor, and its file's stem.
+    pub(crate) id: String,
+    /// What it shows.
+    pub(crate) title: String,
+    /// What to see in it, and how it was made.
+    pub(crate) caption: String,
+    /// The command that remakes it.
+    pub(crate) command: String,
+    /// Its contents.
+    pub(crate) data: Records,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_quotes_and_gives_uncertainties_their_own_column() {
+        let mut data = Records::new(["object", "accuracy"]);
+        data.push(["a, b".into(), Cell::PercentSpread(0.75, 0.01, 1)]);
+        data.push(["c".into()]);
+        assert_eq!(
+            String::from_utf8(data.csv().unwrap()).unwrap(),
+            "object,accuracy,accuracy ±\n\"a, b\",0.75,0.01\nc,,\n"
+        );
+    }
+
+    #[test]
+    fn numbers_are_shown_for_people() {
+        assert_eq!(Cell::Number(1234567.0, 0).shown(), "1\u{202f}234\u{202f}567");
+        assert_eq!(Cell::Number(-1234.5, 1).shown(), "\u{2212}1234.5");
+        assert_eq!(Cell::PercentSpread(0.907, 0.025, 1).shown(), "90.7 ± 2.5\u{a0}%");
+        assert_eq!(Cell::Number(f64::NAN, 1).shown(), "–");
+    }
+}

@@ -1,0 +1,366 @@
+//! A page on which objects can be touched, with the simulator and the recognizer inside.
+//!
+//! The page holds all that it needs and asks the network for nothing: the objects' surfaces, the compiled models, and the
+//! lines of Rust that touch the one and read the other ([`palpate::play`], compiled to WebAssembly by `host/web`). What a
+//! page says is what the program says; [`trace()`] writes that down, to compare.
+
+mod models;
+mod surfaces;
+mod trace;
+
+pub use models::{Training, expect, train};
+pub use surfaces::{Surface, surfaces};
+pub use trace::trace;
+
+use palpate::compile::CompiledModel;
+use palpate::error::{CaptureProblem, EvaluateProblem, PageProblem, Result};
+use palpate::evaluate::ApproachSequential;
+use palpate::mesh::Object;
+use crate::page::html;
+use crate::page::scene;
+use palpate::play::compress;
+use palpate::probe::approach::Aim;
+use palpate::touches::Origin;
+use palpate::touches::noise::Noise;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, html};
+use palpate_onboard::Model;
+use palpate_shared::format::{Counted, Length};
+use std::path::PathBuf;
+
+/// The game, compiled to WebAssembly.
+const WASM: &[u8] = include_bytes!("../../assets/play/palpate.wasm");
+
+/// What a page is made for.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// How objects are touched: unit, probe and aim count.
+    pub origin: Origin,
+    /// The noise that the page begins with.
+    pub noise: Noise,
+    /// The command that remakes the page.
+    pub command: String,
+}
+
+/// A model that plays.
+#[derive(Clone, Debug)]
+pub struct Contender {
+    /// What the page calls it.
+    pub name: String,
+    /// The model.
+    pub model: CompiledModel,
+    /// What it costs on average, measured on many more approaches than anybody plays; none if that is not known.
+    pub expected: Option<Expected>,
+}
+
+/// What a model costs on average.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Expected {
+    /// Approaches to its verdict, also where it gave up.
+    pub approaches: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// The share of rounds in which it named another object.
+    pub wrong: f64,
+}
+
+impl From<&ApproachSequential> for Expected {
+    fn from(measured: &ApproachSequential) -> Self {
+        Self {
+            approaches: measured.mean_approaches,
+            standard_error: measured.mean_approaches_standard_error,
+            wrong: measured.error,
+        }
+    }
+}
+
+impl Contender {
+    /// A model by a name that says which touches are evidence to it, and what it makes of them.
+    ///
+    /// # Errors
+    /// [`EvaluateProblem::RawFeatures`] for a model over rows of features.
+    pub fn new(model: CompiledModel, expected: Option<Expected>) -> Result<Self> {
+        let name = about(&model.model())?;
+        Ok(Self { name, model, expected })
+    }
+}
+
+/// Tells models of one name apart by the files that they came from: by the files' names, or, where those are the same too,
+/// by their paths; the same file twice is numbered.
+pub fn distinguish(contenders: &mut [Contender], files: &[PathBuf]) {
+    let stem = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let path = |file: &PathBuf| file.display().to_string();
+    let names: Vec<String> = contenders.iter().map(|contender| contender.name.clone()).collect();
+    for (index, (contender, file)) in contenders.iter_mut().zip(files).enumerate() {
+        let same = || (0..names.len()).zip(files).filter(|(other, _)| names[*other] == names[index]);
+        if same().count() < 2 {
+            continue;
+        }
+        let is_alone = |of: &dyn Fn(&PathBuf) -> String| same().filter(|(_, other)| of(other) == of(file)).count() == 1;
+        let before = same().filter(|(other, own)| *other < index && *own == file).count();
+        contender.name += &match () {
+            () if is_alone(&stem) => format!(" ({})", stem(file)),
+            () if is_alone(&path) => format!(" ({})", path(file)),
+            () => format!(" ({}, {})", path(file), before + 1),
+        };
+    }
+}
+
+/// A model's features and touches, in words.
+fn about(model: &Model<'_>) -> Result<String> {
+    let descriptor = model.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
+    let touches = match model.trained_touches().counted {
+        Counted::Full => "full touches",
+        Counted::Contacts => "every contact",
+        Counted::All => "every approach",
+    };
+    Ok(format!("{}, {touches}", descriptor.for_full_touches().name()))
+}
+
+/// The page for objects and models, as HTML. At most 3 MB with models of up to half a megabyte together: larger meshes are
+/// simplified, which the page says. The same objects, models and settings give the same page.
+///
+/// # Errors
+/// As [`surfaces()`]; [`CaptureProblem`] for an object whose true size is not known.
+pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -> Result<String> {
+    let surfaces = surfaces(objects, &settings.origin)?;
+    let json = data(&surfaces, contenders, settings)?;
+    let body = html! {
+        (body(&surfaces, contenders, settings))
+        script id="data" type="application/json" { (maud::PreEscaped(json)) }
+        (scene::stage())
+        (html::script(include_str!("game.js")))
+        (html::script(include_str!("picture.js")))
+        (html::script(include_str!("page.js")))
+    };
+    Ok(html::file_with_wasm("Touch it yourself – Palpate", &[scene::STYLE, include_str!("page.css")], &body))
+}
+
+/// What the page's script needs, safe inside a script element.
+fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> Result<String> {
+    let Settings { origin, noise, .. } = settings;
+    let data = serde_json::json!({
+        "wasm": STANDARD.encode(WASM),
+        "millimeters": origin.unit == Length::Millimeter,
+        "aim": Aim::ALL.iter().position(|aim| *aim == origin.aim),
+        "probe": origin.probe,
+        "noise": noise,
+        "objects": surfaces.iter().map(|surface| serde_json::json!({
+            "name": surface.name,
+            "length": surface.length,
+            "mesh": STANDARD.encode(&surface.packed),
+        })).collect::<Vec<_>>(),
+        "models": contenders.iter().map(|contender| serde_json::json!({
+            "name": contender.name,
+            "bytes": STANDARD.encode(compress(contender.model.bytes())),
+            "objects": contender.model.names(),
+            "known": contender.model.model().known_count(),
+            "plan": contender.model.model().plan().is_some(),
+            "expected": contender.expected,
+        })).collect::<Vec<_>>(),
+    });
+    let text = serde_json::to_string(&data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;
+    // In a script element only `<` could end the data early.
+    Ok(text.replace('<', "\\u003c"))
+}
+
+fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> Markup {
+    let has_plan = contenders.iter().any(|contender| contender.model.model().plan().is_some());
+    // The model to use, where there are several: every contact is evidence, and no pose is needed.
+    let counts_contacts =
+        |contender: &Contender| contender.model.model().trained_touches().counted == Counted::Contacts;
+    let shown = contenders.iter().position(counts_contacts).unwrap_or(0);
+    html! {
+        header {
+            h1 { "Touch it yourself" }
+            p.lead {
+                "Three fingers in a row approach an object; each says when it makes contact. From these times alone a \
+                 model of a few kilobytes tells " (surfaces.len()) " objects apart. The simulator and the recognizer in \
+                 this page are the program's own, compiled to WebAssembly."
+            }
+            p id="failure" role="alert" {}
+            noscript { p { "This page needs JavaScript, which this browser does not run." } }
+        }
+        main {
+            section.table aria-label="The object" {
+                div.row {
+                    label for="object" { "Object" }
+                    select id="object" {
+                        @for (index, surface) in surfaces.iter().enumerate() { option value=(index) { (surface.name) } }
+                        option value="secret" { "a secret one" }
+                    }
+                    button type="button" id="secret" { "Guess what I am touching" }
+                }
+                (scene::figure("Click the surface to touch it there. Drag to turn, scroll or pinch to zoom."))
+                div.row {
+                    button.main type="button" id="touch" { "Touch at random" }
+                    button type="button" id="until" { "Touch until sure" }
+                    @if has_plan { button type="button" id="planned" { "Touch where planned" } }
+                    button type="button" id="again" { "Start again" }
+                }
+                p.note { "Hold the first button, or keep Enter pressed on it, for many." }
+                div id="guesses" hidden {
+                    p { "Your guess:" }
+                    div.row {
+                        @for (index, surface) in surfaces.iter().enumerate() {
+                            button type="button" data-guess=(index) { (surface.name) }
+                        }
+                    }
+                }
+                p id="answer" role="status" {}
+            }
+            section.knowledge aria-label="What the model knows" {
+                @if contenders.len() > 1 {
+                    div.row {
+                        label for="model" { "Model" }
+                        select id="model" {
+                            @for (index, contender) in contenders.iter().enumerate() {
+                                option value=(index) selected[index == shown] { (contender.name) }
+                            }
+                        }
+                    }
+                }
+                p id="verdict" role="status" {}
+                table id="bars" {
+                    caption { "Posterior of each object. At the line the model is sure." }
+                    thead { tr { th scope="col" { "object" } th scope="col" { "posterior" } th.number scope="col" { "in %" } } }
+                    tbody {}
+                }
+                @if has_plan {
+                    label { input type="checkbox" id="where"; " Where next? Show the approach that the plan proposes" }
+                    p.note id="proposal" {}
+                }
+                h2 { "Touches" }
+                div.scroll role="region" aria-label="Touches" tabindex="0" {
+                    table id="touches" {
+                        thead { tr {
+                            th.number scope="col" { "approach" }
+                            @for (class, name) in [("first", "t1 / ms"), ("middle", "t2 / ms"), ("last", "t3 / ms")] {
+                                th.number.(class) scope="col" { (name) }
+                            }
+                            th scope="col" { "fingers" }
+                        } }
+                        tbody {}
+                    }
+                }
+            }
+            (compare(contenders, settings))
+            (notes(surfaces, contenders, settings))
+        }
+    }
+}
+
+/// All models on the same touches, and what is added to these.
+fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
+    let ms = |micros: f64| micros / 1e3;
+    let bent = settings.noise.bent;
+    html! {
+        section.compare {
+            h2 { "Side by side, on the same touches" }
+            div.scroll role="region" aria-label="Models" tabindex="0" {
+                table id="models" {
+                    thead { tr {
+                        th scope="col" { "model" }
+                        th scope="col" { "says" }
+                        th.number scope="col" { "posterior" }
+                        th.number scope="col" { "approaches" }
+                        th.number scope="col" { "of them evidence" }
+                        th.number scope="col" { "approaches, on average" }
+                        th.number scope="col" { "expected" }
+                        th.number scope="col" { "wrong" }
+                        th.number scope="col" { "bytes" }
+                    } }
+                    tbody {
+                        @for contender in contenders {
+                            tr {
+                                th scope="row" { (contender.name) }
+                                td {} td.number {} td.number {} td.number {} td.number { "–" }
+                                td.number {
+                                    @match contender.expected {
+                                        Some(expected) => {
+                                            (format!("{:.1} ± {:.1}", expected.approaches, expected.standard_error))
+                                        }
+                                        None => "–",
+                                    }
+                                }
+                                td.number { "–" }
+                                td.number { (contender.model.bytes().len()) }
+                            }
+                        }
+                    }
+                }
+            }
+            div.row {
+                button type="button" id="series" { "Play 100 rounds" }
+                p id="rounds" role="status" {}
+            }
+            fieldset {
+                legend { "What the sensor adds" }
+                @for (id, label, least, largest, value) in [
+                    ("noise", "Noise: up to", 0.0, 20.0, ms(settings.noise.deviation.largest)),
+                    ("bent1", "Finger 1 bent: early by", -20.0, 20.0, ms(bent[0])),
+                    ("bent2", "Finger 2 bent: early by", -20.0, 20.0, ms(bent[1])),
+                    ("bent3", "Finger 3 bent: early by", -20.0, 20.0, ms(bent[2])),
+                ] {
+                    div.slider {
+                        label for=(id) { (label) }
+                        input type="range" id=(id) min=(least) max=(largest) step="0.5" value=(value);
+                        output for=(id) {}
+                    }
+                }
+                p.note id="condition" {}
+            }
+        }
+    }
+}
+
+fn notes(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> Markup {
+    let simplified: Vec<String> = surfaces
+        .iter()
+        .filter(|surface| surface.triangles < surface.of)
+        .map(|surface| format!("{} ({} of {} triangles)", surface.name, surface.triangles, surface.of))
+        .collect();
+    let instances: Vec<&str> =
+        surfaces.iter().filter(|surface| surface.instances > 1).map(|surface| surface.name.as_str()).collect();
+    let timer = settings.noise.timer;
+    html! {
+        section.notes {
+            h2 { "What is what" }
+            p {
+                "An approach at random is one of a capture: from any direction, at any point of the bounding box. A click \
+                 is an approach that you aimed, which the models were not trained for: they may be surer or less sure than \
+                 they should be. An approach costs a robot the same whether or not it is evidence."
+            }
+            p {
+                "The picture and the fingers have the same surface: the mesh with its corners rounded to a 65,536th of its \
+                 longest side"
+                @if simplified.is_empty() { "." } @else { ", and simplified where that is needed: " (simplified.join(", ")) "." }
+                @if !instances.is_empty() { " Of objects with several meshes, the first is here: " (instances.join(", ")) "." }
+            }
+            p {
+                "The deviation of a touch's noise is drawn between " (settings.noise.deviation.least / 1e3) " ms and what the \
+                 slider says"
+                @if timer > 0.0 { "; the timer counts steps of " (timer / 1e3) " ms" }
+                ". Times count from the first contact; – is a finger that missed."
+            }
+            @if contenders.iter().any(|contender| contender.expected.is_some()) {
+                p {
+                    "The expected number is the mean that the program measured on captured approaches, with "
+                    (settings.noise.to_string()) ". Rounds are played with the sliders as they are."
+                }
+            }
+            p { "Made by " code { (settings.command) } }
+        }
+    }
+}
+
+/// The longest side of an object's first mesh, in units.
+fn length(object: &Object, origin: &Origin) -> Result<f64> {
+    let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
+    let first = object.instances().next().and_then(|first| origin.length_of(object, first));
+    Ok(first.ok_or_else(unknown)?)
+}
+
+#[cfg(test)]
+mod tests;

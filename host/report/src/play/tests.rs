@@ -1,0 +1,175 @@
+use super::*;
+use palpate::compile::{self, compile};
+use palpate::ensemble::{self, Ensemble, Node, Output, Tree};
+use palpate::mesh::Mesh;
+use palpate::play::Game;
+use palpate::probe::scene::Scene;
+use palpate_onboard::Verdict;
+use palpate_shared::Descriptor;
+
+/// The sections of a WebAssembly module: each one's number and content.
+fn sections(module: &[u8]) -> Vec<(u8, &[u8])> {
+    let mut rest = module.strip_prefix(b"\0asm\x01\0\0\0").expect("a module of version 1");
+    let mut sections = Vec::new();
+    while let Some((&number, tail)) = rest.split_first() {
+        // LEB128.
+        let end = tail.iter().position(|byte| byte & 0x80 == 0).unwrap() + 1;
+        let length = (0..end).map(|at| usize::from(tail[at] & 0x7f) << (7 * at)).sum();
+        let (content, after) = tail[end..].split_at(length);
+        sections.push((number, content));
+        rest = after;
+    }
+    sections
+}
+
+#[test]
+fn the_compiled_game_imports_nothing_names_no_path_and_is_small() {
+    let sections = sections(WASM);
+    assert!(sections.iter().any(|(number, _)| *number == 10), "it has code");
+    assert!(!sections.iter().any(|(number, _)| *number == 2), "it has a section of imports");
+    let compressed = miniz_oxide::deflate::compress_to_vec_zlib(WASM, 9).len();
+    assert!(compressed <= 400_000, "{compressed} bytes");
+    let text = String::from_utf8_lossy(WASM);
+    for path in ["/home/", "/root/", "/tmp/", "/usr/", "C:\\"] {
+        assert!(!text.contains(path), "{path}");
+    }
+}
+
+fn object(name: &str, rings: u32, height: f32) -> Object {
+    Object::new(name, Mesh::globe(rings).stretched([1.0, 1.0, height]))
+}
+
+/// One nat for the first of two objects below a curvature of 9 ms, one for the second above.
+fn contender(names: [&str; 2]) -> Contender {
+    let nodes = vec![
+        Node::Split { feature: 0, threshold: 9_000.0, missing_left: true, left: 1, right: 2 },
+        Node::Leaf(vec![0.5, -0.5]),
+        Node::Leaf(vec![-0.5, 0.5]),
+    ];
+    let ensemble = Ensemble {
+        inputs: Descriptor::Curvature.into(),
+        objects: names.map(String::from).into(),
+        base_margins: vec![0.0; 2],
+        trees: vec![Tree { nodes, output: Output::Each }],
+        origin: ensemble::Origin::default(),
+    };
+    let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+    Contender::new(CompiledModel::from_bytes(bytes).unwrap(), None).unwrap()
+}
+
+fn settings() -> Settings {
+    Settings { origin: Origin::default(), noise: Noise::switch(), command: "palpate play".into() }
+}
+
+#[test]
+fn a_page_holds_everything_itself_and_names_cannot_break_out_of_it() {
+    let objects = [object("</script><script>alert(1)</script>", 8, 1.0), object("disc", 8, 0.1)];
+    let page = page(&objects, &[contender(["disc", "<b>"])], &settings()).unwrap();
+    assert!(!page.contains("<script>alert") && !page.contains("<b>"));
+    let own = page.replace(scene::LIBRARY, "");
+    for part in ["http:", "https:", "url(", "@import", "src=\"/", "fetch(", "import("] {
+        assert!(!own.contains(part), "{part}");
+    }
+    assert!(own.contains("'wasm-unsafe-eval'") && own.contains("curvature, full touches"));
+    // Only one model: nothing to choose, and no plan.
+    assert!(!own.contains("id=\"model\"") && !own.contains("id=\"planned\""));
+}
+
+#[test]
+fn a_page_of_ten_large_objects_stays_below_three_megabytes_and_says_what_it_simplified() {
+    // Rough surfaces, as scans are: smooth ones are packed too well to be simplified.
+    let rough = |i: u32| {
+        let mut mesh = Mesh::globe(180 + i).stretched([1.0, 1.0, 0.1 * (i + 1) as f32]);
+        for (index, vertex) in mesh.vertices.iter_mut().enumerate() {
+            let scale = 1.0 + 3e-6 * (7_919 * index % 10_007) as f32;
+            *vertex = vertex.map(|coordinate| coordinate * scale);
+        }
+        Object::new(format!("object{i}"), mesh)
+    };
+    let objects: Vec<Object> = (0..10).map(rough).collect();
+    let surfaces = surfaces(&objects, &Origin::default()).unwrap();
+    assert!(surfaces.iter().any(|surface| surface.triangles < surface.of));
+    assert!(surfaces.iter().all(|surface| surface.triangles > 5_000));
+    let page = page(&objects, &[contender(["object0", "object1"])], &settings()).unwrap();
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+    let stated = format!("({} of {} triangles)", surfaces[9].triangles, surfaces[9].of);
+    assert!(page.contains(&stated), "{stated}");
+}
+
+#[test]
+fn a_small_object_is_touched_as_it_is_but_for_a_rounding_of_its_corners() {
+    let objects = [object("globe", 20, 1.0)];
+    let [surface] = &surfaces(&objects, &Origin::default()).unwrap()[..] else { panic!() };
+    assert_eq!((surface.triangles, surface.of, surface.length), (1_520, 1_520, 10.0));
+    let scene = |mesh: &Mesh| Scene::new(mesh, 10.0).unwrap();
+    let (own, page) = (scene(objects[0].mesh()), scene(&surface.mesh()));
+    let origin = Origin { approaches: true, ..Origin::default() };
+    let touched = |scene: Scene| palpate::capture::touches(&[scene], "globe", &origin, 0..300).unwrap();
+    for (own, page) in touched(own).touches().iter().zip(touched(page).touches()) {
+        assert_eq!(own.pattern(), page.pattern());
+        let times = own.times().into_iter().zip(page.times());
+        for (own, page) in times.filter_map(|(own, page)| Some((own.micros()?, page.micros()?))) {
+            // A step is 15 µs of way; on a slope a contact moves by a few of them.
+            assert!(own.abs_diff(page) < 200, "{own} {page}");
+        }
+    }
+}
+
+#[test]
+fn a_trace_is_what_the_game_computes() {
+    let objects = [object("disc", 12, 0.1), object("globe", 12, 1.0)];
+    let surfaces = surfaces(&objects, &Origin::default()).unwrap();
+    let contender = contender(["disc", "globe"]);
+    let trace = trace(&surfaces, std::slice::from_ref(&contender), &settings(), 2).unwrap();
+    assert_eq!(trace.lines().count(), 400);
+    let mut game = Game::new(&Origin::default());
+    game.set_noise(Noise::switch()).unwrap();
+    for surface in &surfaces {
+        game.add_object(&surface.name, &surface.mesh(), surface.length).unwrap();
+    }
+    game.add_model(contender.model.model()).unwrap();
+    let mut lines = trace.lines();
+    for (object, seed) in [(0, 1), (0, 2), (1, 1), (1, 2)] {
+        let mut round = game.round(object, seed).unwrap();
+        for index in 0..100 {
+            let touch = game.touch_at_random(&mut round).touch;
+            let times = touch.times().map(|time| time.micros().map_or("-".into(), |micros| micros.to_string()));
+            let recognizer = round.players()[0].recognizer();
+            let verdict = u8::from(recognizer.verdict() != Verdict::Undecided);
+            let evidence = match recognizer.evidence() {
+                [a, b] => format!("{a},{b}"),
+                _ => "0,0".into(),
+            };
+            let line = format!(
+                "{object} {seed} {index} {} {verdict} {} {} {evidence}",
+                times.join(" "),
+                recognizer.best(),
+                recognizer.touches()
+            );
+            assert_eq!(lines.next(), Some(line.as_str()));
+        }
+    }
+    assert!(trace.lines().any(|line| line.contains(" 1 ")));
+}
+
+#[test]
+fn models_of_one_name_are_told_apart_by_their_files() {
+    let ensemble = Ensemble {
+        inputs: Descriptor::Curvature.into(),
+        objects: vec!["a".into(), "b".into()],
+        base_margins: vec![0.0; 2],
+        trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5, 0.0])], output: Output::Each }],
+        origin: ensemble::Origin::default(),
+    };
+    let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+    let contender = || Contender::new(CompiledModel::from_bytes(bytes.clone()).unwrap(), None).unwrap();
+    let names = |files: &[&str]| -> Vec<String> {
+        let mut contenders: Vec<Contender> = files.iter().map(|_| contender()).collect();
+        distinguish(&mut contenders, &files.iter().map(PathBuf::from).collect::<Vec<_>>());
+        contenders.into_iter().map(|contender| contender.name.replace("curvature, full touches", "~")).collect()
+    };
+    assert_eq!(names(&["a.palpate"]), ["~"]);
+    assert_eq!(names(&["small.palpate", "dir/sure.palpate"]), ["~ (small)", "~ (sure)"]);
+    assert_eq!(names(&["x/m.palpate", "y/m.palpate", "n.palpate"]), ["~ (x/m.palpate)", "~ (y/m.palpate)", "~ (n)"]);
+    assert_eq!(names(&["m.palpate", "m.palpate"]), ["~ (m.palpate, 1)", "~ (m.palpate, 2)"]);
+}

@@ -1,0 +1,67 @@
+//! What a page has to compute, computed by the program.
+
+use super::{Contender, Settings, Surface};
+use palpate::capture::touches;
+use palpate::error::{EvaluateProblem, Result};
+use palpate::probe::scene::Scene;
+use palpate::touches::Origin;
+use palpate_onboard::{CapacityError, Recognizer, Stopping, Verdict};
+use palpate_shared::Touch;
+use std::fmt::Write;
+
+/// Approaches of a round.
+const ROUND: u64 = 100;
+
+/// One line for each of `rounds` · 100 approaches to each object: the object, the round's seed, the approach, the three
+/// contact times in microseconds; then for each model its verdict (0 undecided, 1 recognized, 2 unknown, 3 gave up), the
+/// object with the most evidence, touches that were evidence, and the evidence for each object. Computed as a capture, an
+/// evaluation's noise and a recognizer do, not as the page's game does.
+///
+/// # Errors
+/// As [`Scene::new`] and [`touches`]; [`EvaluateProblem::TooManyObjects`].
+pub fn trace(surfaces: &[Surface], contenders: &[Contender], settings: &Settings, rounds: u64) -> Result<String> {
+    let mut text = String::new();
+    for (number, surface) in surfaces.iter().enumerate() {
+        let scene = [Scene::new(&surface.mesh(), surface.length)?];
+        for seed in 1..=rounds {
+            let origin = Origin { approaches: true, pose: true, seed, ..settings.origin.clone() };
+            let captured = touches(&scene, &surface.name, &origin, 0..ROUND)?;
+            let noisy = |(index, touch): (u64, &Touch)| {
+                settings.noise.add(&surface.name, std::slice::from_ref(touch), (seed << 32) + index).pop()
+            };
+            let sensed: Vec<Touch> = (0..).zip(captured.touches()).filter_map(noisy).collect();
+            let models: Vec<_> = contenders.iter().map(|contender| contender.model.model()).collect();
+            let recognizer = |model| Recognizer::<256>::new(model, Stopping::from_model(model));
+            let too_many = |error: CapacityError| EvaluateProblem::TooManyObjects {
+                objects: error.objects,
+                capacity: error.capacity,
+            };
+            let mut recognizers: Vec<_> = models.iter().map(recognizer).collect::<Result<_, _>>().map_err(too_many)?;
+            for (index, touch) in sensed.iter().enumerate() {
+                let times = touch.times().map(|time| time.micros().map_or("-".into(), |micros| micros.to_string()));
+                // Writing to a string cannot fail.
+                _ = write!(text, "{number} {seed} {index} {}", times.join(" "));
+                for recognizer in &mut recognizers {
+                    // Refused or not: what it knows is compared.
+                    _ = recognizer.push(touch);
+                    line(&mut text, recognizer);
+                }
+                text.push('\n');
+            }
+        }
+    }
+    Ok(text)
+}
+
+fn line(text: &mut String, recognizer: &Recognizer<'_, 256>) {
+    let verdict = match recognizer.verdict() {
+        Verdict::Undecided => 0,
+        Verdict::Recognized { .. } => 1,
+        Verdict::Unknown => 2,
+        Verdict::GaveUp => 3,
+    };
+    let model = recognizer.model();
+    let of = |object| recognizer.evidence().get(object).copied().unwrap_or_else(|| model.prior(object).into());
+    let evidence: Vec<String> = (0..model.object_count()).map(|object| of(object).to_string()).collect();
+    _ = write!(text, " {verdict} {} {} {}", recognizer.best(), recognizer.touches(), evidence.join(","));
+}

@@ -1,0 +1,345 @@
+//! Promised error rates: whether they are kept, and what they cost, compared with the limit.
+
+use super::context::{Context, compiled, compiled_f32};
+use super::density::density_model;
+use super::limit::Large;
+use super::statistics::wilson;
+use palpate::calibrate::{self, Odds, Per, Sequence, Supply, Terms, Until, choose, follow, margin_of, odds_of};
+use palpate::compile;
+use palpate::error::{Problem, Result};
+use crate::page::axis::{Axis, short_number};
+use crate::page::chart::{Chart, Mark, Shape, Stroke};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::table::{Cell, Records, Table};
+use palpate::probe::scene::Scene;
+use palpate::touches::Origin;
+use palpate_onboard::Model;
+use palpate_shared::Descriptor;
+use serde::{Deserialize, Serialize};
+
+/// The promised rates.
+const RATES: [f64; 6] = [0.1, 0.05, 0.02, 0.01, 0.005, 0.001];
+/// The one whose objects are shown.
+const SHOWN: f64 = 0.01;
+/// How much stricter than the strictest rate's posterior sequences are followed, in nats.
+const BEYOND: f64 = 2.5;
+/// Touches after which a sequence ends undecided.
+const MAX_TOUCHES: u32 = 200;
+/// The probability that each promise is kept.
+const CONFIDENCE: f64 = 0.95;
+
+/// What promises showed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Promises {
+    /// Sequences that thresholds were found on, and others that they were tested on.
+    sequences: [usize; 2],
+    /// For each of [`RATES`].
+    rates: Vec<Promised>,
+    /// For each object at [`SHOWN`].
+    objects: Vec<OfObject>,
+}
+
+/// The results for one rate; none where there were too few sequences to promise it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Promised {
+    rate: f64,
+    /// Stopping when the posterior passes one less the rate.
+    uncalibrated: Stopped,
+    /// Promised on average.
+    average: Option<Stopped>,
+    /// The same of the limit.
+    limit: Option<Stopped>,
+    /// Promised of each name, and of each object; `error` is that of the worst.
+    name: Option<Stopped>,
+    object: Option<Stopped>,
+}
+
+/// What thresholds came to on sequences that they were not found on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Stopped {
+    /// The threshold in nats; the mean of several.
+    margin: f64,
+    touches: f64,
+    /// Share of the names given that were wrong, and its 95 % interval.
+    error: f64,
+    low: f64,
+    high: f64,
+    undecided: f64,
+}
+
+/// What a promise means for an object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct OfObject {
+    name: String,
+    /// Of a promise on average, and of one per name; none where there were too few sequences for it.
+    promised: [Option<Meaning>; 2],
+}
+
+/// What thresholds come to for an object.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Meaning {
+    /// Touches until a verdict.
+    touches: f64,
+    /// Share of wrong names among those given to the object.
+    error: f64,
+    /// Share of wrong ones when its name is given.
+    named_wrongly: f64,
+}
+
+/// Finds thresholds on a capture of their own and tests them on another.
+pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
+    let ours = compiled(&context.models()?.ours)?.bytes;
+    let (density, _) = density_model(Descriptor::Curvature, &large.train, &large.held)?;
+    let limit = compiled_f32(&density)?.bytes;
+    let [ours, limit] = [compile::open(&ours)?, compile::open(&limit)?];
+    let names = context.names();
+    // Other seeds than those of the folds and of the large capture.
+    let seeds = [0x11_1118, 0x11_1119].map(|other| context.settings.seed.wrapping_add(other));
+    let draw = |model: &Model<'_>| -> Result<[Vec<Sequence>; 2]> {
+        Ok([sequences(context, model, seeds[0])?, sequences(context, model, seeds[1])?])
+    };
+    let (ours, limit) = (draw(&ours)?, draw(&limit)?);
+    let mut found = Vec::new();
+    let chosen = |sequences: &[Sequence], rate: f64, per: Per| -> Result<Option<Odds>> {
+        let terms = Terms { rate, confidence: CONFIDENCE, per };
+        match choose(sequences, &names, strictest(), &terms) {
+            Ok(chosen) => Ok(Some(chosen.odds)),
+            Err(error) if matches!(error.problem(), Some(Problem::Calibrate(_))) => Ok(None),
+            Err(error) => Err(error),
+        }
+    };
+    let mut objects = Vec::new();
+    for rate in RATES {
+        context.check()?;
+        let [average, name, object] = [Per::Average, Per::Name, Per::Object].map(|per| chosen(&ours[0], rate, per));
+        let (average, name, object) = (average?, name?, object?);
+        let of_limit = chosen(&limit[0], rate, Per::Average)?;
+        if rate == SHOWN {
+            objects = of_objects(&ours[1], &names, [&average, &name]);
+        }
+        let by = |of: &dyn Fn(&Sequence, usize) -> usize, odds: &Odds| worst(&ours[1], names.len(), odds, of);
+        found.push(Promised {
+            rate,
+            uncalibrated: stopped(&ours[1], &Odds::All(odds_of(((1.0 - rate) / rate).ln()))),
+            average: average.map(|odds| stopped(&ours[1], &odds)),
+            limit: of_limit.map(|odds| stopped(&limit[1], &odds)),
+            name: name.map(|odds| by(&|_, name| name, &odds)),
+            object: object.map(|odds| by(&|sequence, _| sequence.object, &odds)),
+        });
+    }
+    Ok(Promises { sequences: [ours[0].len(), ours[1].len()], rates: found, objects })
+}
+
+/// The margin that sequences are followed to.
+fn strictest() -> f64 {
+    let least = RATES[RATES.len() - 1];
+    ((1.0 - least) / least).ln() + BEYOND
+}
+
+/// Sequences of full touches captured for this, the same for any number of rates.
+fn sequences(context: &Context, model: &Model<'_>, seed: u64) -> Result<Vec<Sequence>> {
+    let names = context.names();
+    let objects: Vec<(&str, &[Scene])> =
+        names.iter().map(String::as_str).zip(context.all_scenes().iter().map(Vec::as_slice)).collect();
+    let settings = calibrate::Settings {
+        rate: RATES[RATES.len() - 1],
+        sequences: if context.settings.quick { 4_000 } else { 100_000 },
+        max_touches: Some(MAX_TOUCHES),
+        seed,
+        ..calibrate::Settings::default()
+    };
+    let origin = Origin { seed, approaches: false, ..context.settings.capture.clone() };
+    let dataset =
+        calibrate::fresh(model, &objects, &origin, &settings, &mut calibrate::Fresh::default(), context.progress)?;
+    // The model's objects are the context's, in the same order.
+    let mut supplies: Vec<Supply<'_>> =
+        (0..names.len()).zip(&dataset.objects).map(|(object, of)| Supply::new(object, of, seed)).collect();
+    let wanted = vec![settings.sequences / names.len().max(1); names.len()];
+    let until = Until { margin: strictest(), max_touches: MAX_TOUCHES };
+    follow(model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, context.progress)
+}
+
+/// What thresholds come to, all objects together.
+fn stopped(sequences: &[Sequence], odds: &Odds) -> Stopped {
+    let (mut given, mut wrong, mut touches) = (0.0, 0.0, 0.0);
+    for sequence in sequences {
+        let look = sequence.given(odds);
+        touches += f64::from(look.map_or(sequence.touches, |look| look.touches));
+        given += f64::from(u8::from(look.is_some()));
+        wrong += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
+    }
+    let all = sequences.len().max(1) as f64;
+    let (low, high) = wilson(wrong, given);
+    let margin = match odds {
+        Odds::All(odds) => margin_of(*odds),
+        Odds::ByObject(odds) => odds.iter().map(|&odds| margin_of(odds)).sum::<f64>() / odds.len().max(1) as f64,
+    };
+    let error = if given > 0.0 { wrong / given } else { 0.0 };
+    Stopped { margin, touches: touches / all, error, low, high, undecided: 1.0 - given / all }
+}
+
+/// The same with the error of the worst of the groups that `of` (sequence, name given) divides the names into.
+fn worst(sequences: &[Sequence], groups: usize, odds: &Odds, of: &dyn Fn(&Sequence, usize) -> usize) -> Stopped {
+    let mut tallies = vec![(0.0, 0.0); groups];
+    for sequence in sequences {
+        let Some(look) = sequence.given(odds) else { continue };
+        let (wrong, given) = &mut tallies[of(sequence, look.name)];
+        *given += 1.0;
+        *wrong += f64::from(u8::from(look.name != sequence.object));
+    }
+    let worst =
+        tallies.into_iter().filter(|(_, given)| *given > 0.0).max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+    let (wrong, given) = worst.unwrap_or((0.0, 1.0));
+    let (low, high) = wilson(wrong, given);
+    Stopped { error: wrong / given, low, high, ..stopped(sequences, odds) }
+}
+
+fn of_objects(sequences: &[Sequence], names: &[String], odds: [&Option<Odds>; 2]) -> Vec<OfObject> {
+    let of = |object: usize, odds: &Odds| {
+        let own: Vec<Sequence> = sequences.iter().filter(|sequence| sequence.object == object).cloned().collect();
+        let named: Vec<Sequence> = sequences
+            .iter()
+            .filter(|sequence| sequence.given(odds).is_some_and(|look| look.name == object))
+            .cloned()
+            .collect();
+        let own = stopped(&own, odds);
+        Meaning { touches: own.touches, error: own.error, named_wrongly: stopped(&named, odds).error }
+    };
+    let objects = names.iter().enumerate().map(|(object, name)| OfObject {
+        name: name.clone(),
+        promised: odds.map(|odds| odds.as_ref().map(|odds| of(object, odds))),
+    });
+    objects.collect()
+}
+
+/// The figure and the tables.
+pub(super) fn section(context: &Context, promises: &Promises) -> Result<Section> {
+    let [found, tested] = promises.sequences;
+    let mut section = Section::new("promises", "Promises");
+    section.text(format!(
+        "A promised error rate is the share of the names given that are wrong at most; a sequence that reaches {MAX_TOUCHES} \
+         touches without a name is undecided, neither right nor wrong. Thresholds were found by Learn-then-Test on {found} \
+         sequences of touches captured for that, so that each promise is kept with a probability of 95 %, and measured on \
+         {tested} other sequences. Stopping when the posterior passes one less the rate is wrong less often than it might \
+         be, and takes more touches. The limit is a density estimate from the large capture, with thresholds of its own."
+    ));
+    section.figure(figure(context, promises)?);
+    section.table(table(context, promises));
+    section.table(objects(context, promises));
+    Ok(section)
+}
+
+fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
+    let ticks = RATES.map(|rate| (rate, format!("{} %", short_number(rate * 100.0)))).to_vec();
+    let (low, high) = (RATES[RATES.len() - 1] * 0.3, RATES[0] * 1.5);
+    let axis = || Axis::logarithmic(low, high).with_ticks(ticks.clone());
+    let mut chart = Chart::new("promised", axis(), "measured", axis()).sized(520, 420);
+    chart.marks.push(Mark::Line { points: vec![(low, low), (high, high)], color: color::GRAY, stroke: Stroke::Dashed });
+    let mut data = Records::new(["thresholds", "promised", "measured", "low", "high"]);
+    type Of = fn(&Promised) -> Option<Stopped>;
+    let ways = [
+        ("uncalibrated", color::GRAY, Shape::Ring, (|of| Some(of.uncalibrated)) as Of),
+        ("average", color::OURS, Shape::Disc, |of| of.average),
+        ("worst name", color::PAPER, Shape::Disc, |of| of.name),
+    ];
+    for (name, color, shape, of) in ways {
+        let measured: Vec<(f64, Stopped)> =
+            promises.rates.iter().filter_map(|promised| Some((promised.rate, of(promised)?))).collect();
+        for (rate, stopped) in &measured {
+            let shares = [*rate, stopped.error, stopped.low, stopped.high].map(|share| Cell::Percent(share, 3));
+            data.push(std::iter::once(name.into()).chain(shares));
+        }
+        let visible = || measured.iter().filter(|(_, stopped)| stopped.error > low);
+        let spread = visible().map(|(rate, stopped)| (*rate, stopped.low.max(low), stopped.high)).collect();
+        chart.marks.push(Mark::Spread { points: spread, color });
+        let points: Vec<(f64, f64)> = visible().map(|(rate, stopped)| (*rate, stopped.error)).collect();
+        chart.series(name, color, shape, &points);
+    }
+    Ok(Figure {
+        id: "promises-kept".into(),
+        title: "Promised and measured error rates".into(),
+        caption: "On the dashed line a promise is used up; above it, it is broken. Bars are 95 % intervals (Wilson)."
+            .into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
+}
+
+fn table(context: &Context, promises: &Promises) -> Table {
+    let mut data = Records::new([
+        "promised",
+        "uncalibrated",
+        "touches",
+        "on average",
+        "touches",
+        "undecided",
+        "limit's touches",
+        "ratio",
+        "per name: worst",
+        "touches",
+        "per object: worst",
+        "touches",
+    ]);
+    for promised in &promises.rates {
+        let error = |of: Option<Stopped>| of.map_or(Cell::Missing, |of| Cell::Percent(of.error, 2));
+        let touches = |of: Option<Stopped>| of.map_or(Cell::Missing, |of| Cell::Number(of.touches, 1));
+        let ratio = promised.average.zip(promised.limit).map(|(ours, limit)| ours.touches / limit.touches);
+        data.push([
+            Cell::Percent(promised.rate, 1),
+            error(Some(promised.uncalibrated)),
+            touches(Some(promised.uncalibrated)),
+            error(promised.average),
+            touches(promised.average),
+            promised.average.map_or(Cell::Missing, |of| Cell::Percent(of.undecided, 2)),
+            touches(promised.limit),
+            ratio.map_or(Cell::Missing, |ratio| Cell::Number(ratio, 2)),
+            error(promised.name),
+            touches(promised.name),
+            error(promised.object),
+            touches(promised.object),
+        ]);
+    }
+    Table {
+        id: "promises-table".into(),
+        title: "What promises cost".into(),
+        caption:
+            "– stands for a rate that so few sequences cannot promise. A promise per object has one threshold, strict \
+                  enough for the object that is mistaken most often."
+                .into(),
+        command: context.settings.command.clone(),
+        data,
+    }
+}
+
+fn objects(context: &Context, promises: &Promises) -> Table {
+    let mut data = Records::new([
+        "object",
+        "touches, on average",
+        "mistaken",
+        "named wrongly",
+        "touches, per name",
+        "mistaken",
+        "named wrongly",
+    ]);
+    for object in &promises.objects {
+        let cells = object.promised.iter().flat_map(|meaning| match meaning {
+            Some(Meaning { touches, error, named_wrongly }) => {
+                [Cell::Number(*touches, 1), Cell::Percent(*error, 2), Cell::Percent(*named_wrongly, 2)]
+            }
+            None => [Cell::Missing, Cell::Missing, Cell::Missing],
+        });
+        data.push(std::iter::once(object.name.as_str().into()).chain(cells));
+    }
+    Table {
+        id: "promises-objects".into(),
+        title: "A promise of 1 % for each object".into(),
+        caption:
+            "Mistaken: share of wrong names among those given to the object. Named wrongly: share of wrong ones when \
+                  its name is given. Dashes: too few sequences for the promise."
+                .into(),
+        command: context.settings.command.clone(),
+        data,
+    }
+}

@@ -1,0 +1,261 @@
+//! A page on which a mesh can be turned and looked at, with some approaches of the probe.
+//!
+//! The page holds all that it needs and asks the network for nothing. It answers what a user should know about a mesh
+//! before capturing millions of touches: is it right side out and closed, does its scale suit the fingers, where do the
+//! fingers touch it.
+
+use palpate::error::Result;
+use palpate::mesh::Object;
+use palpate::mesh::facts::Facts;
+use crate::page::html;
+use crate::page::scene::{self, Line, SimplifiedMesh};
+use palpate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
+use palpate::probe::scene::Scene;
+use palpate::random::{self, Purpose};
+use glam::DVec3;
+use maud::html;
+
+/// What a page shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// How many full touches.
+    pub touches: usize,
+    /// How many approaches that not all fingers touched.
+    pub misses: usize,
+    /// The seed from which approaches are drawn.
+    pub seed: u64,
+    /// The longest side of the object's bounding box, in units.
+    pub length: f64,
+    /// How far outside the sphere about the bounding box approaches start, in units.
+    pub clearance: f64,
+    /// The probe.
+    pub probe: Probe,
+}
+
+/// Two dozen touches and a dozen misses of the published probe.
+impl Default for Settings {
+    fn default() -> Self {
+        Self { touches: 24, misses: 12, seed: 1, length: 10.0, clearance: CLEARANCE, probe: Probe::default() }
+    }
+}
+
+/// Whether a mesh can be touched as it is, in words, if its longest side has this length and the probe these fingers.
+pub fn verdict(facts: &Facts, length: f64, probe: &Probe) -> String {
+    let unit = f64::from((facts.high - facts.low).max_element()) / length;
+    facts.verdict(2.0 * probe.radius * unit)
+}
+
+/// How many approaches are drawn at most to find the touches.
+const MOST_APPROACHES: u64 = 200_000;
+
+/// The page for an object, as HTML: at most 6 MB, whatever the mesh's size, since no more than 120,000 triangles are
+/// shown (the touches are those of the whole mesh). The same settings give the same page.
+///
+/// # Errors
+/// As [`Scene::new`] and [`Probe::check`].
+pub fn page(object: &Object, settings: &Settings) -> Result<String> {
+    settings.probe.check(settings.length)?;
+    let scene = Scene::new(object.mesh(), settings.length)?;
+    let facts = Facts::of(object.mesh());
+    let mesh = SimplifiedMesh::new(object.mesh(), settings.length);
+    let shown_triangles = mesh.triangles.len();
+    let drawn = draw(&scene, settings);
+    let own = serde_json::json!({
+        "length": settings.length,
+        "full": drawn.approaches.iter().map(Drawn::is_full).collect::<Vec<_>>(),
+        "approaches": drawn.approaches,
+    });
+    let lines = drawn.approaches.iter().enumerate().flat_map(|(group, approach)| approach.lines(group));
+    let [low, high] = scene.bounds().map(|corner| corner.to_array());
+    let scene = scene::Scene { mesh, low, high, radius: settings.probe.radius, lines: lines.collect() };
+    let json = scene.json(own.as_object().cloned().unwrap_or_default())?;
+    Ok(html(object, settings, &facts, shown_triangles, &drawn, &json))
+}
+
+/// One approach, for the page's script.
+#[derive(serde::Serialize)]
+struct Drawn {
+    /// Where each finger starts.
+    starts: [[f64; 3]; FINGERS],
+    direction: [f64; 3],
+    /// How far each finger goes to its contact, in units; null if it misses.
+    distances: [Option<f64>; FINGERS],
+    /// When each finger touches, in seconds after the first; null if it misses.
+    times: [Option<f64>; FINGERS],
+}
+
+impl Drawn {
+    fn is_full(&self) -> bool {
+        self.distances.iter().all(Option::is_some)
+    }
+
+    /// A line for each finger's way, with a ball where it touches; a finger that misses goes as far beyond the object as
+    /// it started before it.
+    fn lines(&self, group: usize) -> impl Iterator<Item = Line> {
+        const COLORS: [&str; FINGERS] = ["first", "middle", "last"];
+        let direction = DVec3::from(self.direction);
+        (0..FINGERS).map(move |finger| {
+            let start = DVec3::from(self.starts[finger]);
+            let distance = self.distances[finger].unwrap_or(-2.0 * start.dot(direction));
+            let ball = self.distances[finger].is_some();
+            Line {
+                group,
+                start: start.to_array(),
+                end: (start + distance * direction).to_array(),
+                color: if ball { COLORS[finger] } else { "missed" },
+                ball,
+            }
+        })
+    }
+}
+
+/// The approaches to show, and how many were drawn to find them.
+struct Approaches {
+    approaches: Vec<Drawn>,
+    tried: u64,
+    full: u64,
+}
+
+fn draw(scene: &Scene, settings: &Settings) -> Approaches {
+    let mut rng = random::generator(settings.seed, Purpose::View, "", 0);
+    let (mut touches, mut misses) = (Vec::new(), Vec::new());
+    let (mut tried, mut full) = (0, 0);
+    while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < settings.misses) {
+        let approach =
+            Approach::draw_at(&mut rng, scene.bounds(), scene.bounds(), settings.probe.tilt, settings.clearance);
+        let distances = approach.distances(scene, &settings.probe);
+        let times = approach.touch(distances, &settings.probe).times();
+        let drawn = Drawn {
+            starts: approach.fingers(settings.probe.spacing).map(|finger| finger.to_array()),
+            direction: approach.direction.to_array(),
+            distances,
+            times: times.map(|time| time.micros().map(|micros| f64::from(micros) / 1e6)),
+        };
+        tried += 1;
+        let is_full = drawn.is_full();
+        full += u64::from(is_full);
+        let (kept, most) = if is_full { (&mut touches, settings.touches) } else { (&mut misses, settings.misses) };
+        if kept.len() < most {
+            kept.push(drawn);
+        }
+    }
+    touches.extend(misses);
+    Approaches { approaches: touches, tried, full }
+}
+
+fn html(
+    object: &Object,
+    settings: &Settings,
+    facts: &Facts,
+    shown_triangles: usize,
+    drawn: &Approaches,
+    json: &str,
+) -> String {
+    let side = facts.high - facts.low;
+    let unit = f64::from(side.max_element()) / settings.length;
+    let share = 100.0 * drawn.full as f64 / drawn.tried.max(1) as f64;
+    let body = html! {
+        main {
+            (scene::figure("Drag to turn, scroll or pinch to zoom, drag with two fingers or the right mouse button to move. \
+                            Click a contact or a row to see one approach alone; Escape shows all."))
+            aside {
+                h1 { (object.name) }
+                dl {
+                    div { dt { "Triangles" } dd {
+                        (grouped(facts.triangles))
+                        @if shown_triangles < facts.triangles {
+                            " (simplified to " (grouped(shown_triangles)) " here; the touches are those of the whole mesh)"
+                        }
+                    } }
+                    div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
+                    div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
+                    @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (grouped(facts.parts.len())) } } }
+                    div { dt { "Size in the file" } dd {
+                        (three_digits(side.x.into())) " × " (three_digits(side.y.into())) " × " (three_digits(side.z.into()))
+                    } }
+                    div { dt { "One unit here" } dd { (three_digits(unit)) " in the file" } }
+                    div { dt { "Finger radius" } dd {
+                        (settings.probe.radius) " units, " (three_digits(settings.probe.radius * unit)) " in the file"
+                    } }
+                    div { dt { "Full touches" } dd { (format!("{share:.1} % of {} approaches", grouped(drawn.tried as usize))) } }
+                }
+                @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
+                p { (object.name) ": " (verdict(facts, settings.length, &settings.probe)) "." }
+                fieldset {
+                    legend { "Show" }
+                    @for (id, label, on) in [
+                        ("touches", "touches", true), ("misses", "misses", false), ("box", "bounding box", true),
+                        ("edges", "edges of triangles", false), ("smooth", "smooth shading", facts.triangles > 5000),
+                    ] {
+                        label { input type="checkbox" id=(id) checked[on]; " " (label) }
+                    }
+                }
+                p.key {
+                    @for (class, label) in [
+                        ("first", "finger 1"),
+                        ("middle", "finger 2"),
+                        ("last", "finger 3"),
+                        ("missed", "misses"),
+                        ("back", "inside of the surface"),
+                    ] {
+                        span { span class={ "finger " (class) } {} (label) }
+                    }
+                }
+                div.scroll role="region" aria-label="Approaches" tabindex="0" {
+                    table {
+                        thead { tr {
+                            @for name in ["approach", "t1 / s", "t2 / s", "t3 / s", "κ / ms"] { th scope="col" { (name) } }
+                        } }
+                        tbody {
+                            @for (i, approach) in drawn.approaches.iter().enumerate() {
+                                tr data-approach=(i) {
+                                    td {
+                                        button type="button" aria-pressed="false" aria-label={ "Show approach " (i + 1) } { (i + 1) }
+                                    }
+                                    @for time in approach.times { td { (seconds(time)) } }
+                                    td { (curvature(approach.times)) }
+                                }
+                            }
+                        }
+                    }
+                }
+                p.note {
+                    "Times are counted from the first contact; – is a finger that did not touch. "
+                    "κ = t1 − 2·t2 + t3, the curvature under the probe."
+                }
+            }
+        }
+        (scene::scripts(json, include_str!("page.js")))
+    };
+    html::file(&format!("{} – Palpate", object.name), &[include_str!("page.css"), scene::STYLE], &body)
+}
+
+fn seconds(time: Option<f64>) -> String {
+    time.map_or("–".into(), |seconds| format!("{seconds:.4}"))
+}
+
+fn curvature(times: [Option<f64>; FINGERS]) -> String {
+    match times {
+        [Some(first), Some(middle), Some(last)] => format!("{:.1}", (first - 2.0 * middle + last) * 1e3),
+        _ => "–".into(),
+    }
+}
+
+/// A number with three significant digits.
+fn three_digits(value: f64) -> String {
+    if value == 0.0 || !(1e-3..1e6).contains(&value.abs()) {
+        return format!("{value:.2e}");
+    }
+    let digits = (2.0 - value.abs().log10().floor()).max(0.0) as usize;
+    format!("{value:.digits$}")
+}
+
+/// A count with its thousands separated by commas.
+fn grouped(count: usize) -> String {
+    let digits = count.to_string();
+    let groups: Vec<&[u8]> = digits.as_bytes().rchunks(3).rev().collect();
+    groups.iter().map(|group| String::from_utf8_lossy(group)).collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,179 @@
+use super::*;
+use palpate::mesh::Mesh;
+use palpate::mesh::builtin;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use std::collections::HashMap;
+
+fn object(name: &str, mesh: Mesh) -> Object {
+    Object::new(name, mesh)
+}
+
+fn cube() -> Mesh {
+    let vertices = (0..8_u8).map(|i| [i & 1, i >> 1 & 1, i >> 2].map(f32::from)).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    Mesh { vertices, triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
+}
+
+/// A wavy square of 2n² triangles.
+fn waves(n: u32) -> Mesh {
+    let place = |i: u32| i as f32 / n as f32;
+    let vertices = (0..=n)
+        .flat_map(|y| (0..=n).map(move |x| (x, y)))
+        .map(|(x, y)| [place(x), place(y), 0.1 * libm::sinf(20.0 * place(x)) * libm::sinf(15.0 * place(y))])
+        .collect();
+    let at = |x, y| y * (n + 1) + x;
+    let triangles = (0..n)
+        .flat_map(|y| (0..n).map(move |x| (x, y)))
+        .flat_map(|(x, y)| {
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    Mesh { vertices, triangles }
+}
+
+/// The data that the page's script reads.
+fn data(page: &str) -> serde_json::Value {
+    let start = page.find(r#"type="application/json">"#).unwrap() + 24;
+    let end = start + page[start..].find("</script>").unwrap();
+    serde_json::from_str(&page[start..end]).unwrap()
+}
+
+#[test]
+fn a_page_refers_to_nothing_outside_itself() {
+    let page = page(&builtin::one("bowl").unwrap(), &Settings::default()).unwrap();
+    for part in [" src=", "@import", "url(", "<link rel=\"stylesheet\"", "fetch(\"http", "importScripts"] {
+        let own = page.replace(scene::LIBRARY, "");
+        assert!(!own.contains(part), "the page holds {part}");
+    }
+    assert!(page.contains("default-src 'none'"));
+}
+
+#[test]
+fn a_page_has_the_touches_and_misses_that_were_asked_for() {
+    let settings = Settings { touches: 7, misses: 3, ..Settings::default() };
+    let page = page(&builtin::one("spoon").unwrap(), &settings).unwrap();
+    let data = data(&page);
+    let approaches = data["approaches"].as_array().unwrap();
+    let full = |approach: &&serde_json::Value| approach["distances"].as_array().unwrap().iter().all(|d| d.is_number());
+    assert_eq!((approaches.len(), approaches.iter().filter(full).count()), (10, 7));
+    assert_eq!(page.matches("<tr data-approach").count(), 10);
+}
+
+#[test]
+fn an_objects_name_cannot_break_out_of_the_page() {
+    let page = page(&object("</script><script>alert(1)</script>", cube()), &Settings::default()).unwrap();
+    assert!(!page.contains("<script>alert"));
+}
+
+#[test]
+fn the_shown_mesh_is_as_large_as_the_scene() {
+    let page = page(&object("cube", cube()), &Settings { length: 4.0, ..Settings::default() }).unwrap();
+    let data = data(&page);
+    assert_eq!(data["low"], serde_json::json!([-2.0, -2.0, -2.0]));
+    assert_eq!(data["origin"], serde_json::json!([-2.0, -2.0, -2.0]));
+    assert!((data["step"].as_f64().unwrap() * 65535.0 - 4.0).abs() < 1e-12);
+    let steps = STANDARD.decode(data["positions"].as_str().unwrap()).unwrap();
+    assert_eq!(steps.len(), 8 * 6);
+    assert_eq!((steps.iter().min(), steps.iter().max()), (Some(&0), Some(&255)));
+}
+
+#[test]
+fn a_mesh_of_a_million_triangles_and_a_soup_of_them_make_pages_below_six_megabytes() {
+    let smooth = waves(708);
+    assert!(smooth.triangles.len() > 1_000_000);
+    // The same as separate triangles, each shrunk so that none shares a corner with another.
+    let vertices: Vec<[f32; 3]> = smooth
+        .triangles
+        .iter()
+        .flat_map(|triangle| {
+            let corners = triangle.map(|i| glam::Vec3::from(smooth.vertices[i as usize]));
+            let middle = corners.iter().sum::<glam::Vec3>() / 3.0;
+            corners.map(|corner| corner.lerp(middle, 0.1).to_array())
+        })
+        .collect();
+    let soup =
+        Mesh { triangles: (0..vertices.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), vertices };
+    for (name, mesh) in [("smooth", smooth), ("soup", soup)] {
+        let page = page(&object(name, mesh), &Settings::default()).unwrap();
+        assert!(page.len() < 6_000_000, "{name}: {} bytes", page.len());
+        let count = STANDARD.decode(data(&page)["indices"].as_str().unwrap()).unwrap().len();
+        assert!(count > 3 * 2 * scene::MOST_TRIANGLES / 3, "{name}: only {count} bytes of indices are left");
+        assert!(page.contains("simplified to"), "{name}");
+    }
+}
+
+#[test]
+fn numbers_have_three_digits() {
+    assert_eq!(
+        [three_digits(16.0), three_digits(0.15), three_digits(1234.5), three_digits(0.0), three_digits(2e-9)],
+        ["16.0", "0.150", "1234", "0.00e0", "2.00e-9"]
+    );
+    assert_eq!([grouped(7), grouped(1234), grouped(1_234_567)], ["7", "1,234", "1,234,567"]);
+}
+
+/// The custom properties of the page's styles, in light and in dark.
+fn colors(style: &str) -> [HashMap<String, [f64; 3]>; 2] {
+    let of = |block: &str| -> HashMap<String, [f64; 3]> {
+        let properties = block.split('}').next().unwrap().split('{').nth(1).unwrap().split(';');
+        let property = |text: &str| {
+            let (name, color) = text.trim().strip_prefix("--")?.split_once(": #")?;
+            let digit = |i: usize| f64::from(u8::from_str_radix(&color[i..=i], 16).unwrap());
+            let channel =
+                |i: usize| if color.len() == 3 { 17.0 * digit(i) } else { 16.0 * digit(2 * i) + digit(2 * i + 1) };
+            Some((name.to_string(), [0, 1, 2].map(channel)))
+        };
+        properties.filter_map(property).collect()
+    };
+    let (light, dark) = style.split_once("prefers-color-scheme: dark").unwrap();
+    [of(&light[light.find(":root").unwrap()..]), of(&dark[dark.find(":root").unwrap()..])]
+}
+
+/// The contrast ratio of WCAG 2.
+fn contrast(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let luminance = |color: [f64; 3]| {
+        let linear = |channel: f64| match channel / 255.0 {
+            dark @ ..=0.04045 => dark / 12.92,
+            bright => libm::pow((bright + 0.055) / 1.055, 2.4),
+        };
+        0.2126 * linear(color[0]) + 0.7152 * linear(color[1]) + 0.0722 * linear(color[2])
+    };
+    let (a, b) = (luminance(a) + 0.05, luminance(b) + 0.05);
+    a.max(b) / a.min(b)
+}
+
+#[test]
+fn text_on_the_pages_has_a_contrast_of_at_least_four_and_a_half() {
+    let view = include_str!("page.css");
+    // The fingers' colors are for dots and underlines, not for text.
+    assert!(!view.contains(" color: var(--first)") && !view.contains(" color: var(--middle)"));
+    for colors in colors(view) {
+        for (text, ground) in
+            [("ink", "ground"), ("ink", "shade"), ("soft", "ground"), ("warning", "ground"), ("on-first", "first")]
+        {
+            let contrast = contrast(colors[text], colors[ground]);
+            assert!(contrast >= 4.5, "{text} on {ground}: {contrast}");
+        }
+        for (dot, ground) in ["first", "middle", "last", "missed", "back"].map(|dot| (dot, "ground")) {
+            assert!(contrast(colors[dot], colors[ground]) >= 3.0, "{dot} on {ground}");
+        }
+    }
+    for colors in colors(crate::page::document::STYLE) {
+        for (text, ground) in
+            [("ink", "ground"), ("ink", "shade"), ("soft", "ground"), ("soft", "shade"), ("link", "ground")]
+        {
+            let contrast = contrast(colors[text], colors[ground]);
+            assert!(contrast >= 4.5, "{text} on {ground}: {contrast}");
+        }
+    }
+}
+
+#[test]
+fn buttons_and_headings_of_the_page_have_names() {
+    let page = page(&builtin::one("bowl").unwrap(), &Settings::default()).unwrap();
+    assert!(page.contains("aria-label=\"Show approach 1\""));
+    for empty in ["<button type=\"button\"></button>", "<th scope=\"col\"></th>", "<th></th>", "<th>"] {
+        assert!(!page.contains(empty), "{empty}");
+    }
+}
