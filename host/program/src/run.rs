@@ -14,14 +14,14 @@ use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, SequentialS
 use palpate::mesh::Object;
 use palpate::output;
 use palpate::progress::{self, Progress};
-use palpate_report::play::{self, Contender, Expected};
-use palpate_report::results;
-use palpate_report::run_page::{RunResults, run_page};
-use palpate_report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use palpate::touches::folds::{self, Split};
 use palpate::touches::noise::Noise;
 use palpate::touches::{Dataset, Listing, ObjectTouches, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_report::play::{self, Contender, Expected};
+use palpate_report::results;
+use palpate_report::run_page::{RunResults, run_page};
+use palpate_report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
 use palpate_shared::format::Counted;
 use serde::Serialize;
 use std::cell::RefCell;

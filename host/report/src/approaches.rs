@@ -2,17 +2,17 @@
 //! size.
 
 use super::context::{Context, compiled};
+use crate::page::axis::Axis;
+use crate::page::chart::{Chart, Shape};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::compile;
 use palpate::ensemble::{Ensemble, train};
 use palpate::error::Result;
 use palpate::evaluate::{Approaches, Candidate, Margins, SequentialSettings};
 use palpate::mesh::Object;
-use crate::page::axis::Axis;
-use crate::page::chart::{Chart, Shape};
-use crate::page::color;
-use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::probe::approach::Probe;
 use palpate::probe::scene::Scene;
 use palpate::progress;

@@ -1,9 +1,9 @@
 //! Confusion matrices: which object is recognized as which.
 
-use palpate::error::Result;
 use crate::page::chart::Svg;
 use crate::page::heat_map::heat_map;
 use crate::page::table::{Cell, Records};
+use palpate::error::Result;
 use plotters::style::RGBColor;
 
 /// The matrix drawn: row by row the object that was touched, column by column the one recognized.

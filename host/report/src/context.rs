@@ -235,8 +235,8 @@ pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::evaluate::{Candidate, Margins};
     use crate::several_meshes::meshes;
+    use palpate::evaluate::{Candidate, Margins};
 
     #[test]
     fn what_a_fold_states_of_objects_with_several_meshes_is_what_fresh_touches_give() {

@@ -3,16 +3,16 @@
 use super::context::Context;
 use super::instructions::Instructions;
 use super::limit::Large;
-use palpate::compile::{self, Leaf};
-use palpate::ensemble::Ensemble;
-use palpate::ensemble::train;
-use palpate::error::{CompileProblem, Error, Problem, Result};
-use palpate::evaluate::{Candidate, Margins, parity};
 use crate::page::axis::{Axis, short_number};
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::compile::{self, Leaf};
+use palpate::ensemble::Ensemble;
+use palpate::ensemble::train;
+use palpate::error::{CompileProblem, Error, Problem, Result};
+use palpate::evaluate::{Candidate, Margins, parity};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
@@ -323,8 +323,8 @@ fn table(context: &Context, members: &[Member]) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::ensemble::{Node, Output, Tree};
     use crate::instructions::Count;
+    use palpate::ensemble::{Node, Output, Tree};
 
     /// A chain of splits of curvature, `depth` of them one below the other.
     fn chain(depth: usize, leaf: f32) -> Ensemble {

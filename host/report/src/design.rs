@@ -1,11 +1,11 @@
 //! The page of a search for a probe: what it costs in approaches to build another one.
 
-use palpate::error::Result;
 use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::error::Result;
 use palpate::probe::approach::Aim;
 use palpate::tune::probe::{Design, Trial};
 use palpate_shared::format::Length;
@@ -14,7 +14,7 @@ use palpate_shared::format::Length;
 ///
 /// # Errors
 /// If a chart cannot be drawn.
-pub(crate) fn page(design: &Design, command: &str) -> Result<Page> {
+pub fn page(design: &Design, command: &str) -> Result<Page> {
     let mut result = Section::new("result", "The result");
     result.text(assumed(design)).table(compared(design, command)).table(by_aim(design, command));
     let mut trade = Section::new("spacing", "What another spacing costs");
@@ -42,7 +42,7 @@ pub(crate) fn page(design: &Design, command: &str) -> Result<Page> {
 }
 
 /// What lengths are measured in.
-pub(crate) fn unit(design: &Design) -> &'static str {
+pub fn unit(design: &Design) -> &'static str {
     match design.unit {
         Length::Tenth => "units",
         Length::Millimeter => "millimeters",
@@ -50,7 +50,7 @@ pub(crate) fn unit(design: &Design) -> &'static str {
 }
 
 /// What the best probe is compared with.
-pub(crate) fn published(design: &Design) -> &'static str {
+pub fn published(design: &Design) -> &'static str {
     match design.unit {
         Length::Tenth => "The published probe",
         Length::Millimeter => "The published probe in millimeters, scaled to the median object",
@@ -58,7 +58,7 @@ pub(crate) fn published(design: &Design) -> &'static str {
 }
 
 /// A probe in a few words.
-pub(crate) fn described(trial: &Trial) -> String {
+pub fn described(trial: &Trial) -> String {
     let probe = trial.probe;
     format!(
         "Spacing {}, radius {}, tilt ±{}°, aimed at the {}",

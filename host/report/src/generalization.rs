@@ -2,15 +2,15 @@
 
 use super::context::{Context, compiled, touch};
 use super::statistics::mean_deviation;
-use palpate::compile;
-use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins};
-use palpate::mesh::Object;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records};
+use palpate::compile;
+use palpate::error::Result;
+use palpate::evaluate::{Candidate, Margins};
+use palpate::mesh::Object;
 use palpate::probe::scene::Scene;
 use palpate::touches::{Dataset, ObjectTouches, Origin};
 use serde::{Deserialize, Serialize};

@@ -2,16 +2,16 @@
 
 use super::context::{Context, touch};
 use super::instructions::Instructions;
-use palpate::capture;
-use palpate::compile::{self, Leaf};
-use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins, SequentialSettings};
-use palpate::mesh::{Mesh, Object, builtin};
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::capture;
+use palpate::compile::{self, Leaf};
+use palpate::error::Result;
+use palpate::evaluate::{Candidate, Margins, SequentialSettings};
+use palpate::mesh::{Mesh, Object, builtin};
 use palpate::probe::scene::Scene;
 use palpate::progress;
 use palpate::touches::{Dataset, ObjectTouches, Origin};

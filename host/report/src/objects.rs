@@ -3,15 +3,15 @@
 use super::context::Context;
 use super::statistics::{density, quantile};
 use super::view;
-use palpate::error::Result;
-use palpate::mesh::facts::Facts;
-use palpate::mesh::{Instance, Object};
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
 use crate::page::document::{Block, Figure, Picture, Section};
 use crate::page::render;
 use crate::page::table::{Cell, Records, Table};
+use palpate::error::Result;
+use palpate::mesh::facts::Facts;
+use palpate::mesh::{Instance, Object};
 use palpate_shared::Touch;
 
 /// The figure of the objects, that of their curvature, and a table of what capturing took.

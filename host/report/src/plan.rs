@@ -2,17 +2,17 @@
 
 use super::approaches::approaches;
 use super::context::Context;
+use crate::page::axis::{Axis, short_number};
+use crate::page::chart::{Chart, Shape};
+use crate::page::color;
+use crate::page::document::{Figure, Section};
+use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf, compile};
 use palpate::ensemble::train;
 use palpate::error::{Error, EvaluateProblem, Problem, Result};
 use palpate::evaluate::{
     self, Active, ApproachSequential, Candidate, Evaluation, Margins, Rule, SequentialSettings, Switched,
 };
-use crate::page::axis::{Axis, short_number};
-use crate::page::chart::{Chart, Shape};
-use crate::page::color;
-use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::touches::noise::Noise;
 use palpate::touches::{Dataset, Origin};
 use palpate_shared::Descriptor;

@@ -1,14 +1,14 @@
 //! Whether the simulation is right: recorded touches beside simulated ones.
 
 use super::context::Context;
-use palpate::capture;
-use palpate::error::{EvaluateProblem, Result};
-use palpate::evaluate::compare::{self, Comparison, Cost, ObjectComparison, Share};
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::capture;
+use palpate::error::{EvaluateProblem, Result};
+use palpate::evaluate::compare::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::progress;
 use palpate::touches::{Dataset, Origin, checksum, files};
 use std::path::Path;

@@ -16,7 +16,7 @@ const MADE_FROM: &str = "made_from";
 ///
 /// # Errors
 /// [`ReportProblem::OtherResults`] naming the file, or [`Error::Io`].
-pub(crate) fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace: &str) -> Result<()> {
+pub fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace: &str) -> Result<()> {
     let summary = directory.join(SUMMARY);
     let refused = |path: &Path, found: String| Err(Error::at(Place::file(path), ReportProblem::OtherResults { found }));
     match std::fs::read(&summary) {
@@ -59,7 +59,7 @@ fn difference(stated: &Value, wanted: &Value) -> String {
 ///
 /// # Errors
 /// [`ReportProblem::Json`].
-pub(crate) fn json(what: &'static str, value: &impl Serialize) -> Result<Value> {
+pub fn json(what: &'static str, value: &impl Serialize) -> Result<Value> {
     serde_json::to_value(value).map_err(|error| ReportProblem::Json { what, reason: error.to_string() }.into())
 }
 

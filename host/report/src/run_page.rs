@@ -1,47 +1,47 @@
 //! The page of a run: the short form of the report.
 
-use palpate::error::Result;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Block, Figure, Page, Picture, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::error::Result;
 
 /// What a run has to show.
 #[derive(Clone, Debug)]
-pub(crate) struct RunResults {
+pub struct RunResults {
     /// The command that remakes it.
-    pub(crate) command: String,
+    pub command: String,
     /// The file of the page on which the objects can be touched.
-    pub(crate) play: String,
+    pub play: String,
     /// One picture per object, with a line about its capture. May be empty.
-    pub(crate) pictures: Vec<Picture>,
+    pub pictures: Vec<Picture>,
     /// The methods compared, the paper's first.
-    pub(crate) methods: Vec<RunMethod>,
+    pub methods: Vec<RunMethod>,
     /// The table that the run prints: what was measured in the first column, then one column per method.
-    pub(crate) table: Records,
+    pub table: Records,
     /// What should be known about the table, in sentences; may be empty.
-    pub(crate) note: String,
+    pub note: String,
     /// Settings, times and version, as name and value.
-    pub(crate) facts: Vec<(String, String)>,
+    pub facts: Vec<(String, String)>,
 }
 
 /// One method's accuracies.
 #[derive(Clone, Debug)]
-pub(crate) struct RunMethod {
+pub struct RunMethod {
     /// Its name, in one to three words.
-    pub(crate) name: String,
+    pub name: String,
     /// `(touches, accuracy, standard error)`, by rising number of touches, each a share of one.
-    pub(crate) curve: Vec<(usize, f64, f64)>,
+    pub curve: Vec<(usize, f64, f64)>,
     /// For each object its `(touches, accuracy)`.
-    pub(crate) per_object: Vec<(String, Vec<(usize, f64)>)>,
+    pub per_object: Vec<(String, Vec<(usize, f64)>)>,
 }
 
 /// The page of a run.
 ///
 /// # Errors
 /// If a chart cannot be drawn.
-pub(crate) fn run_page(results: &RunResults) -> Result<Page> {
+pub fn run_page(results: &RunResults) -> Result<Page> {
     let mut sections = Vec::new();
     let mut section = Section::new("objects", "The objects");
     section.blocks.push(Block::Link(results.play.clone(), "Touch them yourself".into()));

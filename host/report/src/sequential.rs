@@ -4,13 +4,13 @@ use super::context::{Context, compiled, compiled_f32};
 use super::limit::Large;
 use super::run_page::method_style;
 use super::statistics::quantile;
-use palpate::compile;
-use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::compile;
+use palpate::error::Result;
+use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use serde::{Deserialize, Serialize};
 
 /// Thresholds: the recognizer stops when the posterior passes one less these.

@@ -1,18 +1,18 @@
 //! The simulator's speed against its error, for several ways to decide a contact.
 
 use super::context::Context;
-use palpate::error::Result;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
+use glam::DVec3;
+use palpate::error::Result;
 use palpate::probe::approach::{Approach, Probe};
 use palpate::probe::scene::Scene;
 use palpate::probe::sweep::narrow::{self, Motion, Triangle};
 use palpate::probe::sweep::precision::{self, DoubleWithoutReject, Precision, SingleAfterReject};
 use palpate::random::{self, Purpose};
-use glam::DVec3;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -7,13 +7,13 @@ use super::{
     approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
     published, recorded, results, sequential, simulator, strangers,
 };
+use crate::page::document::{Page, Section};
 use palpate::capture;
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::{ReportProblem, Result};
 use palpate::mesh::{Object, source};
 use palpate::output::write_json;
-use crate::page::document::{Page, Section};
 use palpate::progress::{self, Progress};
 use serde::Serialize;
 use serde::de::DeserializeOwned;

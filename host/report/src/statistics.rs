@@ -46,11 +46,11 @@ pub(crate) fn paired_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
 }
 
 /// How many distinct groups an accuracy must rest on to be given.
-pub(crate) const LEAST_GROUPS: usize = 300;
+pub const LEAST_GROUPS: usize = 300;
 
 /// How many different groups of `size` can be drawn from `touches` touches, without regard to order; at most
 /// [`LEAST_GROUPS`] are counted.
-pub(crate) fn distinct_groups(touches: usize, size: usize) -> usize {
+pub fn distinct_groups(touches: usize, size: usize) -> usize {
     let Some(rest) = touches.checked_sub(size) else { return 0 };
     let mut groups = 1;
     for k in 1..=size.min(rest) {
@@ -65,7 +65,7 @@ pub(crate) fn distinct_groups(touches: usize, size: usize) -> usize {
 
 /// The largest groups of which at least [`LEAST_GROUPS`] different ones can be drawn from `touches` touches; 0 if there
 /// are none.
-pub(crate) fn largest_group(touches: usize) -> usize {
+pub fn largest_group(touches: usize) -> usize {
     (1..=touches).rev().find(|&size| distinct_groups(touches, size) >= LEAST_GROUPS).unwrap_or(0)
 }
 

@@ -1,16 +1,16 @@
 //! Objects that a model does not know: each is left out of the training in turn.
 
 use super::context::Context;
-use palpate::capture;
-use palpate::ensemble::train;
-use palpate::error::{Error, EvaluateProblem, Problem, Result};
-use palpate::evaluate::{DETECTED_BY, Outcome};
-use palpate::mesh::builtin;
 use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::capture;
+use palpate::ensemble::train;
+use palpate::error::{Error, EvaluateProblem, Problem, Result};
+use palpate::evaluate::{DETECTED_BY, Outcome};
+use palpate::mesh::builtin;
 use palpate::strangers::{LeftOut, Sets, Settings, captured, leave_one_out};
 use palpate::touches::{Dataset, ObjectTouches, Origin};
 use palpate_shared::format::Held;

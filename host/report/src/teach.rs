@@ -1,18 +1,18 @@
 //! The page of objects that were learned from recorded touches: how well, and what more approaches would come to.
 
-use palpate::error::Result;
 use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
+use palpate::error::Result;
 use palpate::teach::{LEAST, Needed, Taught, TaughtObject};
 
 /// The page. `command` is what remakes it.
 ///
 /// # Errors
 /// If a chart cannot be drawn.
-pub(crate) fn page(taught: &Taught, command: &str) -> Result<Page> {
+pub fn page(taught: &Taught, command: &str) -> Result<Page> {
     let mut result = Section::new("result", "How well they are recognized");
     result.text(
         "Recorded touches were held out in parts: no part, nor a copy of one of its touches, was learned from while it was \
@@ -118,7 +118,7 @@ fn curve(taught: &Taught, command: &str) -> Result<Figure> {
 }
 
 /// Whether more approaches to an object would help, in a sentence.
-pub(crate) fn more_approaches(object: &TaughtObject) -> String {
+pub fn more_approaches(object: &TaughtObject) -> String {
     let Some(last) = object.curve.points.last() else { return String::new() };
     let (now, then) = (last.error, object.curve.with_twice);
     if now - then < 0.005 {
@@ -134,7 +134,7 @@ pub(crate) fn more_approaches(object: &TaughtObject) -> String {
 }
 
 /// Whether enough was recorded for a promise, in two sentences.
-pub(crate) fn promise(taught: &Taught) -> String {
+pub fn promise(taught: &Taught) -> String {
     let Needed { sequences, of_each, approaches } = taught.promise;
     let recorded = taught.objects.iter().map(|object| object.approaches).min().unwrap_or(0);
     let what = format!(

@@ -1,10 +1,10 @@
+use glam::DVec3;
 use palpate::Error;
 use palpate::Result;
 use palpate::mesh::file::{self, Contents};
 use palpate::output;
 use palpate::probe::cast::{self, Agreement, Line};
 use palpate::probe::scene::Scene;
-use glam::DVec3;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

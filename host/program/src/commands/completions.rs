@@ -1,6 +1,6 @@
+use clap_complete::Shell;
 use palpate::Result;
 use palpate::output::print;
-use clap_complete::Shell;
 
 #[derive(clap::Args)]
 #[command(after_help = "\

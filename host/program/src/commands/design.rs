@@ -8,7 +8,6 @@ use palpate::error::Error;
 use palpate::mesh::Object;
 use palpate::output;
 use palpate::probe::approach::Aim;
-use palpate_report;
 use palpate::tune::probe::{Design, Settings, Trial, design};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
@@ -107,7 +106,7 @@ fn run_design(arguments: &DesignArguments) -> Result<()> {
     let found = design(&objects, &settings, &Bar::new())?;
     let files = [arguments.output.join("probe.toml"), arguments.output.join("design.html")];
     output::write_bytes(&files[0], found.toml().as_bytes())?;
-    report::design::page(&found, &arguments.words(&settings))?.write(&files[1])?;
+    palpate_report::design::page(&found, &arguments.words(&settings))?.write(&files[1])?;
     if arguments.json {
         return output::print_json(&found);
     }
@@ -182,16 +181,16 @@ fn table(design: &Design) -> String {
     for trial in &design.by_spacing {
         line(&mut text, if trial == best { "*" } else { "" }, trial);
     }
-    head(&mut text, report::design::published(design), std::slice::from_ref(&design.published));
+    head(&mut text, palpate_report::design::published(design), std::slice::from_ref(&design.published));
     line(&mut text, "", &design.published);
     _ = write!(
         text,
         "\n* the best: {}. Approaches are to {} % wrong verdicts; > where more were wrong or missing.\n\
          Assumed: {} {} per second, Gaussian noise of {} ms on contact times; evidence: {}, {}.\n",
-        report::design::described(best).to_lowercase(),
+        palpate_report::design::described(best).to_lowercase(),
         100.0 * design.error_rate,
         best.probe.speed,
-        report::design::unit(design),
+        palpate_report::design::unit(design),
         design.noise / 1e3,
         design.counted,
         design.descriptor,

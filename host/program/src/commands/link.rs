@@ -1,5 +1,6 @@
 use super::progress::Bar;
 use super::record::LinkArguments;
+use clap::ArgGroup;
 use palpate::chip::{
     ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Transport, Update, probability,
     stream,
@@ -10,7 +11,6 @@ use palpate::output::{print, print_json};
 use palpate::progress::Progress;
 use palpate::touches::{Log, is_log};
 use palpate::{Error, Result};
-use clap::ArgGroup;
 use palpate_shared::link::{Decision, HostSettings};
 use std::io::BufReader;
 use std::ops::ControlFlow;

@@ -38,11 +38,11 @@ mod verify;
 mod view;
 mod watch;
 
+use clap::error::{ContextKind, ContextValue};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use palpate::error::{Problem, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing, Log, Warning};
 use palpate::{Error, Result};
-use clap::error::{ContextKind, ContextValue};
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

@@ -1,12 +1,12 @@
 //! `palpate objects`.
 
+use clap::builder::PossibleValuesParser;
 use palpate::Result;
 use palpate::mesh::Object;
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
 use palpate::output;
 use palpate_report::page::render;
-use clap::builder::PossibleValuesParser;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

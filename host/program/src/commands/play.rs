@@ -5,9 +5,9 @@ use super::shell;
 use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::output;
-use palpate_report::play::{self, Settings, Training};
 use palpate::touches::Origin;
 use palpate::touches::noise::Noise;
+use palpate_report::play::{self, Settings, Training};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

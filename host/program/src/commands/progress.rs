@@ -1,7 +1,7 @@
 //! Progress on stderr, where it is a terminal.
 
-use palpate::progress::Progress;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
+use palpate::progress::Progress;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 

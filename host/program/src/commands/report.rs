@@ -4,9 +4,9 @@ use super::progress::Bar;
 use super::shell;
 use palpate::Result;
 use palpate::output::{print, print_json, refuse_stdout};
-use palpate_report::{self, Existing, Settings};
 use palpate::touches::Origin;
 use palpate::touches::noise::Noise;
+use palpate_report::{self, Existing, Settings};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let settings = Settings { command, growth, noise, real, recorded, capture, ..settings };
     let objects = || size.objects(&settings.sources, seed);
     let existing = Existing { resume, replace: force };
-    let written = report::report_on(&objects, &settings, &output, existing, &Bar::new())?;
+    let written = palpate_report::report_on(&objects, &settings, &output, existing, &Bar::new())?;
     if json {
         return print_json(&written.summary);
     }

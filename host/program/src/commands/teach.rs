@@ -1,9 +1,9 @@
 //! What `palpate train` takes and says about recorded touches.
 
 use palpate::error::{Error, Place, Result, TouchesProblem};
-use palpate_report::teach::{more_approaches, page, promise};
 use palpate::teach::{Taught, TaughtObject};
 use palpate::touches::{Dataset, ObjectTouches, is_log};
+use palpate_report::teach::{more_approaches, page, promise};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -1,12 +1,12 @@
 use super::probe::{SizeArguments, refuse_unstated};
+use glam::DVec3;
 use palpate::Result;
 use palpate::error::CaptureProblem;
 use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::probe::approach::Probe;
-use palpate_report::view;
 use palpate::touches::Origin;
-use glam::DVec3;
+use palpate_report::view;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

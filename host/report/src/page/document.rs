@@ -2,36 +2,36 @@
 
 use super::table::{Cell, Records, Table};
 use super::{chart::Svg, html};
-use palpate::error::Result;
-use palpate::output::write_bytes;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
+use palpate::error::Result;
+use palpate::output::write_bytes;
 use std::path::{Path, PathBuf};
 
 /// The page's style.
-pub(crate) const STYLE: &str = include_str!("page.css");
+pub const STYLE: &str = include_str!("page.css");
 
 /// A figure: one or more drawings side by side, with the numbers behind them.
 #[derive(Clone, Debug)]
-pub(crate) struct Figure {
+pub struct Figure {
     /// Its anchor, and its files' stem.
-    pub(crate) id: String,
+    pub id: String,
     /// What it shows.
-    pub(crate) title: String,
+    pub title: String,
     /// What to see in it, and how it was made.
-    pub(crate) caption: String,
+    pub caption: String,
     /// The command that remakes it.
-    pub(crate) command: String,
+    pub command: String,
     /// Its drawings, at least one.
-    pub(crate) panels: Vec<Svg>,
+    pub panels: Vec<Svg>,
     /// The numbers drawn.
-    pub(crate) data: Records,
+    pub data: Records,
 }
 
 impl Figure {
     /// All panels in one drawing on white, in rows of at most 1,160 pixels.
-    pub(crate) fn whole_svg(&self) -> Svg {
+    pub fn whole_svg(&self) -> Svg {
         let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
         let (width, height) = (cell(|panel| panel.width), cell(|panel| panel.height));
         let columns = (1160 / width.max(1)).clamp(1, self.panels.len().max(1) as u32);
@@ -51,7 +51,7 @@ impl Figure {
 
 /// What a section is made of.
 #[derive(Clone, Debug)]
-pub(crate) enum Block {
+pub enum Block {
     /// A paragraph.
     Text(String),
     /// A paragraph about what may make the figures wrong.
@@ -68,52 +68,52 @@ pub(crate) enum Block {
 
 /// A small picture in the page.
 #[derive(Clone, Debug)]
-pub(crate) struct Picture {
+pub struct Picture {
     /// What it shows.
-    pub(crate) name: String,
+    pub name: String,
     /// The bytes of a PNG file.
-    pub(crate) png: Vec<u8>,
+    pub png: Vec<u8>,
     /// A few words below it.
-    pub(crate) line: String,
+    pub line: String,
 }
 
 /// A heading with what belongs below it.
 #[derive(Clone, Debug)]
-pub(crate) struct Section {
+pub struct Section {
     /// Its anchor.
-    pub(crate) id: String,
+    pub id: String,
     /// Its heading.
-    pub(crate) title: String,
+    pub title: String,
     /// What it holds.
-    pub(crate) blocks: Vec<Block>,
+    pub blocks: Vec<Block>,
 }
 
 impl Section {
     /// An empty section.
-    pub(crate) fn new(id: &str, title: &str) -> Self {
+    pub fn new(id: &str, title: &str) -> Self {
         Self { id: id.to_string(), title: title.to_string(), blocks: Vec::new() }
     }
 
     /// Adds a paragraph.
-    pub(crate) fn text(&mut self, text: impl Into<String>) -> &mut Self {
+    pub fn text(&mut self, text: impl Into<String>) -> &mut Self {
         self.blocks.push(Block::Text(text.into()));
         self
     }
 
     /// Adds a paragraph about what may make the figures wrong.
-    pub(crate) fn warning(&mut self, text: impl Into<String>) -> &mut Self {
+    pub fn warning(&mut self, text: impl Into<String>) -> &mut Self {
         self.blocks.push(Block::Warning(text.into()));
         self
     }
 
     /// Adds a figure.
-    pub(crate) fn figure(&mut self, figure: Figure) -> &mut Self {
+    pub fn figure(&mut self, figure: Figure) -> &mut Self {
         self.blocks.push(Block::Figure(figure));
         self
     }
 
     /// Adds a table.
-    pub(crate) fn table(&mut self, table: Table) -> &mut Self {
+    pub fn table(&mut self, table: Table) -> &mut Self {
         self.blocks.push(Block::Table(table));
         self
     }
@@ -121,27 +121,27 @@ impl Section {
 
 /// A whole page.
 #[derive(Clone, Debug)]
-pub(crate) struct Page {
+pub struct Page {
     /// Its title.
-    pub(crate) title: String,
+    pub title: String,
     /// One or two sentences below the title.
-    pub(crate) summary: String,
+    pub summary: String,
     /// The sections, in order.
-    pub(crate) sections: Vec<Section>,
+    pub sections: Vec<Section>,
     /// The footer: settings and version, as name and value.
-    pub(crate) facts: Vec<(String, String)>,
+    pub facts: Vec<(String, String)>,
     /// Whether the files of figures and tables are written next to the page and linked.
-    pub(crate) files: bool,
+    pub files: bool,
 }
 
 impl Page {
     /// All figures, in order.
-    pub(crate) fn figures(&self) -> impl Iterator<Item = &Figure> {
+    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
         self.blocks().filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
     }
 
     /// All tables, in order.
-    pub(crate) fn tables(&self) -> impl Iterator<Item = &Table> {
+    pub fn tables(&self) -> impl Iterator<Item = &Table> {
         self.blocks().filter_map(|block| if let Block::Table(table) = block { Some(table) } else { None })
     }
 
@@ -150,7 +150,7 @@ impl Page {
     }
 
     /// The page as HTML.
-    pub(crate) fn html(&self) -> String {
+    pub fn html(&self) -> String {
         let body = html! {
             header {
                 h1 { (self.title) }
@@ -183,7 +183,7 @@ impl Page {
     ///
     /// # Errors
     /// [`palpate::Error::Io`] naming the file.
-    pub(crate) fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
+    pub fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
         let mut written = Vec::new();
         let mut put = |path: PathBuf, bytes: &[u8]| -> Result<()> {
             write_bytes(&path, bytes)?;

@@ -9,9 +9,9 @@
 pub(crate) mod axis;
 pub(crate) mod chart;
 pub(crate) mod color;
-pub(crate) mod document;
+pub mod document;
 pub(crate) mod heat_map;
 pub(crate) mod html;
 pub mod render;
 pub(crate) mod scene;
-pub(crate) mod table;
+pub mod table;

@@ -5,7 +5,7 @@ use palpate::error::{PageProblem, Result};
 
 /// One cell.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Cell {
+pub enum Cell {
     /// Words.
     Text(String),
     /// A number and how many decimals are shown; CSV has all of them.
@@ -34,12 +34,12 @@ impl From<String> for Cell {
 
 impl Cell {
     /// A whole number.
-    pub(crate) fn count(value: impl TryInto<u64>) -> Self {
+    pub fn count(value: impl TryInto<u64>) -> Self {
         value.try_into().map_or(Self::Missing, |value| Self::Number(value as f64, 0))
     }
 
     /// What the page shows.
-    pub(crate) fn shown(&self) -> String {
+    pub fn shown(&self) -> String {
         match *self {
             Self::Text(ref text) => text.clone(),
             Self::Number(value, decimals) => grouped(&finite(value, decimals)),
@@ -58,7 +58,7 @@ impl Cell {
     }
 
     /// What the column sorts by, if this is a number.
-    pub(crate) fn value(&self) -> Option<f64> {
+    pub fn value(&self) -> Option<f64> {
         match *self {
             Self::Number(value, _)
             | Self::Spread(value, _, _)
@@ -107,21 +107,21 @@ fn grouped(text: &str) -> String {
 
 /// Rows under named columns: the numbers behind a figure, or a table's.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Records {
+pub struct Records {
     /// The columns' names, units in parentheses.
-    pub(crate) columns: Vec<String>,
+    pub columns: Vec<String>,
     /// The rows, each as long as `columns`.
-    pub(crate) rows: Vec<Vec<Cell>>,
+    pub rows: Vec<Vec<Cell>>,
 }
 
 impl Records {
     /// No rows yet.
-    pub(crate) fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
+    pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
         Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }
     }
 
     /// Adds a row; one that is too short is filled with [`Cell::Missing`].
-    pub(crate) fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
+    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
         let mut row: Vec<Cell> = row.into_iter().collect();
         row.resize(self.columns.len(), Cell::Missing);
         self.rows.push(row);
@@ -131,7 +131,7 @@ impl Records {
     ///
     /// # Errors
     /// If the CSV library refuses, which it has no reason to.
-    pub(crate) fn csv(&self) -> Result<Vec<u8>> {
+    pub fn csv(&self) -> Result<Vec<u8>> {
         let spread: Vec<bool> = (0..self.columns.len())
             .map(|c| self.rows.iter().any(|row| matches!(row[c], Cell::Spread(..) | Cell::PercentSpread(..))))
             .collect();
@@ -157,17 +157,17 @@ impl Records {
 
 /// A table in the page.
 #[derive(Clone, Debug)]
-pub(crate) struct Table {
+pub struct Table {
     /// Its anchor, and its file's stem.
-    pub(crate) id: String,
+    pub id: String,
     /// What it shows.
-    pub(crate) title: String,
+    pub title: String,
     /// What to see in it, and how it was made.
-    pub(crate) caption: String,
+    pub caption: String,
     /// The command that remakes it.
-    pub(crate) command: String,
+    pub command: String,
     /// Its contents.
-    pub(crate) data: Records,
+    pub data: Records,
 }
 
 #[cfg(test)]

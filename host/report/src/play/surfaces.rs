@@ -1,8 +1,8 @@
 //! The objects' surfaces, small enough for a page.
 
+use crate::page::scene::SimplifiedMesh;
 use palpate::error::Result;
 use palpate::mesh::{Mesh, Object};
-use crate::page::scene::SimplifiedMesh;
 use palpate::play::{pack, unpack};
 use palpate::touches::Origin;
 use rayon::prelude::*;

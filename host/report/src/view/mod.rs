@@ -4,16 +4,16 @@
 //! before capturing millions of touches: is it right side out and closed, does its scale suit the fingers, where do the
 //! fingers touch it.
 
+use crate::page::html;
+use crate::page::scene::{self, Line, SimplifiedMesh};
+use glam::DVec3;
+use maud::html;
 use palpate::error::Result;
 use palpate::mesh::Object;
 use palpate::mesh::facts::Facts;
-use crate::page::html;
-use crate::page::scene::{self, Line, SimplifiedMesh};
 use palpate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
 use palpate::probe::scene::Scene;
 use palpate::random::{self, Purpose};
-use glam::DVec3;
-use maud::html;
 
 /// What a page shows.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
 use super::*;
-use palpate::mesh::Mesh;
-use palpate::mesh::builtin;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use palpate::mesh::Mesh;
+use palpate::mesh::builtin;
 use std::collections::HashMap;
 
 fn object(name: &str, mesh: Mesh) -> Object {

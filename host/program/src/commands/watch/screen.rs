@@ -1,10 +1,10 @@
 //! What is known of a chip, drawn in a terminal.
 
-use palpate::chip::watch::Status;
-use palpate::{Error, Result};
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use crossterm::style::{ContentStyle, PrintStyledContent, StyledContent, Stylize};
 use crossterm::{cursor, execute, queue, terminal};
+use palpate::chip::watch::Status;
+use palpate::{Error, Result};
 use std::io::{Write, stdout};
 use std::iter::repeat_n;
 use std::time::{Duration, Instant};

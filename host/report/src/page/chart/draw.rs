@@ -6,10 +6,10 @@
 use super::layout::{Anchor, Layout, NARROW, SAMPLE, Text};
 use super::parts::{Chart, Key, Mark, Shape, Stroke, Svg};
 use super::text::SIZE;
-use palpate::error::{PageProblem, Result};
 use crate::page::axis::Axis;
 use crate::page::color::{GRAY, GRID};
 use maud::html;
+use palpate::error::{PageProblem, Result};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::element::{Circle, DashedPathElement, PathElement, Polygon, Rectangle, TriangleMarker};

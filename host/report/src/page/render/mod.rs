@@ -7,8 +7,8 @@ mod picture;
 mod raster;
 mod viewpoint;
 
-use palpate::mesh::{Mesh, Object};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+use palpate::mesh::{Mesh, Object};
 use picture::Picture;
 use viewpoint::Viewpoint;
 

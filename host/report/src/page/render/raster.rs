@@ -1,8 +1,8 @@
 //! Triangles to shaded pixels.
 
 use super::viewpoint::Viewpoint;
-use palpate::mesh::Mesh;
 use glam::{Vec2, Vec3};
+use palpate::mesh::Mesh;
 
 /// Samples per pixel, each way.
 const SAMPLES: u32 = 3;

@@ -1,7 +1,7 @@
 //! Where a mesh is looked at from.
 
-use palpate::mesh::Mesh;
 use glam::{Mat3, Vec3};
+use palpate::mesh::Mesh;
 
 /// A direction to look from.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! A mesh as a page holds it: its triangles, few enough and small enough.
 
-use palpate::mesh::Mesh;
 use glam::{DVec3, Vec3};
+use palpate::mesh::Mesh;
 use std::collections::HashMap;
 
 /// How many triangles a page holds at most.
