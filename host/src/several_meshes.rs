@@ -10,11 +10,10 @@ use crate::ensemble::Ensemble;
 use crate::ensemble::train::{self, train};
 use crate::error::{CalibrateProblem, Problem};
 use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings, compare};
-use crate::mesh::{Instance, Mesh, Object};
 use crate::repetitions::{assert_rare, repetitions};
 use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches, Source, folds, synthetic};
-use crate::{capture, run, strangers, teach, tune};
+use crate::{strangers, teach, tune};
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::Held;
 use std::sync::LazyLock;
@@ -307,55 +306,4 @@ fn known_touches_are_thinned_within_each_mesh() {
     let known = touches(24_000, 1);
     let thinned = known.objects[0].thinned(12_000);
     assert_eq!(thinned.by_source().iter().map(Vec::len).collect::<Vec<_>>(), [6_000; 2]);
-}
-
-/// Three objects of two meshes each.
-pub(crate) fn meshes() -> Vec<Object> {
-    let sides = [
-        ("one", [[1.0, 1.0, 1.0], [1.0, 0.6, 0.7]]),
-        ("three", [[1.0, 0.9, 0.1], [1.0, 0.5, 0.12]]),
-        ("two", [[1.0, 0.1, 0.1], [1.0, 0.35, 0.25]]),
-    ];
-    let object = |(name, sides): (&str, [[f32; 3]; 2])| {
-        let instance = |(number, sides): (usize, [f32; 3])| Instance {
-            name: format!("{name} {number}"),
-            mesh: Mesh::globe(10).stretched(sides),
-        };
-        Object::of_instances(name, sides.into_iter().enumerate().map(instance).collect()).unwrap()
-    };
-    sides.map(object).into()
-}
-
-#[test]
-fn what_a_run_states_is_what_its_model_does() {
-    let objects = meshes();
-    let place = tempfile::tempdir().unwrap();
-    let origin = crate::touches::Origin { touches: 900, ..Default::default() };
-    let settings = run::Settings {
-        capture: origin.clone().into(),
-        approaches: 3_000,
-        groups: 300,
-        error_rate: 0.1,
-        sequences: 1_500,
-        ..run::Settings::default()
-    };
-    let summary = run::run(&objects, &settings, place.path(), &()).unwrap();
-    let bytes = std::fs::read(place.path().join("model.palpate")).unwrap();
-    let model = Model::new(&bytes).unwrap();
-    let unseen = crate::touches::Origin { touches: 6_000, approaches: true, seed: 99, ..origin };
-    let (mut fresh, _) = capture::in_memory(&objects, &unseen.into(), &()).unwrap();
-    assert_eq!(fresh.several().values().copied().collect::<Vec<_>>(), [2; 3]);
-    evaluate::add_noise(&mut fresh, &settings.noise, 98).unwrap();
-    let margins = Margins::new(Candidate::Compiled(&model), &fresh).unwrap();
-    let sequences = SequentialSettings { error_rate: None, max_touches: None, sequences: 500, seed: 9 };
-    let measured = margins.approaches(&[20], &sequences).unwrap();
-    let stated = summary.ours.evaluation.approaches.unwrap();
-    Share::of(stated.accuracy[&20], cases(900, 900, 20.0))
-        .agrees("run, accuracy", Share::of(measured.accuracy[&20], cases(1_500, 18_000, 20.0)));
-    let (own, other) = (&stated.sequential, &measured.sequential);
-    Share::of(own.error, cases(900, 900, own.mean_approaches))
-        .agrees("run, wrong names", Share::of(other.error, cases(1_500, 18_000, other.mean_approaches)));
-    let promised = summary.ours.calibration.ok_or(summary.ours.uncalibrated).unwrap();
-    let measured = Share::of(other.error, cases(1_500, 18_000, other.mean_approaches));
-    assert!(measured.0 <= promised.promised + 3.0 * measured.1, "{measured:?}");
 }

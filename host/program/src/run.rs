@@ -1,5 +1,7 @@
 //! The main job: capture, train, compile, recognize, report.
 
+#[cfg(test)]
+mod several_meshes;
 mod shown;
 
 pub use shown::text;

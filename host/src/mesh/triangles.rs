@@ -113,7 +113,7 @@ impl Mesh {
     }
 
     /// The mesh with each axis scaled.
-    #[cfg(test)]
+    #[must_use]
     pub fn stretched(mut self, factors: [f32; 3]) -> Self {
         self.vertices.iter_mut().for_each(|vertex| (0..3).for_each(|axis| vertex[axis] *= factors[axis]));
         self

@@ -3,7 +3,7 @@ use std::process::Command;
 
 /// The lines for a capture without Dask, as the documentation has them.
 fn documented(start: &str) -> &'static str {
-    let lines = include_str!("../../python/README.md").lines();
+    let lines = include_str!("../../../python/README.md").lines();
     lines.into_iter().find(|line| line.starts_with(start)).expect("the documentation says how")
 }
 
