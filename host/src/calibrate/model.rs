@@ -8,7 +8,7 @@ use super::{Per, Tally, binomial_tail};
 use crate::compile::{self, Restated, restate};
 use crate::ensemble::StatedProbe;
 use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result, Supplied};
-use crate::evaluate::Candidate;
+use crate::evaluate::{Candidate, OfTouches};
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};

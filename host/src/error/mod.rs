@@ -3,14 +3,11 @@
 mod calibrate;
 mod capture;
 mod chip;
-mod compile;
-mod ensemble;
 mod evaluate;
 mod mesh;
 mod page;
 mod probe;
 mod report;
-mod rows;
 mod teach;
 mod touches;
 mod tune;
@@ -18,67 +15,22 @@ mod tune;
 pub use calibrate::{CalibrateProblem, Supplied};
 pub use capture::CaptureProblem;
 pub use chip::ChipProblem;
-pub use compile::CompileProblem;
-pub use ensemble::{EnsembleProblem, NameProblem, TreeProblem};
 pub use evaluate::EvaluateProblem;
 pub use mesh::MeshProblem;
 pub use page::PageProblem;
+pub use palpate_trees::error::{CompileProblem, EnsembleProblem, NameProblem, Place, RowsProblem, TreeProblem};
 pub use probe::ProbeProblem;
 pub use report::ReportProblem;
-pub use rows::RowsProblem;
 pub use teach::TeachProblem;
 pub use touches::TouchesProblem;
 pub use tune::TuneProblem;
 
+use palpate_trees::error as trees;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// The result of everything fallible in this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
-
-/// Where something is wrong.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Place {
-    /// In memory: nothing that a path names.
-    #[default]
-    Nowhere,
-    /// In a file or directory as a whole.
-    File(PathBuf),
-    /// In a line of a text file, counted from 1.
-    Line(PathBuf, u64),
-    /// At a byte of a binary file, counted from 0.
-    Byte(PathBuf, u64),
-}
-
-impl Place {
-    /// In the file or directory `path` as a whole.
-    pub fn file(path: impl AsRef<Path>) -> Self {
-        Self::File(path.as_ref().into())
-    }
-
-    /// In line `line` (from 1) of `path`.
-    pub fn line(path: impl AsRef<Path>, line: u64) -> Self {
-        Self::Line(path.as_ref().into(), line)
-    }
-
-    /// At byte `offset` (from 0) of `path`.
-    pub fn byte(path: impl AsRef<Path>, offset: u64) -> Self {
-        Self::Byte(path.as_ref().into(), offset)
-    }
-}
-
-/// The prefix of a message: `path: `, `path:line: `, `path: byte n: `, or nothing.
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Nowhere => Ok(()),
-            Self::File(path) => write!(f, "{}: ", path.display()),
-            Self::Line(path, line) => write!(f, "{}:{line}: ", path.display()),
-            Self::Byte(path, offset) => write!(f, "{}: byte {offset}: ", path.display()),
-        }
-    }
-}
 
 /// What is wrong: one kind for each room of the library. Its `Display` says what is wrong, without a full stop;
 /// [`fix`](Self::fix) says what to do.
@@ -222,6 +174,29 @@ problems!(
     ReportProblem
 );
 
+impl From<trees::Problem> for Problem {
+    fn from(problem: trees::Problem) -> Self {
+        match problem {
+            trees::Problem::Setting { name, value, allowed } => Self::Setting { name, value, allowed },
+            trees::Problem::Ensemble(problem) => Self::Ensemble(problem),
+            trees::Problem::Compile(problem) => Self::Compile(problem),
+            trees::Problem::Rows(problem) => Self::Rows(problem),
+        }
+    }
+}
+
+/// The same error, with the problem as one of this crate's.
+impl From<trees::Error> for Error {
+    fn from(error: trees::Error) -> Self {
+        match error {
+            trees::Error::Io { path, action, source, fix } => Self::Io { path, action, source, fix },
+            trees::Error::At { place, problem } => Self::At { place, problem: problem.into() },
+            trees::Error::Cancelled => Self::Cancelled,
+            trees::Error::Closed => Self::Closed,
+        }
+    }
+}
+
 impl Error {
     /// Something is wrong at a place.
     pub fn at(place: Place, problem: impl Into<Problem>) -> Self {
@@ -243,17 +218,7 @@ impl Error {
 
     /// The operating system refused `action` (an infinitive) on `path`; the fix follows from the kind of refusal.
     pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
-        use std::io::ErrorKind;
-        let fix = match source.kind() {
-            ErrorKind::NotFound => "Check the path",
-            ErrorKind::PermissionDenied => "Check the permissions, or choose another place",
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then run the command again",
-            ErrorKind::IsADirectory => "Give a file, not a directory",
-            ErrorKind::NotADirectory => "Give a directory, not a file",
-            ErrorKind::InvalidData => "Check that it is the right kind of file",
-            _ => "Check the file and the disk it is on",
-        };
-        Self::Io { path: path.as_ref().into(), action, source, fix: format!("{fix}.") }
+        trees::Error::io(path, action, source).into()
     }
 
     /// Says which file wrong data came from; other errors stay as they are.

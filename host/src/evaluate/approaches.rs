@@ -1,7 +1,7 @@
 //! Counted in approaches, which is what a robot pays for.
 
+use super::Estimate;
 use super::draws::Draws;
-use super::estimate::Estimate;
 use super::margins::Margins;
 use super::sequential::{Outcome, SequentialSettings, Stated};
 use crate::error::{Error, Result};

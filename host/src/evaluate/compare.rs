@@ -8,7 +8,7 @@
 //! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
 //! recorded ones, and how many more approaches it takes there to be right as often as on simulated ones.
 
-use super::estimate::Estimate;
+use super::Estimate;
 use super::{Candidate, Margins, SequentialSettings};
 use crate::ensemble::{feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};

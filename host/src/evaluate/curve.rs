@@ -1,7 +1,8 @@
 //! Accuracy after a fixed number of touches.
 
-use super::estimate::Estimate;
-use super::margins::{Candidate, Margins, rivals};
+use super::Candidate;
+use super::Estimate;
+use super::margins::{Margins, rivals};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 

@@ -40,42 +40,37 @@ pub mod compare;
 mod cost_of_noise;
 mod curve;
 mod draws;
-mod estimate;
 mod full;
-mod isolated;
 mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
 mod poses;
-pub mod predict;
 mod promise;
-mod reference;
-mod rows;
 mod sequential;
 mod strangers;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
-pub mod together;
 mod under_plan;
-pub mod verify;
 
 pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
-pub use estimate::Estimate;
+pub use margins::Margins;
+pub(crate) use margins::OfTouches;
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
-pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
+pub use palpate_trees::verify::{
+    self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict, together,
+};
 pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
 pub use poses::{ByPose, Stock};
 pub use promise::{Finding, PromiseCheck, by_theory};
-pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 pub use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};

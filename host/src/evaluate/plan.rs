@@ -1,6 +1,7 @@
 //! A plan of approaches for a model: how well each pose of the probe tells each two objects apart.
 
-use super::margins::{Candidate, Margins, Values, row};
+use super::Candidate;
+use super::margins::{Margins, Values, row};
 use super::poses::ByPose;
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};

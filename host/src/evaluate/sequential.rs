@@ -1,8 +1,9 @@
 //! Touching until sure.
 
-use super::estimate::Estimate;
+use super::Candidate;
+use super::Estimate;
 use super::full::FullRecognizer;
-use super::margins::{Candidate, Margins, Values, row};
+use super::margins::{Margins, Values, row};
 use super::{ERROR_RATE, MAX_TOUCHES};
 use crate::compile;
 use crate::error::{Error, Result};
@@ -198,7 +199,7 @@ impl Margins<'_> {
             (None, Candidate::Compiled(model)) if max_touches > 0 => {
                 Ok(Stopping::from_model(model).with_max_touches(max_touches))
             }
-            (error_rate, _) => compile::stopping(error_rate.unwrap_or(ERROR_RATE), max_touches),
+            (error_rate, _) => Ok(compile::stopping(error_rate.unwrap_or(ERROR_RATE), max_touches)?),
         }
     }
 

@@ -1,6 +1,6 @@
 //! What happens when the object is exchanged while it is being touched, and what forgetting does about it.
 
-use super::estimate::Estimate;
+use super::Estimate;
 use super::margins::{Margins, Values, row};
 use super::sequential::{Outcome, SequentialSettings, until_sure};
 use crate::error::{Error, EvaluateProblem, Result};

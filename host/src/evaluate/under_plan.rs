@@ -1,7 +1,7 @@
 //! The figures of an evaluation under a model's plan.
 
+use super::Estimate;
 use super::active::Active;
-use super::estimate::Estimate;
 use super::margins::Margins;
 use super::sequential::Outcome;
 use super::{Evaluation, Settings};

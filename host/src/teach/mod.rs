@@ -25,7 +25,7 @@ pub use curve::{Curve, Point};
 pub use promise::Needed;
 
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
-use crate::ensemble::{Ensemble, Node, Origin};
+use crate::ensemble::{Ensemble, Node, TouchOrigin};
 use crate::error::Result;
 use crate::evaluate::ROBOTS;
 use crate::progress::Progress;
@@ -263,8 +263,11 @@ fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], const
             leaf += 1;
         }
     }
-    let own = Origin::new(recorded, None, None);
-    extended.origin.touches.extend(own.touches);
+    // What cannot be read was refused before.
+    if let Ok(mut stated) = TouchOrigin::of(&extended.origin) {
+        stated.touches.extend(TouchOrigin::new(recorded, None).touches);
+        stated.state(&mut extended.origin);
+    }
     let objects = (at, recorded.objects.len());
     if let Some(trained) = &mut extended.origin.trained {
         trained.touches = with(trained.touches, &recorded.objects);

@@ -8,8 +8,9 @@
 //! share. Otherwise each margin would hold the log of that share, and summing margins over touches would count that prior
 //! once per touch instead of once.
 
-use crate::ensemble::check::check_names;
-use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Trained, Tree, feature_row};
+use crate::ensemble::{
+    Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, TouchOrigin, Trained, Tree, check_names, feature_row,
+};
 use crate::error::{EnsembleProblem, Error, Result};
 use crate::mesh::BACKGROUND;
 use crate::progress::Progress;
@@ -186,7 +187,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
 fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Origin {
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
-    Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) }
+    TouchOrigin { noise, ..TouchOrigin::new(dataset, settings.probe) }.origin(Some(trained))
 }
 
 /// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,

@@ -5,7 +5,6 @@ use super::forest::Forest;
 use super::parts::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
 use crate::error::{CompileProblem, Error, Result};
-use crate::probe::approach::Probe;
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
@@ -26,12 +25,14 @@ pub(super) fn write(
     let mut text = text(ensemble)?;
     let priors = priors(settings, forest.objects(), parts.unit)?;
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
-    // Where nothing is known, the published probe.
-    let probe = ensemble.origin.probe.map_or_else(Probe::default, |stated| stated.probe);
     // In the order of the tags.
-    let optional =
-        [optional(ensemble, settings, forest)?, parts.section(), of_rows(ensemble, settings), captured(ensemble)]
-            .concat();
+    let optional = [
+        optional(ensemble, settings, forest)?,
+        parts.section(),
+        of_rows(ensemble, settings),
+        captured(ensemble, settings),
+    ]
+    .concat();
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
     // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
     text.resize(text.len().next_multiple_of(4), 0);
@@ -62,8 +63,8 @@ pub(super) fn write(
         .with_margin_error(parts.margin_error)
         .with_odds(stopping.odds())
         .with_max_touches(stopping.max_touches())
-        .with_spacing(probe.spacing as f32)
-        .with_speed(probe.speed as f32)
+        .with_spacing(settings.stated.spacing)
+        .with_speed(settings.stated.speed)
         .with_text_length(count(text.len())?)
         .with_sections(count(optional.len())?)
         .with_ensemble(hash)
@@ -85,8 +86,9 @@ pub(super) fn write(
 
 /// Bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
 pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
-    let sections =
-        optional(ensemble, settings, forest)?.len() + of_rows(ensemble, settings).len() + captured(ensemble).len();
+    let sections = optional(ensemble, settings, forest)?.len()
+        + of_rows(ensemble, settings).len()
+        + captured(ensemble, settings).len();
     Ok(text(ensemble)?.len().next_multiple_of(4) + sections + CHECKSUM_LENGTH)
 }
 
@@ -97,9 +99,9 @@ fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
     // Rows of features are no touches of any probe.
     if forest.descriptor.is_some() {
         let trained = Trained {
-            probe: origin.probe.map(|stated| stated.trained()),
+            probe: settings.stated.probe,
             touches: origin.trained.map(|trained| trained.touches),
-            noise: origin.noise.map(|noise| noise.trained()),
+            noise: settings.stated.noise,
             shares: origin.trained.and_then(|trained| trained.pattern_shares()),
         };
         // In the order of the tags.
@@ -148,10 +150,10 @@ fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
 }
 
 /// The section that says which touches it was trained on; nothing where that is not known.
-fn captured(ensemble: &Ensemble) -> Vec<u8> {
+fn captured(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
     let mut bytes = Vec::new();
-    if let Some(content) = ensemble.descriptor().and_then(|_| ensemble.origin.section(&ensemble.objects)) {
-        write_section(Tag::Capture, false, &content, &mut |part| bytes.extend_from_slice(part));
+    if let Some(content) = settings.stated.capture.as_ref().filter(|_| ensemble.descriptor().is_some()) {
+        write_section(Tag::Capture, false, content, &mut |part| bytes.extend_from_slice(part));
     }
     bytes
 }

@@ -240,44 +240,28 @@ fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, Ensemble
 
 /// What the optional attributes say about the training touches.
 fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
-    let probe = attributes.get("palpate_probe").map(|text| {
-        let expected = "a JSON object of radius, spacing, speed, tilt and length";
-        parsed("palpate_probe", expected, text)
-    });
     let trained = attributes.get("palpate_trained").map(|text| {
         let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
         parsed("palpate_trained", expected, text)
-    });
-    let captured = attributes
-        .get("palpate_captured")
-        .map(|text| parsed("palpate_captured", "a JSON object of settings, samples and objects", text));
-    let touches = attributes.get("palpate_touches").map(|text| {
-        let (name, expected) = ("palpate_touches", "a JSON object of hexadecimal numbers");
-        let touches: BTreeMap<String, String> = parsed(name, expected, text)?;
-        let number = |(object, text): (String, String)| match u64::from_str_radix(&text, 16) {
-            Ok(number) => Ok((object, number)),
-            Err(error) => Err(EnsembleProblem::Attribute { name, expected, detail: error.to_string() }),
-        };
-        touches.into_iter().map(number).collect()
-    });
-    let noise = attributes.get("palpate_noise").map(|text| {
-        let expected = "a JSON object of what was added to the touches in training";
-        parsed("palpate_noise", expected, text)
     });
     let background = attributes.get("palpate_background").map(|text| {
         let expected = "true where the last object is a background, else false";
         parsed("palpate_background", expected, text)
     });
+    // What the crate that trained it states, and this one does not read.
+    let is_read = |name: &str| READ.contains(&name) || !name.starts_with("palpate_");
+    let others = attributes.iter().filter(|(name, _)| !is_read(name));
     Ok(Origin {
         background: background.transpose()?.unwrap_or_default(),
-        probe: probe.transpose()?,
         trained: trained.transpose()?,
-        noise: noise.transpose()?,
-        touches: touches.transpose()?.unwrap_or_default(),
-        captured: captured.transpose()?,
         imported: None,
+        attributes: others.map(|(name, text)| (name.clone(), text.clone())).collect(),
     })
 }
+
+/// Attributes that this crate reads.
+const READ: [&str; 5] =
+    ["palpate_background", "palpate_descriptor", "palpate_objects", "palpate_prediction", "palpate_trained"];
 
 fn parsed<'t, T: serde::Deserialize<'t>>(
     name: &'static str,

@@ -10,12 +10,10 @@
 //! |---|---|
 //! | `palpate_descriptor` | the descriptor's name; absent for an ensemble over rows |
 //! | `palpate_objects` | a JSON array of the objects' names, in the order of the labels |
-//! | `palpate_probe` | optional: the probe of the training touches, a JSON object of `radius`, `spacing`, `speed`, `tilt` and `length` |
-//! | `palpate_noise` | optional: what was added to the training touches ([`Noise`](crate::touches::noise::Noise)), a JSON object |
 //! | `palpate_background` | optional: `true` where the last object is a background, which is never named |
 //! | `palpate_prediction` | optional: what the library that trained an ensemble over rows makes of margins, and which numbers stand for a missing value there, a JSON object |
-//! | `palpate_captured` | optional: the capture of the training touches ([`Captured`](crate::touches::Captured)), a JSON object |
-//! | `palpate_touches` | optional: fingerprints of the training touches, a JSON object of hexadecimal numbers by object |
+//! | `palpate_trained` | optional: which touches it was trained on, a JSON object |
+//! | `palpate_…` | others are kept as they are: [`Origin::attributes`](super::Origin::attributes) |
 //!
 //! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
 
@@ -23,8 +21,6 @@ mod objective;
 mod outputs;
 mod read;
 mod schema;
-#[cfg(all(test, feature = "train"))]
-mod tests;
 mod trees;
 mod write;
 
@@ -106,12 +102,10 @@ fn without_literals(bytes: &[u8]) -> Cow<'_, [u8]> {
 
 impl Ensemble {
     /// What XGBoost itself has just trained on `descriptor`'s features of `objects`.
-    #[cfg(feature = "xgboost")]
-    pub(crate) fn from_xgboost(
-        json: &[u8],
-        descriptor: palpate_shared::Descriptor,
-        objects: Vec<String>,
-    ) -> Result<Self> {
+    ///
+    /// # Errors
+    /// [`EnsembleProblem`] for what [`load`](Self::load) refuses.
+    pub fn from_xgboost(json: &[u8], descriptor: palpate_shared::Descriptor, objects: Vec<String>) -> Result<Self> {
         let path = Path::new("XGBoost's model");
         let mut document: Document =
             serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;

@@ -80,27 +80,14 @@ pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -
         }
     }
     // Numbers and strings are always JSON.
-    if let Some(probe) = origin.probe.and_then(|probe| serde_json::to_string(&probe).ok()) {
-        attributes.insert("palpate_probe".into(), probe);
-    }
     if let Some(trained) = origin.trained.and_then(|trained| serde_json::to_string(&trained).ok()) {
         attributes.insert("palpate_trained".into(), trained);
-    }
-    if let Some(noise) = origin.noise.and_then(|noise| serde_json::to_string(&noise).ok()) {
-        attributes.insert("palpate_noise".into(), noise);
     }
     if origin.background {
         attributes.insert("palpate_background".into(), "true".into());
     }
-    if let Some(captured) = origin.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok()) {
-        attributes.insert("palpate_captured".into(), captured);
-    }
-    if !origin.touches.is_empty() {
-        let hexadecimal = origin.touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
-        if let Ok(touches) = serde_json::to_string(&hexadecimal.collect::<BTreeMap<_, _>>()) {
-            attributes.insert("palpate_touches".into(), touches);
-        }
-    }
+    let others = origin.attributes.iter().map(|(name, text)| (name.clone(), text.clone()));
+    attributes.extend(others);
     attributes
 }
 

@@ -5,9 +5,9 @@ use crate::error::{EnsembleProblem, NameProblem, TreeProblem};
 use std::collections::HashSet;
 
 /// The most objects that a compiled model can distinguish.
-pub(crate) const MAX_OBJECTS: usize = 256;
+pub const MAX_OBJECTS: usize = 256;
 /// The most features that a compiled model can have.
-pub(crate) const MAX_FEATURES: usize = 256;
+pub const MAX_FEATURES: usize = 256;
 /// The most bytes of an object's name: a compiled model has one byte for its length.
 const MAX_NAME: usize = 255;
 
@@ -118,7 +118,7 @@ fn check_features(names: &[String], ensemble: &Ensemble) -> Result<(), EnsembleP
 }
 
 /// Whether these names can be an ensemble's objects.
-pub(crate) fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
+pub fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
     if !(2..=MAX_OBJECTS).contains(&names.len()) {
         return Err(EnsembleProblem::ObjectCount { count: names.len() });
     }

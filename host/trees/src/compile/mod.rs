@@ -8,11 +8,11 @@
 //! [`compile`] does all of it; [`CompiledModel`] is a compiled model read from a file.
 //!
 //! ```
-//! use palpate::compile::{self, compile};
-//! use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
+//! use palpate_trees::compile::{self, compile};
+//! use palpate_trees::ensemble::{Ensemble, Node, Origin, Output, Tree};
 //! use palpate_shared::{Descriptor, Touch};
 //!
-//! # fn main() -> palpate::Result<()> {
+//! # fn main() -> palpate_trees::Result<()> {
 //! // One split at a curvature of 50 ms: flatter is a bowl, more curved a fork.
 //! let nodes = vec![
 //!     Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 },
@@ -59,7 +59,7 @@ mod write;
 pub use cost::{Core, Instructions, Memory};
 pub use emit::{Language, emit};
 pub use fit::compile_within;
-pub(crate) use groups::leaves_of_trees;
+pub use groups::leaves_of_trees;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
@@ -71,6 +71,7 @@ use axes::Axes;
 use cells::Cells;
 use forest::Forest;
 use palpate_onboard::Stopping;
+use palpate_shared::format::{TrainedNoise, TrainedProbe};
 
 /// How to compile an ensemble.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,6 +94,30 @@ pub struct Settings {
     /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
     /// feature's scale; `None` compares f32 values.
     pub scales: Option<Vec<f32>>,
+    /// For an ensemble over touches: what the model states of them. The crate `palpate` fills it in from the ensemble.
+    pub stated: Stated,
+}
+
+/// What a model over touches states of the touches that it was trained on; it changes no margin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stated {
+    /// Distance between neighboring fingers, in the probe's unit.
+    pub spacing: f32,
+    /// Speed of an approach, in units per second.
+    pub speed: f32,
+    /// The probe, where it is known.
+    pub probe: Option<TrainedProbe>,
+    /// What was added to the touches in training.
+    pub noise: Option<TrainedNoise>,
+    /// The capture that made the touches: the content of the section [`Tag::Capture`](palpate_shared::format::Tag::Capture).
+    pub capture: Option<Vec<u8>>,
+}
+
+/// The published probe: a spacing of 1.5, and 10 units per second.
+impl Default for Stated {
+    fn default() -> Self {
+        Self { spacing: 1.5, speed: 10.0, probe: None, noise: None, capture: None }
+    }
 }
 
 impl Default for Settings {
@@ -106,6 +131,7 @@ impl Default for Settings {
             max_touches: 200,
             priors: None,
             scales: None,
+            stated: Stated::default(),
         }
     }
 }
@@ -188,7 +214,7 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
         .ok_or_else(|| Error::setting("error_rate", error_rate, "a number of at least 1e-15 and below 0.5"))
 }
 
-/// Compiles an ensemble. The model states the ensemble's own probe, or the published one where the ensemble states none.
+/// Compiles an ensemble. The model states the probe of the settings.
 ///
 /// # Errors
 /// [`CompileProblem`] for an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
@@ -250,7 +276,7 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
 }
 
 /// The ensemble's trees in the order in which a model with such leaves has them.
-pub(crate) fn order_of_trees(ensemble: &Ensemble, leaf: Leaf) -> Result<Vec<usize>> {
+pub fn order_of_trees(ensemble: &Ensemble, leaf: Leaf) -> Result<Vec<usize>> {
     let ensemble = range::scaled(ensemble);
     let forest = Forest::new(&ensemble, None)?;
     let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;

@@ -1,18 +1,30 @@
 //! A compiled model over rows compared with its ensemble, and with the library that trained it: on given rows, and on rows
 //! made at every threshold.
 
-use super::isolated::first_different_tree;
-use super::predict::class_of;
-use super::reference::Reference;
-pub use super::reference::{bound, margins, unit};
-use super::together::margins_of_rows;
+mod candidate;
+mod estimate;
+mod isolated;
+pub mod predict;
+mod reference;
+mod score;
+pub mod together;
+
+pub use candidate::Candidate;
+pub use estimate::Estimate;
+pub use reference::{bound, margins, unit};
+pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
+
 use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
 use crate::progress::{self, Progress};
 use crate::rows::{Encoder, Rows, generate};
+use isolated::first_different_tree;
 use palpate_onboard::Model;
 use palpate_shared::format::LeafType;
+use predict::class_of;
 use rayon::prelude::*;
+use reference::Reference;
+use together::margins_of_rows;
 
 /// How far a model is from what it was made of.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]

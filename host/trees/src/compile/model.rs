@@ -1,8 +1,6 @@
 //! Compiled models, opened.
 
-use crate::ensemble::compiled_trained_on;
 use crate::error::{CompileProblem, Error, Place, Result};
-use crate::touches::Dataset;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{Axis, HEADER_LENGTH, Layout};
 use std::path::{Path, PathBuf};
@@ -10,8 +8,8 @@ use std::path::{Path, PathBuf};
 /// A compiled model that was checked: its bytes, and the file that they came from.
 ///
 /// ```no_run
-/// # fn main() -> palpate::Result<()> {
-/// let compiled = palpate::compile::CompiledModel::read("model.palpate")?;
+/// # fn main() -> palpate_trees::Result<()> {
+/// let compiled = palpate_trees::compile::CompiledModel::read("model.palpate")?;
 /// println!("{} bytes, knows {}", compiled.bytes().len(), compiled.names().join(", "));
 /// # Ok(())
 /// # }
@@ -38,7 +36,7 @@ impl CompiledModel {
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub(crate) fn from_file(path: &Path, bytes: Vec<u8>) -> Result<Self> {
+    pub fn from_file(path: &Path, bytes: Vec<u8>) -> Result<Self> {
         match Model::new(&bytes) {
             Ok(_) => Ok(Self { path: Some(path.into()), bytes }),
             Err(error) => {
@@ -76,13 +74,6 @@ impl CompiledModel {
     /// The model's bytes, kept.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
-    }
-
-    /// The objects whose touches in `dataset` the model was trained on, as far as it states that: what it does on them says
-    /// nothing about others. Of other touches, one object in 65,536 is taken for one of these.
-    pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
-        let stated = self.model().trained_capture();
-        stated.map_or_else(Vec::new, |stated| compiled_trained_on(&stated, &self.names(), dataset))
     }
 
     /// The names of the objects that the model knows, in its order.

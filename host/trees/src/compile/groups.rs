@@ -20,7 +20,7 @@ pub(super) fn groups_and_splits<'m>(model: &Model<'m>) -> (Vec<Group>, &'m [u8])
 }
 
 /// The groups of a model, and how many leaves each of their trees has, in the model's order. Tables have no groups.
-pub(crate) fn leaves_of_trees(model: &Model<'_>) -> Vec<(Group, Vec<usize>)> {
+pub fn leaves_of_trees(model: &Model<'_>) -> Vec<(Group, Vec<usize>)> {
     let (groups, mut rest) = groups_and_splits(model);
     let size = if model.layout() == Layout::Wide { 6 } else { 3 };
     let mut leaves = |group: &Group| {
