@@ -151,7 +151,7 @@ pub(super) fn worse(objects: &BTreeMap<String, OfObject>, rate: f64) -> Vec<Wors
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or the data set lacks an
 /// object; as [`Margins::new`](crate::evaluate::Margins::new) for touches that the model cannot use;
-/// [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges;
+/// [`Setting`](crate::error::Setting) for settings out of their ranges;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn calibrate(
     model: &Model<'_>,

@@ -176,7 +176,7 @@ impl<'m> Margins<'m> {
     /// they cannot be recognized, and are not tested.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) `prior` unless there is a weight for each object, and one of
+    /// [`Setting`](crate::error::Setting) `prior` unless there is a weight for each object, and one of
     /// a tested object is above 0.
     pub fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
         let objects = self.objects.len();

@@ -40,6 +40,7 @@ pub mod compare;
 mod cost_of_noise;
 mod curve;
 mod draws;
+mod error;
 mod full;
 mod margins;
 pub mod model_file;
@@ -60,6 +61,7 @@ pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
+pub use error::EvaluateProblem;
 pub use margins::Margins;
 pub(crate) use margins::OfTouches;
 #[cfg(feature = "train")]
@@ -168,7 +170,7 @@ pub struct Evaluation {
 /// Evaluates a model on test touches.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting): `at` if a number of touches is 0 or more than an object has,
+/// [`Setting`](crate::error::Setting): `at` if a number of touches is 0 or more than an object has,
 /// `groups` if there are none, `error_rate` and `max_touches` if they are out of their ranges.
 pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation> {
     let most = settings.at.iter().copied().max().unwrap_or(0);

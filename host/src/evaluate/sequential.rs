@@ -94,7 +94,7 @@ impl Margins<'_> {
     /// Pushes random sequences of each object's touches into a recognizer until it stops.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) if there are no sequences, or the error rate or the limit of
+    /// [`Setting`](crate::error::Setting) if there are no sequences, or the error rate or the limit of
     /// touches is out of its range.
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
         let SequentialSettings { sequences, seed, .. } = *settings;

@@ -61,7 +61,7 @@ impl Margins<'_> {
     /// [`Forgetting`] at `nats`.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) as [`Margins::sequential`], and `switch` if `nats` is not above
+    /// [`Setting`](crate::error::Setting) as [`Margins::sequential`], and `switch` if `nats` is not above
     /// 0; [`EvaluateProblem::NotCompiled`] for an ensemble, [`EvaluateProblem::NothingToSwitch`] for a data set of one
     /// object.
     pub fn switched(&self, settings: &SequentialSettings, nats: f32) -> Result<Switched> {

@@ -133,7 +133,7 @@ impl Supply {
 /// this test and does not hold with it: the model states it no more. [`calibrate_with_promise`] finds both.
 ///
 /// # Errors
-/// [`EvaluateProblem`] as for an evaluation, and for too few touches; [`Problem::Setting`](crate::error::Problem::Setting)
+/// [`EvaluateProblem`] as for an evaluation, and for too few touches; [`Setting`](crate::error::Setting)
 /// for shares that are none.
 pub fn calibrate(
     model: &Model<'_>,

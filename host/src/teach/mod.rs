@@ -14,6 +14,7 @@ mod balance;
 mod check;
 mod column;
 mod curve;
+mod error;
 mod held_out;
 mod promise;
 mod rows;
@@ -22,6 +23,7 @@ mod tests;
 
 pub use alone::alone;
 pub use curve::{Curve, Point};
+pub use error::TeachProblem;
 pub use promise::Needed;
 
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
@@ -137,7 +139,7 @@ pub struct TaughtObject {
 /// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
 /// is known already, if touches are missing or too few, have no pose, or are not every approach;
 /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if probes do;
-/// [`Problem::Setting`](crate::error::Problem::Setting); [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Setting`](crate::error::Setting); [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn teach(
     ensemble: &Ensemble,
     known: &Dataset,

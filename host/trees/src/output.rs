@@ -133,7 +133,7 @@ fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>
 /// Refuses to write onto what is being read: the file `output` must be none of the `inputs`.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting), `output`.
+/// [`Setting`](crate::error::Setting), `output`.
 pub fn refuse_input<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>) -> Result<()> {
     let Ok(written) = output.canonicalize() else { return Ok(()) };
     let is_written = |input: P| written.is_file() && input.as_ref().canonicalize().is_ok_and(|input| input == written);
@@ -146,7 +146,7 @@ pub fn refuse_input<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Ite
 /// Refuses `-` where a directory belongs.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting), `output`.
+/// [`Setting`](crate::error::Setting), `output`.
 pub fn refuse_stdout(directory: &Path) -> Result<()> {
     if is_stdout(directory) {
         return Err(Error::setting("output", "standard output", "a directory: several files are written"));

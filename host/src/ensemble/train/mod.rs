@@ -158,7 +158,7 @@ impl Settings {
 /// of threads. Progress is counted in rounds.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) if a setting is out of its range; [`EnsembleProblem`] if there are
+/// [`Setting`](crate::error::Setting) if a setting is out of its range; [`EnsembleProblem`] if there are
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {

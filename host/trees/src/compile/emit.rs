@@ -145,7 +145,7 @@ fn identifier(name: &str) -> String {
 mod tests {
     use super::*;
 
-    const HOUSEHOLD: &[u8] = include_bytes!("../../../models/household.palpate");
+    const HOUSEHOLD: &[u8] = include_bytes!("../../../../models/household.palpate");
 
     /// The numbers between the last `open` and the end.
     fn numbers(source: &str, open: &str) -> Vec<u8> {

@@ -39,6 +39,7 @@ mod axes;
 mod cells;
 mod cost;
 mod emit;
+mod error;
 mod fit;
 mod forest;
 mod groups;
@@ -58,6 +59,7 @@ mod write;
 
 pub use cost::{Core, Instructions, Memory};
 pub use emit::{Language, emit};
+pub use error::CompileProblem;
 pub use fit::compile_within;
 pub use groups::leaves_of_trees;
 pub use model::{CompiledModel, longest_time, names, open};
@@ -66,7 +68,7 @@ pub use restate::{Restated, RestatedSection, restate};
 pub use share::{different_leaves, unshared};
 
 use crate::ensemble::Ensemble;
-use crate::error::{CompileProblem, Error, Result};
+use crate::error::{Error, Result};
 use axes::Axes;
 use cells::Cells;
 use forest::Forest;
@@ -205,7 +207,7 @@ pub struct Compiled {
 /// When recognizers stop.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) `error_rate` or `max_touches`, whichever is out of its range.
+/// [`Setting`](crate::error::Setting) `error_rate` or `max_touches`, whichever is out of its range.
 pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
     if max_touches == 0 {
         return Err(Error::setting("max_touches", 0, "at least 1"));
@@ -219,7 +221,7 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 /// # Errors
 /// [`CompileProblem`] for an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
 /// that fall together when rounded to whole numbers, more of something than the format can count, or that does not fit
-/// the layout asked for; [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges.
+/// the layout asked for; [`Setting`](crate::error::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let original = ensemble;
     let ensemble = &*range::scaled(ensemble);

@@ -50,7 +50,7 @@ pub(super) fn share(parts: &Parts, leaf: LeafType, objects: usize) -> Option<Par
 /// Its margins are the same.
 ///
 /// # Errors
-/// [`Problem::Compile`](crate::error::Problem::Compile) for more than 4 GB.
+/// [`CompileProblem`](crate::error::CompileProblem) for more than 4 GB.
 pub fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
     let Some(shared) = model.shared_leaves() else { return Ok(None) };
     let (bytes, header) = (model.bytes(), model.header());

@@ -1,8 +1,8 @@
 use super::*;
-use crate::ensemble::{Inputs, Node, Origin, Output, StatedProbe, Tree};
-use crate::error::{Problem, TreeProblem};
-use crate::probe::approach::Probe;
+use crate::ensemble::{Inputs, Node, Origin, Output, Tree};
+use crate::error::{Setting, TreeProblem};
 use palpate_onboard::ModelError;
+use palpate_shared::format::Length;
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
 fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
@@ -45,10 +45,8 @@ fn with(layout: Option<Layout>, leaf: Leaf) -> Settings {
 }
 
 fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
-    match compile(ensemble, settings).unwrap_err() {
-        Error::At { problem: Problem::Compile(problem), .. } => problem,
-        other => panic!("{other}"),
-    }
+    let error = compile(ensemble, settings).unwrap_err();
+    error.problem::<CompileProblem>().unwrap_or_else(|| panic!("{error}")).clone()
 }
 
 /// What setting was refused.
@@ -56,7 +54,7 @@ fn setting(settings: &Settings) -> &'static str {
     let error = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), settings).unwrap_err();
     assert_eq!(error.exit_code(), 2);
     match error.problem() {
-        Some(Problem::Setting { name, .. }) => name,
+        Some(Setting { name, .. }) => name,
         other => panic!("{other:?}"),
     }
 }
@@ -178,7 +176,7 @@ fn the_header_says_what_was_compiled() {
     // Which ensemble it was, wherever that came from.
     let hash = |ensemble: &Ensemble| open(&compile(ensemble, &settings).unwrap().bytes).unwrap().header().ensemble();
     let first = hash(&ensemble);
-    ensemble.origin.touches.insert("bowl".into(), 7);
+    ensemble.origin.attributes.insert("palpate_touches".into(), "{}".into());
     assert_eq!(hash(&ensemble), first);
     ensemble.base_margins[0] = 0.25;
     assert_ne!(hash(&ensemble), first);
@@ -186,16 +184,14 @@ fn the_header_says_what_was_compiled() {
 
 #[test]
 fn a_model_states_the_probe_of_its_touches_and_the_published_one_only_where_none_is_known() {
-    let mut ensemble = stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
-    let stated = |ensemble: &Ensemble| {
-        let compiled = compile(ensemble, &Settings::default()).unwrap();
+    let ensemble = stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
+    let header = |stated: Stated| {
+        let compiled = compile(&ensemble, &Settings { stated, ..Settings::default() }).unwrap();
         let model = open(&compiled.bytes).unwrap();
         (model.header().spacing(), model.header().speed())
     };
-    assert_eq!(stated(&ensemble), (1.5, 10.0));
-    let probe = Probe { spacing: 2.0, speed: 25.0, ..Probe::default() };
-    ensemble.origin.probe = Some(StatedProbe { probe, ..StatedProbe::default() });
-    assert_eq!(stated(&ensemble), (2.0, 25.0));
+    assert_eq!(header(Stated::default()), (1.5, 10.0));
+    assert_eq!(header(Stated { spacing: 2.0, speed: 25.0, ..Stated::default() }), (2.0, 25.0));
 }
 
 #[test]
@@ -274,7 +270,7 @@ fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
     compile(&rows, &Settings { leaf: Leaf::F32, ..Settings::default() }).unwrap();
     for scales in [vec![1.0], vec![1.0, 0.0], vec![f32::NAN, 1.0]] {
         let error = compile(&rows, &Settings { scales: Some(scales), ..Settings::default() }).unwrap_err();
-        assert!(matches!(error.problem(), Some(Problem::Setting { name: "scales", .. })), "{error}");
+        assert!(matches!(error.problem::<Setting>(), Some(Setting { name: "scales", .. })), "{error}");
     }
     // Whole thresholds, and halves between neighbors, are what trainers put between whole numbers.
     for step in [1.0, 0.5] {
@@ -299,7 +295,7 @@ fn a_compiled_model_opens_in_one_place_and_says_what_is_wrong_at_which_byte() {
     let error = CompiledModel::read(&path).unwrap_err();
     assert!(error.to_string().contains("model.palpate: byte 50: the model is truncated"), "{error}");
     for error in [error, CompiledModel::from_bytes(cut.to_vec()).unwrap_err(), open(cut).map(|_| ()).unwrap_err()] {
-        assert_eq!(error.problem(), Some(&problem.clone().into()));
+        assert_eq!(error.problem(), Some(&problem));
     }
 }
 
@@ -327,13 +323,14 @@ fn estimates_from_a_models_bytes_are_those_of_its_compilation() {
 #[test]
 fn what_is_read_from_a_model_is_found_behind_its_optional_sections() {
     let trees = (1..8).map(|splits| chain(splits, |number| number % 2)).collect();
-    let plain = ensemble(Descriptor::Curvature, trees);
-    let mut stated = plain.clone();
-    stated.origin.probe = Some(StatedProbe::default());
+    let ensemble = ensemble(Descriptor::Curvature, trees);
+    let probe = TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth };
     for &layout in Layout::ALL {
-        let [Ok(plain), Ok(stated)] =
-            [&plain, &stated].map(|ensemble| compile(ensemble, &with(Some(layout), Leaf::I16)))
-        else {
+        let compiled = |probe| {
+            let stated = Stated { probe, ..Stated::default() };
+            compile(&ensemble, &Settings { stated, ..with(Some(layout), Leaf::I16) })
+        };
+        let [Ok(plain), Ok(stated)] = [None, Some(probe)].map(compiled) else {
             continue;
         };
         assert!(stated.bytes.len() > plain.bytes.len());
@@ -443,9 +440,9 @@ fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
         let compiled = compile_within(&ensemble, &settings, most).unwrap();
         assert!(compiled.bytes.len() <= most && leaf_of(&compiled) == leaf, "{most}");
     }
-    let problem = compile_within(&ensemble, &settings, i8 - 1).unwrap_err().problem().cloned();
+    let problem = compile_within(&ensemble, &settings, i8 - 1).unwrap_err().problem::<CompileProblem>().cloned();
     let over = CompileProblem::OverBudget { bytes: i8, most: i8 - 1 };
-    assert_eq!(problem, Some(crate::error::Problem::Compile(over)));
+    assert_eq!(problem, Some(over));
 }
 
 /// Trees of three splits over the oriented touch's features, whose leaves are taken from the start of a sequence.

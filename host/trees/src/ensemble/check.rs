@@ -167,10 +167,7 @@ mod tests {
             change(&mut changed);
             let error = changed.save(&path).unwrap_err();
             assert!(error.to_string().contains("ensemble.json: ") && !path.exists(), "{error}");
-            match error.problem().unwrap() {
-                crate::error::Problem::Ensemble(problem) => problem.clone(),
-                other => panic!("{other:?}"),
-            }
+            error.problem::<EnsembleProblem>().unwrap_or_else(|| panic!("{error}")).clone()
         };
         let split =
             |left, right, feature, threshold| Node::Split { feature, threshold, missing_left: true, left, right };

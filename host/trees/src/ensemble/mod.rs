@@ -5,6 +5,7 @@
 //! chip reads.
 
 mod check;
+mod error;
 pub mod import;
 mod inputs;
 mod nodes;
@@ -13,6 +14,7 @@ mod xgboost;
 
 pub(crate) use check::check_leaf;
 pub use check::{MAX_FEATURES, MAX_OBJECTS, check_names};
+pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 pub use inputs::Inputs;
 pub use nodes::Threshold;
 pub use origin::{Imported, Origin, Trained};

@@ -1,11 +1,13 @@
 //! Rows of features, for models that other libraries trained: CSV files, and what a chip gets of a row.
 
+mod error;
 mod generate;
 pub mod scales;
 
+pub use error::RowsProblem;
 pub use generate::generate;
 
-use crate::error::{Error, Place, Result, RowsProblem};
+use crate::error::{Error, Place, Result};
 use palpate_onboard::Model;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Key, f32_key};

@@ -1,5 +1,6 @@
 //! What can be wrong with meshes and where they come from.
 
+use crate::error::Problem;
 use std::path::PathBuf;
 
 /// What can be wrong with meshes and where they come from.
@@ -146,9 +147,8 @@ fn variation(seed: &Option<u64>) -> String {
     seed.map_or("in its canonical proportions".into(), |seed| format!("with seed {seed}"))
 }
 
-impl MeshProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for MeshProblem {
+    fn fix(&self) -> String {
         match self {
             Self::NoSuchSource { builtin } => {
                 format!("Check the path, or give one of the built-in objects: {}.", builtin.join(", "))

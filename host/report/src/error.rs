@@ -1,5 +1,7 @@
 //! What can be wrong with the report and the main job.
 
+use palpate::error::Problem;
+
 /// What can be wrong with the report and the main job.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -43,9 +45,8 @@ pub enum ReportProblem {
     },
 }
 
-impl ReportProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for ReportProblem {
+    fn fix(&self) -> String {
         match self {
             Self::OneObject => "Give at least two objects.",
             Self::OtherResults { .. } => "Choose another directory, or force the replacement.",

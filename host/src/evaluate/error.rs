@@ -1,5 +1,6 @@
 //! What can be wrong with evaluating.
 
+use crate::error::Problem;
 use palpate_shared::Descriptor;
 
 /// What can be wrong with evaluating.
@@ -150,9 +151,8 @@ fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
     }
 }
 
-impl EvaluateProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for EvaluateProblem {
+    fn fix(&self) -> String {
         match self {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
             Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",

@@ -1,5 +1,7 @@
 //! What can be wrong with searching for a model.
 
+use crate::error::Problem;
+
 /// What can be wrong with searching for a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -47,9 +49,8 @@ pub enum TuneProblem {
     },
 }
 
-impl TuneProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for TuneProblem {
+    fn fix(&self) -> String {
         match self {
             Self::NothingFits { .. } => "Allow more bytes or more instructions.",
             Self::FewObjects { .. } => "Give two or more objects.",

@@ -1,5 +1,6 @@
 //! What can be wrong with data sets and files of touches.
 
+use crate::error::Problem;
 use std::path::PathBuf;
 
 /// What can be wrong with data sets and files of touches.
@@ -345,9 +346,8 @@ pub enum TouchesProblem {
     },
 }
 
-impl TouchesProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for TouchesProblem {
+    fn fix(&self) -> String {
         match self {
             Self::Fields { .. }
             | Self::NotANumber { .. }

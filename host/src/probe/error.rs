@@ -1,9 +1,11 @@
 //! What can be wrong with scenes, probes and casts.
 
+use crate::error::Problem;
+
 /// What can be wrong with scenes, probes and casts.
 ///
 /// What is wrong with a scene's mesh is a [`MeshProblem`](super::MeshProblem), what is wrong with a probe's measures a
-/// [`Problem::Setting`](super::Problem::Setting).
+/// [`Setting`](crate::error::Setting).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProbeProblem {
@@ -43,9 +45,8 @@ pub enum ProbeProblem {
     },
 }
 
-impl ProbeProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for ProbeProblem {
+    fn fix(&self) -> String {
         match self {
             Self::Differs { .. } => "Use both with the same probe: times mean something else with another.".into(),
             Self::BadFile { .. } => {

@@ -1,5 +1,7 @@
 //! What can be wrong with calibrating.
 
+use crate::error::Problem;
+
 /// What can be wrong with calibrating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -56,9 +58,8 @@ pub struct Supplied {
     pub fewest: u64,
 }
 
-impl CalibrateProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for CalibrateProblem {
+    fn fix(&self) -> String {
         match self {
             Self::TooFew { supplied: None, .. } => "Allow more sequences, or promise a higher error rate.",
             Self::TooFew { supplied: Some(_), .. } => "Record or capture more touches, or promise a higher error rate.",

@@ -1,6 +1,7 @@
 //! What can be wrong with compiling, and compiled models.
 
-use super::TreeProblem;
+use crate::error::Problem;
+use crate::error::TreeProblem;
 use palpate_onboard::ModelError;
 use palpate_shared::format::Layout;
 
@@ -104,9 +105,8 @@ fn limit(layout: Layout) -> &'static str {
     }
 }
 
-impl CompileProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for CompileProblem {
+    fn fix(&self) -> String {
         match self {
             Self::Model(ModelError::NotAModel) => "Give a file that `palpate export` wrote.",
             Self::Model(ModelError::Version(_)) => "Export the ensemble again with this version of palpate.",

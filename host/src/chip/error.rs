@@ -1,5 +1,6 @@
 //! What can be wrong with chips, real and emulated, and the line to them.
 
+use crate::error::Problem;
 use palpate_shared::link::{LinkError, Refusal};
 use std::path::PathBuf;
 
@@ -135,9 +136,8 @@ fn after_colon(said: &str) -> String {
     if said.trim().is_empty() { String::new() } else { format!(": {}", said.trim()) }
 }
 
-impl ChipProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for ChipProblem {
+    fn fix(&self) -> String {
         match self {
             Self::NotAPort { .. } => "Give a serial port, tcp://HOST:PORT or emulator.",
             Self::NotFaults { .. } => "Give three probabilities and milliseconds, as in 0.001,0.001,0.01,5.",

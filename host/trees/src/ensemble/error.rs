@@ -1,5 +1,6 @@
 //! What can be wrong with ensembles, their files and their training.
 
+use crate::error::Problem;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
@@ -360,9 +361,8 @@ fn bad_name(name: &str, why: NameProblem) -> String {
     }
 }
 
-impl EnsembleProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for EnsembleProblem {
+    fn fix(&self) -> String {
         match self {
             Self::Unsupported { way, .. } => way.clone(),
             Self::Damaged { .. } => "Save the model again with the library that trained it.".into(),

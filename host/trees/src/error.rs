@@ -1,13 +1,10 @@
 //! What can go wrong, said so that the user knows where and what to do next.
 
-mod compile;
-mod ensemble;
-mod rows;
+pub use crate::compile::CompileProblem;
+pub use crate::ensemble::{EnsembleProblem, NameProblem, TreeProblem};
+pub use crate::rows::RowsProblem;
 
-pub use compile::CompileProblem;
-pub use ensemble::{EnsembleProblem, NameProblem, TreeProblem};
-pub use rows::RowsProblem;
-
+use std::any::Any;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -58,40 +55,37 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong: one kind for each room of the crate. Its `Display` says what is wrong, without a full stop;
-/// [`fix`](Self::fix) says what to do.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Problem {
-    /// A setting is out of its range: a mistake of the caller, not of the data.
-    #[error("{name} is {value}")]
-    Setting {
-        /// The setting's name: the field in its `Settings`.
-        name: &'static str,
-        /// What it was set to.
-        value: String,
-        /// What it may be: "1 to 10000".
-        allowed: String,
-    },
-    /// With ensembles, their files and their training.
-    #[error(transparent)]
-    Ensemble(#[from] EnsembleProblem),
-    /// With compiling, and compiled models.
-    #[error(transparent)]
-    Compile(#[from] CompileProblem),
-    /// With rows of features, and models over them.
-    #[error(transparent)]
-    Rows(#[from] RowsProblem),
+/// Something that is wrong with what was given. Each room has an enum of its own, with a variant for whatever a caller may
+/// act on. Its `Display` says what is wrong, without a full stop.
+pub trait Problem: std::error::Error + Any + Send + Sync {
+    /// What to do about it, as a sentence.
+    fn fix(&self) -> String;
+
+    /// The exit code of a program that ends with it: 1 for bad input, 2 for bad arguments.
+    fn exit_code(&self) -> u8 {
+        1
+    }
 }
 
-impl Problem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
-        match self {
-            Self::Setting { allowed, .. } => format!("Use {allowed}."),
-            Self::Ensemble(problem) => problem.fix(),
-            Self::Compile(problem) => problem.fix(),
-            Self::Rows(problem) => problem.fix(),
-        }
+/// A setting is out of its range: a mistake of the caller, not of the data.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{name} is {value}")]
+pub struct Setting {
+    /// The setting's name: the field in its `Settings`.
+    pub name: &'static str,
+    /// What it was set to.
+    pub value: String,
+    /// What it may be: "1 to 10000".
+    pub allowed: String,
+}
+
+impl Problem for Setting {
+    fn fix(&self) -> String {
+        format!("Use {}.", self.allowed)
+    }
+
+    fn exit_code(&self) -> u8 {
+        2
     }
 }
 
@@ -116,7 +110,7 @@ pub enum Error {
         /// Where.
         place: Place,
         /// What.
-        problem: Problem,
+        problem: Box<dyn Problem>,
     },
     /// The caller cancelled the work through its [`Progress`](crate::progress::Progress).
     #[error("cancelled")]
@@ -126,33 +120,28 @@ pub enum Error {
     Closed,
 }
 
-/// Problems that no path names.
-macro_rules! problems {
-    ($($problem:ty),*) => {
-        $(impl From<$problem> for Error {
-            fn from(problem: $problem) -> Self {
-                Self::at(Place::Nowhere, problem)
-            }
-        })*
-    };
+/// A problem that no path names.
+impl<P: Problem> From<P> for Error {
+    fn from(problem: P) -> Self {
+        Self::at(Place::Nowhere, problem)
+    }
 }
-problems!(Problem, EnsembleProblem, CompileProblem, RowsProblem);
 
 impl Error {
     /// Something is wrong at a place.
-    pub fn at(place: Place, problem: impl Into<Problem>) -> Self {
-        Self::At { place, problem: problem.into() }
+    pub fn at(place: Place, problem: impl Problem) -> Self {
+        Self::At { place, problem: Box::new(problem) }
     }
 
     /// The setting `name` is `value`, which is not among what is `allowed` ("1 to 10000").
     pub fn setting(name: &'static str, value: impl fmt::Display, allowed: impl Into<String>) -> Self {
-        Problem::Setting { name, value: value.to_string(), allowed: allowed.into() }.into()
+        Setting { name, value: value.to_string(), allowed: allowed.into() }.into()
     }
 
-    /// What is wrong, where the library found it in what it was given.
-    pub fn problem(&self) -> Option<&Problem> {
+    /// What is wrong, if it is a problem of this kind: `error.problem::<Setting>()`.
+    pub fn problem<P: Problem>(&self) -> Option<&P> {
         match self {
-            Self::At { problem, .. } => Some(problem),
+            Self::At { problem, .. } => (problem.as_ref() as &dyn Any).downcast_ref(),
             _ => None,
         }
     }
@@ -175,7 +164,7 @@ impl Error {
     /// Says which file wrong data came from; other errors stay as they are.
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         match self {
-            Self::At { place: Place::Nowhere, problem } => Self::at(Place::file(path), problem),
+            Self::At { place: Place::Nowhere, problem } => Self::At { place: Place::file(path), problem },
             other => other,
         }
     }
@@ -183,7 +172,7 @@ impl Error {
     /// The program's exit code: 1 for bad input, 2 for bad arguments, 0 when the reader of stdout went away.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::At { problem: Problem::Setting { .. }, .. } => 2,
+            Self::At { problem, .. } => problem.exit_code(),
             Self::Closed => 0,
             _ => 1,
         }

@@ -1,5 +1,7 @@
 //! What can be wrong with drawing.
 
+use palpate::error::Problem;
+
 /// What can be wrong with drawing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -26,9 +28,8 @@ pub enum PageProblem {
     },
 }
 
-impl PageProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for PageProblem {
+    fn fix(&self) -> String {
         match self {
             Self::Chart { .. } | Self::Csv { .. } | Self::Scene { .. } => "Report this as a bug.".into(),
         }

@@ -1,5 +1,6 @@
 //! What can be wrong with teaching objects from recorded touches.
 
+use crate::error::Problem;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
@@ -66,9 +67,8 @@ pub enum TeachProblem {
     },
 }
 
-impl TeachProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for TeachProblem {
+    fn fix(&self) -> String {
         match self {
             Self::NotOfTouches => "Give an ensemble that was trained on touches.",
             Self::OneValue => "Train with leaves that hold a value for each object, as the preset compact does.",

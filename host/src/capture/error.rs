@@ -1,6 +1,6 @@
 //! What can be wrong with captures.
 
-use super::Problem;
+use crate::error::Problem;
 use std::io::ErrorKind;
 
 /// What can be wrong with captures.
@@ -8,12 +8,14 @@ use std::io::ErrorKind;
 #[non_exhaustive]
 pub enum CaptureProblem {
     /// An object's mesh makes no scene.
-    #[error("{name}: {problem}")]
+    #[error("{name}: {detail}")]
     Object {
         /// The object.
         name: String,
         /// What is wrong with it.
-        problem: Box<Problem>,
+        detail: String,
+        /// What to do about it, as a sentence.
+        fix: String,
     },
     /// An object is to be touched at its true size, which is not known.
     #[error("{name}: the unit of its mesh is not known, and so its true size is not")]
@@ -129,11 +131,10 @@ pub enum CaptureProblem {
     WorkerStopped,
 }
 
-impl CaptureProblem {
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for CaptureProblem {
+    fn fix(&self) -> String {
         match self {
-            Self::Object { problem, .. } => return problem.fix(),
+            Self::Object { fix, .. } => return fix.clone(),
             Self::Untouchable { .. } => {
                 "Leave the object out, or give a larger radius, a smaller spacing or a greater length."
             }

@@ -1,5 +1,6 @@
 //! What can be wrong with rows of features, and with comparing models on them.
 
+use crate::error::Problem;
 use crate::verify::ClassDiffers;
 
 /// What `verify` compares with.
@@ -118,9 +119,10 @@ impl RowsProblem {
     pub fn is_about_margins(&self) -> bool {
         matches!(self, Self::MarginRows { .. } | Self::MarginColumns { .. } | Self::Probabilities)
     }
+}
 
-    /// What to do about it, as a sentence.
-    pub fn fix(&self) -> String {
+impl Problem for RowsProblem {
+    fn fix(&self) -> String {
         match self {
             Self::NotRows { .. } => "Give a header line with the features' names, then one row per line.",
             Self::Empty => "Give at least one row below the header.",
