@@ -27,7 +27,7 @@ def to_ensemble(
     value in training, beside NaN: XGBoost's boosters and files do not hold it, its estimators do. `Ensemble.notes` says what
     to know about the trees.
 
-    Models are told apart by their class. Any other class, and one that is derived from these, is refused by name: it may
+    Models are identified by their exact class. Any other class, and one that is derived from these, is refused by name: it may
     predict in another way.
     """
     given = None if names is None else list(names)
