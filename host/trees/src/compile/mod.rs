@@ -147,8 +147,8 @@ impl Settings {
     }
 }
 
-/// Models of more objects than this are usually compiled with leaves of one byte: `docs/growth.md` has what that saves and
-/// what it costs.
+/// Models of more objects than this are usually compiled with leaves of one byte: `docs/measurements/growth.md`
+/// has what that saves and what it costs.
 pub const MANY: usize = 50;
 
 /// What a layout is chosen for.
