@@ -1,6 +1,6 @@
 //! From touches to an ensemble.
 //!
-//! The trainer ([`boost`]) is gradient boosting with softmax loss over histograms, XGBoost's algorithm and parameters. Two
+//! The trainer ([`palpate_trees::train`]) is gradient boosting with softmax loss over histograms, XGBoost's algorithm and parameters. Two
 //! presets: the published method, and a compact one, whose trees hold one leaf value for each object, so that one walk through a
 //! tree serves all objects.
 //!
@@ -18,11 +18,11 @@ use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::format::{Counted, TrainedTouches};
 use palpate_shared::{Descriptor, Patterns, Touch};
+use palpate_trees::train as boost;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 
-mod boost;
 mod small;
 #[cfg(feature = "xgboost")]
 mod xgboost;

@@ -26,45 +26,63 @@ const BLOCK: usize = 1024;
 
 /// Rows of features, each of a class.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rows<'r> {
+pub struct Rows<'r> {
     /// Rows × columns; NaN where missing.
-    pub(crate) features: &'r [f32],
+    pub features: &'r [f32],
     /// Features of a row; at least one.
-    pub(crate) columns: usize,
+    pub columns: usize,
     /// Each row's class.
-    pub(crate) labels: &'r [u32],
+    pub labels: &'r [u32],
     /// Each row's weight, above 0; 1 where there are none.
-    pub(crate) weights: Option<&'r [f32]>,
+    pub weights: Option<&'r [f32]>,
 }
 
 /// Parameters of trees. Names and meanings are XGBoost's.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Parameters {
+pub struct Parameters {
     /// Leaves hold a value for each class (a tree for each round) instead of one (a tree for each class and round).
-    pub(crate) multi_output: bool,
+    pub multi_output: bool,
     /// Boosting rounds.
-    pub(crate) rounds: usize,
+    pub rounds: usize,
     /// `max_depth`: 1 to 16.
-    pub(crate) depth: usize,
+    pub depth: usize,
     /// `eta`: the share of each tree that is added.
-    pub(crate) eta: f32,
+    pub eta: f32,
     /// `min_child_weight`: the least sum of second derivatives in a leaf; where it holds several values, their mean.
-    pub(crate) min_child_weight: f32,
+    pub min_child_weight: f32,
     /// `max_bin`: the most bins of a column; at least 2.
-    pub(crate) bins: usize,
+    pub bins: usize,
     /// `base_score`: the margin of every class without any tree.
-    pub(crate) base_margin: f32,
+    pub base_margin: f32,
 }
 
 /// Reasons for which no trees are grown.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Failure {
+pub enum Failure {
     /// Numbers of features, labels and weights that do not go with each other.
     #[error("{rows} labels need as many rows of {columns} features, and as many weights if there are any")]
-    Shape { rows: usize, columns: usize },
+    Shape {
+        /// Labels.
+        rows: usize,
+        /// Features of a row.
+        columns: usize,
+    },
+    /// A parameter out of its range.
+    #[error("{name} is not {allowed}")]
+    Parameter {
+        /// The parameter's name.
+        name: &'static str,
+        /// What it may be.
+        allowed: &'static str,
+    },
     /// A feature that is too large or not a number, a class that there is not, or a weight that is not above 0.
     #[error("row {row} has a {what}")]
-    Row { row: usize, what: &'static str },
+    Row {
+        /// The row, counted from 0.
+        row: usize,
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// No threads could be had.
     #[error("{0}")]
     Threads(String),
@@ -79,7 +97,7 @@ pub(crate) enum Failure {
 ///
 /// # Errors
 /// [`Failure`].
-pub(crate) fn train(
+pub fn train(
     rows: Rows<'_>,
     classes: usize,
     parameters: &Parameters,
@@ -87,6 +105,7 @@ pub(crate) fn train(
     on_round: &(dyn Fn() -> ControlFlow<()> + Sync),
 ) -> Result<(Vec<f32>, Vec<Tree>), Failure> {
     rows.check(classes)?;
+    parameters.check()?;
     let train = || boost(&rows, classes, parameters, on_round);
     let trees = match threads.map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build()) {
         None => train(),
@@ -94,6 +113,22 @@ pub(crate) fn train(
         Some(Err(error)) => Err(Failure::Threads(error.to_string())),
     };
     Ok((vec![parameters.base_margin; classes], trees?))
+}
+
+impl Parameters {
+    fn check(&self) -> Result<(), Failure> {
+        let refused = |name, allowed| Err(Failure::Parameter { name, allowed });
+        match self {
+            _ if !(1..=16).contains(&self.depth) => refused("depth", "1 to 16"),
+            _ if !(2..=65_536).contains(&self.bins) => refused("bins", "2 to 65536"),
+            _ if !(self.eta > 0.0 && self.eta <= 1.0) => refused("eta", "above 0 and at most 1"),
+            _ if !(self.min_child_weight >= 0.0 && self.min_child_weight.is_finite()) => {
+                refused("min_child_weight", "a number of at least 0")
+            }
+            _ if !self.base_margin.is_finite() => refused("base_margin", "a number"),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Rows<'_> {
