@@ -3,8 +3,9 @@
 use super::nodes::Threshold;
 use crate::error::{ProbeProblem, Result};
 use crate::probe::approach::Probe;
-use crate::touches::noise::Noise;
-use crate::touches::{self, Captured, Dataset, short, tenth, unit};
+use crate::probe::noise::Noise;
+use crate::probe::unit::{self, tenth};
+use crate::touches::{self, Captured, Dataset, short};
 use palpate_shared::format::{
     Counted, Length, PatternShares, Prediction, TrainedCapture, TrainedProbe, TrainedTouches,
 };

@@ -407,7 +407,7 @@ fn needed(accuracy: &BTreeMap<usize, Estimate>, wanted: f64) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::error::Problem;
-    use crate::touches::noise::Noise;
+    use crate::probe::noise::Noise;
     use crate::touches::synthetic;
 
     fn shifted(dataset: &Dataset, noise: &Noise) -> Dataset {

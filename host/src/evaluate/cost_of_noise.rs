@@ -3,7 +3,7 @@
 use super::{Candidate, Margins, add_noise};
 use crate::ensemble::train::{self, train};
 use crate::error::Result;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use crate::touches::{Dataset, folds};
 use serde::Serialize;
 

@@ -83,7 +83,7 @@ pub use switch::{Rule, Stopped, Switched};
 pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use palpate_shared::ContactPattern;
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Test touches with noise.
 
 use crate::error::Result;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 
 /// The most robots whose biases are drawn.

@@ -3,7 +3,7 @@
 use super::estimate::Estimate;
 use super::margins::{Candidate, Margins};
 use super::sequential::Outcome;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{Counted, Per};
 use serde::Serialize;

@@ -25,7 +25,7 @@
 
 use crate::error::{Error, Place, ProbeProblem, Result, TouchesProblem};
 use crate::probe::approach::{FINGERS, Probe};
-use crate::touches::noise::{Deviation, Noise, quantity};
+use crate::probe::noise::{Deviation, Noise, quantity};
 use palpate_shared::format::Length;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
@@ -45,7 +45,7 @@ pub struct ProbeFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    #[serde(default = "crate::touches::tenth", with = "crate::touches::unit")]
+    #[serde(default = "super::unit::tenth", with = "super::unit")]
     unit: Length,
     radius: f64,
     spacing: f64,

@@ -8,8 +8,8 @@ use palpate::calibrate::{self, Calibrated, Per, Settings, Worse};
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::strangers;
-use palpate::touches::noise::Noise;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -11,7 +11,7 @@
 //! | `palpate_descriptor` | the descriptor's name; absent for an ensemble over rows |
 //! | `palpate_objects` | a JSON array of the objects' names, in the order of the labels |
 //! | `palpate_probe` | optional: the probe of the training touches, a JSON object of `radius`, `spacing`, `speed`, `tilt` and `length` |
-//! | `palpate_noise` | optional: what was added to the training touches ([`Noise`](crate::touches::noise::Noise)), a JSON object |
+//! | `palpate_noise` | optional: what was added to the training touches ([`Noise`](crate::probe::noise::Noise)), a JSON object |
 //! | `palpate_background` | optional: `true` where the last object is a background, which is never named |
 //! | `palpate_prediction` | optional: what the library that trained an ensemble over rows makes of margins, and which numbers stand for a missing value there, a JSON object |
 //! | `palpate_captured` | optional: the capture of the training touches ([`Captured`](crate::touches::Captured)), a JSON object |

@@ -182,7 +182,7 @@ fn simulated(
     if settings.approaches < 1_000 {
         return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
     }
-    let real = crate::touches::noise::Noise::default();
+    let real = crate::probe::noise::Noise::default();
     let origin =
         Origin { approaches: true, touches: settings.approaches, seed: settings.seed, real, ..settings.origin.clone() };
     let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;

@@ -4,7 +4,7 @@
 //! same for all touches of one robot is a bias.
 //!
 //! ```
-//! use palpate::touches::noise::{Deviation, Noise};
+//! use palpate::probe::noise::{Deviation, Noise};
 //! use palpate_shared::Touch;
 //!
 //! let noise = Noise { deviation: "0..10ms".parse()?, timer: 1_000.0, ..Noise::default() };
@@ -313,7 +313,7 @@ impl Noise {
     }
 
     /// The same with touch i made by robot `robot(i)`.
-    pub(super) fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
+    pub(crate) fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
         // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
         // version 0.1.0, and no other setting changes it.
         let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
