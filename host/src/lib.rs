@@ -98,8 +98,6 @@ pub mod error;
 pub mod output;
 pub mod progress;
 pub mod random;
-#[cfg(all(test, feature = "train"))]
-mod repetitions;
 
 pub mod mesh;
 pub mod probe;
@@ -126,8 +124,8 @@ pub mod play;
 
 pub mod chip;
 
-#[cfg(all(test, feature = "objects", feature = "train"))]
-mod several_meshes;
+#[cfg(all(test, feature = "train"))]
+mod tests;
 
 pub use error::{Error, Result};
 pub use glam;

@@ -1,7 +1,5 @@
 //! The main job: capture, train, compile, recognize, report.
 
-#[cfg(test)]
-mod several_meshes;
 mod shown;
 
 pub use shown::text;
@@ -467,6 +465,8 @@ fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Re
 
 #[cfg(test)]
 mod tests {
+    mod several_meshes;
+
     use super::*;
     use palpate::error::{Error, Problem};
     use palpate::mesh::Mesh;

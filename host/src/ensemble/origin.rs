@@ -257,7 +257,7 @@ fn fingerprints(dataset: &Dataset) -> BTreeMap<String, u64> {
 #[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     #[test]
     fn training_touches_are_known_again_and_others_are_not() {

@@ -408,7 +408,7 @@ mod tests {
     use super::*;
     use crate::error::Problem;
     use crate::probe::noise::Noise;
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     fn shifted(dataset: &Dataset, noise: &Noise) -> Dataset {
         dataset.each(|own| own.noisy(noise, 3, 1))

@@ -28,7 +28,7 @@ mod tests {
     use super::*;
     use crate::ensemble::train::{Settings, train};
     use crate::evaluate::{Candidate, Margins};
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
     use std::collections::BTreeSet;
 
     #[test]

@@ -3,8 +3,8 @@ use crate::compile::{Settings as Compilation, compile};
 use crate::ensemble::train::{self, train, train_with_background};
 use crate::error::Problem;
 use crate::evaluate::{self, Margins, SequentialSettings};
-use crate::repetitions::{assert_rare, repetitions};
-use crate::touches::synthetic;
+use crate::tests::repetitions::{assert_rare, repetitions};
+use crate::tests::synthetic;
 use palpate_onboard::{Recognizer, Stopping, Verdict};
 use std::sync::LazyLock;
 

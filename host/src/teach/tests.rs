@@ -9,8 +9,8 @@ use crate::ensemble::train::{self, train, train_with_background};
 use crate::error::{Problem, TeachProblem};
 use crate::evaluate::{Candidate, Margins};
 use crate::probe::noise::Noise;
-use crate::repetitions::repetitions;
-use crate::touches::synthetic;
+use crate::tests::repetitions::repetitions;
+use crate::tests::synthetic;
 use palpate_shared::{Descriptor, Pose, Q15_ONE};
 use rand_distr::{Distribution, StandardNormal};
 

@@ -55,8 +55,6 @@ mod recording;
 mod save;
 mod seconds;
 mod shard;
-#[cfg(all(test, feature = "train"))]
-pub(crate) mod synthetic;
 pub mod text;
 mod warning;
 

@@ -11,10 +11,11 @@ use crate::ensemble::train::{self, train};
 use crate::error::{CalibrateProblem, Problem};
 use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings, compare};
 use crate::probe::noise::Noise;
-use crate::repetitions::{assert_rare, repetitions};
-use crate::touches::{Dataset, ObjectTouches, Source, folds, synthetic};
+use crate::tests::repetitions::{assert_rare, repetitions};
+use crate::tests::synthetic;
+use crate::touches::{Dataset, ObjectTouches, Source, folds};
 use crate::{strangers, teach, tune};
-use palpate_onboard::{Model, Stopping};
+use palpate_onboard::Stopping;
 use palpate_shared::format::Held;
 use std::sync::LazyLock;
 
