@@ -1,5 +1,4 @@
-//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]), and the
-//! one that recorded touches came from ([`fit`]).
+//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]).
 //!
 //! A family of ensembles is trained (trees, depth, eta; for the table layout bins of each feature), each compiled with
 //! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Among them are trees for
@@ -22,7 +21,6 @@
 //! ```
 
 mod family;
-pub mod fit;
 pub mod probe;
 #[cfg(test)]
 mod tests;

@@ -20,7 +20,7 @@
 //! ```no_run
 //! use palpate::mesh::source;
 //! use palpate::touches::Dataset;
-//! use palpate::tune::fit::{self, fit};
+//! use palpate::fit::{self, fit};
 //!
 //! # fn main() -> palpate::Result<()> {
 //! let objects = source::objects(&["meshes".into()])?;
