@@ -72,8 +72,8 @@ pub mod station;
 
 pub use bytes::{Aligned, ModelError};
 pub use decide::{
-    CapacityError, Fit, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
-    exp2_negative,
+    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping,
+    Verdict, exp2_negative,
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};

@@ -22,4 +22,4 @@ pub use recognizer::{CapacityError, Recognizer, Verdict};
 #[cfg(feature = "link")]
 pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;
-pub use strangers::Fit;
+pub use strangers::Familiarity;

@@ -7,7 +7,7 @@ use palpate::probe;
 use palpate::rows::{Encoder, feature_names};
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::ContactPattern;
-use palpate_shared::format::{FitTerms, Length, TrainedNoise, TrainedProbe};
+use palpate_shared::format::{Length, MisfitTerms, TrainedNoise, TrainedProbe};
 use std::collections::BTreeMap;
 
 #[derive(serde::Serialize)]
@@ -64,7 +64,7 @@ pub(super) struct Tested {
     pub(super) threshold: f64,
 }
 
-pub(super) fn tested(terms: &FitTerms) -> Tested {
+pub(super) fn tested(terms: &MisfitTerms) -> Tested {
     Tested {
         held: terms.held.name(),
         promised: f64::from(terms.alarms) / 1e6,
