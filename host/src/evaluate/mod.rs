@@ -32,10 +32,7 @@
 //! # }
 //! ```
 
-mod active;
 mod approaches;
-#[cfg(feature = "train")]
-pub mod compare;
 #[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
@@ -48,9 +45,10 @@ pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
-mod poses;
 pub mod predict;
 mod promise;
+#[cfg(feature = "train")]
+pub mod recorded;
 mod reference;
 mod rows;
 mod sequential;
@@ -59,10 +57,8 @@ mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 pub mod together;
-mod under_plan;
 pub mod verify;
 
-pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
@@ -72,15 +68,13 @@ pub use estimate::Estimate;
 pub(crate) use margins::best;
 pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
-pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
-pub use poses::{ByPose, Stock};
+pub use plan::{Active, ActiveFacts, ByPose, Hardest, LEAST_IN_POSE, Planned, Stock, evaluate_active, plan};
 pub use promise::{Finding, PromiseCheck, by_theory};
 pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 pub use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};
 pub use switch::{Rule, Stopped, Switched};
-pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
 use crate::probe::noise::Noise;

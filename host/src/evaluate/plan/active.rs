@@ -1,9 +1,9 @@
 //! Approaches where the model's plan says.
 
-use super::margins::{Candidate, Margins, Tested, Values, row};
 use super::poses::{ByPose, Stock};
-use super::sequential::Outcome;
 use crate::error::{EvaluateProblem, Result};
+use crate::evaluate::margins::{Candidate, Margins, Tested, Values, row};
+use crate::evaluate::sequential::Outcome;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Poses;
