@@ -95,8 +95,6 @@
 //! port and no trainer.
 
 pub mod error;
-pub mod output;
-pub mod progress;
 pub mod random;
 
 pub mod mesh;
@@ -108,7 +106,6 @@ pub mod capture;
 pub mod fit;
 
 pub mod ensemble;
-pub mod rows;
 
 pub mod compile;
 pub mod evaluate;
@@ -134,4 +131,5 @@ pub use error::{Error, Result};
 pub use glam;
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;
+pub use palpate_trees::{self as trees, output, progress, rows};
 pub use rand;

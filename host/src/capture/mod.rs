@@ -26,6 +26,7 @@
 //! ```
 
 mod admission;
+mod error;
 mod memory;
 mod pipeline;
 mod sample;
@@ -33,11 +34,12 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{CaptureProblem, Error, Result};
+use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Entry, ObjectTouches, Origin};
+pub use error::CaptureProblem;
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
@@ -73,7 +75,7 @@ impl Settings {
     /// Refuses settings that make no capture.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) naming the field.
+    /// [`Setting`](crate::error::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
         if self.threads == Some(0) {
             return Err(Error::setting("threads", 0, "1 or more, or none for all that the machine has"));
@@ -170,7 +172,8 @@ pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> 
         }
         Scene::new(&instance.mesh, length).map_err(|error| match error {
             Error::At { problem, .. } => {
-                CaptureProblem::Object { name: object.name.clone(), problem: Box::new(problem) }.into()
+                let (detail, fix) = (problem.to_string(), problem.fix());
+                CaptureProblem::Object { name: object.name.clone(), detail, fix }.into()
             }
             other => other.in_file(&object.name),
         })

@@ -1,5 +1,5 @@
 use super::*;
-use crate::error::Problem;
+
 use crate::mesh::Mesh;
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, Listing, Shard};
@@ -196,10 +196,7 @@ fn refusal(objects: &[Object], settings: &Settings, directory: &Path) -> Capture
     let error = capture(objects, settings, directory, &()).unwrap_err();
     assert_eq!(error.exit_code(), 1);
     assert_eq!(read_files(directory), before, "what is there must stay");
-    match error {
-        Error::At { problem: Problem::Capture(problem), .. } => problem,
-        other => panic!("{other}"),
-    }
+    error.problem::<CaptureProblem>().unwrap_or_else(|| panic!("{error}")).clone()
 }
 
 fn globe_called(name: &str) -> Object {
@@ -473,9 +470,9 @@ fn an_object_at_its_true_size_is_scaled_to_millimeters() {
     let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 10.0 };
     let origin = Origin { unit, probe, ..origin(50) };
     let mut object = Object::new("globe", Mesh::globe(12));
-    let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem().cloned();
+    let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem::<CaptureProblem>().cloned();
     let unknown = problem(scenes(&[&object], &origin, &()));
-    assert_eq!(unknown, Some(Problem::Capture(CaptureProblem::NoTrueSize { name: "globe".into() })));
+    assert_eq!(unknown, Some(CaptureProblem::NoTrueSize { name: "globe".into() }));
     // Meters: about two of them.
     object.millimeters = Some(1_000.0);
     let [low, high] = scenes(&[&object], &origin, &()).unwrap()[0][0].bounds();

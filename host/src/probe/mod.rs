@@ -37,6 +37,7 @@
 
 pub mod approach;
 pub mod cast;
+mod error;
 pub mod file;
 pub mod noise;
 pub mod scene;
@@ -44,6 +45,7 @@ pub mod sweep;
 pub(crate) mod unit;
 
 pub use approach::{Aim, Approach, Probe};
+pub use error::ProbeProblem;
 pub use scene::Scene;
 
 /// The vectors in this room's signatures: [`DVec3`](glam::DVec3) for positions and directions, in units.

@@ -8,7 +8,7 @@ use crate::calibrate::{self, Odds, Per, Supply, Until, follow};
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train::{self, train};
-use crate::error::{CalibrateProblem, Problem};
+use crate::error::CalibrateProblem;
 use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings, recorded};
 use crate::probe::noise::Noise;
 use crate::tests::repetitions::{assert_rare, repetitions};
@@ -140,7 +140,7 @@ fn calibrated(dataset: Dataset, per: Per, seed: u64) -> calibrate::Calibrated {
 fn promised<T>(calibrated: crate::error::Result<T>) -> Option<T> {
     calibrated
         .map_err(|error| match error.problem() {
-            Some(Problem::Calibrate(CalibrateProblem::NotKept { .. })) => {}
+            Some(CalibrateProblem::NotKept { .. }) => {}
             _ => panic!("{error}"),
         })
         .ok()

@@ -4,7 +4,7 @@ mod files;
 
 use files::{channel, chunk, file, message, python, record, schema, touches};
 use palpate::chip::{Step, Steps};
-use palpate::error::{Error, Place, Problem, TouchesProblem};
+use palpate::error::{Error, Place, TouchesProblem};
 use palpate::touches::check::Check;
 use palpate::touches::mcap::{self, TOUCH, VERDICT, Writer};
 use palpate::touches::{
@@ -27,10 +27,10 @@ fn error(bytes: &[u8]) -> String {
 /// What is wrong with these bytes, and at which of them.
 #[track_caller]
 fn problem(bytes: &[u8]) -> (TouchesProblem, Place) {
-    match read(bytes).map(|log| log.touches().len()).unwrap_err() {
-        Error::At { problem: Problem::Touches(problem), place } => (problem, place),
-        other => panic!("{other}"),
-    }
+    let error = read(bytes).map(|log| log.touches().len()).unwrap_err();
+    let problem = error.problem::<TouchesProblem>().unwrap_or_else(|| panic!("{error}")).clone();
+    let Error::At { place, .. } = error else { panic!("{error}") };
+    (problem, place)
 }
 
 /// The touches that make.py wrote, with and without their poses.

@@ -4,7 +4,7 @@ use super::noise::NoiseArguments;
 use super::numbers::error_rate;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
-use palpate::error::{Problem, RowsProblem};
+use palpate::error::RowsProblem;
 use palpate::evaluate::model_file::ModelFile;
 use palpate::evaluate::{
     self, Active, Candidate, Classes, LEAST_GROUPS, Margins, Regression, RowsEvaluation, Settings, evaluate_rows,
@@ -202,7 +202,7 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str) -> Result<()> {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let rows = super::verify::read_rows(&arguments.directory, &names, Some(label))?;
     let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| match error.problem() {
-        Some(Problem::Rows(RowsProblem::Label { .. })) => error.in_file(&arguments.directory),
+        Some(RowsProblem::Label { .. }) => error.in_file(&arguments.directory),
         _ => error.in_file(&arguments.model),
     })?;
     if arguments.json {

@@ -208,6 +208,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         max_touches: arguments.max_touches,
         scales,
         priors: arguments.prior.of(&ensemble.objects)?,
+        ..Settings::default()
     };
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
         1 => error.in_file(&arguments.ensemble),

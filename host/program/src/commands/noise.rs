@@ -1,6 +1,6 @@
 //! Options for what a real sensor, timer and robot add to touches.
 
-use palpate::error::TouchesProblem;
+use palpate::error::{Problem, TouchesProblem};
 use palpate::probe::noise::{Deviation, Noise, quantity};
 
 /// The noise options. `bias` is what all touches of one robot share; everything else differs from touch to touch.

@@ -2,7 +2,8 @@
 
 use super::poses::{ByPose, Stock};
 use crate::error::{EvaluateProblem, Result};
-use crate::evaluate::margins::{Candidate, Margins, Tested, Values, row};
+use crate::evaluate::Candidate;
+use crate::evaluate::margins::{Margins, Tested, Values, row};
 use crate::evaluate::sequential::Outcome;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};

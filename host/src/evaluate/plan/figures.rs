@@ -2,10 +2,9 @@
 
 use super::active::Active;
 use crate::error::{Error, Result};
-use crate::evaluate::estimate::Estimate;
 use crate::evaluate::margins::Margins;
 use crate::evaluate::sequential::Outcome;
-use crate::evaluate::{Evaluation, Settings};
+use crate::evaluate::{Estimate, Evaluation, Settings};
 use palpate_onboard::Stopping;
 use palpate_shared::ContactPattern;
 use rayon::prelude::*;
@@ -24,7 +23,7 @@ struct Counts {
 /// drawn at random. Touches, too, are those of such approaches.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) as [`evaluate`](crate::evaluate::evaluate()).
+/// [`Setting`](crate::error::Setting) as [`evaluate`](crate::evaluate::evaluate()).
 pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
     let Settings { at, at_approaches, groups, seed, .. } = settings;
     let rule = margins.stopping(&settings.sequences())?;

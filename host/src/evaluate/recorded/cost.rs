@@ -3,8 +3,7 @@
 use super::{Settings, Share};
 use crate::ensemble::train;
 use crate::error::Result;
-use crate::evaluate::estimate::Estimate;
-use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::evaluate::{Candidate, Estimate, Margins, SequentialSettings};
 use crate::progress::Progress;
 use crate::touches::{Dataset, folds};
 use serde::{Deserialize, Serialize};

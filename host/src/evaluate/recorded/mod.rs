@@ -14,7 +14,7 @@ mod features;
 pub use cost::Cost;
 pub use features::FeatureComparison;
 
-use super::estimate::Estimate;
+use super::Estimate;
 use crate::ensemble::{feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::progress::{self, Progress};
@@ -254,7 +254,7 @@ fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, sett
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Problem;
+
     use crate::probe::noise::Noise;
     use crate::tests::synthetic;
 
@@ -297,7 +297,7 @@ mod tests {
     fn what_cannot_be_compared_is_refused_with_the_reason() {
         let dataset = synthetic::dataset(&[300, 300], 1);
         let refused = |one: &Dataset, other: &Dataset| match compare(one, other, &quick(), &()).unwrap_err().problem() {
-            Some(Problem::Evaluate(EvaluateProblem::Incomparable { detail })) => detail.clone(),
+            Some(EvaluateProblem::Incomparable { detail }) => detail.clone(),
             other => panic!("{other:?}"),
         };
         let mut other = dataset.clone();
