@@ -23,7 +23,7 @@
 //! Radius, spacing, speed and unit are what a data set and a model state and what is compared. What the real probe adds
 //! is not compared: it is added to touches by a capture with this file or else in training and testing, and never twice.
 
-use crate::error::{Error, Place, ProbeProblem, Problem, Result, TouchesProblem};
+use crate::error::{Error, Place, ProbeProblem, Problem, Result};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::noise::{Deviation, Noise, quantity};
 use palpate_shared::format::Length;
@@ -143,7 +143,7 @@ fn tilt() -> f64 {
 /// A quantity that is written as text with its unit.
 fn read<'de, D: Deserializer<'de>, T>(
     deserializer: D,
-    parse: impl Fn(&str) -> Result<T, TouchesProblem>,
+    parse: impl Fn(&str) -> Result<T, ProbeProblem>,
 ) -> Result<Option<T>, D::Error> {
     let text = String::deserialize(deserializer)?;
     parse(&text).map(Some).map_err(|problem| D::Error::custom(format!("{problem}. {}", problem.fix())))

@@ -3,7 +3,7 @@
 use super::numbers::count;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
-use palpate::error::TuneProblem;
+use palpate::error::FitProblem;
 use palpate::fit::{Estimate, Fit, Settings, between, fit};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
@@ -77,7 +77,7 @@ pub(super) fn run(arguments: &FitArguments) -> Result<()> {
         output::print_about(&arguments.output, &table(&found))?;
     }
     if !suspects.is_empty() && !arguments.force {
-        return Err(Error::from(TuneProblem::Suspects { suspects }).in_file(&arguments.recorded));
+        return Err(Error::from(FitProblem::Suspects { suspects }).in_file(&arguments.recorded));
     }
     for suspect in suspects {
         eprintln!("palpate: warning: {suspect}.");
