@@ -2,7 +2,7 @@
 
 use super::evidence::best;
 use super::expected::is_possible;
-use super::exponential::exp2_negative;
+use crate::exponential::exp2_negative;
 use crate::model::Model;
 use palpate_shared::format::{MisfitTerms, MisfitTest, ObjectMisfit};
 
