@@ -91,7 +91,7 @@
 //! | `experiments` | yes | `probe::sweep::precision`: other precisions to compare the sweep with |
 //! | `xgboost` | no | XGBoost 1.6.2 as a second trainer, built from its C++ source |
 //!
-//! `palpate = { version = "0.2", default-features = false }` brings no terminal, no progress bar, no plots, no serial
+//! `palpate = { version = "0.3", default-features = false }` brings no terminal, no progress bar, no plots, no serial
 //! port and no trainer.
 
 pub mod error;

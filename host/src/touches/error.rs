@@ -370,13 +370,13 @@ impl Problem for TouchesProblem {
             Self::TooMany { .. } => "Divide the log: mcap filter LOG -o PART.mcap --start TIME --end TIME.",
             Self::OtherCompression { .. } => "Compress it again: mcap compress LOG -o OTHER.mcap --compression zstd.",
             Self::OtherEncoding { .. } | Self::OtherDefinition { .. } => {
-                "Log them as docs/mcap.md says: JSON, or CDR by the definitions in host/msg."
+                "Log them as docs/reference/mcap.md says: JSON, or CDR by the definitions in host/msg."
             }
             Self::NoTouchChannel { .. } => {
-                "Name the schema of the touches palpate.Touch, or in ROS 2 palpate_msgs/msg/Touch: docs/mcap.md."
+                "Name the schema of the touches palpate.Touch, or in ROS 2 palpate_msgs/msg/Touch: docs/reference/mcap.md."
             }
             Self::Message { .. } | Self::BadMessage { .. } => {
-                "Correct what logged it: docs/mcap.md says what belongs in a message."
+                "Correct what logged it: docs/reference/mcap.md says what belongs in a message."
             }
             Self::NamelessTouch => "Name the object in every message, or in none.",
             Self::NotInLog { .. } => "Give one of these names, or the log of the other object.",

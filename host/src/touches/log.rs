@@ -1,4 +1,4 @@
-//! Touches out of a robot's log, which is an MCAP file: `docs/mcap.md` says what belongs in it.
+//! Touches out of a robot's log, which is an MCAP file: `docs/reference/mcap.md` says what belongs in it.
 
 use super::logged::{Channels, LoggedVerdict, Message, Said};
 use super::{ObjectTouches, Source, Warning, mcap, text};

@@ -38,7 +38,7 @@ With --active, on approaches with pose, each next approach is drawn from those o
 
 With --label the file has rows of features for a model that was exported from another library's (CSV): each row is classified alone, and compared with the class in the column, its name or its number from 0; or for a model with one output with the number there.
 
-A robot's log (MCAP, see docs/mcap.md) is a data set of the objects that its messages name. A directory may hold logs too: NAME.mcap beside NAME.txt, where messages name no object.
+A robot's log (MCAP, see docs/reference/mcap.md) is a data set of the objects that its messages name. A directory may hold logs too: NAME.mcap beside NAME.txt, where messages name no object.
 
 No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
 

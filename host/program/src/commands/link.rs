@@ -119,7 +119,7 @@ another object. Every touch is counted exactly once, however bad the line.
 
 With --record, what the chip's own fingers touch goes to DIR/NAME.txt, each touch as soon as the chip reports it, and \
 dataset.json says when, with which probe and by which firmware. A model on the chip is not needed. If the cable is \
-pulled, this waits for it; recording the same object again adds to it. See docs/real-probe.md.
+pulled, this waits for it; recording the same object again adds to it. See docs/guide/real-probe.md.
 
 An approach that touches nothing closes no switch, so the chip cannot report it and it is not recorded. To train on misses \
 (palpate train --touches all) or to compare contact patterns with those of a simulation, the robot has to say when an \

@@ -126,7 +126,7 @@ Examples:
   palpate run meshes/ -o out  the same for your own meshes
   palpate help capture        what a command does, with examples
 
-What the words of the output mean: docs/words.md"
+What the words of the output mean: docs/reference/words.md"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]

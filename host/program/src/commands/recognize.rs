@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided; recognized; unknown where the touches fit no object of the model, which only a model with a test of fit says (`palpate calibrate --strangers`); or gave-up once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
 
-FILE may be a robot's log as well (MCAP, see docs/mcap.md): its touches are taken in the order of their log times, and where the object that they name changes, the next touch is the first of another object.
+FILE may be a robot's log as well (MCAP, see docs/reference/mcap.md): its touches are taken in the order of their log times, and where the object that they name changes, the next touch is the first of another object.
 
 With --mcap touches and verdicts are written as a log, with the posterior of every object after every touch, once all touches are recognized. Foxglove shows it: plot /verdict.posteriors.fork. Touches that are not from a log are logged a second apart.
 

@@ -14,7 +14,7 @@ A line is a touch: three contact times in seconds on any clock, - for a finger t
 the probe's direction and alignment (six numbers). Lines like these come from any robot that can print. Lines `- - -` for \
 approaches that missed are welcome: they say how often each object is missed.
 
-FILE may be a robot's log as well (MCAP, see docs/mcap.md): its touches of NAME are taken, or all of them if its messages \
+FILE may be a robot's log as well (MCAP, see docs/reference/mcap.md): its touches of NAME are taken, or all of them if its messages \
 name no object.
 
 DIR gets NAME.txt and dataset.json, which says when, from where and with which probe the touches were recorded. All \

@@ -2,7 +2,7 @@
 # Accuracy on touches of real robots (or such as stand for them), for models trained clean, on a mixture, and for fitted
 # probes.
 #
-#   docs/tables/robots.sh MESHES ROBOT DIR
+#   docs/measurements/tables/robots.sh MESHES ROBOT DIR
 #
 # ROBOT has known/ (recorded touches to fit from), plate.txt and test/ (touches to test on), DIR is filled. The program is
 # $PALPATE, or target/release/palpate; $TOUCHES and $APPROACHES are those of each object to train on.

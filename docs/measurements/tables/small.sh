@@ -1,7 +1,7 @@
 #!/bin/sh
-# The table of docs/small.md: models of 5.7 KB and 3 KB, trained and chosen on some touches, tested on others.
+# The table of docs/measurements/small.md: models of 5.7 KB and 3 KB, trained and chosen on some touches, tested on others.
 #
-#   docs/tables/small.sh DIR
+#   docs/measurements/tables/small.sh DIR
 #
 # The meshes are those of $PALPATE_SHARED/objects (../shared/objects), DIR is filled. The program is $PALPATE, or
 # target/release/palpate. Training has 210,000 touches of each object ($TOUCHES) with seed 1; tuning the first 21,000 of them

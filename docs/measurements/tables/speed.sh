@@ -1,12 +1,12 @@
 #!/bin/sh
-# Remakes the tables of docs/speed.md: speed against error of whatever precision or approximation can be chosen.
+# Remakes the tables of docs/measurements/speed.md: speed against error of whatever precision or approximation can be chosen.
 #
-#   docs/tables/speed.sh DIR         about fifteen minutes; reports are left in DIR
-#   docs/tables/speed.sh             without the reports: about two minutes
+#   docs/measurements/tables/speed.sh DIR         about fifteen minutes; reports are left in DIR
+#   docs/measurements/tables/speed.sh             without the reports: about two minutes
 #
 # The chip's exponentials need qemu-system-arm and the targets thumbv7em-none-eabihf and thumbv6m-none-eabi.
 set -eu
-cd "$(dirname "$0")/../.."
+cd "$(dirname "$0")/../../.."
 cargo run --locked --release --quiet -p palpate-tests --bin speed
 
 if command -v qemu-system-arm >/dev/null; then

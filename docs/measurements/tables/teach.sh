@@ -2,7 +2,7 @@
 # One object taught among nine simulated ones: how many of its groups of 60 approaches are recognized, and how many of the
 # others'. The taught object is touched by the same simulated probe, with other seeds: what teaching alone costs.
 #
-#   docs/tables/teach.sh MESHES DIR [OBJECT...]
+#   docs/measurements/tables/teach.sh MESHES DIR [OBJECT...]
 #
 # MESHES is a directory with meshes, DIR is filled. The program is $PALPATE, or target/release/palpate; $APPROACHES are those
 # of each simulated object (30000).

@@ -1,8 +1,8 @@
 #!/bin/sh
-# Remakes the table of docs/fit.md: models for crooked probes, trained clean, for noise, on a mixture, for a fitted probe,
+# Remakes the table of docs/measurements/fit.md: models for probes with deviations, trained clean, for noise, on a mixture, for a fitted probe,
 # and for the true one. Accuracy after 10 / 30 full touches.
 #
-#   docs/tables/fit.sh MESHES DIR [TOUCHES]
+#   docs/measurements/tables/fit.sh MESHES DIR [TOUCHES]
 #
 # MESHES is a directory with the ten meshes, DIR is filled. TOUCHES of each object to train on (21000). The program is
 # $PALPATE, or target/release/palpate.
