@@ -1398,7 +1398,7 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
 }
 
 /* Whether the leader may be named by the model's test of fit: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
-static inline palpate_verdict palpate_fit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
+static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const palpate_model *model = recognizer->model;
     const uint8_t *test = model->strangers_;
@@ -1445,7 +1445,7 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     recognizer->touches += recognizer->touches != UINT32_MAX;
     best = palpate_best(recognizer);
     if (PALPATE_STRANGERS) {
-        verdict = palpate_fit_(recognizer, best);
+        verdict = palpate_by_misfit_(recognizer, best);
     }
     if (recognizer->by_object != 0 && model->odds_ != NULL) {
         left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;

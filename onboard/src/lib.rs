@@ -65,6 +65,7 @@ mod bytes;
 mod decide;
 #[cfg(feature = "effector")]
 pub mod effector;
+mod exponential;
 mod layouts;
 mod model;
 #[cfg(feature = "station")]
@@ -72,11 +73,11 @@ pub mod station;
 
 pub use bytes::{Aligned, ModelError};
 pub use decide::{
-    CapacityError, Fit, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
-    exp2_negative,
+    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
+pub use exponential::exp2_negative;
 #[cfg(feature = "rows")]
 pub use layouts::batch::Batch;
 pub use model::{Model, Refused, inverse_link};

@@ -1,7 +1,5 @@
 //! The main job: capture, train, compile, recognize, report.
 
-#[cfg(test)]
-mod several_meshes;
 mod shown;
 
 pub use shown::text;
@@ -15,9 +13,9 @@ use palpate::evaluate::parity::{self, Parity};
 use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, SequentialSettings};
 use palpate::mesh::Object;
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::progress::{self, Progress};
 use palpate::touches::folds::{self, Split};
-use palpate::touches::noise::Noise;
 use palpate::touches::{Dataset, Listing, ObjectTouches, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_report::error::ReportProblem;
@@ -468,6 +466,8 @@ fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Re
 
 #[cfg(test)]
 mod tests {
+    mod several_meshes;
+
     use super::*;
     use palpate::error::Error;
     use palpate::mesh::Mesh;

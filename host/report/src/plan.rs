@@ -13,7 +13,7 @@ use palpate::error::{EvaluateProblem, Result};
 use palpate::evaluate::{
     self, Active, ApproachSequential, Candidate, Evaluation, Margins, Rule, SequentialSettings, Switched,
 };
-use palpate::touches::noise::Noise;
+use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;

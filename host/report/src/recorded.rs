@@ -8,7 +8,7 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::error::{EvaluateProblem, Result};
-use palpate::evaluate::compare::{self, Comparison, Cost, ObjectComparison, Share};
+use palpate::evaluate::recorded::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::progress;
 use palpate::touches::{Dataset, Origin, checksum, files};
 use std::path::Path;
@@ -33,8 +33,8 @@ pub(super) fn measure(context: &Context) -> Result<Option<Comparison>> {
         return Err(palpate::Error::from(EvaluateProblem::Incomparable { detail }).in_file(directory));
     }
     let groups = if settings.quick { 300 } else { 1_000 };
-    let compared = compare::Settings { groups, seed: settings.seed, ..Default::default() };
-    compare::compare(&recorded, &simulated, &compared, context.progress).map(Some)
+    let compared = recorded::Settings { groups, seed: settings.seed, ..Default::default() };
+    recorded::compare(&recorded, &simulated, &compared, context.progress).map(Some)
 }
 
 /// A checksum of the recorded touches' files: a report that is resumed with others starts again.

@@ -1,8 +1,8 @@
 //! How much of everything a report measures.
 
 use palpate::mesh::builtin::BACKGROUND_SHAPES;
+use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::touches::noise::Noise;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

@@ -6,7 +6,7 @@ use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::ObjectTouches;
-use palpate_onboard::{Fit, Model, Recognizer, Stopping};
+use palpate_onboard::{Familiarity, Model, Recognizer, Stopping};
 use palpate_shared::Touch;
 use palpate_shared::format::Plan;
 use rand::seq::SliceRandom;
@@ -210,10 +210,11 @@ fn one<const N: usize>(
         }
         let (evidence, best, touches) = (recognizer.evidence(), recognizer.best(), recognizer.touches());
         // What the model's own test says, as on the chip: a name is held back, or there is none.
-        let fit = recognizer.fit();
-        let may_name = gate(&Moment { touch, evidence, best, touches, approaches }) && fit == Fit::Fits;
+        let familiarity = recognizer.familiarity();
+        let may_name =
+            gate(&Moment { touch, evidence, best, touches, approaches }) && familiarity == Familiarity::Known;
         let odds = sequence.push(recognizer, approaches, may_name);
-        if (may_name && odds <= strictest) || fit == Fit::Stranger || touches >= until.max_touches {
+        if (may_name && odds <= strictest) || familiarity == Familiarity::Stranger || touches >= until.max_touches {
             return (sequence, true);
         }
     }

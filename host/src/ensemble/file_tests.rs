@@ -1,7 +1,7 @@
 use super::*;
 use crate::ensemble::train::{Settings, train};
 use crate::ensemble::{Inputs, Node, Output};
-use crate::touches::synthetic;
+use crate::tests::synthetic;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use serde_json::{Value, json};

@@ -4,8 +4,9 @@ use super::{Origin, Trained};
 use crate::compile::{self, CompiledModel};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
 use crate::probe::approach::Probe;
-use crate::touches::noise::Noise;
-use crate::touches::{self, Captured, Dataset, short, tenth, unit};
+use crate::probe::noise::Noise;
+use crate::probe::unit::{self, tenth};
+use crate::touches::{self, Captured, Dataset, short};
 use palpate_shared::format::{Length, TrainedProbe};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -252,7 +253,7 @@ fn fingerprints(dataset: &Dataset) -> BTreeMap<String, u64> {
 #[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     #[test]
     fn training_touches_are_known_again_and_others_are_not() {

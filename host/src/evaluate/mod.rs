@@ -32,10 +32,7 @@
 //! # }
 //! ```
 
-mod active;
 mod approaches;
-#[cfg(feature = "train")]
-pub mod compare;
 #[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
@@ -47,16 +44,15 @@ pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
-mod poses;
 mod promise;
+#[cfg(feature = "train")]
+pub mod recorded;
 mod sequential;
 mod strangers;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
-mod under_plan;
 
-pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
@@ -70,17 +66,15 @@ pub use noisy::{ROBOTS, add_noise};
 pub use palpate_trees::verify::{
     self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict, together,
 };
-pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
-pub use poses::{ByPose, Stock};
+pub use plan::{Active, ActiveFacts, ByPose, Hardest, LEAST_IN_POSE, Planned, Stock, evaluate_active, plan};
 pub use promise::{Finding, PromiseCheck, by_theory};
 pub use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};
 pub use switch::{Rule, Stopped, Switched};
-pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use palpate_shared::ContactPattern;
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -223,7 +223,7 @@ mod tests {
     use crate::compile::{self, compile};
     use crate::ensemble::train::{self, train};
 
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     fn ensemble() -> Ensemble {
         let settings = train::Settings { rounds: 5, depth: 3, ..train::Settings::compact() };

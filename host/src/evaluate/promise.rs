@@ -4,7 +4,7 @@ use super::Candidate;
 use super::Estimate;
 use super::margins::Margins;
 use super::sequential::Outcome;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{Counted, Per};
 use serde::Serialize;

@@ -47,10 +47,10 @@ pub mod obj;
 mod placed;
 mod ply;
 mod polygon;
-#[cfg(test)]
-mod samples;
 pub mod source;
 mod stl;
+#[cfg(test)]
+mod tests;
 mod triangles;
 mod words;
 

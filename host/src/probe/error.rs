@@ -25,6 +25,14 @@ pub enum ProbeProblem {
         /// What is wrong.
         message: String,
     },
+    /// A text is no duration, angle or share.
+    #[error("{text:?} is not a quantity with its unit")]
+    BadQuantity {
+        /// The text.
+        text: String,
+        /// What to write, with an example.
+        example: &'static str,
+    },
     /// A line of a file of casts has too few or too many fields.
     #[error("{fields} fields where a cast has 7, or 8 with a time")]
     CastFields {
@@ -52,6 +60,7 @@ impl Problem for ProbeProblem {
             Self::BadFile { .. } => {
                 "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, timer and [real].".into()
             }
+            Self::BadQuantity { example, .. } => format!("Give {example}."),
             Self::CastFields { .. } | Self::CastCoordinate { .. } | Self::CastTime { .. } => {
                 "Give set,ox,oy,oz,dx,dy,dz and, if known, t.".into()
             }

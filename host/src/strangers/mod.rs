@@ -1,7 +1,7 @@
 //! A test of whether touches fit any object that a model knows, made from touches that its training never saw.
 //!
 //! ```text
-//! touches ──► margins ──┬─ a quarter ──► what touches of each object give: means and covariances (fit)
+//! touches ──► margins ──┬─ a quarter ──► what touches of each object give: means and covariances (misfit)
 //! other shapes ─────────┼──────────────► what touches of strangers give
 //!                       │                        └──► the misfit, in integers (fixed)
 //!                       └─ the rest ───► sequences (follow) ──► its threshold, by Learn-then-Test
@@ -18,10 +18,10 @@
 //! instead of 27.5; on oriented touches .95 by 30 and .97 by 60, and 20 touches instead of 7. [`Held::Likely`] finds out .53 by 60 touches and names .40, for 27.2 touches. Hopeless by curvature
 //! alone: a fork where a spoon is known (.23 by 120 touches), and until 60 touches a hammer where a paper clip is (.18).
 
-mod fit;
 mod fixed;
 mod follow;
 mod leave_one_out;
+mod misfit;
 mod promised;
 #[cfg(feature = "objects")]
 mod shapes;
@@ -39,11 +39,11 @@ use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::together::margins_of_touches;
 use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
-use fit::Moments;
 use follow::{Policy, Sequence};
+use misfit::Moments;
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
-use palpate_shared::format::{FitTerms, Held, Strangers, Tag};
+use palpate_shared::format::{Held, MisfitTerms, Strangers, Tag};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -91,7 +91,7 @@ pub struct Calibrated {
     /// The model's bytes.
     pub bytes: Vec<u8>,
     /// What is the same for all objects.
-    pub terms: FitTerms,
+    pub terms: MisfitTerms,
     /// Of the sequences that the threshold was tested on, those that ended as unknown.
     pub alarms: usize,
     /// Touches used on average in these sequences.
@@ -125,7 +125,7 @@ impl Supply {
     }
 }
 
-/// Gives a model a test of fit, or replaces the one that it has. `dataset` holds touches of every object that the model
+/// Gives a model a misfit test, or replaces the one that it has. `dataset` holds touches of every object that the model
 /// knows, none of them used in training; `shapes` touches of many other shapes, if there are any: every instance of each of
 /// these objects is one.
 ///
@@ -148,17 +148,17 @@ pub fn calibrate(
     let (learn, test) = learned_and_tested(supplies, objects);
     let known = model.known_count();
     let moments = Moments::new(&learn, &of_shapes(model, shapes), known, objects, unit);
-    let fits =
-        fit::fits(&moments, None).ok_or(EvaluateProblem::TooFewForFit { found: learn_count(&learn, objects) })?;
-    let terms = |threshold: f64, least: u32| terms(settings, &fits, threshold, least);
+    let misfits =
+        misfit::misfits(&moments, None).ok_or(EvaluateProblem::TooFewForFit { found: learn_count(&learn, objects) })?;
+    let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
     // Levels of misfit do not depend on any threshold.
-    let untested = stated(model, &terms(0.0, FIRST), &fits)?;
+    let untested = stated(model, &terms(0.0, FIRST), &misfits)?;
     let untested = compile::open(&untested)?;
     let follow = |of: &[Supply], policy: &Policy| follow::sequences(&untested, of, policy, settings.sequences);
 
     let free = Policy { until: follow::Until::Touches(MOST_HELD.min(model.header().max_touches())), least: FIRST };
     let rough = follow::quantile(&follow(&learn, &free), 1.0 - settings.alarms);
-    let left_out = fit::left_out(&moments, &learn, rough, unit, free.last());
+    let left_out = misfit::left_out(&moments, &learn, rough, unit, free.last());
     let least = match settings.held {
         Held::Likely => FIRST,
         Held::Certain => found_out(&left_out).min(free.last()).max(FIRST),
@@ -167,8 +167,8 @@ pub fn calibrate(
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
     let kept = threshold(&sequences, settings, loosest, least, known)?;
-    let terms = FitTerms { sequences: kept.sequences, ..terms(kept.threshold, least) };
-    let bytes = stated(model, &terms, &fits)?;
+    let terms = MisfitTerms { sequences: kept.sequences, ..terms(kept.threshold, least) };
+    let bytes = stated(model, &terms, &misfits)?;
     let names = compile::names(model);
     let at = |path: &[f64], touches: u32| path.get(touches as usize - 1).or(path.last()).copied().unwrap_or(0.0);
     Ok(Calibrated {
@@ -221,8 +221,8 @@ fn learned_and_tested(supplies: Vec<Supply>, objects: usize) -> (Vec<Supply>, Ve
 /// [`calibrate`] tested the threshold on.
 fn tested_means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<[f64; 2]> {
     let (_, test) = learned_and_tested(supplies(model, dataset, settings.seed)?, model.object_count());
-    let Some(test_of_fit) = model.strangers().and_then(|strangers| strangers.test) else { return Ok([0.0; 2]) };
-    let FitTerms { threshold, doubt, least, .. } = test_of_fit.terms;
+    let Some(misfit_test) = model.strangers().and_then(|strangers| strangers.test) else { return Ok([0.0; 2]) };
+    let MisfitTerms { threshold, doubt, least, .. } = misfit_test.terms;
     let [threshold, doubt] = [threshold, doubt].map(|limit| f64::from(limit) / NAT);
     let policy = Policy { until: follow::Until::Named { level: doubt }, least };
     let sequences = follow::sequences(model, &test, &policy, settings.sequences);
@@ -309,12 +309,12 @@ fn below(held: Held) -> f64 {
     }
 }
 
-fn terms(settings: &Settings, fits: &[fit::Fit], threshold: f64, least: u32) -> FitTerms {
+fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64, least: u32) -> MisfitTerms {
     // `as` saturates.
     let millionths = |share: f64| (share * 1e6).round() as u32;
-    FitTerms {
+    MisfitTerms {
         held: settings.held,
-        rivals: fits.first().map_or(0, |fit| fit.rivals.len() as u8),
+        rivals: misfits.first().map_or(0, |misfit| misfit.rivals.len() as u8),
         first: FIRST,
         least,
         threshold: (threshold * NAT).round() as i32,
@@ -328,10 +328,10 @@ fn terms(settings: &Settings, fits: &[fit::Fit], threshold: f64, least: u32) -> 
 }
 
 /// The model with a test.
-fn stated(model: &Model<'_>, terms: &FitTerms, fits: &[fit::Fit]) -> Result<Vec<u8>> {
+fn stated(model: &Model<'_>, terms: &MisfitTerms, misfits: &[misfit::Misfit]) -> Result<Vec<u8>> {
     let mut section = Strangers::header(model.background().is_some(), true).to_vec();
     section.extend(terms.to_bytes());
-    fits.iter().for_each(|fit| fixed::write(fit, f64::from(model.unit()), &mut section));
+    misfits.iter().for_each(|misfit| fixed::write(misfit, f64::from(model.unit()), &mut section));
     let sections = vec![(Tag::Strangers, Some((true, section))), (Tag::Promise, None)];
     Ok(restate(model, &Restated { sections, ..Restated::default() })?)
 }

@@ -1,4 +1,4 @@
-//! A test of fit and a promised error rate together.
+//! A misfit test and a promised error rate together.
 //!
 //! Which names are given depends on the test: it holds some back and ends sequences. How often known objects are taken
 //! for unknown depends on the thresholds: the later names are given, the longer there is for a false alarm. So both are
@@ -32,7 +32,7 @@ const STRICTER: f64 = 0.5;
 /// The confidence of the first thresholds, which promise nothing: that of an estimate.
 const EVEN: f64 = 0.5;
 
-/// Gives a model a test of fit, or replaces the one that it has, and thresholds that keep a promised error rate with that
+/// Gives a model a misfit test, or replaces the one that it has, and thresholds that keep a promised error rate with that
 /// test: a sequence that ends as unknown is one without a name, and a name is given when the test lets it be. `promise.noise`
 /// is added to touches and shapes. Each of the two shares is kept with its own confidence.
 ///

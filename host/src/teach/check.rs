@@ -4,7 +4,7 @@ use super::{LEAST, Settings};
 use crate::ensemble::{Ensemble, Output, StatedProbe, TouchOrigin};
 use crate::error::{Error, Result, TeachProblem};
 use crate::mesh::BACKGROUND;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;

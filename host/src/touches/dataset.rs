@@ -2,11 +2,11 @@
 
 use super::checksum::checksum;
 use super::files::files;
-use super::noise::Noise;
 use super::warning::Warning;
 use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
+use crate::probe::noise::Noise;
 use palpate_shared::Touch;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

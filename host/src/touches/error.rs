@@ -311,14 +311,6 @@ pub enum TouchesProblem {
         /// The text.
         name: String,
     },
-    /// A text is no duration, angle or share.
-    #[error("{text:?} is not a quantity with its unit")]
-    BadQuantity {
-        /// The text.
-        text: String,
-        /// What to write, with an example.
-        example: &'static str,
-    },
     /// A file whose name does not say what it holds.
     #[error("not a file of touches by its name")]
     NoFormat,
@@ -414,7 +406,6 @@ impl Problem for TouchesProblem {
             Self::NoFormat => "Call it like the object, with the ending .txt or .parquet.",
             Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
-            Self::BadQuantity { example, .. } => return format!("Give {example}."),
             Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }

@@ -1,7 +1,7 @@
 //! The touches of one object, and what each of them is of.
 
-use super::noise::Noise;
 use super::{Meshes, Recorded};
+use crate::probe::noise::Noise;
 use palpate_shared::Touch;
 use std::path::PathBuf;
 

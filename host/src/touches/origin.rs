@@ -1,10 +1,11 @@
 //! How touches were made.
 
-use super::noise::Noise;
 use super::{Format, Shard};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::approach::{Aim, CLEARANCE, Probe};
+use crate::probe::noise::Noise;
+use crate::probe::unit;
 use glam::DVec3;
 use palpate_shared::format::Length;
 use std::ops::Range;
@@ -20,7 +21,7 @@ pub struct Origin {
     pub seed: u64,
     /// What the probe's lengths are measured in: units, with every object scaled to `length`, or millimeters, with objects
     /// at their true size. Before version 0.3.0, always units.
-    #[serde(default = "tenth", with = "unit")]
+    #[serde(default = "unit::tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning at true size.
     pub length: f64,
@@ -111,27 +112,5 @@ impl Origin {
     /// Whether the pose is written.
     pub fn writes_pose(&self) -> bool {
         self.pose || self.format == Format::Parquet
-    }
-}
-
-/// The unit of data sets and ensembles that state none.
-pub(crate) fn tenth() -> Length {
-    Length::Tenth
-}
-
-/// A unit of length by its name, `unit` or `mm`.
-pub(crate) mod unit {
-    use palpate_shared::format::Length;
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature is serde's")]
-    pub(crate) fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(unit.name())
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Length, D::Error> {
-        let name = std::borrow::Cow::<str>::deserialize(deserializer)?;
-        let named = Length::ALL.iter().copied().find(|unit| unit.name() == name);
-        named.ok_or_else(|| D::Error::custom(format!("unit {name:?}, where \"unit\" or \"mm\" is expected")))
     }
 }

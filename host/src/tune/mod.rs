@@ -1,5 +1,4 @@
-//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]), and the
-//! one that recorded touches came from ([`fit`]).
+//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]).
 //!
 //! A family of ensembles is trained (trees, depth, eta; for the table layout bins of each feature), each compiled with
 //! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Among them are trees for
@@ -23,7 +22,6 @@
 
 mod error;
 mod family;
-pub mod fit;
 pub mod probe;
 #[cfg(test)]
 mod tests;
@@ -33,10 +31,10 @@ use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
 use crate::ensemble::{Ensemble, StatedProbe};
 use crate::error::{CalibrateProblem, CompileProblem, Result};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
+use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use crate::touches::folds;
-use crate::touches::noise::Noise;
 pub use error::TuneProblem;
 use palpate_shared::Descriptor;
 use serde::Serialize;

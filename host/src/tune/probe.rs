@@ -26,9 +26,9 @@ use crate::error::{Error, Result, TuneProblem};
 use crate::evaluate::{Approaches, Candidate, Margins, SequentialSettings};
 use crate::mesh::Object;
 use crate::probe::approach::{Aim, Probe};
+use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::noise::Noise;
 use crate::touches::{Dataset, Origin};
 use palpate_shared::format::{Counted, Length};
 use palpate_shared::{ContactPattern, Descriptor};
@@ -214,7 +214,7 @@ pub struct Design {
     /// All probes tried in the rounds before, the best of each round first.
     pub rounds: Vec<Vec<Trial>>,
     /// What lengths are measured in.
-    #[serde(with = "crate::touches::unit")]
+    #[serde(with = "crate::probe::unit")]
     pub unit: Length,
     /// The error rate that was asked for.
     pub error_rate: f64,

@@ -5,11 +5,11 @@ use palpate::glam::DVec3;
 use palpate::mesh::Mesh;
 use palpate::onboard::{Refused, Verdict};
 use palpate::play::{Approached, Game, Round, Series, decompress, unpack};
+use palpate::probe::noise::{Deviation, Noise};
 use palpate::probe::{Aim, Probe};
 use palpate::shared::format::Length;
 use palpate::shared::{ContactPattern, Pose, Q15_ONE, Touch};
 use palpate::touches::Origin;
-use palpate::touches::noise::{Deviation, Noise};
 use std::cell::RefCell;
 
 /// What the functions work on.

@@ -1,6 +1,6 @@
 //! What the touches so far say about each object.
 
-use super::exponential::exp2_negative;
+use crate::exponential::exp2_negative;
 
 /// A posterior probability, in Q56: fine enough to distinguish 1 − 1e-16 from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

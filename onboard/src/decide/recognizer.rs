@@ -3,7 +3,7 @@
 use super::evidence::{self, Posterior, Rivals, SHARPNESS, Unit};
 use super::expected::{self, NothingExpected};
 use super::stopping::Stopping;
-use super::strangers::{self, Fit};
+use super::strangers::{self, Familiarity};
 use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
 use core::fmt;
@@ -182,20 +182,20 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.best(&self.model)
     }
 
-    /// Whether the touches so far fit the [best](Self::best) object, by the model's test; [`Fit::Fits`] without one, and
+    /// Whether the touches so far fit the [best](Self::best) object, by the model's test; [`Familiarity::Known`] without one, and
     /// before the first touch.
     ///
     /// Cost: as the test in [`push`](Self::push).
-    pub fn fit(&self) -> Fit {
+    pub fn familiarity(&self) -> Familiarity {
         match self.state.covered() {
-            0 => Fit::Fits,
-            touches => strangers::fit(&self.model, self.evidence(), self.best(), touches),
+            0 => Familiarity::Known,
+            touches => strangers::familiarity(&self.model, self.evidence(), self.best(), touches),
         }
     }
 
     /// What the weights of all objects but the [best](Self::best) come to, the best one's being 1, in Q56; the most
     /// there is where the background has more. The best object is recognized once this is at most its
-    /// [threshold](Stopping::odds_of), and its touches [fit](Self::fit).
+    /// [threshold](Stopping::odds_of), and its touches [fit](Self::familiarity).
     ///
     /// Cost: an exponential for each object.
     pub fn rivals(&self) -> u64 {
@@ -280,11 +280,12 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         }
         self.state.touches = self.state.touches.saturating_add(1);
         let best = strangers::leader(&self.model, self.evidence());
-        let fit = strangers::fit(&self.model, self.evidence(), best.0, self.state.covered());
+        let familiarity = strangers::familiarity(&self.model, self.evidence(), best.0, self.state.covered());
         let odds = self.state.stopping.odds_of(best.0, &self.model);
-        let may_be_named = fit == Fit::Fits && !strangers::is_background(&self.model, self.evidence(), best.1);
+        let may_be_named =
+            familiarity == Familiarity::Known && !strangers::is_background(&self.model, self.evidence(), best.1);
         let rivals = if may_be_named { evidence::rivals(self.evidence(), best, odds, unit(&self.model)) } else { None };
-        if fit == Fit::Stranger {
+        if familiarity == Familiarity::Stranger {
             self.state.decided = Decided::Unknown;
         } else if let Some(rivals) = rivals {
             self.state.decided = Decided::Object(u8::try_from(best.0).unwrap_or(u8::MAX));

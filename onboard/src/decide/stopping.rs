@@ -29,7 +29,7 @@ impl Stopping {
 
     /// Stops once the weights of all other objects come to at most `odds` (Q56), the best object's being 1, or after
     /// `max_touches`, where 0 counts as 1. No object weighs more than the best one: at `odds` of 2^56 for each other object
-    /// every touch decides, also where all are level, unless the model's [test of fit](crate::Fit) or its
+    /// every touch decides, also where all are level, unless the model's [misfit test](crate::Familiarity) or its
     /// [background](Model::background) objects.
     pub const fn from_odds(odds: u64, max_touches: u32) -> Self {
         Self { odds, max_touches: 1, by_object: false }.with_max_touches(max_touches)

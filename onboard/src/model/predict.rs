@@ -1,7 +1,7 @@
 //! A row to a class or a value, as the library that trained the model predicts it.
 
 use super::Model;
-use crate::decide::exp2_negative;
+use crate::exponential::exp2_negative;
 use palpate_shared::format::{Link, Prediction, f32_key};
 
 impl Model<'_> {

@@ -9,8 +9,8 @@ use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::strangers;
-use palpate::touches::noise::Noise;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

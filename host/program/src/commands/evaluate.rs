@@ -10,10 +10,10 @@ use palpate::evaluate::{
     self, Active, Candidate, Classes, LEAST_GROUPS, Margins, Regression, RowsEvaluation, Settings, evaluate_rows,
 };
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
 use palpate::rows::feature_names;
 use palpate::touches::Dataset;
-use palpate::touches::noise::Noise;
 use palpate::{Error, Result};
 use palpate_shared::format::Counted;
 use std::fmt::Write as _;

@@ -1,7 +1,7 @@
 //! Options for what a real sensor, timer and robot add to touches.
 
-use palpate::error::{Problem, TouchesProblem};
-use palpate::touches::noise::{Deviation, Noise, quantity};
+use palpate::error::{ProbeProblem, Problem};
+use palpate::probe::noise::{Deviation, Noise, quantity};
 
 /// The noise options. `bias` is what all touches of one robot share; everything else differs from touch to touch.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -87,11 +87,11 @@ impl NoiseArguments {
 }
 
 /// A quantity; what is wrong with it, with an example.
-fn said<T>(result: Result<T, TouchesProblem>) -> Result<T, String> {
+fn said<T>(result: Result<T, ProbeProblem>) -> Result<T, String> {
     result.map_err(|problem| problem.fix().trim_end_matches('.').to_lowercase())
 }
 
-fn quantity_of<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, String> {
+fn quantity_of<T: std::str::FromStr<Err = ProbeProblem>>(text: &str) -> Result<T, String> {
     said(text.parse())
 }
 

@@ -5,8 +5,8 @@ use super::shell;
 use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::touches::noise::Noise;
 use palpate_report::play::{self, Settings, Training};
 use std::path::PathBuf;
 

@@ -3,11 +3,11 @@
 use palpate::calibrate;
 use palpate::compile;
 use palpate::evaluate;
+use palpate::probe;
 use palpate::rows::{Encoder, feature_names};
-use palpate::touches;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::ContactPattern;
-use palpate_shared::format::{FitTerms, Length, TrainedNoise, TrainedProbe};
+use palpate_shared::format::{Length, MisfitTerms, TrainedNoise, TrainedProbe};
 use std::collections::BTreeMap;
 
 #[derive(serde::Serialize)]
@@ -41,7 +41,7 @@ pub(super) struct Promised {
     pub(super) mean: f64,
     pub(super) max_touches: u32,
     /// What was added to the touches.
-    pub(super) noise: touches::noise::Noise,
+    pub(super) noise: probe::noise::Noise,
     /// Nats by which an object has to be ahead of all others for its name to be given.
     pub(super) margins: BTreeMap<String, f64>,
     /// What the error rate is at most by theory, with any priors.
@@ -64,7 +64,7 @@ pub(super) struct Tested {
     pub(super) threshold: f64,
 }
 
-pub(super) fn tested(terms: &FitTerms) -> Tested {
+pub(super) fn tested(terms: &MisfitTerms) -> Tested {
     Tested {
         held: terms.held.name(),
         promised: f64::from(terms.alarms) / 1e6,
@@ -196,7 +196,7 @@ pub(super) fn promised(model: &Model<'_>) -> Option<Promised> {
         undecided: 1.0 - f64::from(promise.given) / f64::from(promise.sequences.max(1)),
         mean: f64::from(promise.mean_thousandths) / 1e3,
         max_touches: promise.max_touches,
-        noise: touches::noise::Noise::of_promise(&promise.noise),
+        noise: probe::noise::Noise::of_promise(&promise.noise),
         margins: compile::names(model)
             .into_iter()
             .take(model.known_count())

@@ -13,8 +13,8 @@ use crate::ensemble::{
 };
 use crate::error::{EnsembleProblem, Error, Result};
 use crate::mesh::BACKGROUND;
+use crate::probe::noise::Noise;
 use crate::progress::Progress;
-use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::format::{Counted, TrainedTouches};
 use palpate_shared::{Descriptor, Patterns, Touch};

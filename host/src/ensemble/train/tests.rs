@@ -1,7 +1,8 @@
 use super::*;
 use crate::compile;
 use crate::error::{NameProblem, Setting};
-use crate::touches::{ObjectTouches, Source, synthetic};
+use crate::tests::synthetic;
+use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
 
 fn quick() -> Settings {

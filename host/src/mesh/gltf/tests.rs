@@ -1,6 +1,6 @@
 use super::*;
 use crate::mesh::Mesh;
-use crate::mesh::samples::{corners, document, glb_of};
+use crate::mesh::tests::samples::{corners, document, glb_of};
 use serde_json::{Value, json};
 
 /// A square of two triangles, as a GLB file whose document was changed.
@@ -200,7 +200,7 @@ fn buffers_beside_the_file_are_read_also_with_escaped_names_and_never_more_than_
 
 #[test]
 fn chunks_that_do_not_fit_are_refused_with_their_byte() {
-    let whole = crate::mesh::samples::glb(&square());
+    let whole = crate::mesh::tests::samples::glb(&square());
     let complaint = |bytes: &[u8]| parse(bytes, Path::new("cup.glb"), None).unwrap_err().to_string();
     assert!(
         complaint(&whole[..whole.len() - 4]).contains("cup.glb: byte 8: the GLB file is damaged: it states a length")

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::samples;
+use crate::mesh::tests::samples;
 
 fn parse_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
     parse(bytes.as_ref(), Path::new("cup.ply")).map(|(mesh, _)| mesh)

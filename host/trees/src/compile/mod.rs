@@ -36,11 +36,11 @@
 //! ```
 
 mod axes;
+mod budget;
 mod cells;
 mod cost;
 mod emit;
 mod error;
-mod fit;
 mod forest;
 mod groups;
 mod layout;
@@ -57,10 +57,10 @@ mod tests;
 mod trees;
 mod write;
 
+pub use budget::compile_within;
 pub use cost::{Core, Instructions, Memory};
 pub use emit::{Language, emit};
 pub use error::CompileProblem;
-pub use fit::compile_within;
 pub use groups::leaves_of_trees;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};

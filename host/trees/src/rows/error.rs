@@ -1,7 +1,6 @@
 //! What can be wrong with rows of features, and with comparing models on them.
 
 use crate::error::Problem;
-use crate::verify::ClassDiffers;
 
 /// What `verify` compares with.
 const RAW_SCORES: &str = "Give the library's raw scores, before the softmax or the logistic function: one column per output, or one for a binary model (its second class), in the order of the classes. XGBoost: `output_margin=True`; LightGBM: `raw_score=True`; CatBoost: `prediction_type=\"RawFormulaVal\"`; scikit-learn: `decision_function`, of forests `predict_proba`; onnxruntime: a model converted with `options={id(model): {\"raw_scores\": True}}`, of forests its probabilities.";
@@ -148,4 +147,15 @@ impl Problem for RowsProblem {
         }
         .into()
     }
+}
+
+/// A row that the library puts into another class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassDiffers {
+    /// The row, counted from 1.
+    pub row: usize,
+    /// The model's class and the library's.
+    pub classes: [String; 2],
+    /// How far apart their margins are by the library.
+    pub gap: f64,
 }

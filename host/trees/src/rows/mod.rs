@@ -4,7 +4,7 @@ mod error;
 mod generate;
 pub mod scales;
 
-pub use error::RowsProblem;
+pub use error::{ClassDiffers, RowsProblem};
 pub use generate::generate;
 
 use crate::error::{Error, Place, Result};

@@ -9,6 +9,7 @@ mod reference;
 mod score;
 pub mod together;
 
+pub use crate::rows::ClassDiffers;
 pub use candidate::Candidate;
 pub use estimate::Estimate;
 pub use reference::{bound, margins, unit};
@@ -81,17 +82,6 @@ impl Verified {
             },
         }
     }
-}
-
-/// A row that the library puts into another class.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ClassDiffers {
-    /// The row, counted from 1.
-    pub row: usize,
-    /// The model's class and the library's.
-    pub classes: [String; 2],
-    /// How far apart their margins are by the library.
-    pub gap: f64,
 }
 
 /// What comparing rows comes to.

@@ -3,7 +3,7 @@
 use super::super::progress::Bar;
 use super::super::{dataset, train};
 use palpate::Result;
-use palpate::evaluate::compare::{Comparison, Cost, Settings, Share, compare};
+use palpate::evaluate::recorded::{Comparison, Cost, Settings, Share, compare};
 use palpate::output;
 use palpate::touches::{Captured, Dataset};
 use palpate_shared::Descriptor;

@@ -1,8 +1,15 @@
 //! A plan of approaches for a model: how well each pose of the probe tells each two objects apart.
 
+mod active;
+mod figures;
+mod poses;
+
+pub use active::{Active, ActiveFacts};
+pub use figures::evaluate_active;
+pub use poses::{ByPose, Stock};
+
 use super::Candidate;
 use super::margins::{Margins, Values, row};
-use super::poses::ByPose;
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::touches::Dataset;

@@ -1,7 +1,7 @@
 //! Approaches by the pose that they were made in, so that a robot can be sent where a plan says.
 
-use super::draws::Draws;
 use crate::error::{EvaluateProblem, Result};
+use crate::evaluate::draws::Draws;
 use crate::random::Purpose;
 use crate::touches::ObjectTouches;
 use palpate_shared::Poses;

@@ -9,10 +9,11 @@ use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train::{self, train};
 use crate::error::CalibrateProblem;
-use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings, compare};
-use crate::repetitions::{assert_rare, repetitions};
-use crate::touches::noise::Noise;
-use crate::touches::{Dataset, ObjectTouches, Source, folds, synthetic};
+use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings, recorded};
+use crate::probe::noise::Noise;
+use crate::tests::repetitions::{assert_rare, repetitions};
+use crate::tests::synthetic;
+use crate::touches::{Dataset, ObjectTouches, Source, folds};
 use crate::{strangers, teach, tune};
 use palpate_onboard::Stopping;
 use palpate_shared::format::Held;
@@ -259,8 +260,8 @@ fn what_tune_states_is_what_its_model_does() {
 #[test]
 fn what_a_comparison_states_is_what_its_model_does() {
     let (recorded, simulated) = (touches(2_000, 7), touches(6_000, 8));
-    let settings = compare::Settings { groups: 500, ..compare::Settings::default() };
-    let compared = compare::compare(&recorded, &simulated, &settings, &()).unwrap();
+    let settings = recorded::Settings { groups: 500, ..recorded::Settings::default() };
+    let compared = recorded::compare(&recorded, &simulated, &settings, &()).unwrap();
     assert!(compared.told_apart.low < 0.51, "{:?}", compared.told_apart);
     let split = folds::split(&simulated, 0.25, settings.seed).unwrap();
     let ensemble = train(&split.train, &train::Settings::compact(), &()).unwrap();

@@ -1,6 +1,6 @@
 //! The figures of a run over objects with several very different meshes agree with fresh touches.
 
-use super::*;
+use crate::run::*;
 use palpate::mesh::{Instance, Mesh};
 
 /// A share, and its standard error.
@@ -57,7 +57,7 @@ fn what_a_run_states_is_what_its_model_does() {
         sequences: 1_500,
         ..Settings::default()
     };
-    let summary = super::run(&objects, &settings, place.path(), &()).unwrap();
+    let summary = run(&objects, &settings, place.path(), &()).unwrap();
     let bytes = std::fs::read(place.path().join("model.palpate")).unwrap();
     let model = Model::new(&bytes).unwrap();
     let unseen = palpate::touches::Origin { touches: 6_000, approaches: true, seed: 99, ..origin };

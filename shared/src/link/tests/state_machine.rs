@@ -5,7 +5,7 @@
 //! Frames are delivered in any order, twice, late (also after resets), or not at all. Both hosts hear what a chip says that
 //! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.
 
-use super::*;
+use crate::link::*;
 use crate::{Pose, Touch};
 use proptest::prelude::*;
 use std::collections::BTreeMap;

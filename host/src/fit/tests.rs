@@ -218,7 +218,7 @@ fn a_few_touches_give_warnings_and_too_few_an_error() {
     assert!(found.warnings.iter().any(|warning| warning.record.contains("approaches")), "{:?}", found.warnings);
     let few = recorded(&objects()[..1], 12, 12, &BENT);
     let error = fit(&few, &objects(), None, &settings(), &()).unwrap_err();
-    assert!(matches!(error.problem::<TuneProblem>(), Some(TuneProblem::FewRecorded { .. })), "{error}");
+    assert!(matches!(error.problem::<FitProblem>(), Some(FitProblem::FewRecorded { .. })), "{error}");
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn usual(resolution: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touches::noise::Noise;
+    use crate::probe::noise::Noise;
 
     /// Touches whose times are spread over some hundred milliseconds.
     fn touches(count: u32, timer: f64) -> Vec<Touch> {

@@ -1,11 +1,10 @@
 //! The figures of an evaluation under a model's plan.
 
-use super::Estimate;
 use super::active::Active;
-use super::margins::Margins;
-use super::sequential::Outcome;
-use super::{Evaluation, Settings};
 use crate::error::{Error, Result};
+use crate::evaluate::margins::Margins;
+use crate::evaluate::sequential::Outcome;
+use crate::evaluate::{Estimate, Evaluation, Settings};
 use palpate_onboard::Stopping;
 use palpate_shared::ContactPattern;
 use rayon::prelude::*;
@@ -20,11 +19,11 @@ struct Counts {
     made: [usize; 2],
 }
 
-/// Evaluates a model as [`evaluate`](super::evaluate()), with every approach where the model's plan says instead of one
+/// Evaluates a model as [`evaluate`](crate::evaluate::evaluate()), with every approach where the model's plan says instead of one
 /// drawn at random. Touches, too, are those of such approaches.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) as [`evaluate`](super::evaluate()).
+/// [`Setting`](crate::error::Setting) as [`evaluate`](crate::evaluate::evaluate()).
 pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
     let Settings { at, at_approaches, groups, seed, .. } = settings;
     let rule = margins.stopping(&settings.sequences())?;

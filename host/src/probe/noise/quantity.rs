@@ -1,12 +1,12 @@
 //! Quantities as users write them: durations, angles and shares, each with its unit.
 
-use crate::error::{Result, TouchesProblem};
+use crate::error::{ProbeProblem, Result};
 
 /// A duration of at least 0 such as `5ms`, `300us` or `0.005s`, in microseconds.
 ///
 /// # Errors
-/// [`TouchesProblem::BadQuantity`].
-pub fn duration(text: &str) -> Result<f64, TouchesProblem> {
+/// [`ProbeProblem::BadQuantity`].
+pub fn duration(text: &str) -> Result<f64, ProbeProblem> {
     // Longest unit first: every one of them ends in `s`.
     let units = [("us", 1.0), ("ms", 1e3), ("s", 1e6)];
     let found = units.into_iter().find_map(|(name, unit)| Some((text.trim().strip_suffix(name)?, unit)));
@@ -18,8 +18,8 @@ pub fn duration(text: &str) -> Result<f64, TouchesProblem> {
 /// An angle of at least 0 such as `5deg` or `5°`, in degrees.
 ///
 /// # Errors
-/// [`TouchesProblem::BadQuantity`].
-pub fn angle(text: &str) -> Result<f64, TouchesProblem> {
+/// [`ProbeProblem::BadQuantity`].
+pub fn angle(text: &str) -> Result<f64, ProbeProblem> {
     let trimmed = text.trim();
     let found = trimmed.strip_suffix("deg").or_else(|| trimmed.strip_suffix('°'));
     found.and_then(|text| number(text, 1.0)).ok_or_else(|| bad(text, "an angle such as 5deg"))
@@ -28,8 +28,8 @@ pub fn angle(text: &str) -> Result<f64, TouchesProblem> {
 /// A share of at least 0 such as `2%` or `0.02`.
 ///
 /// # Errors
-/// [`TouchesProblem::BadQuantity`].
-pub fn share(text: &str) -> Result<f64, TouchesProblem> {
+/// [`ProbeProblem::BadQuantity`].
+pub fn share(text: &str) -> Result<f64, ProbeProblem> {
     let found = match text.trim().strip_suffix('%') {
         Some(percent) => number(percent, 1.0).map(|percent| percent / 100.0),
         None => number(text, 1.0),
@@ -41,8 +41,8 @@ fn number(text: &str, unit: f64) -> Option<f64> {
     text.trim().parse().ok().filter(|number: &f64| *number >= 0.0 && number.is_finite()).map(|number| number * unit)
 }
 
-fn bad(text: &str, example: &'static str) -> TouchesProblem {
-    TouchesProblem::BadQuantity { text: text.into(), example }
+fn bad(text: &str, example: &'static str) -> ProbeProblem {
+    ProbeProblem::BadQuantity { text: text.into(), example }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! same for all touches of one robot is a bias.
 //!
 //! ```
-//! use palpate::touches::noise::{Deviation, Noise};
+//! use palpate::probe::noise::{Deviation, Noise};
 //! use palpate_shared::Touch;
 //!
 //! let noise = Noise { deviation: "0..10ms".parse()?, timer: 1_000.0, ..Noise::default() };
@@ -12,14 +12,14 @@
 //! // The first contact is 0 again, and the timer counts whole milliseconds.
 //! assert!(noisy[0].times().iter().all(|time| time.micros().is_some_and(|micros| micros % 1_000 == 0)));
 //! assert_eq!(Deviation::from(5_000.0).largest, 5_000.0);
-//! # Ok::<_, palpate::error::TouchesProblem>(())
+//! # Ok::<_, palpate::error::ProbeProblem>(())
 //! ```
 
 pub mod quantity;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{Error, Result, TouchesProblem};
+use crate::error::{Error, ProbeProblem, Result};
 use crate::probe::approach::{FINGERS, to_q15};
 use crate::random::{self, Purpose};
 use glam::DVec3;
@@ -97,10 +97,10 @@ impl From<f64> for Deviation {
 
 /// `5ms`, or a range as `0..10ms`.
 impl FromStr for Deviation {
-    type Err = TouchesProblem;
+    type Err = ProbeProblem;
 
-    fn from_str(text: &str) -> Result<Self, TouchesProblem> {
-        let problem = || TouchesProblem::BadQuantity {
+    fn from_str(text: &str) -> Result<Self, ProbeProblem> {
+        let problem = || ProbeProblem::BadQuantity {
             text: text.into(),
             example: "a duration with its unit such as 5ms, or a range such as 0..10ms",
         };
@@ -313,7 +313,7 @@ impl Noise {
     }
 
     /// The same with touch i made by robot `robot(i)`.
-    pub(super) fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
+    pub(crate) fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
         // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
         // version 0.1.0, and no other setting changes it.
         let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);

@@ -8,8 +8,13 @@
 //! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
 //! recorded ones, and how many more approaches it takes there to be right as often as on simulated ones.
 
+mod cost;
+mod features;
+
+pub use cost::Cost;
+pub use features::FeatureComparison;
+
 use super::Estimate;
-use super::{Candidate, Margins, SequentialSettings};
 use crate::ensemble::{feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::progress::{self, Progress};
@@ -39,19 +44,12 @@ impl Default for Settings {
     }
 }
 
-/// Numbers of approaches after which accuracy is given.
-const AT: [usize; 5] = [5, 10, 20, 30, 60];
-/// Approaches whose accuracy on simulated touches is asked for on recorded ones.
-const COST_AT: usize = 20;
 /// The most simulated touches for each recorded one: more say no more.
 const MOST: usize = 5;
 /// The fewest recorded touches of an object that are compared.
 pub const LEAST: usize = 30;
 /// Standard errors to either side of an interval of 95 %.
 const QUANTILE: f64 = 1.96;
-/// Kolmogorov's distribution at 95 %.
-const KOLMOGOROV: f64 = 1.358;
-
 /// A share and its 95 % interval, by the normal approximation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Share {
@@ -100,59 +98,6 @@ pub struct ObjectComparison {
     pub features: Vec<FeatureComparison>,
 }
 
-/// How a feature of recorded and simulated touches compares.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FeatureComparison {
-    /// The feature's name.
-    pub feature: String,
-    /// Its 5th, 25th, 50th, 75th and 95th percentiles among recorded touches: microseconds for times, Q15 for cosines.
-    pub recorded: [f64; 5],
-    /// The same among simulated touches.
-    pub simulated: [f64; 5],
-    /// The largest difference between the shares of touches below a value: 0 to 1.
-    pub apart: f64,
-    /// What [`FeatureComparison::apart`] would be by chance in one of 20 comparisons.
-    pub by_chance: f64,
-}
-
-impl FeatureComparison {
-    /// In words: "alike", "9 % apart: smaller, wider".
-    pub fn words(&self) -> String {
-        if self.apart <= self.by_chance {
-            return "alike".into();
-        }
-        let [_, low, middle, high, _] = self.recorded;
-        let [_, own_low, own_middle, own_high, _] = self.simulated;
-        let (width, own_width) = (high - low, own_high - own_low);
-        let mut how = Vec::new();
-        if (middle - own_middle).abs() > 0.1 * own_width.max(1.0) {
-            how.push(if middle > own_middle { "larger" } else { "smaller" });
-        }
-        if width > 1.1 * own_width {
-            how.push("wider");
-        } else if 1.1 * width < own_width {
-            how.push("narrower");
-        }
-        let how = if how.is_empty() { "another shape".to_owned() } else { how.join(", ") };
-        format!("{:.0} % apart: {how}", 100.0 * self.apart)
-    }
-}
-
-/// What it costs a model that recorded touches are not as simulated.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Cost {
-    /// Objects that the model knows; all of the simulated ones.
-    pub known: usize,
-    /// Accuracy after a number of approaches, on simulated touches that the model was not trained on.
-    pub simulated: BTreeMap<usize, Share>,
-    /// The same on recorded touches of the same objects.
-    pub recorded: BTreeMap<usize, Share>,
-    /// How many approaches the accuracy on simulated touches is of.
-    pub after: usize,
-    /// After how many approaches the model is right as often on recorded touches; none if it never is.
-    pub needed: Option<f64>,
-}
-
 impl Comparison {
     /// What the figure means, in a sentence.
     pub fn verdict(&self) -> &'static str {
@@ -163,23 +108,6 @@ impl Comparison {
                 "They differ: fit the probe to recorded touches, or record more of them."
             }
             _ => "They differ much: the probe, a mesh or its size is not what is simulated.",
-        }
-    }
-}
-
-impl Cost {
-    /// What it costs, in a sentence.
-    pub fn sentence(&self) -> String {
-        let Self { after, needed, .. } = self;
-        match needed {
-            Some(needed) if needed - *after as f64 > 0.5 => format!(
-                "To be right as often as on simulated touches after {after} approaches takes {needed:.0} on recorded ones: {:.0} more.",
-                (needed - *after as f64).max(1.0)
-            ),
-            Some(_) => format!("It is right as often on recorded touches: after {after} approaches nothing is lost."),
-            None => {
-                format!("On recorded touches it is never right as often as on simulated ones after {after} approaches.")
-            }
         }
     }
 }
@@ -240,7 +168,7 @@ pub fn compare(
         descriptor: descriptor.name().into(),
         told_apart,
         objects: compared.into_iter().map(|(object, _)| object).collect(),
-        cost: cost(&recorded, &simulated, settings, progress)?,
+        cost: cost::cost(&recorded, &simulated, settings, progress)?,
     })
 }
 
@@ -263,9 +191,9 @@ fn object(
     let patterns = ContactPattern::ALL.iter().map(|pattern| (pattern.name().to_owned(), share(*pattern))).collect();
     let rows =
         both.map(|touches| -> Vec<Vec<f32>> { touches.iter().map(|touch| feature_row(descriptor, touch)).collect() });
-    let features = (descriptor.feature_names().iter().enumerate())
-        .filter(|(_, name)| **name != "pattern")
-        .filter_map(|(column, name)| feature(name, rows.each_ref().map(|rows| values(rows, column))));
+    let features = (descriptor.feature_names().iter().enumerate()).filter(|(_, name)| **name != "pattern").filter_map(
+        |(column, name)| features::feature(name, rows.each_ref().map(|rows| features::values(rows, column))),
+    );
     let comparison = ObjectComparison {
         name: recorded.name.clone(),
         touches: both.map(<[Touch]>::len),
@@ -289,36 +217,6 @@ fn first(object: &ObjectTouches, count: usize) -> ObjectTouches {
     let mut chosen: Vec<usize> = order.into_iter().take(count).map(|(.., touch)| touch).collect();
     chosen.sort_unstable();
     object.select(chosen)
-}
-
-/// The values of a feature where it is not missing, in order.
-fn values(rows: &[Vec<f32>], column: usize) -> Vec<f64> {
-    let there = rows.iter().filter_map(|row| row.get(column)).filter(|value| value.is_finite());
-    let mut values: Vec<f64> = there.map(|value| f64::from(*value)).collect();
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-/// Compares two samples in order; none if one is empty.
-fn feature(name: &str, [recorded, simulated]: [Vec<f64>; 2]) -> Option<FeatureComparison> {
-    let percentiles = |values: &[f64]| {
-        let at = |percent: usize| values.get(percent * (values.len() - 1) / 100).copied().unwrap_or_default();
-        [5, 25, 50, 75, 95].map(at)
-    };
-    if recorded.is_empty() || simulated.is_empty() {
-        return None;
-    }
-    let [n, m] = [recorded.len() as f64, simulated.len() as f64];
-    let below = |values: &[f64], at: f64| values.partition_point(|value| *value <= at) as f64;
-    let at = recorded.iter().chain(&simulated);
-    let apart = at.map(|&at| (below(&recorded, at) / n - below(&simulated, at) / m).abs()).fold(0.0, f64::max);
-    Some(FeatureComparison {
-        feature: name.into(),
-        recorded: percentiles(&recorded),
-        simulated: percentiles(&simulated),
-        apart,
-        by_chance: KOLMOGOROV * ((n + m) / (n * m)).sqrt(),
-    })
 }
 
 /// How often trees tell touches of two samples apart that they were not trained on; the two samples weigh equally.
@@ -353,62 +251,12 @@ fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, sett
     Ok(Estimate::mean_of([0, 1].map(|class: usize| Estimate::share(right[class], counts[class])).into_iter()))
 }
 
-/// What a model that is trained on simulated touches makes of recorded ones; none for fewer than two recorded objects.
-fn cost(recorded: &Dataset, simulated: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Option<Cost>> {
-    if recorded.objects.len() < 2 {
-        return Ok(None);
-    }
-    let split = folds::split(simulated, 0.25, settings.seed)?;
-    let recipe = train::Settings { descriptor: settings.descriptor, ..train::Settings::compact() };
-    let model = train::train(&split.train, &recipe, progress)?;
-    let names = recorded.names();
-    let tested = split.test.only(|name| names.iter().any(|own| own == name));
-    progress.begin("measuring", None);
-    let accuracy = |dataset: &Dataset, at: &[usize]| -> Result<BTreeMap<usize, Estimate>> {
-        let margins = Margins::new(Candidate::Full(&model), dataset)?;
-        let at: Vec<usize> = at.iter().copied().filter(|at| *at <= margins.fewest_approaches()).collect();
-        let sequences =
-            SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed: settings.seed };
-        let measured = margins.approaches(&at, &sequences)?;
-        let both = measured.accuracy.iter().zip(measured.accuracy_standard_error.values());
-        Ok(both.map(|((at, value), error)| (*at, Estimate { value: *value, standard_error: *error })).collect())
-    };
-    let all: Vec<usize> = (1..=*AT.last().unwrap_or(&1)).collect();
-    let [own, other] = [&tested, recorded].map(|dataset| accuracy(dataset, &all));
-    let (own, other) = (own?, other?);
-    let shown = |of: &BTreeMap<usize, Estimate>| -> BTreeMap<usize, Share> {
-        AT.iter().filter_map(|at| Some((*at, Share::of(*of.get(at)?)))).collect()
-    };
-    let after = COST_AT.min(own.len()).min(other.len()).max(1);
-    let wanted = own.get(&after).map_or(1.0, |estimate| estimate.value);
-    Ok(Some(Cost {
-        known: model.known_count(),
-        simulated: shown(&own),
-        recorded: shown(&other),
-        after,
-        needed: needed(&other, wanted),
-    }))
-}
-
-/// The number of approaches after which this accuracy is reached, in between two of them by a straight line.
-fn needed(accuracy: &BTreeMap<usize, Estimate>, wanted: f64) -> Option<f64> {
-    let (mut before, mut least) = (0.0, 0.0);
-    for (&at, estimate) in accuracy {
-        if estimate.value >= wanted {
-            let share = (wanted - least) / (estimate.value - least).max(1e-12);
-            return Some(before + share.clamp(0.0, 1.0) * (at as f64 - before));
-        }
-        (before, least) = (at as f64, estimate.value);
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    use crate::touches::noise::Noise;
-    use crate::touches::synthetic;
+    use crate::probe::noise::Noise;
+    use crate::tests::synthetic;
 
     fn shifted(dataset: &Dataset, noise: &Noise) -> Dataset {
         dataset.each(|own| own.noisy(noise, 3, 1))

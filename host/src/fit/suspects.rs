@@ -407,7 +407,7 @@ fn moments(values: &[f64]) -> [f64; 2] {
 mod tests {
     use super::*;
     use crate::random::{Purpose, generator};
-    use crate::repetitions::{assert_rare, repetitions};
+    use crate::tests::repetitions::{assert_rare, repetitions};
     use rand_distr::{Distribution, StandardNormal};
 
     /// Log-densities of so many touches of the right object, whose densities are known: as another's, which gives numbers

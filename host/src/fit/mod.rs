@@ -20,7 +20,7 @@
 //! ```no_run
 //! use palpate::mesh::source;
 //! use palpate::touches::Dataset;
-//! use palpate::tune::fit::{self, fit};
+//! use palpate::fit::{self, fit};
 //!
 //! # fn main() -> palpate::Result<()> {
 //! let objects = source::objects(&["meshes".into()])?;
@@ -34,6 +34,7 @@
 mod advice;
 mod candidate;
 mod density;
+mod error;
 mod likelihood;
 mod outcome;
 mod posed;
@@ -43,12 +44,13 @@ mod suspects;
 #[cfg(all(test, feature = "objects"))]
 mod tests;
 mod timer;
+pub use error::FitProblem;
 pub use outcome::between;
 pub use outcome::{Estimate, Fit, Warning};
 pub use suspects::Suspect;
 
 use crate::capture;
-use crate::error::{Error, Result, TuneProblem};
+use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
@@ -113,7 +115,7 @@ impl Evidence<'_> {
 /// objects and 1,200 recorded approaches.
 ///
 /// # Errors
-/// [`TuneProblem::NotRecorded`] if a recorded object is not among the objects; [`TuneProblem::FewRecorded`] for fewer than
+/// [`FitProblem::NotRecorded`] if a recorded object is not among the objects; [`FitProblem::FewRecorded`] for fewer than
 /// [`LEAST`] touches with two or three contacts; as [`crate::capture::touches`]; [`Error::Cancelled`].
 pub fn fit(
     recorded: &Dataset,
@@ -127,7 +129,7 @@ pub fn fit(
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
     let found = touches().chain(plate.into_iter().flatten()).filter(useful).count();
     if found < LEAST {
-        return Err(TuneProblem::FewRecorded { touches: found, least: LEAST }.into());
+        return Err(FitProblem::FewRecorded { touches: found, least: LEAST }.into());
     }
     let (objects, scenes) = simulated(objects, settings, progress)?;
     let kept = kept(recorded);
@@ -158,7 +160,7 @@ pub fn fit(
 fn place(name: &str, objects: &[Object]) -> Result<usize> {
     objects.iter().position(|object| object.name == name).ok_or_else(|| {
         let known = objects.iter().map(|object| object.name.clone()).collect();
-        TuneProblem::NotRecorded { name: name.into(), known }.into()
+        FitProblem::NotRecorded { name: name.into(), known }.into()
     })
 }
 
@@ -182,7 +184,7 @@ fn simulated(
     if settings.approaches < 1_000 {
         return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
     }
-    let real = crate::touches::noise::Noise::default();
+    let real = crate::probe::noise::Noise::default();
     let origin =
         Origin { approaches: true, touches: settings.approaches, seed: settings.seed, real, ..settings.origin.clone() };
     let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;

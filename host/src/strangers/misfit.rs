@@ -3,7 +3,7 @@
 use super::follow::early;
 use super::{FIRST, Supply};
 use nalgebra::{DMatrix, DVector};
-use palpate_shared::format::FitTest;
+use palpate_shared::format::MisfitTest;
 use rayon::prelude::*;
 
 /// The touches at which the spread of other shapes is weighed against that of touches.
@@ -29,7 +29,7 @@ pub(super) struct Moments {
 
 /// What touches of one object give, in nats: see [`super`].
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Fit {
+pub(super) struct Misfit {
     /// Whose evidence against the object counts.
     pub(super) rivals: Vec<usize>,
     /// Of this evidence per touch.
@@ -75,9 +75,9 @@ impl Moments {
         Self { of: of.collect(), shapes: shapes.collect(), known, objects }
     }
 
-    /// The fit of an object as if the model did not have the column `without`; none if its touches are too few or too
+    /// The misfit of an object as if the model did not have the column `without`; none if its touches are too few or too
     /// much alike to have a covariance.
-    fn fit(&self, leader: usize, without: Option<usize>) -> Option<Fit> {
+    fn misfit(&self, leader: usize, without: Option<usize>) -> Option<Misfit> {
         let (mean, covariance) = self.of.get(leader)?;
         let rivals = self.rivals(leader, without);
         let count = rivals.len();
@@ -122,34 +122,34 @@ impl Moments {
         let factor = reversed.cholesky()?.l();
         let weights =
             DMatrix::from_fn(count, count, |a, b| if b > a { 0.0 } else { factor[(count - 1 - b, count - 1 - a)] });
-        Some(Fit { rivals, mean: expected, slope, weights, constant })
+        Some(Misfit { rivals, mean: expected, slope, weights, constant })
     }
 
     /// The rivals of an object: all others, or those whose evidence is nearest to its own; the background always.
     fn rivals(&self, leader: usize, without: Option<usize>) -> Vec<usize> {
         let mut rivals: Vec<usize> =
             (0..self.objects).filter(|&other| other != leader && Some(other) != without).collect();
-        if rivals.len() > FitTest::MOST_RIVALS {
+        if rivals.len() > MisfitTest::MOST_RIVALS {
             let mean = &self.of[leader].0;
             let ahead = |&rival: &usize| if rival >= self.known { f64::INFINITY } else { mean[rival] };
             rivals.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
-            rivals.truncate(FitTest::MOST_RIVALS);
+            rivals.truncate(MisfitTest::MOST_RIVALS);
             rivals.sort_unstable();
         }
         rivals
     }
 }
 
-/// The fit of every known object; none if one has none.
-pub(super) fn fits(moments: &Moments, without: Option<usize>) -> Option<Vec<Fit>> {
-    let fits: Option<Vec<Fit>> =
-        (0..moments.known).map(|object| moments.fit(object, without.filter(|other| *other != object))).collect();
-    fits.filter(|fits| fits.iter().all(|fit| !fit.rivals.is_empty()))
+/// The misfit of every known object; none if one has none.
+pub(super) fn misfits(moments: &Moments, without: Option<usize>) -> Option<Vec<Misfit>> {
+    let misfits: Option<Vec<Misfit>> =
+        (0..moments.known).map(|object| moments.misfit(object, without.filter(|other| *other != object))).collect();
+    misfits.filter(|misfits| misfits.iter().all(|misfit| !misfit.rivals.is_empty()))
 }
 
-impl Fit {
-    /// How badly the evidence of `touches` touches fits, in nats.
-    pub(super) fn misfit(&self, evidence: &[f64], leader: usize, touches: u32) -> f64 {
+impl Misfit {
+    /// The misfit of the evidence of `touches` touches, in nats.
+    pub(super) fn of(&self, evidence: &[f64], leader: usize, touches: u32) -> f64 {
         let count = f64::from(touches);
         let against =
             self.rivals.iter().zip(self.mean.iter()).map(|(&r, mean)| evidence[r] - evidence[leader] - count * mean);
@@ -164,7 +164,7 @@ pub(super) fn left_out(moments: &Moments, supplies: &[Supply], threshold: f64, u
     let of = |stranger: usize| {
         let objects = moments.objects;
         // With two objects, none is left that could be told from the other.
-        let Some(fits) = fits(moments, Some(stranger)) else { return vec![0.0; last as usize] };
+        let Some(misfits) = misfits(moments, Some(stranger)) else { return vec![0.0; last as usize] };
         let mut found = vec![0_usize; last as usize];
         let pools = supplies[stranger].pools.iter();
         let sequences: Vec<&[i32]> = pools.flat_map(|rows| rows.chunks_exact(objects * last as usize)).collect();
@@ -179,7 +179,7 @@ pub(super) fn left_out(moments: &Moments, supplies: &[Supply], threshold: f64, u
                 else {
                     break;
                 };
-                if touches >= FIRST && fits[leader].misfit(&evidence, leader, touches) - early(touches) > threshold {
+                if touches >= FIRST && misfits[leader].of(&evidence, leader, touches) - early(touches) > threshold {
                     found.iter_mut().skip(touches as usize - 1).for_each(|found| *found += 1);
                     break;
                 }

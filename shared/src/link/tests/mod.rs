@@ -1,3 +1,5 @@
+mod state_machine;
+
 use super::*;
 use crate::{ContactTime, Pose, Touch};
 use proptest::prelude::*;

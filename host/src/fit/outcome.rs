@@ -5,7 +5,7 @@ use super::search::{Best, Ends};
 use super::suspects::Suspect;
 use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use palpate_shared::format::Length;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
@@ -57,7 +57,7 @@ pub struct Fit {
     /// The probe as it should be.
     pub probe: Probe,
     /// What its lengths are measured in.
-    #[serde(with = "crate::touches::unit")]
+    #[serde(with = "crate::probe::unit")]
     pub unit: Length,
     /// Its speed over the nominal one.
     pub speed_factor: Estimate,

@@ -1,10 +1,10 @@
 //! Approaches where the model's plan says.
 
-use super::Candidate;
-use super::margins::{Margins, Tested, Values, row};
 use super::poses::{ByPose, Stock};
-use super::sequential::Outcome;
 use crate::error::{EvaluateProblem, Result};
+use crate::evaluate::Candidate;
+use crate::evaluate::margins::{Margins, Tested, Values, row};
+use crate::evaluate::sequential::Outcome;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Poses;
