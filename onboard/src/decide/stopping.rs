@@ -9,7 +9,7 @@ pub struct Stopping {
     /// Error rate / (1 − error rate) in Q56: what the other objects' weights may come to, the best object's being 1.
     pub(crate) odds: u64,
     pub(crate) max_touches: u32,
-    /// Whether objects have the thresholds that their model states for each, where it does.
+    /// True if objects have the thresholds that their model states for each, where it does.
     pub(crate) by_object: bool,
 }
 

@@ -24,7 +24,7 @@ impl<'a> Plan<'a> {
     /// Stored where no approach touches anything.
     pub const UNTOUCHED: i8 = i8::MIN;
 
-    /// What stands before the separations.
+    /// Bytes in front of the separations.
     pub const fn header(poses: Poses) -> [u8; 4] {
         [0, poses.rolls(), 0, 0]
     }
@@ -43,7 +43,7 @@ impl<'a> Plan<'a> {
         Some(Self { poses, separations })
     }
 
-    /// How many pairs this many objects make.
+    /// Number of pairs of this many objects.
     pub const fn pairs(objects: usize) -> usize {
         // No model has more than 256, so nothing here needs 64 bits.
         let objects = if objects < 1 << 16 { objects } else { (1 << 16) - 1 };
@@ -71,7 +71,7 @@ impl<'a> Plan<'a> {
         self.separations.get(start..start.saturating_add(poses)).unwrap_or_default()
     }
 
-    /// Whether an approach in the pose with this number may touch something.
+    /// True if an approach in the pose with this number may touch something.
     ///
     /// Cost: a few instructions. Cannot fail.
     pub fn may_touch(&self, pose: u16) -> bool {

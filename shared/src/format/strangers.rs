@@ -1,4 +1,4 @@
-//! What a model knows about objects that it does not know: a background, and a test of fit.
+//! Statements of a model about objects that it does not know: a background, and a test of fit.
 //!
 //! The test compares the evidence so far with what touches of the leading object give. With r the evidence of *rivals*
 //! (other objects, and the background) against the leader, less its mean, summed over n touches, the misfit is
@@ -24,7 +24,7 @@ pub struct Strangers<'a> {
 /// The numbers of a test that are the same for all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FitTerms {
-    /// How long names are held back.
+    /// Rule for holding names back.
     pub held: Held,
     /// Rivals of each object: 1 to [`FitTest::MOST_RIVALS`].
     pub rivals: u8,
@@ -34,7 +34,7 @@ pub struct FitTerms {
     pub least: u32,
     /// The misfit above which an object is a stranger, after many touches; in 2^-16 nats, as the next two.
     pub threshold: i32,
-    /// How much higher it is at first.
+    /// Amount by which it is higher at first.
     pub early: u32,
     /// The misfit above which no name is given yet, after many touches; at most `threshold`.
     pub doubt: i32,
@@ -51,13 +51,13 @@ pub struct FitTerms {
 /// A test of fit, read in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FitTest<'a> {
-    /// What is the same for all objects.
+    /// Terms that are the same for all objects.
     pub terms: FitTerms,
     /// One after the other, one for each object but the background, and what has grown after them.
     records: &'a [u8],
 }
 
-/// What touches of one object give.
+/// Expected evidence of touches of one object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjectFit<'a> {
     /// Means are multiples of 2^this units.
@@ -117,7 +117,7 @@ impl FitTerms {
     /// Bytes in the section.
     pub const LENGTH: usize = 40;
 
-    /// What stands in the section.
+    /// Returns the bytes of the section.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
         let Self { held, rivals, first, least, threshold, early, doubt, halving, alarms, sequences, confidence } =
             *self;
@@ -173,7 +173,7 @@ impl<'a> FitTest<'a> {
         Some(Self { terms: FitTerms::from_bytes(terms)?, records })
     }
 
-    /// Whether there are records of `known` objects, with rivals that exist among `objects`.
+    /// True if there are records of `known` objects, with rivals that exist among `objects`.
     fn makes_sense(&self, known: usize, objects: usize) -> bool {
         (0..known).all(|object| {
             self.object(object).is_some_and(|record| {
@@ -184,7 +184,7 @@ impl<'a> FitTest<'a> {
         })
     }
 
-    /// What touches of an object give; `None` for one that has no record.
+    /// Expected evidence of touches of an object; `None` for one that has no record.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn object(&self, object: usize) -> Option<ObjectFit<'a>> {

@@ -1,4 +1,4 @@
-//! What interrupts and the main loop share: the switches, what the UART has received, the alarm that wakes.
+//! State that interrupts and the main loop share: the switches, what the UART has received, the alarm that wakes.
 
 use core::cell::RefCell;
 use critical_section::{CriticalSection, Mutex};
@@ -72,12 +72,12 @@ pub fn start(switches: Switches, mut reader: Reader<UART0, Wires>, mut alarm: Al
     }
 }
 
-/// What the switches have to say.
+/// Returns the messages of the switches.
 pub fn sense() -> Sensed {
     with(|shared| shared.watcher.sense(&shared.clock)).unwrap_or(Sensed::Nothing(0))
 }
 
-/// What the UART has received; how many bytes.
+/// Reads bytes that the UART has received; returns their number.
 pub fn receive(buffer: &mut [u8]) -> usize {
     let mut count = 0;
     for slot in buffer {
