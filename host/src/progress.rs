@@ -1,4 +1,4 @@
-//! How far long work has come, told to whoever wants to know; and a way to stop it.
+//! Progress of long work, for whoever wants to show it; and a way to stop it.
 
 use crate::error::{Error, Result};
 
@@ -18,7 +18,7 @@ pub trait Progress: Sync {
         _ = steps;
     }
 
-    /// Whether the call should stop as soon as it can, with [`Error::Cancelled`]. Asked often; should be cheap.
+    /// True if the call should stop as soon as it can, with [`Error::Cancelled`]. Asked often; should be cheap.
     fn is_cancelled(&self) -> bool {
         false
     }

@@ -53,7 +53,7 @@ pub(crate) use model::{STRICTEST, add_noise, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
 pub use temperature::temperature;
-/// What the promised rate is of, in words.
+/// The cases that the promised rate refers to, in words.
 pub fn of_what(per: Per) -> &'static str {
     match per {
         Per::Average => "all names given, on average,",

@@ -48,7 +48,7 @@ const ONE: f64 = 72_057_594_037_927_936.0;
 pub struct Look {
     /// The object with the most evidence.
     pub name: usize,
-    /// What the weights of the others came to, in Q56: the recognizer's own integers.
+    /// Sum of the weights of the others, in Q56: the recognizer's own integers.
     pub odds: u64,
     /// Touches so far that are evidence.
     pub touches: u32,

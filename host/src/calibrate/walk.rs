@@ -11,7 +11,7 @@
 //! of successes in independent trials, 1956). How many names are given is taken as given; the simulations of
 //! `calibrate/tests.rs`, whose error rates are known, count how often a promise is broken in the end.
 
-/// What happened at a threshold: errors, of cases that could have been errors.
+/// Results at a threshold: errors, of cases that could have been errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Errors.
@@ -25,7 +25,7 @@ pub struct Tally {
 pub struct Kept<T> {
     /// The threshold.
     pub threshold: T,
-    /// What happened: one tally, or one of each that the rate is promised for.
+    /// Results: one tally, or one of each that the rate is promised for.
     pub tallies: Vec<Tally>,
 }
 
@@ -43,7 +43,7 @@ pub enum Stop {
     TooMany {
         /// The position of the tally.
         position: usize,
-        /// What it was.
+        /// Its tally.
         tally: Tally,
     },
 }
@@ -92,7 +92,7 @@ pub fn walk<T>(steps: impl IntoIterator<Item = (T, Vec<Tally>)>, rate: f64, conf
     })
 }
 
-/// How many cases it takes at least to promise `rate` with probability `confidence`, if none is an error.
+/// Smallest number of cases that allows a promise of `rate` with probability `confidence`, if none is an error.
 pub fn needed(rate: f64, confidence: f64) -> u64 {
     ((1.0 - confidence).ln() / (-rate).ln_1p()).ceil() as u64
 }

@@ -17,7 +17,7 @@ use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How often what is on the disk is checkpointed.
+/// Time between checkpoints of the data on the disk.
 const CHECKPOINT: Duration = Duration::from_millis(500);
 
 pub(super) struct Store {
@@ -68,7 +68,7 @@ impl Store {
         })
     }
 
-    /// What there is of an object.
+    /// Entry of an object.
     pub(super) fn entry(&self, object: usize) -> &Entry {
         &self.listing.objects[self.positions[object]]
     }

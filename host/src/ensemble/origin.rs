@@ -12,14 +12,14 @@ use palpate_shared::{ContactPattern, Patterns};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What an ensemble says about its training touches. Empty for ensembles from elsewhere.
+/// Statements of an ensemble about its training touches. Empty for ensembles from elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origin {
     /// The probe that made them, where the data set states it.
     pub probe: Option<StatedProbe>,
-    /// Which touches they were, and so which ones are evidence.
+    /// Kind of touches they were, and so which ones are evidence.
     pub trained: Option<Trained>,
-    /// What was added to them in training; none also where that is not known.
+    /// Noise added to them in training; none also where that is not known.
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
@@ -32,7 +32,7 @@ pub struct Origin {
     pub imported: Option<Imported>,
 }
 
-/// What is known about an ensemble that another library trained.
+/// Facts about an ensemble that another library trained.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Imported {
     /// The library and the kind of file, such as "LightGBM text".
@@ -40,10 +40,10 @@ pub struct Imported {
     /// The farthest that a margin can be from the library's own, since leaves and sums are f32 here and f64 there; 0
     /// where the library adds the same f32 values in the same order.
     pub rounding: f64,
-    /// What a user should know about it, each a sentence.
+    /// Notes for the user, each a sentence.
     pub notes: Vec<String>,
-    /// How margins become a class or a value, as the library's `predict` does it. Its scale makes the library's margins of
-    /// what the trees add up to.
+    /// Rule that turns margins into a class or a value, as the library's `predict` does it. Its scale makes the
+    /// library's margins of what the trees add up to.
     pub prediction: Prediction,
     /// The least and the largest of the numbers that stand for a missing value, beside NaN.
     pub sentinel: Option<[f32; 2]>,
@@ -58,7 +58,7 @@ pub struct StatedProbe {
     /// The probe's measures.
     #[serde(flatten)]
     pub probe: Probe,
-    /// What its lengths are measured in.
+    /// Unit of its lengths.
     #[serde(default = "tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning in millimeters.
@@ -78,7 +78,7 @@ impl StatedProbe {
         dataset.origin.as_ref().map(Self::from)
     }
 
-    /// What a compiled model states about it. Units are made tenths of the longest side, whatever side objects were
+    /// Statements of a compiled model about it. Units are made tenths of the longest side, whatever side objects were
     /// scaled to.
     pub fn trained(&self) -> TrainedProbe {
         let scale = match self.unit {
@@ -134,7 +134,7 @@ pub struct Trained {
 }
 
 impl Trained {
-    /// What the chip's model states of [`Trained::shares`].
+    /// Statement of the chip's model about [`Trained::shares`].
     pub fn pattern_shares(&self) -> Option<PatternShares> {
         // `as` saturates.
         self.shares.map(|shares| PatternShares(shares.map(|share| (share * 65_535.0).round() as u16)))
@@ -206,7 +206,7 @@ impl Origin {
         })
     }
 
-    /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
+    /// Creates the origin from the data set, the probe that they were made with, and which of them were trained on.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
         Self { probe, trained, touches: fingerprints(dataset), captured: Captured::of(dataset), ..Self::default() }
     }

@@ -1,6 +1,6 @@
-//! What can be wrong with calibrating.
+//! Problems with calibrating.
 
-/// What can be wrong with calibrating.
+/// Problems with calibrating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrateProblem {
@@ -15,7 +15,7 @@ pub enum CalibrateProblem {
         found: u64,
         /// Names needed, if none is wrong.
         needed: u64,
-        /// What the sequences were drawn from, if it was used up.
+        /// Supply that the sequences were drawn from, if it was used up.
         supplied: Option<Supplied>,
     },
     /// No threshold keeps the promise.
@@ -50,14 +50,14 @@ pub enum CalibrateProblem {
 /// The touches of a data set that sequences used up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Supplied {
-    /// Whether it holds approaches, or full touches only.
+    /// True if it holds approaches, and not full touches only.
     pub approaches: bool,
-    /// How many of these it holds of the object that it has the fewest of.
+    /// Number of these that it holds of the object with the fewest.
     pub fewest: u64,
 }
 
 impl CalibrateProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::TooFew { supplied: None, .. } => "Allow more sequences, or promise a higher error rate.",
@@ -78,7 +78,7 @@ fn percent(rate: f64) -> f64 {
     (rate * 1e9).round() / 1e7
 }
 
-/// How many touches of each object as many names take, in words: in proportion.
+/// Estimate, in words, of the touches of each object that yield the names needed: in proportion.
 fn in_touches(supplied: Option<Supplied>, found: u64, needed: u64) -> String {
     let Some(Supplied { approaches, fewest }) = supplied else { return String::new() };
     let what = if approaches { "approaches" } else { "touches" };

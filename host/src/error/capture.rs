@@ -1,9 +1,9 @@
-//! What can be wrong with captures.
+//! Problems with captures.
 
 use super::Problem;
 use std::io::ErrorKind;
 
-/// What can be wrong with captures.
+/// Problems with captures.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureProblem {
@@ -12,7 +12,7 @@ pub enum CaptureProblem {
     Object {
         /// The object.
         name: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: Box<Problem>,
     },
     /// An object is to be touched at its true size, which is not known.
@@ -26,7 +26,7 @@ pub enum CaptureProblem {
     Untouchable {
         /// The object.
         name: String,
-        /// How many approaches were tried.
+        /// Number of approaches tried.
         approaches: u64,
     },
     /// Another capture has locked the directory.
@@ -37,7 +37,7 @@ pub enum CaptureProblem {
     HoldsOtherObjects {
         /// The objects.
         objects: Vec<String>,
-        /// How many touches there are of them.
+        /// Number of touches of them.
         touches: u64,
     },
     /// The directory holds a data set of the same objects that was made in another way.
@@ -45,7 +45,7 @@ pub enum CaptureProblem {
     HoldsOtherSettings {
         /// The objects.
         objects: Vec<String>,
-        /// Which settings differ, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The directory holds files of touches that no listing names.
@@ -59,7 +59,7 @@ pub enum CaptureProblem {
     HoldsRecorded {
         /// The objects.
         objects: Vec<String>,
-        /// How many touches there are of them.
+        /// Number of touches of them.
         touches: u64,
     },
     /// The directory holds an unfinished capture.
@@ -67,7 +67,7 @@ pub enum CaptureProblem {
     HoldsUnfinished {
         /// Its objects.
         objects: Vec<String>,
-        /// How many touches there are.
+        /// Number of touches.
         touches: u64,
     },
     /// Objects that are to be added are there already.
@@ -79,7 +79,7 @@ pub enum CaptureProblem {
     /// Objects cannot be added to a data set that was made in another way.
     #[error("cannot add to these touches: other settings: {differences}")]
     AddsOtherSettings {
-        /// Which settings differ, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The capture to resume was started by another version.
@@ -91,7 +91,7 @@ pub enum CaptureProblem {
     /// The capture to resume was started with other settings.
     #[error("cannot resume: other settings: {differences}")]
     ResumesOtherSettings {
-        /// Which settings differ, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The capture to resume was started with other objects.
@@ -103,7 +103,7 @@ pub enum CaptureProblem {
     /// A part lost what was checkpointed.
     #[error("shorter than the {bytes} bytes that dataset.json states")]
     Shorter {
-        /// What is stated.
+        /// Stated size in bytes.
         bytes: u64,
     },
     /// Touches could not be written.
@@ -111,17 +111,17 @@ pub enum CaptureProblem {
     NotWritten {
         /// The kind of the operating system's error.
         kind: ErrorKind,
-        /// What the operating system said.
+        /// The operating system's message.
         message: String,
     },
     /// The operating system refused a thread.
     #[error("the system started only {started} of {asked} threads ({message})")]
     Threads {
-        /// How many were to start.
+        /// Number of threads asked for.
         asked: usize,
-        /// How many did.
+        /// Number of threads started.
         started: usize,
-        /// What the operating system said.
+        /// The operating system's message.
         message: String,
     },
     /// A worker ended without a result.
@@ -130,7 +130,7 @@ pub enum CaptureProblem {
 }
 
 impl CaptureProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::Object { problem, .. } => return problem.fix(),

@@ -1,22 +1,22 @@
-//! What can be wrong with chips, real and emulated, and the line to them.
+//! Problems with chips, real and emulated, and the line to them.
 
 use palpate_shared::link::{LinkError, Refusal};
 use std::path::PathBuf;
 
-/// What can be wrong with chips, real and emulated, and the line to them.
+/// Problems with chips, real and emulated, and the line to them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChipProblem {
     /// A port is written in a way that means nothing.
     #[error("`{text}` is not a port")]
     NotAPort {
-        /// What was given.
+        /// Text that was given.
         text: String,
     },
     /// Faults of a bad line are written in a way that means nothing.
     #[error("`{text}` does not say what a bad line does")]
     NotFaults {
-        /// What was given.
+        /// Text that was given.
         text: String,
     },
     /// This build of the library has no serial ports.
@@ -25,7 +25,7 @@ pub enum ChipProblem {
     /// The operating system cannot open a serial port.
     #[error("cannot open the serial port: {reason}")]
     CannotOpen {
-        /// What the operating system said.
+        /// The operating system's message.
         reason: String,
         /// The serial ports that there are.
         ports: Vec<String>,
@@ -33,13 +33,13 @@ pub enum ChipProblem {
     /// Nobody answers at a TCP address.
     #[error("cannot connect to the chip: {reason}")]
     CannotConnect {
-        /// What the operating system said.
+        /// The operating system's message.
         reason: String,
     },
     /// The line to a chip broke while it was used.
     #[error("the connection to the chip was lost: {reason}")]
     Lost {
-        /// What the operating system said.
+        /// The operating system's message.
         reason: String,
     },
     /// The chip does not answer.
@@ -94,7 +94,7 @@ pub enum ChipProblem {
     /// A line of a journal is wrong.
     #[error("not an entry of a journal: {reason}")]
     NotAnEntry {
-        /// What the parser said.
+        /// The parser's message.
         reason: String,
     },
     /// The emulator is not installed.
@@ -109,21 +109,21 @@ pub enum ChipProblem {
     /// The emulator ended by itself.
     #[error("the emulator ended{}", after_colon(said))]
     EmulatorEnded {
-        /// What it wrote to standard error.
+        /// Its standard error.
         said: String,
     },
     /// The emulated chip did not come to an end.
     #[error("the emulated chip did not finish within {seconds} s{}", after_colon(said))]
     EmulatorTimeout {
-        /// How long it was given.
+        /// Time that it was given, in seconds.
         seconds: u64,
-        /// What it wrote.
+        /// Its output.
         said: String,
     },
     /// The emulated chip says nothing about a touch's instructions.
     #[error("the emulated chip does not say how many instructions a touch takes{}", after_colon(said))]
     NoCost {
-        /// What it wrote instead.
+        /// Its output instead.
         said: String,
     },
     /// A chip that cannot be reset from here.
@@ -136,7 +136,7 @@ fn after_colon(said: &str) -> String {
 }
 
 impl ChipProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::NotAPort { .. } => "Give a serial port, tcp://HOST:PORT or emulator.",

@@ -1,10 +1,10 @@
-//! What can be wrong with compiling, and compiled models.
+//! Problems with compiling, and compiled models.
 
 use super::TreeProblem;
 use palpate_onboard::ModelError;
 use palpate_shared::format::Layout;
 
-/// What can be wrong with compiling, and compiled models.
+/// Problems with compiling, and compiled models.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompileProblem {
@@ -24,7 +24,7 @@ pub enum CompileProblem {
     Tree {
         /// The tree, counted from 0.
         tree: usize,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: TreeProblem,
     },
     /// Leaves or base margins are too large.
@@ -34,7 +34,7 @@ pub enum CompileProblem {
     MarginRange {
         /// The object or class, by name.
         of: String,
-        /// How far from 0 its margin can be.
+        /// Largest distance of its margin from 0.
         range: f64,
         /// The largest single value.
         largest: f32,
@@ -105,7 +105,7 @@ fn limit(layout: Layout) -> &'static str {
 }
 
 impl CompileProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::Model(ModelError::NotAModel) => "Give a file that `palpate export` wrote.",

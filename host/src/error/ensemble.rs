@@ -1,16 +1,16 @@
-//! What can be wrong with ensembles, their files and their training.
+//! Problems with ensembles, their files and their training.
 
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
-/// What can be wrong with ensembles, their files and their training.
+/// Problems with ensembles, their files and their training.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnsembleProblem {
     /// The file is of a kind, or has something in it, that cannot be read.
     #[error("{what}")]
     Unsupported {
-        /// What.
+        /// Description of the file's kind or content.
         what: String,
         /// The way round, as a sentence.
         way: String,
@@ -20,7 +20,7 @@ pub enum EnsembleProblem {
     Damaged {
         /// The format.
         kind: &'static str,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
     /// There are too few or too many features.
@@ -50,19 +50,19 @@ pub enum EnsembleProblem {
     /// A file is not JSON, or not of XGBoost's schema.
     #[error("not an ensemble in XGBoost's JSON format: {detail}")]
     NotJson {
-        /// What the parser said.
+        /// The parser's message.
         detail: String,
     },
     /// The objective is not one whose margins are known.
     #[error("its objective is {found}")]
     Objective {
-        /// What it is.
+        /// The objective found.
         found: String,
     },
     /// The booster has no trees.
     #[error("its booster is {found}, which has no trees")]
     Booster {
-        /// What it is.
+        /// The booster found.
         found: String,
     },
     /// An attribute is missing.
@@ -78,9 +78,9 @@ pub enum EnsembleProblem {
     Attribute {
         /// Its name.
         name: &'static str,
-        /// What it should hold.
+        /// Content that was expected.
         expected: &'static str,
-        /// What the parser said.
+        /// The parser's message.
         detail: String,
     },
     /// The descriptor's name is unknown.
@@ -92,7 +92,7 @@ pub enum EnsembleProblem {
     /// Too few objects, or too many.
     #[error("it names {count} objects")]
     ObjectCount {
-        /// How many.
+        /// Number of objects.
         count: usize,
     },
     /// A name that no object can have.
@@ -100,7 +100,7 @@ pub enum EnsembleProblem {
     ObjectName {
         /// The name.
         name: String,
-        /// Why it cannot be one.
+        /// The reason.
         why: NameProblem,
     },
     /// There are other classes than objects.
@@ -127,7 +127,7 @@ pub enum EnsembleProblem {
     BaseScore {
         /// The base score.
         text: String,
-        /// How many objects there are.
+        /// Number of objects.
         objects: usize,
     },
     /// There is no margin to start from for each object.
@@ -162,7 +162,7 @@ pub enum EnsembleProblem {
     Count {
         /// The field.
         name: &'static str,
-        /// What it holds.
+        /// Text that it holds.
         text: String,
     },
     /// A tree contradicts itself.
@@ -170,7 +170,7 @@ pub enum EnsembleProblem {
     Tree {
         /// The tree, counted from 0.
         tree: usize,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: TreeProblem,
     },
     /// One object cannot be distinguished from anything.
@@ -191,7 +191,7 @@ pub enum EnsembleProblem {
     /// A background does not go with a data set.
     #[error("the background does not go with the data set: {detail}")]
     Background {
-        /// Why not.
+        /// The reason.
         detail: &'static str,
     },
     /// An object has no touch of those that were asked for.
@@ -199,7 +199,7 @@ pub enum EnsembleProblem {
     NothingCounts {
         /// Its name.
         object: String,
-        /// Which touches were to be evidence.
+        /// Touches that were to be evidence.
         counted: Counted,
     },
     /// The descriptor needs the probe's pose.
@@ -213,12 +213,12 @@ pub enum EnsembleProblem {
     Trainer {
         /// Its name.
         trainer: &'static str,
-        /// What it said.
+        /// Its message.
         detail: String,
     },
 }
 
-/// Why a name cannot be an object's.
+/// Reason why a name cannot be an object's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NameProblem {
@@ -232,7 +232,7 @@ pub enum NameProblem {
     Twice,
 }
 
-/// What can be wrong with a tree. Nodes are counted from 0.
+/// Problems with a tree. Nodes are counted from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TreeProblem {
@@ -254,7 +254,7 @@ pub enum TreeProblem {
     Count {
         /// The field.
         name: &'static str,
-        /// What it holds.
+        /// Text that it holds.
         text: String,
     },
     /// Splits by category.
@@ -328,7 +328,7 @@ pub enum TreeProblem {
         node: usize,
         /// Where they should be.
         column: &'static str,
-        /// How many there should be.
+        /// Number of values there should be.
         values: usize,
     },
     /// A leaf has another number of values than the tree's others.
@@ -338,7 +338,7 @@ pub enum TreeProblem {
         node: usize,
         /// Its values.
         found: usize,
-        /// What the tree's output asks for.
+        /// Output that the tree asks for.
         wanted: usize,
     },
     /// A leaf's value cannot be added.
@@ -361,7 +361,7 @@ fn bad_name(name: &str, why: NameProblem) -> String {
 }
 
 impl EnsembleProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::Unsupported { way, .. } => way.clone(),

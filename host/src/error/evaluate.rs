@@ -1,8 +1,8 @@
-//! What can be wrong with evaluating.
+//! Problems with evaluating.
 
 use palpate_shared::Descriptor;
 
-/// What can be wrong with evaluating.
+/// Problems with evaluating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateProblem {
@@ -29,7 +29,7 @@ pub enum EvaluateProblem {
     /// An object has too few touches to say what its touches give.
     #[error("an object has only {found} touches to learn from what its touches give, or they are all alike")]
     TooFewForFit {
-        /// How many there are.
+        /// Number of touches.
         found: usize,
     },
     /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
@@ -37,7 +37,7 @@ pub enum EvaluateProblem {
     TooFewForAlarms {
         /// Sequences of the object with the fewest.
         object_sequences: usize,
-        /// How many of each object it takes.
+        /// Number of sequences of each object that it takes.
         needed: u64,
     },
     /// The model works on other rows than touches.
@@ -101,7 +101,7 @@ pub enum EvaluateProblem {
         object: String,
         /// The fewest approaches in a pose.
         found: usize,
-        /// How many there must be.
+        /// Smallest number allowed.
         needed: usize,
     },
     /// Something was asked for that only compiled models do.
@@ -113,13 +113,13 @@ pub enum EvaluateProblem {
     /// Recorded and simulated touches cannot be compared.
     #[error("the touches cannot be compared: {detail}")]
     Incomparable {
-        /// Why not.
+        /// The reason.
         detail: String,
     },
     /// A line is not a touch.
     #[error("{detail}")]
     Touch {
-        /// What is wrong with it.
+        /// Description of the fault.
         detail: String,
     },
     /// A contact time is longer than an object can make it.
@@ -136,7 +136,7 @@ pub enum EvaluateProblem {
     },
 }
 
-/// Which of the two it is.
+/// Distinguishes the two cases in words.
 fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
     if (object_sequences as u64) < needed {
         format!(
@@ -151,7 +151,7 @@ fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
 }
 
 impl EvaluateProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",

@@ -1,4 +1,4 @@
-//! What can go wrong, said so that the user knows where and what to do next.
+//! Errors, with the place and a remedy.
 
 mod calibrate;
 mod capture;
@@ -80,7 +80,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong: one kind for each room of the library. Its `Display` says what is wrong, without a full stop;
+/// Problem: one variant for each room of the library. Its `Display` says what is wrong, without a full stop;
 /// [`fix`](Self::fix) says what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -90,9 +90,9 @@ pub enum Problem {
     Setting {
         /// The setting's name: the field in its `Settings`.
         name: &'static str,
-        /// What it was set to.
+        /// Value that was given.
         value: String,
-        /// What it may be: "1 to 10000".
+        /// Values allowed: "1 to 10000".
         allowed: String,
     },
     /// With meshes and where they come from.
@@ -140,7 +140,7 @@ pub enum Problem {
 }
 
 impl Problem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::Setting { allowed, .. } => format!("Use {allowed}."),
@@ -171,11 +171,11 @@ pub enum Error {
     Io {
         /// The file or directory.
         path: PathBuf,
-        /// What was tried, as an infinitive: "read the mesh".
+        /// Action that failed, as an infinitive: "read the mesh".
         action: &'static str,
-        /// What the operating system said.
+        /// The operating system's message.
         source: std::io::Error,
-        /// What to do, as a sentence.
+        /// Remedy, as a sentence.
         fix: String,
     },
     /// Something is wrong with what was given.
@@ -183,7 +183,7 @@ pub enum Error {
     At {
         /// Where.
         place: Place,
-        /// What.
+        /// The problem.
         problem: Problem,
     },
     /// The caller cancelled the work through its [`Progress`](crate::progress::Progress).
@@ -233,7 +233,7 @@ impl Error {
         Problem::Setting { name, value: value.to_string(), allowed: allowed.into() }.into()
     }
 
-    /// What is wrong, where the library found it in what it was given.
+    /// The problem, if the library found it in what it was given.
     pub fn problem(&self) -> Option<&Problem> {
         match self {
             Self::At { problem, .. } => Some(problem),

@@ -1,6 +1,6 @@
-//! What can be wrong with drawing.
+//! Problems with drawing.
 
-/// What can be wrong with drawing.
+/// Problems with drawing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageProblem {
@@ -9,25 +9,25 @@ pub enum PageProblem {
     Chart {
         /// The chart's title; may be empty.
         title: String,
-        /// What the library said.
+        /// The library's message.
         reason: String,
     },
     /// The CSV library refused a table.
     #[error("cannot write CSV: {reason}")]
     Csv {
-        /// What the library said.
+        /// The library's message.
         reason: String,
     },
     /// A scene cannot be written as JSON.
     #[error("cannot write the scene as JSON: {reason}")]
     Scene {
-        /// What the JSON library said.
+        /// The JSON library's message.
         reason: String,
     },
 }
 
 impl PageProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::Chart { .. } | Self::Csv { .. } | Self::Scene { .. } => "Report this as a bug.".into(),

@@ -1,6 +1,6 @@
-//! What can be wrong with scenes, probes and casts.
+//! Problems with scenes, probes and casts.
 
-/// What can be wrong with scenes, probes and casts.
+/// Problems with scenes, probes and casts.
 ///
 /// What is wrong with a scene's mesh is a [`MeshProblem`](super::MeshProblem), what is wrong with a probe's measures a
 /// [`Problem::Setting`](super::Problem::Setting).
@@ -14,37 +14,37 @@ pub enum ProbeProblem {
         first: String,
         /// The other.
         second: String,
-        /// What differs: "radius 0.15 and 0.3".
+        /// The differences: "radius 0.15 and 0.3".
         differences: String,
     },
     /// A probe file is not TOML, or not a probe.
     #[error("not a usable probe file: {message}")]
     BadFile {
-        /// What is wrong.
+        /// Description of the fault.
         message: String,
     },
     /// A line of a file of casts has too few or too many fields.
     #[error("{fields} fields where a cast has 7, or 8 with a time")]
     CastFields {
-        /// How many fields the line has.
+        /// Number of fields of the line.
         fields: usize,
     },
     /// A coordinate of a cast is not a finite number.
     #[error("{text:?} is not a finite number")]
     CastCoordinate {
-        /// What stands there instead.
+        /// Text that is there instead.
         text: String,
     },
     /// The known time of a cast is neither a number that is at least 0 nor `miss`.
     #[error("{text:?} is neither a time nor `miss`")]
     CastTime {
-        /// What stands there instead.
+        /// Text that is there instead.
         text: String,
     },
 }
 
 impl ProbeProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::Differs { .. } => "Use both with the same probe: times mean something else with another.".into(),

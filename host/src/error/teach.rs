@@ -1,9 +1,9 @@
-//! What can be wrong with teaching objects from recorded touches.
+//! Problems with teaching objects from recorded touches.
 
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
-/// What can be wrong with teaching objects from recorded touches.
+/// Problems with teaching objects from recorded touches.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TeachProblem {
@@ -35,15 +35,15 @@ pub enum TeachProblem {
         match counted { Counted::All => "every approach", _ => "every touch with a contact" }
     )]
     FullTouches {
-        /// Which touches are evidence.
+        /// Touches that are evidence.
         counted: Counted,
     },
     /// The known objects' touches have other noise than the ensemble was trained for.
     #[error("the ensemble was trained for {stated}, and the touches of its objects have {there} already")]
     OtherNoise {
-        /// What the ensemble was trained for.
+        /// Statement of the ensemble about its training.
         stated: String,
-        /// What the touches have.
+        /// Kind of touches there are.
         there: String,
     },
     /// A pose is missing.
@@ -61,13 +61,13 @@ pub enum TeachProblem {
         object: String,
         /// Its touches that are evidence.
         touches: usize,
-        /// How many are needed.
+        /// Number of touches needed.
         least: usize,
     },
 }
 
 impl TeachProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::NotOfTouches => "Give an ensemble that was trained on touches.",

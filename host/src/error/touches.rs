@@ -1,15 +1,15 @@
-//! What can be wrong with data sets and files of touches.
+//! Problems with data sets and files of touches.
 
 use std::path::PathBuf;
 
-/// What can be wrong with data sets and files of touches.
+/// Problems with data sets and files of touches.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TouchesProblem {
     /// A line has neither three nor nine fields.
     #[error("{count} fields where a touch has three times, or three times and six direction cosines")]
     Fields {
-        /// How many there are.
+        /// Number of fields.
         count: usize,
     },
     /// A field is not a number.
@@ -39,7 +39,7 @@ pub enum TouchesProblem {
     /// A direction or alignment is not a unit vector.
     #[error("the {vector} has length {length:.3} where a unit vector has 1")]
     NotUnit {
-        /// Which vector: "direction" or "alignment".
+        /// The vector: "direction" or "alignment".
         vector: &'static str,
         /// Its length.
         length: f64,
@@ -60,7 +60,7 @@ pub enum TouchesProblem {
     Row {
         /// The row, counted from 1.
         row: u64,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: Box<Self>,
     },
     /// A row of a file of touches names another object than the file.
@@ -74,7 +74,7 @@ pub enum TouchesProblem {
     /// A file is not Parquet, or its structure is damaged.
     #[error("not a usable Parquet file ({message})")]
     NotParquet {
-        /// What the reader said.
+        /// The reader's message.
         message: String,
     },
     /// A Parquet file lacks a column.
@@ -88,13 +88,13 @@ pub enum TouchesProblem {
     Column {
         /// The column.
         name: &'static str,
-        /// What is wrong with it.
+        /// Description of the fault.
         message: String,
     },
     /// Touches could not be written as Parquet.
     #[error("cannot write the touches ({message})")]
     ParquetNotWritten {
-        /// What the writer said.
+        /// The writer's message.
         message: String,
     },
     /// A Parquet file, read by a build without Parquet.
@@ -103,7 +103,7 @@ pub enum TouchesProblem {
     /// A file is no log in MCAP, or is damaged.
     #[error("not a usable MCAP file: {message}")]
     NotMcap {
-        /// What is wrong with it.
+        /// Description of the fault.
         message: String,
     },
     /// A log, for a build without MCAP.
@@ -112,17 +112,17 @@ pub enum TouchesProblem {
     /// Something in a log is larger than what is read.
     #[error("{what} of {bytes} bytes, where at most {most} are read")]
     TooLarge {
-        /// What: "a record".
+        /// The thing that is too large: "a record".
         what: String,
-        /// How large it is.
+        /// Its size.
         bytes: u64,
-        /// How large it may be.
+        /// Largest size allowed.
         most: u64,
     },
     /// A log has more touches than are read.
     #[error("more than {most} touches")]
     TooMany {
-        /// How many are read.
+        /// Largest number that is read.
         most: usize,
     },
     /// A chunk of a log is compressed by something that nobody here knows.
@@ -146,9 +146,9 @@ pub enum TouchesProblem {
     OtherDefinition {
         /// The channel: its topic, with the name of its schema.
         channel: String,
-        /// What the log says.
+        /// Content of the log.
         found: String,
-        /// What it should say.
+        /// Content that was expected.
         expected: String,
     },
     /// A log has no channel of touches.
@@ -164,15 +164,15 @@ pub enum TouchesProblem {
         topic: String,
         /// The message among those of its channel, counted from 1.
         number: u64,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: Box<Self>,
     },
     /// A message of a log is not what its schema says.
     #[error("no {what}: {message}")]
     BadMessage {
-        /// What it should be: "touch in JSON".
+        /// Description of the expected content: "touch in JSON".
         what: &'static str,
-        /// What is wrong with it.
+        /// Description of the fault.
         message: String,
     },
     /// Some touches of a log name an object and others do not.
@@ -214,7 +214,7 @@ pub enum TouchesProblem {
     /// `dataset.json` is no listing.
     #[error("not the listing of a data set ({message})")]
     BadListing {
-        /// What the parser said.
+        /// The parser's message.
         message: String,
     },
     /// Touches of several instances or logs, without an origin that `dataset.json` could state.
@@ -224,7 +224,7 @@ pub enum TouchesProblem {
     Unsaid {
         /// The object's name.
         name: String,
-        /// How many there are.
+        /// Number of sources.
         sources: usize,
     },
     /// Touches of robots that differ, which no file can say.
@@ -254,9 +254,9 @@ pub enum TouchesProblem {
     /// A file has another number of touches than listed.
     #[error("{found} touches where dataset.json states {stated}")]
     OtherCount {
-        /// How many are listed.
+        /// Number of touches listed.
         stated: u64,
-        /// How many there are.
+        /// Number of touches found.
         found: u64,
     },
     /// A Parquet file is not the one that was captured.
@@ -270,7 +270,7 @@ pub enum TouchesProblem {
     HoldsSimulated {
         /// The objects.
         objects: String,
-        /// How many touches there are of them.
+        /// Number of touches of them.
         touches: u64,
     },
     /// Touches are to be recorded into a directory with files of touches that no listing names.
@@ -282,7 +282,7 @@ pub enum TouchesProblem {
     /// Recorded touches are to be added to others that were made in another way.
     #[error("cannot add to these recorded touches: {differences}")]
     OtherRecording {
-        /// What differs, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The same lines were recorded before.
@@ -290,7 +290,7 @@ pub enum TouchesProblem {
     RecordedBefore {
         /// The object.
         object: String,
-        /// How many touches they are.
+        /// Number of touches.
         touches: u64,
         /// When they were recorded.
         began: String,
@@ -315,7 +315,7 @@ pub enum TouchesProblem {
     BadQuantity {
         /// The text.
         text: String,
-        /// What to write, with an example.
+        /// Text to write, with an example.
         example: &'static str,
     },
     /// A file whose name does not say what it holds.
@@ -330,7 +330,7 @@ pub enum TouchesProblem {
     /// A check of a data set found what would make training wrong.
     #[error("training on these touches would be wrong, for {count} reason{}", if *count == 1 { "" } else { "s" })]
     WouldTrainWrong {
-        /// How many reasons there are.
+        /// Number of reasons.
         count: usize,
     },
     /// An object has too few touches to be divided.
@@ -338,15 +338,15 @@ pub enum TouchesProblem {
     TooFew {
         /// The object.
         name: String,
-        /// How many touches it has.
+        /// Number of touches of the object.
         touches: usize,
-        /// How many it needs.
+        /// Number of touches needed.
         least: usize,
     },
 }
 
 impl TouchesProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::Fields { .. }

@@ -1,6 +1,6 @@
-//! What can be wrong with searching for a model.
+//! Problems with searching for a model.
 
-/// What can be wrong with searching for a model.
+/// Problems with searching for a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TuneProblem {
@@ -28,27 +28,27 @@ pub enum TuneProblem {
     /// There are too few recorded touches to fit a probe to.
     #[error("only {touches} recorded touches with two or three contacts, of at least {least} that a fit takes")]
     FewRecorded {
-        /// How many there are.
+        /// Number of touches.
         touches: usize,
-        /// How many it takes.
+        /// Number of touches needed.
         least: usize,
     },
     /// Recordings look wrong.
     #[error("recordings look wrong:\n  {}\nNothing was written", suspects.join("\n  "))]
     Suspects {
-        /// What looks wrong, each a sentence or two.
+        /// Suspicious findings, each a sentence or two.
         suspects: Vec<String>,
     },
     /// There is nothing to distinguish.
     #[error("a probe is searched for {objects} object(s), which leaves nothing to distinguish")]
     FewObjects {
-        /// How many objects there are.
+        /// Number of objects.
         objects: usize,
     },
 }
 
 impl TuneProblem {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
             Self::NothingFits { .. } => "Allow more bytes or more instructions.",

@@ -1,4 +1,4 @@
-//! How far recorded and simulated touches are apart, feature by feature and as a whole.
+//! Distance between recorded and simulated touches, feature by feature and as a whole.
 //!
 //! The one figure is how often a classifier tells a recorded touch of an object from a simulated one: trees are trained to
 //! do just that, and tested on touches that they were not trained on (cross-validation). Half of the time is guessing. It
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How data sets are compared.
+/// Settings of a comparison of data sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The features that touches are compared by, and that the model is trained on.
@@ -71,28 +71,28 @@ impl Share {
     }
 }
 
-/// How recorded and simulated touches compare.
+/// Comparison of recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// The features that they were compared by.
     pub descriptor: String,
-    /// How often a classifier tells recorded from simulated touches of the same object: 0.5 is guessing. Each object
-    /// weighted equally.
+    /// Accuracy of a classifier that distinguishes recorded from simulated touches of the same object: 0.5 is guessing.
+    /// Each object weighted equally.
     pub told_apart: Share,
     /// The objects that both data sets hold, by name.
     pub objects: Vec<ObjectComparison>,
-    /// What it costs; none for fewer than two objects.
+    /// Cost of the difference; none for fewer than two objects.
     pub cost: Option<Cost>,
 }
 
-/// How recorded and simulated touches of an object compare.
+/// Comparison of recorded and simulated touches of an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObjectComparison {
     /// The object's name.
     pub name: String,
     /// Recorded touches, and the simulated ones that they are compared with.
     pub touches: [usize; 2],
-    /// How often a classifier tells them apart: 0.5 is guessing.
+    /// Accuracy of a classifier that distinguishes the two: 0.5 is guessing.
     pub told_apart: Share,
     /// The share of each contact pattern among recorded and among simulated touches.
     pub patterns: BTreeMap<String, [f64; 2]>,
@@ -100,7 +100,7 @@ pub struct ObjectComparison {
     pub features: Vec<FeatureComparison>,
 }
 
-/// How a feature of recorded and simulated touches compares.
+/// Comparison of a feature of recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureComparison {
     /// The feature's name.
@@ -111,7 +111,7 @@ pub struct FeatureComparison {
     pub simulated: [f64; 5],
     /// The largest difference between the shares of touches below a value: 0 to 1.
     pub apart: f64,
-    /// What [`FeatureComparison::apart`] would be by chance in one of 20 comparisons.
+    /// Value that [`FeatureComparison::apart`] would exceed by chance in one of 20 comparisons.
     pub by_chance: f64,
 }
 
@@ -138,7 +138,7 @@ impl FeatureComparison {
     }
 }
 
-/// What it costs a model that recorded touches are not as simulated.
+/// Cost to a model of the difference between recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Objects that the model knows; all of the simulated ones.
@@ -147,14 +147,14 @@ pub struct Cost {
     pub simulated: BTreeMap<usize, Share>,
     /// The same on recorded touches of the same objects.
     pub recorded: BTreeMap<usize, Share>,
-    /// How many approaches the accuracy on simulated touches is of.
+    /// Number of approaches behind the accuracy on simulated touches.
     pub after: usize,
     /// After how many approaches the model is right as often on recorded touches; none if it never is.
     pub needed: Option<f64>,
 }
 
 impl Comparison {
-    /// What the figure means, in a sentence.
+    /// Meaning of the figure, in a sentence.
     pub fn verdict(&self) -> &'static str {
         match self.told_apart {
             Share { low, .. } if low <= 0.5 => "Nothing shows that the simulation is not right.",
@@ -168,7 +168,7 @@ impl Comparison {
 }
 
 impl Cost {
-    /// What it costs, in a sentence.
+    /// Cost, in a sentence.
     pub fn sentence(&self) -> String {
         let Self { after, needed, .. } = self;
         match needed {
@@ -321,7 +321,8 @@ fn feature(name: &str, [recorded, simulated]: [Vec<f64>; 2]) -> Option<FeatureCo
     })
 }
 
-/// How often trees tell touches of two samples apart that they were not trained on; the two samples weigh equally.
+/// Accuracy of trees that distinguish touches of two samples, on touches that they were not trained on; the two samples
+/// weigh equally.
 fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, settings: &Settings) -> Result<Estimate> {
     let samples = [("recorded", recorded), ("simulated", simulated)].map(|(name, object)| object.clone().renamed(name));
     let both = Dataset::new(samples.into());
@@ -353,7 +354,7 @@ fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, sett
     Ok(Estimate::mean_of([0, 1].map(|class: usize| Estimate::share(right[class], counts[class])).into_iter()))
 }
 
-/// What a model that is trained on simulated touches makes of recorded ones; none for fewer than two recorded objects.
+/// Accuracy on recorded touches of a model that is trained on simulated ones; none for fewer than two recorded objects.
 fn cost(recorded: &Dataset, simulated: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Option<Cost>> {
     if recorded.objects.len() < 2 {
         return Ok(None);

@@ -5,7 +5,7 @@ use super::margins::{Candidate, Margins, rivals};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
-/// How often the object with the most evidence was the right one, after 1, 2, 3 … touches.
+/// Share of groups in which the object with the most evidence was the right one, after 1, 2, 3 … touches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     groups: usize,
@@ -13,12 +13,12 @@ pub struct Curve {
     correct: Vec<Vec<usize>>,
 }
 
-/// How sure a model was of the object with the most evidence, and whether that was the right one.
+/// Confidence of a model in the object with the most evidence, and its correctness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Confidence {
     /// The posterior of the best object.
     pub posterior: f64,
-    /// Whether it was the right one.
+    /// True if it was the right one.
     pub correct: bool,
 }
 
@@ -46,7 +46,8 @@ impl Margins<'_> {
         Ok(Curve { groups, correct: correct.collect() })
     }
 
-    /// How often each tested object (rows) was taken for each known one (columns) after `touches` touches.
+    /// Confusion matrix after `touches` touches: number of groups of each tested object (rows) recognized as each known
+    /// one (columns).
     ///
     /// # Errors
     /// As [`Margins::curve`], and `at` if `touches` is 0.
@@ -62,7 +63,7 @@ impl Margins<'_> {
         Ok((0..self.tested.len()).map(row).collect())
     }
 
-    /// How sure the model was after `touches` touches, for each group of each object; for calibration.
+    /// Confidence of the model after `touches` touches, for each group of each object; for calibration.
     ///
     /// # Errors
     /// As [`Margins::curve`], and `at` if `touches` is 0.
@@ -110,7 +111,7 @@ impl Margins<'_> {
         }
     }
 
-    /// What `end` makes of the evidence at the end of each group.
+    /// Applies `end` to the evidence at the end of each group.
     fn ends<T: Send>(
         &self,
         position: usize,

@@ -10,7 +10,7 @@ pub(super) struct FullRecognizer {
     stopping: Stopping,
     /// For each object, what the other objects' weights may come to, its own being 1.
     odds: Vec<f64>,
-    /// How many objects can be named.
+    /// Number of objects that can be named.
     known: usize,
     touches: u32,
     verdict: Verdict,

@@ -205,7 +205,7 @@ mod tests {
         }
     }
 
-    /// What `touch` says for each direction, 20 times each.
+    /// Data set of the touches that `touch` returns for each direction, 20 times each.
     fn dataset(touch: impl Fn(usize, u16, usize) -> Touch) -> Dataset {
         let poses = Poses::with_rolls(1).unwrap();
         let all = |object| {

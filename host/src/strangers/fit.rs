@@ -1,4 +1,4 @@
-//! What touches of each object give, and how far evidence is from it.
+//! Expected evidence of touches of each object, and the distance of evidence from it.
 
 use super::follow::early;
 use super::{FIRST, Supply};
@@ -8,11 +8,11 @@ use rayon::prelude::*;
 
 /// The touches at which the spread of other shapes is weighed against that of touches.
 const AT: f64 = 40.0;
-/// How much of touches' own covariance is added to that of shapes, for the directions that few shapes show; and what
+/// Share of touches' own covariance that is added to that of shapes, for the directions that few shapes show; it
 /// takes the shapes' place where there are none.
 const OWN: f64 = 0.003;
 const WITHOUT_SHAPES: f64 = 0.03;
-/// How far an object may be behind the leader of a shape's touches, in nats per touch, for the shape to count e times
+/// Distance of an object behind the leader of a shape's touches, in nats per touch, at which the shape counts e times
 /// less.
 const NEAR: f64 = 0.05;
 
@@ -27,7 +27,7 @@ pub(super) struct Moments {
     objects: usize,
 }
 
-/// What touches of one object give, in nats: see [`super`].
+/// Expected evidence of touches of one object, in nats: see [`super`].
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fit {
     /// Whose evidence against the object counts.
@@ -148,7 +148,7 @@ pub(super) fn fits(moments: &Moments, without: Option<usize>) -> Option<Vec<Fit>
 }
 
 impl Fit {
-    /// How badly the evidence of `touches` touches fits, in nats.
+    /// Misfit of the evidence of `touches` touches, in nats.
     pub(super) fn misfit(&self, evidence: &[f64], leader: usize, touches: u32) -> f64 {
         let count = f64::from(touches);
         let against =

@@ -49,8 +49,8 @@ use std::collections::BTreeMap;
 
 /// Touches from which on a test is made.
 const FIRST: u32 = 5;
-/// How much higher the limits of misfit are at first, in nats, and the touches after which this has halved. Measured to
-/// find out most strangers after 60 and 120 touches.
+/// Amount by which the limits of misfit are higher at first, in nats, and the touches after which this has halved.
+/// Measured to detect most strangers after 60 and 120 touches.
 const EARLY: f64 = 12.0;
 const HALVED_AFTER: f64 = 21.0;
 /// With [`Held::Certain`] no name is given whose misfit is not this far below the threshold, in nats.
@@ -64,10 +64,10 @@ const STEPS: usize = 400;
 /// 2^-16 nats.
 const NAT: f64 = 65_536.0;
 
-/// What is asked of a test.
+/// Requirements on a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// How long names are held back.
+    /// Rule for holding names back.
     pub held: Held,
     /// The share of known objects' sequences that may end as unknown.
     pub alarms: f64,
@@ -90,7 +90,7 @@ impl Default for Settings {
 pub struct Calibrated {
     /// The model's bytes.
     pub bytes: Vec<u8>,
-    /// What is the same for all objects.
+    /// Terms that are the same for all objects.
     pub terms: FitTerms,
     /// Of the sequences that the threshold was tested on, those that ended as unknown.
     pub alarms: usize,
@@ -108,7 +108,7 @@ pub struct Calibrated {
 struct Supply {
     /// For each source, such as an instance, and each robot one row after the other, in units.
     pools: Vec<Vec<i32>>,
-    /// Whether a pool is a robot's, which makes one sequence.
+    /// True if a pool is a robot's, which makes one sequence.
     is_once: bool,
 }
 
@@ -293,7 +293,7 @@ fn of_shapes(model: &Model<'_>, shapes: &[ObjectTouches]) -> Vec<Vec<f64>> {
     of.filter(|touches| touches.len() >= 20).map(mean).collect()
 }
 
-/// How far below the threshold a misfit must be for a name, in nats.
+/// Amount by which a misfit must be below the threshold for a name, in nats.
 fn doubt(held: Held) -> f64 {
     match held {
         Held::Likely => 0.0,
@@ -301,7 +301,7 @@ fn doubt(held: Held) -> f64 {
     }
 }
 
-/// How far below a first guess, which was found without any name being given, thresholds are tried, in nats.
+/// Distance below a first guess, which was found without any name being given, to which thresholds are tried, in nats.
 fn below(held: Held) -> f64 {
     match held {
         Held::Likely => 6.0,

@@ -74,7 +74,7 @@ pub(super) fn fit(leaves: &Leaves, parts: &[Part<'_>], priors: &[f64]) -> Vec<Ve
     columns
 }
 
-/// How many different touches a part has: copies count once.
+/// Number of different touches of a part: copies count once.
 fn touches(part: &Part<'_>) -> usize {
     let mut sources: Vec<u32> = part.chosen.iter().map(|&row| part.rows.sources[row as usize]).collect();
     sources.sort_unstable();

@@ -1,4 +1,4 @@
-//! How much more approaches would help.
+//! Benefit of more approaches.
 
 use super::Smoothing;
 use super::balance::{Held, Judged, Named};
@@ -16,7 +16,7 @@ pub(super) fn parts() -> usize {
     SHARES.iter().map(|division| division.parts).sum()
 }
 
-/// How an object is recognized after having been taught with ever more approaches.
+/// Accuracy for an object after having been taught with ever more approaches.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Curve {
     /// From few approaches to nearly all that were recorded.

@@ -10,7 +10,7 @@ use crate::error::EnsembleProblem;
 use palpate_shared::format::Link;
 use std::collections::BTreeMap;
 
-/// Why a file was refused, and the line.
+/// Reason why a file was refused, and the line.
 pub(super) struct Refused {
     pub(super) line: Option<u64>,
     pub(super) problem: EnsembleProblem,
@@ -229,7 +229,7 @@ fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> 
     Ok((read, values))
 }
 
-/// Whether every split and every leaf is reached once at most.
+/// Returns an error unless every split and every leaf is reached at most once.
 fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result<()> {
     let (mut of_splits, mut of_leaves) = (vec![false; splits.len()], vec![false; leaves]);
     let mut waiting: Vec<(&str, i64)> = vec![("num_leaves", if splits.is_empty() { -1 } else { 0 })];
@@ -254,7 +254,7 @@ fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result
 struct Grower<'a> {
     splits: &'a [Split],
     values: &'a [f64],
-    /// Whether zeros are missing wherever they are, so that no split has to tell them apart.
+    /// True if zeros are missing wherever they are, so that no split has to tell them apart.
     zero_is_missing: bool,
     nodes: Vec<DraftNode>,
 }

@@ -29,12 +29,12 @@ use super::{Ensemble, Imported, xgboost};
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use std::path::Path;
 
-/// What a file of another library does not say, or a user wants otherwise.
+/// Facts that a file of another library does not state, or that a user wants otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options<'a> {
     /// Other names for the objects: one for each class, or for the one output of a regression.
     pub names: Option<&'a [String]>,
-    /// Whether all trees are taken where the file says that training stopped early, and not those up to the best iteration.
+    /// True to take all trees where the file says that training stopped early, and not those up to the best iteration.
     pub all_trees: bool,
     /// The number that stood for a missing value in training, beside NaN: XGBoost's `missing`, which no file holds. NaN if
     /// there was none.
@@ -109,7 +109,7 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
     Ok(ensemble)
 }
 
-/// What every file of XGBoost leaves open.
+/// Note about every file of XGBoost.
 pub(super) const MISSING_UNKNOWN: &str = "The file does not say which number stood for a missing value in training (XGBoost's \
                                           `missing=`): only NaN is taken for one. State it if there was another.";
 
@@ -150,7 +150,7 @@ enum Kind {
     Onnx,
 }
 
-/// What a file is, by its first bytes.
+/// Returns the kind of a file, by its first bytes.
 fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
     let text = bytes.trim_ascii_start();
     let starts = |prefix: &[u8]| bytes.starts_with(prefix);
@@ -187,7 +187,7 @@ fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
     }
 }
 
-/// What can be read.
+/// Advice on the kinds of files that can be read.
 const KINDS: &str = "Give what `palpate train` wrote, XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or an \
                      ONNX file of trees.";
 

@@ -55,7 +55,7 @@ pub(super) fn from_ubjson(path: &Path, value: serde_json::Value, options: &Optio
     document.into_ensemble(options, "UBJSON").map_err(wrong)
 }
 
-/// What is looked at before the rest: a booster without trees has another schema.
+/// The part of a document that is read first: a booster without trees has another schema.
 #[derive(Default, serde::Deserialize)]
 struct Peek {
     #[serde(default)]
@@ -105,7 +105,7 @@ fn without_literals(bytes: &[u8]) -> Cow<'_, [u8]> {
 }
 
 impl Ensemble {
-    /// What XGBoost itself has just trained on `descriptor`'s features of `objects`.
+    /// Ensemble of a model that XGBoost itself has just trained on `descriptor`'s features of `objects`.
     #[cfg(feature = "xgboost")]
     pub(crate) fn from_xgboost(
         json: &[u8],
@@ -140,7 +140,7 @@ impl Ensemble {
     }
 }
 
-/// What the parser said, at its line.
+/// The parser's message, with its line.
 pub(super) fn not_json(path: &Path, error: &serde_json::Error) -> Error {
     let place = match u64::try_from(error.line()) {
         Ok(line) if line > 0 => Place::line(path, line),

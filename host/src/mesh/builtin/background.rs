@@ -122,7 +122,7 @@ fn profile(dice: &mut Dice) -> Tree {
     curve(&Tree::z(), &knots)
 }
 
-/// What is within `radius` of the z axis, from `bottom` to `top`.
+/// Solid within `radius` of the z axis, from `bottom` to `top`.
 fn turned_solid(radius: Tree, bottom: f32, top: f32) -> Shape {
     let (x, y, _) = Tree::axes();
     let side = Shape((x.square() + y.square() + 1e-9).sqrt() - radius);

@@ -212,7 +212,7 @@ fn is_still(weights: &Option<Vec<f64>>) -> Result<(), MeshProblem> {
     Err(MeshProblem::Unsupported { what, instead: "Apply the morph to the mesh, then export it" })
 }
 
-/// How indices make triangles.
+/// Rule that turns indices into triangles.
 enum Faces {
     Each,
     Strip,
@@ -231,7 +231,7 @@ impl Faces {
         }
     }
 
-    /// How many triangles so many indices make.
+    /// Number of triangles of this many indices.
     fn count(&self, indices: usize) -> usize {
         match self {
             Self::Each => indices / 3,

@@ -14,7 +14,7 @@ pub(super) struct Header {
     pub(super) format: PlyFormat,
     /// The header without comments, for the parser. A text has its coordinates to all digits, whatever kind is stated.
     pub(super) text: String,
-    /// How many bytes and lines it has in the file.
+    /// Its number of bytes and lines in the file.
     pub(super) bytes: u64,
     pub(super) lines: u64,
 }
@@ -30,7 +30,7 @@ struct Property {
     name: String,
     /// As it stands in the file: a kind of number, or a list of them.
     kind: String,
-    /// Whether it is a list of whole numbers, or of any.
+    /// True if it is a list of whole numbers, false if of any.
     list: Option<bool>,
 }
 

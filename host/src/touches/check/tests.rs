@@ -32,7 +32,7 @@ fn change(directory: &Path, listing: impl FnOnce(&mut Listing)) {
     read.write(directory).unwrap();
 }
 
-/// What is wrong, and what is only noted.
+/// Messages of findings that are wrong, and of those that are only noted.
 fn said(directory: &Path) -> (Vec<String>, Vec<String>) {
     let (wrong, notes): (Vec<_>, Vec<_>) =
         Check::of(directory).unwrap().findings.into_iter().partition(|finding| finding.is_wrong);

@@ -1,10 +1,10 @@
-//! What recordings cannot tell, and what to record next.
+//! Advice on what recordings cannot determine, and what to record next.
 
 use super::outcome::{Estimate, Fit, Warning};
 use super::timer::Timer;
 
-/// How wide an interval may be before there is a warning: of the speed, of offsets in milliseconds, of the noise as a share
-/// of it, of shares of missed contacts.
+/// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of the noise as a
+/// share of it, of shares of missed contacts.
 const SPEED: f64 = 0.08;
 const OFFSET: f64 = 5.0;
 const NOISE: f64 = 0.8;

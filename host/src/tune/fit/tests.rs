@@ -7,7 +7,7 @@ use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
-/// What is wrong with a probe. Times are in milliseconds.
+/// Faults of a probe. Times are in milliseconds.
 #[derive(Clone, Copy)]
 struct Crooked {
     /// Times are this many times as long.
