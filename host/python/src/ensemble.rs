@@ -137,19 +137,19 @@ impl Ensemble {
         self.ensemble.inputs.names().into_iter().map(String::from).collect()
     }
 
-    /// Which features a touch is turned into; `None` for an ensemble over rows of features.
+    /// Features that a touch is turned into; `None` for an ensemble over rows of features.
     #[getter]
     fn descriptor(&self) -> Option<&'static str> {
         self.ensemble.descriptor().map(Descriptor::name)
     }
 
-    /// How many trees there are.
+    /// Number of trees.
     #[getter]
     fn trees(&self) -> usize {
         self.ensemble.trees.len()
     }
 
-    /// What to know about an ensemble that another library trained, each a sentence.
+    /// Notes about an ensemble that another library trained, each a sentence.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.ensemble.origin.imported.as_ref().map(|imported| imported.notes.clone()).unwrap_or_default()

@@ -38,7 +38,7 @@ use std::sync::Arc;
 #[pyo3::pyclass(frozen, module = "palpate._native")]
 pub(crate) struct Model {
     pub(crate) opened: Arc<OpenedModel>,
-    /// What the model compares of a row of features.
+    /// Encoder of a row of features into the values that the model compares.
     pub(crate) encoder: Encoder,
 }
 
@@ -78,7 +78,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Rows<'py> {
 /// With fewer rows than this the lock is kept, and one thread does it all.
 const FEW: usize = 256;
 
-/// How many rows are computed between two looks for signals.
+/// Number of rows computed between two checks for signals.
 const BATCH: usize = 1 << 20;
 
 impl Model {
@@ -163,12 +163,12 @@ impl Model {
         PyBytes::new(py, self.model().bytes())
     }
 
-    /// What a pickle holds.
+    /// Contents of a pickle.
     fn __getnewargs__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyBytes>,) {
         (self.to_bytes(py),)
     }
 
-    /// How many bytes the model has.
+    /// Size of the model in bytes.
     #[getter]
     fn size(&self) -> usize {
         self.model().bytes().len()
@@ -189,19 +189,19 @@ impl Model {
         }
     }
 
-    /// Which features a touch is turned into; `None` for a model over rows of features.
+    /// Features that a touch is turned into; `None` for a model over rows of features.
     #[getter]
     fn descriptor(&self) -> Option<&'static str> {
         self.model().descriptor().map(Descriptor::name)
     }
 
-    /// How the trees are laid out.
+    /// Layout of the trees.
     #[getter]
     fn layout(&self) -> &'static str {
         self.model().layout().name()
     }
 
-    /// What leaves are stored as: "i8", "i16" or "f32".
+    /// Type that leaves are stored as: "i8", "i16" or "f32".
     #[getter]
     fn leaf(&self) -> &'static str {
         self.model().leaf_type().name()

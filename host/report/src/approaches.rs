@@ -40,7 +40,7 @@ const CONTACTS: usize = 2;
 /// An approach that touched nothing counts as well.
 const ALL: usize = 3;
 
-/// What approaches told.
+/// Results of approaches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ByApproach {
     /// The share of each contact pattern among each object's approaches.
@@ -55,7 +55,7 @@ pub(super) struct ByApproach {
     true_probe: Option<Probe>,
 }
 
-/// What a way to use approaches achieves.
+/// Results of one way to use approaches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Way {
     bytes: usize,

@@ -21,12 +21,12 @@ const AT: [usize; 4] = [1, 5, 10, 20];
 const BINS: usize = 10;
 const METHODS: [&str; 3] = ["paper's method", "ours", "ours at its temperature"];
 
-/// How well calibrated the posteriors are.
+/// Calibration of the posteriors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Calibration {
     /// Groups per object.
     pub(super) groups: usize,
-    /// What the evidence of the last method is divided by, fitted on single touches.
+    /// Temperature of the last method, fitted on single touches.
     pub(super) temperature: f64,
     /// For each method, for each number of touches: bins.
     pub(super) bins: Vec<Vec<Vec<ReliabilityBin>>>,

@@ -22,14 +22,14 @@ pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 /// The longest groups.
 pub(super) const MOST: usize = 120;
 
-/// What one fold showed.
+/// Results of one fold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Fold {
     /// One of each of [`METHODS`].
     pub(super) methods: Vec<MethodFold>,
 }
 
-/// What one fold showed of one method. Accuracies are after 1, 2, … touches, up to [`MOST`] or to as many as still make
+/// Results of one fold for one method. Accuracies are after 1, 2, … touches, up to [`MOST`] or to as many as still make
 /// [enough distinct groups](super::statistics::LEAST_GROUPS).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct MethodFold {
@@ -39,7 +39,7 @@ pub(super) struct MethodFold {
     pub(super) few_of_object: Vec<Vec<f64>>,
     /// Accuracy over many groups.
     pub(super) many: Vec<f64>,
-    /// How often each object (rows) was recognized as each (columns) after ten touches, over many groups.
+    /// Confusion matrix: number of groups of each object (rows) recognized as each (columns) after ten touches.
     pub(super) confusion: Vec<Vec<usize>>,
     /// Seconds of training.
     pub(super) seconds: f64,

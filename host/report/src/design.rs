@@ -41,7 +41,7 @@ pub fn page(design: &Design, command: &str) -> Result<Page> {
     })
 }
 
-/// What lengths are measured in.
+/// Unit of lengths.
 pub fn unit(design: &Design) -> &'static str {
     match design.unit {
         Length::Tenth => "units",
@@ -49,7 +49,7 @@ pub fn unit(design: &Design) -> &'static str {
     }
 }
 
-/// What the best probe is compared with.
+/// The probe that the best one is compared with.
 pub fn published(design: &Design) -> &'static str {
     match design.unit {
         Length::Tenth => "The published probe",
@@ -82,7 +82,7 @@ fn approaches(trial: &Trial) -> String {
     }
 }
 
-/// What the figures rest on.
+/// Assumptions behind the figures.
 fn assumed(design: &Design) -> String {
     format!(
         "Every probe touched the objects {} times each in the simulator at {} {} per second, with Gaussian noise of {} \

@@ -20,7 +20,7 @@ use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// What growth costs.
+/// Cost of growth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Growth {
     /// For each number of objects.
@@ -29,10 +29,10 @@ pub(super) struct Growth {
     pub(super) triangles: Vec<Triangles>,
 }
 
-/// What a number of objects costs.
+/// Cost of a number of objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Objects {
-    /// How many.
+    /// Number of objects.
     pub(super) count: usize,
     /// Seconds of capturing.
     pub(super) capture: f64,
@@ -59,10 +59,10 @@ const AT: [usize; 3] = [20, 60, 200];
 /// Touches after which a recognizer gives up: twice the usual, since many objects take more.
 const MAX_TOUCHES: u32 = 400;
 
-/// What a number of triangles costs.
+/// Cost of a number of triangles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Triangles {
-    /// How many.
+    /// Number of triangles.
     pub(super) count: usize,
     /// Seconds of building the scene and its tree.
     pub(super) build: f64,

@@ -23,7 +23,7 @@ pub(super) const METHODS: [&str; 3] = ["paper", "ours", "ours, trained for noise
 const COLORS: [RGBColor; 3] = [color::PAPER, color::OURS, color::GREEN];
 const SHAPES: [Shape; 3] = [Shape::Ring, Shape::Disc, Shape::Triangle];
 
-/// What one fold showed, one entry per method and noise level.
+/// Results of one fold, one entry per method and noise level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Fold {
     /// For each of [`METHODS`], for each level: accuracy after ten touches of each object.
@@ -34,7 +34,7 @@ pub(super) struct Fold {
     pub(super) kinds: Vec<Vec<f64>>,
 }
 
-/// What else a sensor, a timer or a robot does, one at a time and then together.
+/// Other errors of a sensor, a timer or a robot, one at a time and then together.
 fn kinds() -> [Noise; 9] {
     let none = Noise::default();
     let timer = 1_000.0;

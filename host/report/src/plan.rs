@@ -29,7 +29,7 @@ const ROLLS: [u8; 3] = [1, 2, 4];
 const FORGETTING: [f32; 4] = [3.0, 5.0, 8.0, 12.0];
 const FORGETTING_RATE: f64 = 0.01;
 
-/// What planning is worth.
+/// Benefit of planning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Plans {
     /// Approaches to each object in each of three captures.

@@ -22,14 +22,14 @@ use serde::{Deserialize, Serialize};
 const RATES: [f64; 6] = [0.1, 0.05, 0.02, 0.01, 0.005, 0.001];
 /// The one whose objects are shown.
 const SHOWN: f64 = 0.01;
-/// How much stricter than the strictest rate's posterior sequences are followed, in nats.
+/// Margin, in nats, by which sequences are followed beyond the posterior of the strictest rate.
 const BEYOND: f64 = 2.5;
 /// Touches after which a sequence ends undecided.
 const MAX_TOUCHES: u32 = 200;
 /// The probability that each promise is kept.
 const CONFIDENCE: f64 = 0.95;
 
-/// What promises showed.
+/// Results of promises.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Promises {
     /// Sequences that thresholds were found on, and others that they were tested on.
@@ -55,7 +55,7 @@ struct Promised {
     object: Option<Stopped>,
 }
 
-/// What thresholds came to on sequences that they were not found on.
+/// Results of thresholds on sequences that they were not found on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Stopped {
     /// The threshold in nats; the mean of several.
@@ -68,7 +68,7 @@ struct Stopped {
     undecided: f64,
 }
 
-/// What a promise means for an object.
+/// Meaning of a promise for an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct OfObject {
     name: String,
@@ -76,7 +76,7 @@ struct OfObject {
     promised: [Option<Meaning>; 2],
 }
 
-/// What thresholds come to for an object.
+/// Results of thresholds for an object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Meaning {
     /// Touches until a verdict.
@@ -160,7 +160,7 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64) -> Result<Vec<Sequ
     follow(model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, context.progress)
 }
 
-/// What thresholds come to, all objects together.
+/// Results of thresholds, all objects together.
 fn stopped(sequences: &[Sequence], odds: &Odds) -> Stopped {
     let (mut given, mut wrong, mut touches) = (0.0, 0.0, 0.0);
     for sequence in sequences {

@@ -1,4 +1,4 @@
-//! Whether the simulation is right: recorded touches beside simulated ones.
+//! Test of the simulation: recorded touches beside simulated ones.
 
 use super::context::Context;
 use crate::page::axis::Axis;

@@ -23,7 +23,7 @@ const DRAWN: f64 = 0.01;
 /// The methods, in the order of [`Sequences::methods`].
 pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 
-/// What sequences showed.
+/// Results of sequences.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Sequences {
     /// Sequences per object.
@@ -54,7 +54,7 @@ pub(super) struct Stopped {
 }
 
 impl Stopped {
-    /// How many times more touches a fixed number needs.
+    /// Number of touches of a fixed-length sequence, divided by ours.
     pub(super) fn ratio(&self) -> Option<f64> {
         self.fixed.map(|fixed| fixed as f64 / self.touches)
     }

@@ -24,11 +24,11 @@ const PER_SHAPE: usize = 300;
 /// Touches up to which detection is shown.
 const MOST: usize = 120;
 
-/// How a model can meet strangers, in the order of [`Column::ways`].
+/// Ways in which a model can meet strangers, in the order of [`Column::ways`].
 const WAYS: [(&str, Option<Held>); 3] =
     [("off", None), ("likely", Some(Held::Likely)), ("certain", Some(Held::Certain))];
 
-/// What was measured: without and with a background column; or why nothing was.
+/// Measurements: without and with a background column; or why nothing was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Measured {
     Columns([Column; 2]),
@@ -40,7 +40,7 @@ pub(super) struct Column {
     ways: Vec<Way>,
 }
 
-/// What a way to meet strangers achieves: means over the objects that were left out.
+/// Results of one way to meet strangers: means over the objects that were left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Way {
     /// The share found out by 1, 2, 3 … touches.

@@ -117,7 +117,7 @@ fn curve(taught: &Taught, command: &str) -> Result<Figure> {
     })
 }
 
-/// Whether more approaches to an object would help, in a sentence.
+/// Says in a sentence if more approaches to an object would help.
 pub fn more_approaches(object: &TaughtObject) -> String {
     let Some(last) = object.curve.points.last() else { return String::new() };
     let (now, then) = (last.error, object.curve.with_twice);
@@ -133,7 +133,7 @@ pub fn more_approaches(object: &TaughtObject) -> String {
     )
 }
 
-/// Whether enough was recorded for a promise, in two sentences.
+/// Says in two sentences if enough was recorded for a promise.
 pub fn promise(taught: &Taught) -> String {
     let Needed { sequences, of_each, approaches } = taught.promise;
     let recorded = taught.objects.iter().map(|object| object.approaches).min().unwrap_or(0);

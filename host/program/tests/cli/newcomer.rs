@@ -1,4 +1,4 @@
-//! What someone is told who uses the program for the first time.
+//! Guidance for someone who uses the program for the first time.
 
 use crate::{command, globe, stderr, stdout};
 use serde_json::Value;

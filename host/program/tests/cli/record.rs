@@ -133,7 +133,7 @@ fn recorded_and_simulated_touches_are_never_mixed() {
 
 /// A chip without a model whose fingers touch when this test says so.
 struct Fingers {
-    /// Whether the host has asked for the model, the last of what it asks.
+    /// True once the host has asked for the model, its last question.
     greeted: Cell<bool>,
 }
 
@@ -186,7 +186,7 @@ fn touch(number: u32) -> Touch {
     )
 }
 
-/// What the chip reports about a touch: counted or not, it was one.
+/// The chip's report of a touch, counted or not.
 fn event(number: u32) -> Event {
     let touch = TouchMessage::from(&touch(number));
     let verdict = VerdictMessage { decision: Decision::Undecided, best: 0, touches: number, detail: None };

@@ -32,10 +32,10 @@ use std::path::PathBuf;
 /// The game, compiled to WebAssembly.
 const WASM: &[u8] = include_bytes!("../../assets/play/palpate.wasm");
 
-/// What a page is made for.
+/// Settings of a page.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// How objects are touched: unit, probe and aim count.
+    /// Origin of the touches: unit, probe and aim count.
     pub origin: Origin,
     /// The noise that the page begins with.
     pub noise: Noise,
@@ -46,15 +46,15 @@ pub struct Settings {
 /// A model that plays.
 #[derive(Clone, Debug)]
 pub struct Contender {
-    /// What the page calls it.
+    /// Its name on the page.
     pub name: String,
     /// The model.
     pub model: CompiledModel,
-    /// What it costs on average, measured on many more approaches than anybody plays; none if that is not known.
+    /// Its average cost, measured on many more approaches than anybody plays; none if that is not known.
     pub expected: Option<Expected>,
 }
 
-/// What a model costs on average.
+/// Average cost of a model.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Expected {
     /// Approaches to its verdict, also where it gave up.
@@ -137,7 +137,7 @@ pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -
     Ok(html::file_with_wasm("Touch it yourself – Palpate", &[scene::STYLE, include_str!("page.css")], &body))
 }
 
-/// What the page's script needs, safe inside a script element.
+/// Data for the page's script, safe inside a script element.
 fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> Result<String> {
     let Settings { origin, noise, .. } = settings;
     let data = serde_json::json!({
