@@ -19,17 +19,17 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// What is wrong with a probe; times in seconds.
+/// Faults of a probe; times in seconds.
 struct Crooked {
     /// The speed over the nominal one.
     factor: f64,
-    /// How much later each finger touches.
+    /// Delay of each finger.
     late: [f64; 3],
     /// The standard deviation of the noise of each contact.
     noise: f64,
     /// The share of contacts that each finger misses.
     missed: [f64; 3],
-    /// How far the plate is out of square, in seconds from one finger to the next.
+    /// Error of the plate's squareness, in seconds from one finger to the next.
     slope: f64,
 }
 
