@@ -14,7 +14,7 @@ pub struct Proposal {
     pub index: usize,
     /// The number of its pose: see [`Poses`](palpate_shared::Poses).
     pub pose: u16,
-    /// How well the approach distinguishes the object with the most evidence from the others, in Q15: the mean
+    /// Degree to which the approach distinguishes the object with the most evidence from the others, in Q15: the mean
     /// separation, each other object counting as much as it is still in play.
     pub score: i32,
 }
