@@ -1,4 +1,4 @@
-"""What calls fail with: the program's messages, which say where, what, and what to do."""
+"""Errors of calls: the program's messages, which say where, what, and what to do."""
 
 from __future__ import annotations
 

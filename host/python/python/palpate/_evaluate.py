@@ -1,4 +1,4 @@
-"""How often a model is right; how far it is from its ensemble."""
+"""Accuracy of a model, and its distance from its ensemble."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ._types import Progress
 
 @dataclass(frozen=True)
 class Sequential:
-    """What a recognizer does that stops by itself, each object weighted by its prior."""
+    """Results of a recognizer that stops by itself, each object weighted by its prior."""
 
     error_rate: float
-    """What it was asked to stay below."""
+    """Error rate that it was asked to keep."""
     mean: float
     """Touches (or approaches) used on average."""
     mean_standard_error: float
@@ -32,7 +32,7 @@ class Sequential:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How often a model is right, and after how many touches. Shares are between 0 and 1."""
+    """Accuracy of a model, and the touches that it needs. Shares are between 0 and 1."""
 
     descriptor: str
     touches: int
@@ -45,7 +45,7 @@ class Evaluation:
     per_object: dict[str, dict[int, float]]
     """The same for each object."""
     sequential: Sequential
-    """What it does when it stops by itself."""
+    """Results of the recognizer that stops by itself."""
     approach_accuracy: dict[int, float]
     """Accuracy after a number of approaches, where the data set holds those."""
     approach_sequential: Sequential | None
@@ -58,10 +58,10 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Parity:
-    """How far a compiled model is from its ensemble."""
+    """Distance between a compiled model and its ensemble."""
 
     touches: int
-    """How many touches were compared."""
+    """Number of touches compared."""
     max_margin_error: float
     """The largest difference of a margin, in nats."""
     stated_bound: float
@@ -69,7 +69,7 @@ class Parity:
     best_differs: int
     """Touches after which another object is the best."""
     sequences: int
-    """How many random sequences were compared."""
+    """Number of random sequences compared."""
     verdict_differs: int
     """Sequences with another verdict."""
     touches_differ: int

@@ -48,7 +48,7 @@ def to_ensemble(
 
 @dataclass(frozen=True)
 class _Asked:
-    """What a caller says about a model."""
+    """Statements of a caller about a model."""
 
     names: list[str] | None
     all_trees: bool
@@ -106,7 +106,7 @@ def _class(kind: type) -> tuple[str, str]:
 
 
 def _refusal(model: object) -> InputError:
-    """Why an object of a class that no reader knows is refused, and what to do."""
+    """Reason why an object of a class that no reader knows is refused, with a remedy."""
     what = f"{type(model).__module__}.{type(model).__qualname__}"
     for kind in type(model).__mro__[1:]:
         library, name = _class(kind)
@@ -205,7 +205,7 @@ _READERS: dict[str, dict[str, _Reader]] = {
         ["Booster", "XGBClassifier", "XGBRFClassifier", "XGBRFRegressor", "XGBRanker", "XGBRegressor"], _xgboost
     ),
 }
-"""What is read, by library and class. A class that is not here is refused."""
+"""Readers by library and class. A class that is not here is refused."""
 
 _INSIDE = {
     "lightgbm": "A booster inside it may be `model.booster_`. ",

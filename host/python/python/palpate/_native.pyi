@@ -1,5 +1,5 @@
 """
-What is written in Rust of the package palpate.
+The native part of the package palpate.
 """
 
 from _typeshed import SupportsGetItem
@@ -43,12 +43,12 @@ class DataSet:
     @property
     def approaches(self, /) -> list[int] | None:
         """
-        How many approaches each object took, where that is known.
+        Number of approaches of each object, where it is known.
         """
     @property
     def counts(self, /) -> list[int]:
         """
-        How many touches each object has, in the order of the names.
+        Number of touches of each object, in the order of the names.
         """
     @property
     def direction(self, /) -> NDArray[float32] | None:
@@ -57,8 +57,9 @@ class DataSet:
         """
     def features(self, /, descriptor: str = "curvature") -> NDArray[float32]:
         """
-        What a descriptor turns each touch into, one row of whole numbers per touch (microseconds, and direction cosines times
-        32767), NaN where one is missing: for training with another library. The code is the chip's.
+        Features that a descriptor turns each touch into, one row of whole numbers per touch (microseconds, and
+        direction cosines times 32767), NaN where one is missing: for training with another library. The code is the
+        chip's.
         """
     @staticmethod
     def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False, instances: ArrayLike | None = None) -> DataSet:
@@ -73,7 +74,7 @@ class DataSet:
     @property
     def holds_approaches(self, /) -> bool:
         """
-        Whether every approach is kept, also those that not all three fingers touched.
+        True if every approach is kept, also those that not all three fingers touched.
         """
     @property
     def instances(self, /) -> NDArray[int16]:
@@ -93,7 +94,7 @@ class DataSet:
     @property
     def objects(self, /) -> NDArray[int16]:
         """
-        Which object each touch is of: its position in the names.
+        Object of each touch: its position in the names.
         """
     @property
     def probe(self, /) -> Probe | None:
@@ -133,7 +134,7 @@ class DataSet:
     @property
     def warnings(self, /) -> list[str]:
         """
-        What looked wrong when the data set was read, and may be meant.
+        Warnings from reading the data set: things that look wrong, but may be meant.
         """
 
 @final
@@ -151,7 +152,7 @@ class Ensemble:
     @property
     def descriptor(self, /) -> str | None:
         """
-        Which features a touch is turned into; `None` for an ensemble over rows of features.
+        Features that a touch is turned into; `None` for an ensemble over rows of features.
         """
     @property
     def features(self, /) -> list[str]:
@@ -193,7 +194,7 @@ class Ensemble:
     @property
     def notes(self, /) -> list[str]:
         """
-        What to know about an ensemble that another library trained, each a sentence.
+        Notes about an ensemble that another library trained, each a sentence.
         """
     @property
     def objects(self, /) -> list[str]:
@@ -207,7 +208,7 @@ class Ensemble:
     @property
     def trees(self, /) -> int:
         """
-        How many trees there are.
+        Number of trees.
         """
 
 @final
@@ -227,7 +228,7 @@ class Model:
     """
     def __getnewargs__(self, /) -> tuple[bytes]:
         """
-        What a pickle holds.
+        Contents of a pickle.
         """
     def __new__(cls, /, content: SupportsGetItem[int, SupportsIndex]) -> Model:
         """
@@ -242,7 +243,7 @@ class Model:
     @property
     def descriptor(self, /) -> str | None:
         """
-        Which features a touch is turned into; `None` for a model over rows of features.
+        Features that a touch is turned into; `None` for a model over rows of features.
         """
     @property
     def features(self, /) -> list[str]:
@@ -252,12 +253,12 @@ class Model:
     @property
     def layout(self, /) -> str:
         """
-        How the trees are laid out.
+        Layout of the trees.
         """
     @property
     def leaf(self, /) -> str:
         """
-        What leaves are stored as: "i8", "i16" or "f32".
+        Type that leaves are stored as: "i8", "i16" or "f32".
         """
     @staticmethod
     def load(path: str | PathLike[str]) -> Model:
@@ -295,7 +296,7 @@ class Model:
     @property
     def size(self, /) -> int:
         """
-        How many bytes the model has.
+        Size of the model in bytes.
         """
     def to_bytes(self, /) -> bytes:
         """
@@ -348,7 +349,7 @@ class Recognizer:
     @property
     def touches(self, /) -> int:
         """
-        How many touches were counted since the last `reset`.
+        Number of touches counted since the last `reset`.
         """
     @property
     def verdict(self, /) -> Verdict:
@@ -385,7 +386,7 @@ class Surface:
     @property
     def triangles(self, /) -> int:
         """
-        How many triangles there are.
+        Number of triangles.
         """
 
 def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:

@@ -18,15 +18,15 @@ _Tree = tuple["int | None", _Integers, _Integers, _Integers, _Floats, npt.NDArra
 
 @dataclass(frozen=True)
 class _Parts:
-    """What margins start from, the trees, and what to know about them."""
+    """Starting values of the margins, the trees, and notes about them."""
 
     base: list[float]
     trees: list[_Tree]
     notes: list[str]
     link: str = "identity"
-    """What makes a value of a margin."""
+    """Function that turns a margin into a value."""
     last_of_ties: bool = False
-    """Whether the last of several largest margins names the class, and not the first."""
+    """True if the last of several largest margins names the class, and not the first."""
 
 
 _VOTES = (
@@ -111,7 +111,7 @@ def _gradient(model: Any) -> _Parts:
 
 
 def _is_constant(init: Any) -> bool:
-    """Whether what boosting starts from is the same for every row, and at every call."""
+    """True if the starting value of boosting is the same for every row, and at every call."""
     kind = (type(init).__module__, type(init).__name__)
     if kind == ("sklearn.dummy", "DummyClassifier"):
         return bool(init.strategy != "stratified")
@@ -169,7 +169,7 @@ def _histogram(model: Any) -> _Parts:
 
 
 _LINKS = {"IdentityLink": "identity", "LogLink": "exponential"}
-"""What makes a prediction of a margin, by scikit-learn's class of the link."""
+"""Functions that turn a margin into a prediction, by scikit-learn's class of the link."""
 
 KNOWN: dict[str, Callable[[Any], _Parts]] = {
     "DecisionTreeClassifier": _single,

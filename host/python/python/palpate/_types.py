@@ -47,27 +47,27 @@ class Probe:
     spacing: float = 1.5
     """The distance between neighboring fingers."""
     speed: float = 10.0
-    """How fast the probe moves, in units per second."""
+    """Speed of the probe, in units per second."""
     tilt: float = 10.0
-    """How far the row may be tilted to either side, in degrees."""
+    """Largest tilt of the row to either side, in degrees."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is known after a touch."""
+    """Result of the touches so far."""
 
     state: Literal["undecided", "recognized", "unknown", "gave-up"]
-    """Whether an object was recognized, the touches fit none that the model knows, or the limit of touches was reached."""
+    """State: an object was recognized, the touches fit none that the model knows, the limit was reached, or none yet."""
     object: str | None
     """The object that was recognized."""
     posterior: float | None
-    """How sure that is."""
+    """Its posterior probability."""
     touches: int
-    """How many touches were counted."""
+    """Number of touches counted."""
     refused: str | None = None
-    """Why the last touch was not counted, if it was not."""
+    """Reason why the last touch was not counted, if it was not."""
 
     @property
     def decided(self) -> bool:
-        """Whether further touches change nothing."""
+        """True if further touches change nothing."""
         return self.state != "undecided"
