@@ -367,7 +367,7 @@ def test_the_number_that_stands_for_a_missing_value_is_the_estimators(missing: f
     # A booster and its file do not hold the number, either: they say so, and take it.
     estimator.save_model(tmp_path / "model.json")
     for source in (estimator.get_booster(), tmp_path / "model.json"):
-        assert "does not say which number stood for a missing value" in palpate.to_ensemble(source).notes[0]
+        assert "does not state the number that stood for a missing value" in palpate.to_ensemble(source).notes[0]
         same = palpate.compile(source, leaf="f32", missing=np.nan if missing is None else missing)
         np.testing.assert_array_equal(same.margins(test), expected)
         if missing is not None:

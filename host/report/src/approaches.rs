@@ -203,9 +203,9 @@ pub(super) fn section(context: &Context, by_approach: &ByApproach) -> Result<Sec
     section.table(ways_table(context, by_approach));
     section.table(objects_table(context, by_approach));
     section.text(format!(
-        "An approach that touches nothing says something only if the robot aims as the simulation does. The next table \
-         shows what that assumption is worth: a robot that aims better and avoids {} % of the misses makes the model wrong \
-         that counts them; the one that does not count them becomes faster.",
+        "A miss is evidence only if the robot aims as the simulation does. The next table tests that assumption: with \
+         a robot that aims better and avoids {} % of the misses, the model that counts misses makes more errors, and \
+         the one that does not becomes faster.",
         100.0 * AVOIDED
     ));
     section.table(misses_table(context, by_approach));
@@ -241,7 +241,7 @@ fn figure(context: &Context, by_approach: &ByApproach) -> Result<Figure> {
     Ok(Figure {
         id: "approaches-accuracy".into(),
         title: "Accuracy against approaches".into(),
-        caption: "A model that has no evidence yet has recognized nothing.".into(),
+        caption: "Without any evidence, no object counts as recognized.".into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
@@ -299,7 +299,7 @@ fn objects_table(context: &Context, by_approach: &ByApproach) -> Table {
         id: "approaches-objects".into(),
         title: "Contact patterns, and approaches to a verdict".into(),
         caption:
-            "The share of each contact pattern among an object's approaches, and how many approaches each way takes."
+            "The share of each contact pattern among an object's approaches, and the number of approaches for each way."
                 .into(),
         command: context.settings.command.clone(),
         data,

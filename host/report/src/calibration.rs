@@ -126,9 +126,10 @@ fn reliability(title: &str, bins: &[ReliabilityBin], color: RGBColor) -> Result<
 pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Section> {
     let mut section = Section::new("calibration", "Calibration");
     section.text(format!(
-        "Is an object with a posterior of 90 % the right one nine times in ten? {} groups per object from the large capture, \
-         in ten bins of the best object's posterior. Dividing the evidence by one temperature ({}, fitted on single \
-         touches) changes no verdict, only the posterior that is shown; `palpate calibrate` puts it into the model.",
+        "Calibration: of the objects with a posterior of 90 %, nine in ten should be right. {} groups per object from \
+         the large capture, in ten bins of the best object's posterior. Dividing the evidence by one temperature ({}, \
+         fitted on single touches) changes no verdict, only the posterior that is shown; `palpate calibrate` stores it \
+         in the model.",
         calibration.groups,
         crate::page::axis::number(calibration.temperature, 2)
     ));
@@ -152,8 +153,9 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
         id: "reliability".into(),
         title: "Reliability diagrams".into(),
         caption:
-            "On the dashed line a posterior is the share right; above it the model is underconfident, below it overconfident. Bars \
-                  are 95 % intervals (Wilson); gray columns show how many of the groups are in each bin."
+            "On the dashed line the posterior equals the accuracy; above it the model is underconfident, below it \
+                  overconfident. Bars are 95 % intervals (Wilson); gray columns show how many of the groups are in \
+                  each bin."
                 .into(),
         command: context.settings.command.clone(),
         panels,
@@ -170,7 +172,7 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
     section.table(Table {
         id: "calibration".into(),
         title: "Expected calibration error".into(),
-        caption: "The mean distance between posterior and share right, over ten bins of equal width.".into(),
+        caption: "The mean distance between posterior and accuracy, over ten bins of equal width.".into(),
         command: context.settings.command.clone(),
         data,
     });

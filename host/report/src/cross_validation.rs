@@ -148,7 +148,8 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
         title: "Groups recognized, mean over folds (the paper's figure 8a)".into(),
         caption: format!(
             "Bars are one standard deviation over folds, of {} groups per object. The CSV also has the same over {} \
-             groups per object. – stands where an object's test touches make fewer than {LEAST_GROUPS} distinct groups.",
+             groups per object. A dash (–) means that an object's test touches make fewer than {LEAST_GROUPS} distinct \
+             groups.",
             context.settings.groups, context.settings.many_groups
         ),
         command: context.settings.command.clone(),
@@ -207,7 +208,7 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     }
     Ok(Figure {
         id: "confusion".into(),
-        title: "Which object is recognized as which after ten touches (figure 9)".into(),
+        title: "Confusion matrix after ten touches (figure 9)".into(),
         caption: format!(
             "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
              groups per object and fold. Shares below half a percent are blank.",
@@ -244,7 +245,7 @@ fn recall(context: &Context, folds: &[Fold]) -> Table {
     Table {
         id: "recall".into(),
         title: "Recall and precision after ten touches".into(),
-        caption: "From the matrices above. A click on a heading sorts.".into(),
+        caption: "From the matrices above. Click a heading to sort.".into(),
         command: context.settings.command.clone(),
         data,
     }

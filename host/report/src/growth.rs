@@ -163,9 +163,9 @@ fn triangles_cost(context: &Context, count: usize) -> Result<Triangles> {
 pub(super) fn left_out() -> Section {
     let mut section = Section::new("left-out", "Not measured");
     section.text(
-        "Growth (what more objects and finer meshes cost) and generalization (recognizing objects that were never touched) \
-         are measured on built-in objects and say nothing about these. A report on other objects leaves them out unless \
-         they are asked for.",
+        "Growth (the cost of more objects and finer meshes) and generalization (recognizing objects that were never \
+         touched) are measured on built-in objects and say nothing about the objects of this report. A report on other \
+         objects leaves them out unless they are asked for.",
     );
     section
 }
@@ -287,10 +287,9 @@ fn objects_table(context: &Context, growth: &Growth) -> Table {
     Table {
         id: "growth-objects".into(),
         title: "More objects, in numbers".into(),
-        caption:
-            "Accuracy, after so many approaches, is over all objects: beyond ten, a fork can be mistaken for another \
-                  fork. A recognizer stops at a posterior of 99 %, or gives up after 400 touches."
-                .into(),
+        caption: "Accuracies are over all objects: beyond ten objects, a fork can be mistaken for another fork. A \
+                  recognizer stops at a posterior of 99 %, or gives up after 400 touches."
+            .into(),
         command: context.settings.command.clone(),
         data: objects_data(growth),
     }

@@ -151,12 +151,12 @@ impl Limit {
 pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
     let mut section = Section::new("limit", "The limit");
     section.text(format!(
-        "How well could any classifier do? {} full touches of each object were captured separately. On 85 % of them a large \
-         ensemble was trained ({} multi-output trees of depth 7), and the density of each object's touches over the two \
-         features of the curvature descriptor was estimated (a grid of 256 × 256 ranks, smoothed by a Gaussian kernel \
-         {:.1} cells wide, mirrored at the borders, the width chosen on 5 % held out). The limit is the better of the \
-         two (or our own model, if it is better than both), here: {}, on groups from the remaining 10 %. Doubling the \
-         capture changed the estimate by {} points at ten touches.",
+        "This section estimates the best accuracy that any classifier could reach. {} full touches of each object were \
+         captured separately. On 85 % of them a large ensemble was trained ({} multi-output trees of depth 7), and the \
+         density of each object's touches over the two features of the curvature descriptor was estimated (a grid of \
+         256 × 256 ranks, smoothed by a Gaussian kernel {:.1} cells wide, mirrored at the borders, the width chosen on \
+         5 % held out). The limit is the better of the two (or our own model, if it is better than both), here: {}, on \
+         groups from the remaining 10 %. Doubling the capture changed the estimate by {} points at ten touches.",
         limit.captured,
         context.settings.limit_rounds,
         limit.width,

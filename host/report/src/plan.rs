@@ -166,19 +166,19 @@ fn at_rates(context: &Context, bytes: &[u8], test: &Dataset, active: bool) -> Re
 pub(super) fn section(context: &Context, plans: &Plans) -> Result<Section> {
     let mut section = Section::new("plan", "Where to touch next");
     section.text(format!(
-        "A robot that knows how the object is turned can choose where it comes from. The plan says for each direction, and \
-         roll of the row of fingers about it, how well an approach tells each two objects apart; the next approach is the \
-         one that tells the likeliest object best from the others. The model was trained on {} approaches to each object, \
-         misses included, and knows the probe's pose; the plan comes from as many others, and both are tested on a third \
-         lot. Aims are random in every case.",
+        "A robot that knows how the object is turned can choose where it comes from. For each direction, and each roll \
+         of the row of fingers about it, the plan states how well an approach distinguishes each pair of objects; the \
+         next approach is the one that best distinguishes the likeliest object from the others. The model was trained \
+         on {} approaches to each object, misses included, and knows the probe's pose; the plan was made from as many \
+         others, and both are tested on a third set. Aims are random in every case.",
         plans.count
     ));
     section.figure(figure(context, plans)?);
     section.table(policies(context, plans));
     section.table(objects(context, plans));
     section.text(
-        "An object may be exchanged, or slip, while it is being touched. Forgetting restarts the recognizer once recent \
-         touches speak for another object against the likeliest one, by the number of nats in the table.",
+        "An object may be exchanged, or slip, while it is being touched. Forgetting restarts the recognizer once \
+         recent touches favor another object over the likeliest one by the number of nats in the table.",
     );
     section.table(switched(context, plans));
     Ok(section)
@@ -245,8 +245,8 @@ fn policies(context: &Context, plans: &Plans) -> Table {
         id: "plan-policies".into(),
         title: "Approaches at random and planned".into(),
         caption: format!(
-            "At thresholds where {percent} % of the sequences are measured to be wrong or undecided. A policy is missing for \
-             which there were too few approaches in each pose."
+            "At thresholds where {percent} % of the sequences are measured to be wrong or undecided. A policy with too \
+             few approaches in each pose is left out."
         ),
         command: context.settings.command.clone(),
         data,
@@ -264,7 +264,10 @@ fn objects(context: &Context, plans: &Plans) -> Table {
     Table {
         id: "plan-objects".into(),
         title: "Approaches to each object".into(),
-        caption: format!("Where {} % of all sequences are wrong or undecided.", short_number(100.0 * ERRORS)),
+        caption: format!(
+            "At the threshold where {} % of all sequences are wrong or undecided.",
+            short_number(100.0 * ERRORS)
+        ),
         command: context.settings.command.clone(),
         data,
     }

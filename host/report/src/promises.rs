@@ -218,11 +218,12 @@ pub(super) fn section(context: &Context, promises: &Promises) -> Result<Section>
     let [found, tested] = promises.sequences;
     let mut section = Section::new("promises", "Promises");
     section.text(format!(
-        "A promised error rate is the share of the names given that are wrong at most; a sequence that reaches {MAX_TOUCHES} \
-         touches without a name is undecided, neither right nor wrong. Thresholds were found by Learn-then-Test on {found} \
-         sequences of touches captured for that, so that each promise is kept with a probability of 95 %, and measured on \
-         {tested} other sequences. Stopping when the posterior passes one less the rate is wrong less often than it might \
-         be, and takes more touches. The limit is a density estimate from the large capture, with thresholds of its own."
+        "A promised error rate is the largest share of wrong names among those given; a sequence that reaches \
+         {MAX_TOUCHES} touches without a name is undecided, neither right nor wrong. Thresholds were found by \
+         Learn-then-Test on {found} sequences of touches captured for that, so that each promise is kept with a \
+         probability of 95 %, and measured on {tested} other sequences. Stopping when the posterior exceeds 1 − rate \
+         makes fewer errors than allowed, and takes more touches. The limit is a density estimate from the large \
+         capture, with its own thresholds."
     ));
     section.figure(figure(context, promises)?);
     section.table(table(context, promises));
@@ -259,7 +260,7 @@ fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
     Ok(Figure {
         id: "promises-kept".into(),
         title: "Promised and measured error rates".into(),
-        caption: "On the dashed line a promise is used up; above it, it is broken. Bars are 95 % intervals (Wilson)."
+        caption: "On the dashed line the measured error rate equals the promised one; above it, the promise is broken. Bars are 95 % intervals (Wilson)."
             .into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
@@ -304,10 +305,9 @@ fn table(context: &Context, promises: &Promises) -> Table {
     Table {
         id: "promises-table".into(),
         title: "What promises cost".into(),
-        caption:
-            "– stands for a rate that so few sequences cannot promise. A promise per object has one threshold, strict \
-                  enough for the object that is mistaken most often."
-                .into(),
+        caption: "A dash (–) marks a rate that these sequences are too few to promise. A promise per object has one \
+                  threshold, strict enough for the object that is mistaken most often."
+            .into(),
         command: context.settings.command.clone(),
         data,
     }

@@ -66,8 +66,8 @@ pub fn run_page(results: &RunResults) -> Result<Page> {
     sections.push(section);
     Ok(Page {
         title: "Recognizing objects by touch".into(),
-        summary: "A probe with three fingers touched each object; trees learned what a touch says about the object; a \
-                  compiled model of a few kilobytes added the evidence up, touch by touch."
+        summary: "A probe with three fingers touched each object; trees learned the evidence that a touch gives for \
+                  each object; a compiled model of a few kilobytes added it up, touch by touch."
             .into(),
         sections,
         facts: results.facts.clone(),

@@ -105,9 +105,9 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
 pub(super) fn section(context: &Context, sequences: &Sequences) -> Result<Section> {
     let mut section = Section::new("sequential", "Stopping when sure");
     section.text(format!(
-        "The recognizer stops as soon as the posterior of an object passes one less the threshold. {} sequences of each \
+        "The recognizer stops as soon as the posterior of an object exceeds 1 − threshold. {} sequences of each \
          object's touches, from the large capture that no model was trained on; a sequence of {MOST} touches without a \
-         verdict counts as an error. It is compared with the fixed number of touches that is wrong no more often.",
+         verdict counts as an error. It is compared with the fixed number of touches that makes no more errors.",
         sequences.count
     ));
     section.figure(trade(context, sequences)?);
@@ -204,11 +204,10 @@ fn table(context: &Context, sequences: &Sequences) -> Table {
     Table {
         id: "sequential".into(),
         title: "Thresholds".into(),
-        caption:
-            "Errors come out below the threshold, since evidence overshoots it on the last touch; they include undecided \
-             sequences. ± is one standard error; – stands where no fixed number up to the longest group is wrong as \
-             rarely."
-                .into(),
+        caption: "Error rates are below the threshold, because evidence overshoots it on the last touch; they include \
+             undecided sequences. ± is one standard error; a dash (–) means that no fixed number up to the longest \
+             group makes as few errors."
+            .into(),
         command: context.settings.command.clone(),
         data,
     }

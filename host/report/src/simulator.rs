@@ -194,7 +194,7 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
     section.table(Table {
         id: "simulator".into(),
         title: "The simulator's choices".into(),
-        caption: "The last row is what the others are compared with.".into(),
+        caption: "The last row is the reference for the others.".into(),
         command: context.settings.command.clone(),
         data,
     });

@@ -37,13 +37,13 @@ pub enum CalibrateProblem {
         objects: Vec<String>,
     },
     /// The touches are those that the model was trained on.
-    #[error("the model was trained on these touches of {}: a promise that they keep would not hold for others", objects.join(", "))]
+    #[error("the model was trained on these touches of {}: a promise calibrated on them would not hold for others", objects.join(", "))]
     TrainedOn {
         /// The objects.
         objects: Vec<String>,
     },
     /// There are no objects to choose between.
-    #[error("the model knows one object only, which it cannot take for another")]
+    #[error("the model knows only one object: there is nothing to mistake it for")]
     OneObject,
 }
 

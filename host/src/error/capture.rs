@@ -49,7 +49,7 @@ pub enum CaptureProblem {
         differences: String,
     },
     /// The directory holds files of touches that no listing names.
-    #[error("holds {}, which no capture listed: once this capture has, they would never be used", list(files))]
+    #[error("holds {}, which no capture has listed: after this capture, they would never be used", list(files))]
     HoldsFiles {
         /// The files' names.
         files: Vec<String>,
@@ -153,9 +153,11 @@ impl CaptureProblem {
             }
             Self::Shorter { .. } => "Capture again from the beginning, replacing these touches.",
             Self::NotWritten { kind: ErrorKind::StorageFull | ErrorKind::QuotaExceeded, .. } => {
-                "Free some space, then resume the capture: what is checkpointed is safe."
+                "Free some space, then resume the capture: everything up to the last checkpoint is safe."
             }
-            Self::NotWritten { .. } => "Check the disk, then resume the capture: what is checkpointed is safe.",
+            Self::NotWritten { .. } => {
+                "Check the disk, then resume the capture: everything up to the last checkpoint is safe."
+            }
             Self::Threads { .. } => "Use fewer threads.",
             Self::WorkerStopped => "Report this as a bug.",
         }

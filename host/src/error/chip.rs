@@ -14,7 +14,7 @@ pub enum ChipProblem {
         text: String,
     },
     /// Faults of a bad line are written in a way that means nothing.
-    #[error("`{text}` does not say what a bad line does")]
+    #[error("`{text}` does not describe a bad line")]
     NotFaults {
         /// Text that was given.
         text: String,
@@ -71,7 +71,7 @@ pub enum ChipProblem {
     #[error("the chip refuses the model: {0}")]
     ModelRefused(Refusal),
     /// An answer or outcome does not belong to what was asked.
-    #[error("the chip's answer does not belong to what it was asked")]
+    #[error("the chip's answer does not match the question")]
     UnexpectedAnswer,
     /// The chip's model is not the one that its verdicts shall be compared with.
     #[error("the chip's model is not the one to compare with: checksum {chip:08x} instead of {expected:08x}")]
@@ -121,7 +121,7 @@ pub enum ChipProblem {
         said: String,
     },
     /// The emulated chip says nothing about a touch's instructions.
-    #[error("the emulated chip does not say how many instructions a touch takes{}", after_colon(said))]
+    #[error("the emulated chip did not report the instructions of a touch{}", after_colon(said))]
     NoCost {
         /// Its output instead.
         said: String,

@@ -82,7 +82,7 @@ pub enum CompileProblem {
     #[error("the ensemble is too large for the model format")]
     TooLarge,
     /// There is no room for the model.
-    #[error("the model has {bytes} bytes at least, more than the {most} that there is room for")]
+    #[error("the model has {bytes} bytes at least, more than the {most} that fit")]
     OverBudget {
         /// The fewest bytes that were found.
         bytes: usize,
@@ -117,7 +117,7 @@ impl CompileProblem {
             Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",
             Self::Tree { .. } => "Train it again, or check the program that wrote it.",
             Self::MarginRange { .. } => {
-                "Margins are logarithms of probabilities, of which a few dozen are sure enough: train it again, or check the program that wrote it."
+                "Margins are log-probabilities, and a few dozen nats already mean certainty: train it again, or check the program that wrote it."
             }
             Self::Features { .. } => "Train on the features that matter, at most 256.",
             Self::Thresholds { .. } => {

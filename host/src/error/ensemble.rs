@@ -24,7 +24,7 @@ pub enum EnsembleProblem {
         what: String,
     },
     /// There are too few or too many features.
-    #[error("it has {count} features, of which its trees use {used}, and not 1 to {most}")]
+    #[error("its trees use {used} of its {count} features, and not 1 to {most}")]
     FeatureCount {
         /// Features.
         count: usize,
@@ -189,7 +189,7 @@ pub enum EnsembleProblem {
         object: String,
     },
     /// A background does not go with a data set.
-    #[error("the background does not go with the data set: {detail}")]
+    #[error("the background does not match the data set: {detail}")]
     Background {
         /// The reason.
         detail: &'static str,

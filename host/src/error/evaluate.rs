@@ -27,7 +27,7 @@ pub enum EvaluateProblem {
         object: String,
     },
     /// An object has too few touches to say what its touches give.
-    #[error("an object has only {found} touches to learn from what its touches give, or they are all alike")]
+    #[error("an object has only {found} touches to learn the expected evidence from, or they are all alike")]
     TooFewForFit {
         /// Number of touches.
         found: usize,
@@ -50,7 +50,7 @@ pub enum EvaluateProblem {
         descriptor: Descriptor,
     },
     /// A compiled model and an ensemble are not of the same objects and descriptor.
-    #[error("the model was not compiled from this ensemble: its objects or its descriptor are others")]
+    #[error("the model was not compiled from this ensemble: its objects or its descriptor differ")]
     OtherModel,
     /// There is nothing to compare models on.
     #[error("there are no touches to compare the models on")]
@@ -77,7 +77,7 @@ pub enum EvaluateProblem {
     #[error("the model has no plan of approaches")]
     NoPlan,
     /// A plan was asked for a model of one object.
-    #[error("the model has one object: there is nothing to tell it from")]
+    #[error("the model has one object: there is nothing to distinguish it from")]
     OneObjectToPlan,
     /// A plan needs approaches, also those that missed.
     #[error("the data set holds full touches only, without the approaches in between")]
@@ -105,7 +105,7 @@ pub enum EvaluateProblem {
         needed: usize,
     },
     /// Something was asked for that only compiled models do.
-    #[error("forgetting is what a compiled model's recognizer does, and this is an ensemble")]
+    #[error("forgetting is a feature of a compiled model's recognizer, and this is an ensemble")]
     NotCompiled,
     /// There is one object only.
     #[error("the data set has one object: there is nothing to exchange it for")]

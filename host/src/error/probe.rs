@@ -47,7 +47,7 @@ impl ProbeProblem {
     /// Remedy, as a sentence.
     pub fn fix(&self) -> String {
         match self {
-            Self::Differs { .. } => "Use both with the same probe: times mean something else with another.".into(),
+            Self::Differs { .. } => "Use both with the same probe: with another, times have another meaning.".into(),
             Self::BadFile { .. } => {
                 "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, timer and [real].".into()
             }

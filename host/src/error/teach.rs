@@ -23,15 +23,15 @@ pub enum TeachProblem {
         objects: Vec<String>,
     },
     /// A name is taken.
-    #[error("{object} is known already: an object that is taught needs a name of its own")]
+    #[error("{object} is known already: a taught object needs a name that no other object has")]
     Known {
         /// The name.
         object: String,
     },
     /// Partial touches are evidence, but none were recorded.
     #[error(
-        "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never give \
-         other touches",
+        "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never \
+         cause other touches",
         match counted { Counted::All => "every approach", _ => "every touch with a contact" }
     )]
     FullTouches {
@@ -55,7 +55,7 @@ pub enum TeachProblem {
         descriptor: Descriptor,
     },
     /// There are too few touches to hold a part of them out.
-    #[error("only {touches} recorded touches of {object} are evidence, of at least {least} that are needed")]
+    #[error("only {touches} recorded touches of {object} are evidence, and at least {least} are needed")]
     TooFew {
         /// The object.
         object: String,

@@ -219,7 +219,8 @@ pub enum TouchesProblem {
     },
     /// Touches of several instances or logs, without an origin that `dataset.json` could state.
     #[error(
-        "{name} has {sources} instances or logs, and without a known probe no dataset.json says which touch is of which"
+        "{name} has {sources} instances or logs, and without a known probe no dataset.json states the source of each \
+         touch"
     )]
     Unsaid {
         /// The object's name.
@@ -228,13 +229,13 @@ pub enum TouchesProblem {
         sources: usize,
     },
     /// Touches of robots that differ, which no file can say.
-    #[error("the touches of {name} are of robots with biases of their own, and no file says which touch is of which")]
+    #[error("the touches of {name} are of robots with different biases, and no file states the robot of each touch")]
     OfRobots {
         /// The object's name.
         name: String,
     },
     /// `dataset.json` names an object that no file of the directory can be called after.
-    #[error("no file can be called after the object {name:?}")]
+    #[error("no file can be named after the object {name:?}")]
     BadName {
         /// The name.
         name: String,
@@ -296,16 +297,16 @@ pub enum TouchesProblem {
         began: String,
     },
     /// A touch has no pose, and is to be recorded with one.
-    #[error("no pose, and it is to be recorded with one")]
+    #[error("no pose, but this data set is recorded with one")]
     NoPose,
     /// A text names no shard.
-    #[error("{text:?} is no shard")]
+    #[error("{text:?} is not a shard")]
     BadShard {
         /// The text.
         text: String,
     },
     /// A text names no format of touches.
-    #[error("{name:?} is no format of touches")]
+    #[error("{name:?} is not a format of touches")]
     UnknownFormat {
         /// The text.
         name: String,
@@ -360,10 +361,10 @@ impl TouchesProblem {
                  alignment."
             }
             Self::HalfPose { .. } => "Give both or neither.",
-            Self::OtherObject { .. } => "Give each object a file that is called like it.",
+            Self::OtherObject { .. } => "Give each object a file with its name.",
             Self::Row { problem, .. } => match **problem {
                 Self::HalfPose { .. } => "Give both or neither.",
-                Self::OtherObject { .. } => "Give each object a file that is called like it.",
+                Self::OtherObject { .. } => "Give each object a file with its name.",
                 _ => "Correct the row, or capture the object again.",
             },
             Self::NotParquet { .. } | Self::NoColumn { .. } | Self::Column { .. } | Self::NoTouches => {
@@ -384,7 +385,7 @@ impl TouchesProblem {
                 "Name the schema of the touches palpate.Touch, or in ROS 2 palpate_msgs/msg/Touch: docs/mcap.md."
             }
             Self::Message { .. } | Self::BadMessage { .. } => {
-                "Correct what logged it: docs/mcap.md says what belongs in a message."
+                "Correct the program that logged it: docs/mcap.md says what belongs in a message."
             }
             Self::NamelessTouch => "Name the object in every message, or in none.",
             Self::NotInLog { .. } => "Give one of these names, or the log of the other object.",
@@ -411,11 +412,11 @@ impl TouchesProblem {
             Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
             Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
-            Self::NoFormat => "Call it like the object, with the ending .txt or .parquet.",
+            Self::NoFormat => "Name it after the object, with the extension .txt or .parquet.",
             Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
             Self::BadQuantity { example, .. } => return format!("Give {example}."),
-            Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
+            Self::WouldTrainWrong { .. } => "Correct the faults listed above, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }
         .into()

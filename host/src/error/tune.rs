@@ -26,7 +26,7 @@ pub enum TuneProblem {
         known: Vec<String>,
     },
     /// There are too few recorded touches to fit a probe to.
-    #[error("only {touches} recorded touches with two or three contacts, of at least {least} that a fit takes")]
+    #[error("only {touches} recorded touches with two or three contacts, and a fit needs at least {least}")]
     FewRecorded {
         /// Number of touches.
         touches: usize,

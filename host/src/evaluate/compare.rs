@@ -157,12 +157,12 @@ impl Comparison {
     /// Meaning of the figure, in a sentence.
     pub fn verdict(&self) -> &'static str {
         match self.told_apart {
-            Share { low, .. } if low <= 0.5 => "Nothing shows that the simulation is not right.",
-            Share { value, .. } if value < 0.55 => "They differ a little: the simulation is nearly right.",
+            Share { low, .. } if low <= 0.5 => "No difference was found: the simulation agrees with the recordings.",
+            Share { value, .. } if value < 0.55 => "They differ slightly: the simulation is nearly correct.",
             Share { value, .. } if value < 0.65 => {
                 "They differ: fit the probe to recorded touches, or record more of them."
             }
-            _ => "They differ much: the probe, a mesh or its size is not what is simulated.",
+            _ => "They differ strongly: the simulated probe, a mesh or its size is wrong.",
         }
     }
 }
@@ -173,12 +173,12 @@ impl Cost {
         let Self { after, needed, .. } = self;
         match needed {
             Some(needed) if needed - *after as f64 > 0.5 => format!(
-                "To be right as often as on simulated touches after {after} approaches takes {needed:.0} on recorded ones: {:.0} more.",
+                "The accuracy on simulated touches after {after} approaches takes {needed:.0} approaches on recorded ones: {:.0} more.",
                 (needed - *after as f64).max(1.0)
             ),
-            Some(_) => format!("It is right as often on recorded touches: after {after} approaches nothing is lost."),
+            Some(_) => format!("Its accuracy is as high on recorded touches: no loss after {after} approaches."),
             None => {
-                format!("On recorded touches it is never right as often as on simulated ones after {after} approaches.")
+                format!("On recorded touches it never reaches its accuracy on simulated ones after {after} approaches.")
             }
         }
     }

@@ -511,7 +511,7 @@ mod tests {
         writer.close().unwrap();
         let error = read(&path).unwrap_err().to_string();
         assert!(error.contains("fork.parquet: row 2001: a touch of \"mouse\" in the file of \"fork\""), "{error}");
-        assert!(error.ends_with("Give each object a file that is called like it."), "{error}");
+        assert!(error.ends_with("Give each object a file with its name."), "{error}");
     }
 
     /// A file of one touch, `fork.parquet`, with another column of objects.

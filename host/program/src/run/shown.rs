@@ -156,8 +156,8 @@ fn missing(summary: &Summary) -> String {
         return String::new();
     }
     format!(
-        "– stands for an accuracy that would rest on fewer than {LEAST_GROUPS} distinct groups of test touches; capture \
-         more touches to measure it."
+        "A dash (–) replaces an accuracy that would rest on fewer than {LEAST_GROUPS} distinct groups of test touches; \
+         capture more touches to measure it."
     )
 }
 

@@ -397,9 +397,9 @@ fn what_a_file_does_not_say_is_said_at_export_and_can_be_stated() {
         stdout(run([&["export", &data(model), "-o", &path("m"), "--leaf", "f32"], more].concat()))
     };
     let missing = "xgboost-3.2-missing-0.json";
-    assert!(export(missing, &[]).contains("which number stood for a missing value in training"));
+    assert!(export(missing, &[]).contains("the number that stood for a missing value in training"));
     let text = export(missing, &["--missing", "0"]);
-    assert!(!text.contains("which number stood for"), "{text}");
+    assert!(!text.contains("the number that stood for"), "{text}");
     assert!(text.contains("0 stands for a missing value") && text.contains("f32-leaves, sentinel"), "{text}");
     let verify = |model: &str, more: &[&str], code: i32| {
         let name = model.rsplit_once('.').unwrap().0;

@@ -175,9 +175,9 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
         header {
             h1 { "Touch it yourself" }
             p.lead {
-                "Three fingers in a row approach an object; each says when it makes contact. From these times alone a \
-                 model of a few kilobytes tells " (surfaces.len()) " objects apart. The simulator and the recognizer in \
-                 this page are the program's own, compiled to WebAssembly."
+                "Three fingers in a row approach an object; each reports when it makes contact. From these times alone \
+                 a model of a few kilobytes distinguishes " (surfaces.len()) " objects. The simulator and the recognizer in this \
+                 page are the program's own, compiled to WebAssembly."
             }
             p id="failure" role="alert" {}
             noscript { p { "This page needs JavaScript, which this browser does not run." } }
@@ -223,7 +223,7 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
                 }
                 p id="verdict" role="status" {}
                 table id="bars" {
-                    caption { "Posterior of each object. At the line the model is sure." }
+                    caption { "Posterior of each object. The line marks the threshold of a verdict." }
                     thead { tr { th scope="col" { "object" } th scope="col" { "posterior" } th.number scope="col" { "in %" } } }
                     tbody {}
                 }
@@ -296,7 +296,7 @@ fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
                 p id="rounds" role="status" {}
             }
             fieldset {
-                legend { "What the sensor adds" }
+                legend { "Noise of the sensor" }
                 @for (id, label, least, largest, value) in [
                     ("noise", "Noise: up to", 0.0, 20.0, ms(settings.noise.deviation.largest)),
                     ("bent1", "Finger 1 bent: early by", -20.0, 20.0, ms(bent[0])),
@@ -328,15 +328,15 @@ fn notes(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) ->
         section.notes {
             h2 { "What is what" }
             p {
-                "An approach at random is one of a capture: from any direction, at any point of the bounding box. A click \
-                 is an approach that you aimed, which the models were not trained for: they may be surer or less sure than \
-                 they should be. An approach costs a robot the same whether or not it is evidence."
+                "A random approach is one of a capture: from any direction, at any point of the bounding box. A click \
+                 is an approach that you aimed, which the models were not trained for: their confidence may be too \
+                 high or too low. An approach costs a robot the same whether or not it is evidence."
             }
             p {
-                "The picture and the fingers have the same surface: the mesh with its corners rounded to a 65,536th of its \
-                 longest side"
+                "The picture and the simulator use the same surface: the mesh with its corners rounded to a 65,536th \
+                 of its longest side"
                 @if simplified.is_empty() { "." } @else { ", and simplified where that is needed: " (simplified.join(", ")) "." }
-                @if !instances.is_empty() { " Of objects with several meshes, the first is here: " (instances.join(", ")) "." }
+                @if !instances.is_empty() { " Of objects with several meshes, the first is shown: " (instances.join(", ")) "." }
             }
             p {
                 "The deviation of a touch's noise is drawn between " (settings.noise.deviation.least / 1e3) " ms and what the \

@@ -105,8 +105,8 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if head.values.contains_key("average_output") {
         let rounds = (blocks.len() / outputs).max(1);
         draft.notes.push(format!(
-            "A random forest: margins are the library's raw scores, which are sums. Its probabilities are those of averages: \
-             posteriors here are as if margins were {rounds} times as large."
+            "A random forest: margins are the library's raw scores, which are sums. Its probabilities are computed \
+             from averages: the posteriors here use margins {rounds} times as large."
         ));
     }
     Ok(draft.finish(names)?)
@@ -143,9 +143,9 @@ fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<us
         return Err(EnsembleProblem::Objective { found: name.into() }.into());
     }
     if matches!(name, "binary" | "multiclassova") && sigmoid.parse() != Ok(1.0) {
-        draft
-            .notes
-            .push(format!("Posteriors take margins as log-odds, but the model's are to be multiplied by {sigmoid}."));
+        draft.notes.push(format!(
+            "Posteriors take margins as log-odds, but the model's must be multiplied by {sigmoid} first."
+        ));
     }
     if name == "multiclassova" {
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());

@@ -101,7 +101,7 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
     }
     if let Some(missing) = options.missing.filter(|missing| !missing.is_nan()) {
         let Some(imported) = ensemble.origin.imported.as_mut() else {
-            let what = "it is over touches, whose missing contacts no number stands for";
+            let what = "it is over touches, where no number stands for a missing contact";
             return Err(Error::at(Place::file(path), unsupported(what, "Leave the missing value out.")));
         };
         imported.sentinel = Some([missing; 2]);
@@ -110,8 +110,9 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
 }
 
 /// Note about every file of XGBoost.
-pub(super) const MISSING_UNKNOWN: &str = "The file does not say which number stood for a missing value in training (XGBoost's \
-                                          `missing=`): only NaN is taken for one. State it if there was another.";
+pub(super) const MISSING_UNKNOWN: &str = "The file does not state the number that stood for a missing value in \
+                                          training (XGBoost's `missing=`): only NaN counts as missing. State the \
+                                          number if there was another.";
 
 fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let names = options.names;
@@ -124,7 +125,7 @@ fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
                 "Save the model with `booster.save_model(\"model.txt\")`.",
             ))),
             JsonKind::XgBoostDump => Err(wrong(unsupported(
-                "it is a list, such as XGBoost's dump_model writes, which lacks what margins start from",
+                "it is a list, as XGBoost's dump_model writes it, which lacks the starting values of the margins",
                 "Save the model with `booster.save_model(\"model.json\")`.",
             ))),
             JsonKind::XgBoost => xgboost::from_json(path, bytes, options),

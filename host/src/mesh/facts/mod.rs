@@ -131,7 +131,7 @@ impl Facts {
             )
         });
         let apart = (!self.stray.is_empty()).then(|| {
-            "what floats apart counts as part of the object, which becomes so much smaller compared with the probe"
+            "pieces that float apart count as parts of the object, which makes the rest smaller compared with the probe"
                 .to_owned()
         });
         let reasons: Vec<String> = gap.into_iter().chain(apart).collect();
@@ -203,12 +203,12 @@ impl Facts {
         match millimeters {
             Some(unit) if SIZES.contains(&(length * unit)) => None,
             Some(unit) => Some(format!(
-                "The mesh has a size that cannot be: its longest side is {} mm, by the unit that it states.",
+                "The mesh has an implausible size: its longest side is {} mm, by the unit that it states.",
                 short(length * unit)
             )),
             None if SIZES.contains(&length) || SIZES.contains(&(length * 1_000.0)) => None,
             None => Some(format!(
-                "The mesh has a size that can be neither meters nor millimeters: its longest side is {shown}."
+                "The mesh has an implausible size, in meters as well as in millimeters: its longest side is {shown}."
             )),
         }
     }

@@ -309,8 +309,8 @@ impl Findings {
         } else if count >= ENOUGH && touches.iter().all(|touch| touch == &touches[0]) {
             self.wrong(path, "all touches are the same", "Check that the probe moves and its clock runs.");
         } else if count >= ENOUGH && is_repeated(touches) {
-            let fix = "Remove the repetition: what was trained on would be tested on too.";
-            self.wrong(path, "every touch stands in it twice or more, as if it was appended to itself", fix);
+            let fix = "Remove the repetition: training touches would also be tested on.";
+            self.wrong(path, "it holds every touch at least twice, as if it was appended to itself", fix);
         } else if count < 100 {
             self.note(path, &format!("only {count} touches"), "Capture some thousand of each object.");
         }
@@ -345,7 +345,11 @@ impl Findings {
             && most > 10 * least
         {
             let what = format!("one object has {least} touches and another {most}");
-            self.note(directory, &what, "Capture as many of each: training weights touches, not objects.");
+            self.note(
+                directory,
+                &what,
+                "Capture as many of each: training weights each touch equally, not each object.",
+            );
         }
     }
 }

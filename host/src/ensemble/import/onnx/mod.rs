@@ -40,18 +40,18 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if others > 0 {
         return Err(unsupported(
             format!(
-                "it has {} tree ensembles, whose answers are put together by something else: weights, votes, probabilities",
+                "it has {} tree ensembles, whose outputs are combined by other operators: weights, votes, probabilities",
                 others + 1
             ),
-            "Of AdaBoost, Bagging, Voting, Stacking, OneVsRest or a calibrated classifier, give a forest or boosted trees \
-             trained in its place. A single model that onnxmltools split has to be converted without `split`.",
+            "In place of AdaBoost, Bagging, Voting, Stacking, OneVsRest or a calibrated classifier, train and give a \
+             forest or boosted trees. A single model that onnxmltools split has to be converted without `split`.",
         ));
     }
     let harmless = |node: &&Node<'_>| !is_ensemble(node) && !HARMLESS.contains(&node.operation);
     if let Some(node) = model.graph.nodes.iter().find(harmless) {
         return Err(unsupported(
             format!("beside the trees it computes with {}", node.operation),
-            "Convert the trees alone, and do what is before or behind them yourself.",
+            "Convert the trees alone, and compute the steps before and after them yourself.",
         ));
     }
     let columns = columns(&model.graph, node)?;
