@@ -24,7 +24,8 @@ pub const FEATURE_LIMIT: i32 = (1 << 24) - 1;
 pub enum Descriptor {
     /// `t1, t2, t3`: the published method's own; the baseline.
     Times,
-    /// `κ = t1 − 2·t2 + t3` and the slope `|t3 − t1|`: all that three times say about a surface under an unknown pose.
+    /// `κ = t1 − 2·t2 + t3` and the slope `|t3 − t1|`: everything that three times say about a surface under an unknown
+    /// pose.
     Curvature,
     /// Curvature, and the vertical (z) components of direction and alignment: an object on a table.
     Gravity,

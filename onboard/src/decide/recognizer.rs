@@ -66,7 +66,7 @@ impl core::error::Error for CapacityError {}
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
 /// State: a number of 64 bits for each object, a few more, and the model, which is copied: where its parts are, not the bytes
-/// that it is read from. The README of this crate states what it comes to.
+/// that it is read from. The README of this crate states its size.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: Model<'m>,
@@ -230,10 +230,11 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.decided = Decided::Fresh;
     }
 
-    /// Forgets all touches, for the next object, which is one of those with a weight: `weights` say how often each object
-    /// is touched, in any common unit, and replace the model's priors until the next [`reset`](Self::reset). An object of
-    /// weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the model
-    /// promises was found out for its own priors, and its test of fit takes the weights' for evidence. `&[3, 0, 1]` says that there are three of the first object for each of the third, and none of the second.
+    /// Forgets all touches, for the next object, which is one of those with a weight: `weights` say how often each
+    /// object is touched, in any common unit, and replace the model's priors until the next [`reset`](Self::reset). An
+    /// object of weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the
+    /// model promises was determined for its own priors, and its test of fit takes the weights' for evidence. The
+    /// weights `&[3, 0, 1]` say that there are three of the first object for each of the third, and none of the second.
     ///
     /// Cost: two logarithms for each object, bit by bit.
     ///

@@ -135,8 +135,8 @@ impl<'a> Model<'a> {
         Strangers::opened(optional::find(self.optional(), Tag::Strangers))
     }
 
-    /// The object that stands for all that the model does not know: the last one, if the model was trained with a
-    /// background. It is a rival of the others, and never named.
+    /// The object that stands for everything that the model does not know: the last one, if the model was trained with
+    /// a background. It is a rival of the others, and never named.
     pub fn background(&self) -> Option<usize> {
         self.strangers().filter(|strangers| strangers.background).map(|_| self.known_count())
     }
@@ -147,7 +147,7 @@ impl<'a> Model<'a> {
         self.object_count().saturating_sub(background.into())
     }
 
-    /// The table that leaves are numbers of, if equal leaves stand once.
+    /// The table that leaves are indices into, if equal leaves are stored once.
     ///
     /// Cost: a few instructions for each optional section. Cannot fail.
     pub fn shared_leaves(&self) -> Option<SharedLeaves<'a>> {

@@ -146,7 +146,7 @@ impl<B: Board> Line<'_, B> {
 /// told: a verdict that the host has heard survives a power cut, and one that was stored is told after it.
 ///
 /// RAM: effector, link, recognition and the storage's. Stack: a few buffers for frames and records more than
-/// [`Recognizer::push`](crate::Recognizer::push). The README of the firmware states what both come to.
+/// [`Recognizer::push`](crate::Recognizer::push). The README of the firmware states the size of both.
 #[derive(Debug)]
 pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
     effector: Effector,

@@ -107,7 +107,7 @@ codes! {
     Held {
         /// Only while the touches do not fit it.
         Likely = 1, "likely";
-        /// Until an object that the model does not know would very probably have been found out.
+        /// Until an object that the model does not know would very probably have been detected.
         Certain = 2, "certain";
     }
 }

@@ -1,4 +1,4 @@
-//! Leaves that are numbers of a table in which each leaf's values stand once.
+//! Leaves as indices into a table in which each leaf's values are stored once.
 
 /// The table of a model whose leaves are shared, and how long a number is that stands for a leaf.
 ///

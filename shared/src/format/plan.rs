@@ -1,10 +1,10 @@
-//! A plan of approaches: how far every pose of the probe tells every two objects apart.
+//! A plan of approaches: how well every pose of the probe distinguishes every pair of objects.
 
 use crate::poses::Poses;
 
 /// A plan of approaches, read in place: for each pose of the probe and each two objects their *separation*, 1 − the mean
 /// of e^(−evidence/2) of an approach in this pose, evidence being that for the object that is touched against the other
-/// one, in nats; of the two objects, the one with the smaller separation counts. It is one less the Bhattacharyya
+/// one, in nats; of the two objects, the one with the smaller separation counts. It is 1 minus the Bhattacharyya
 /// coefficient (Bhattacharyya 1943) as far as the model knows the distributions: 0 where an approach says nothing, 1 where
 /// it says everything.
 ///

@@ -15,7 +15,8 @@ use super::codes::Held;
 /// The optional section: whether the last object is a background, and how to test whether touches fit the leading object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strangers<'a> {
-    /// The last of the model's objects stands for all that the model does not know: it is a rival and never named.
+    /// The last of the model's objects stands for everything that the model does not know: it is a rival and never
+    /// named.
     pub background: bool,
     /// The test, if there is one.
     pub test: Option<FitTest<'a>>,

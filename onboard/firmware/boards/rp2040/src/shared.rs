@@ -20,7 +20,7 @@ pub type Switches = (Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>);
 /// The link's wires.
 pub type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
 
-/// Bytes that may wait for the main loop: all that a host sends without an answer, 8 commands and a question.
+/// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
 const WAITING: usize = 2048;
 
 /// The chip's microsecond timer.
