@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// Is told by long calls how far they have come, and may cancel them.
+/// Receives the progress of long calls, and may cancel them.
 ///
 /// Nothing in the library draws: a program implements this with a progress bar, a log, a callback. `&()` is told
 /// everything and does nothing. Calls come from the thread that made the long call and from its workers.

@@ -339,7 +339,7 @@ impl<'a> Plain<'a> {
         }
     }
 
-    /// The margins in units that sums come to.
+    /// The margins in units, as sums.
     pub fn margins(&self, sums: &[i32]) -> Vec<i32> {
         let q16 = |&bits: &i32| q16(f32::from_bits(bits as u32));
         if self.leaf == 2 { sums.iter().map(q16).collect() } else { sums.to_vec() }

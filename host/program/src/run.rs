@@ -103,7 +103,7 @@ pub struct Summary {
     pub tool_version: &'static str,
     /// The command that remakes it.
     pub command: String,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Noise added to the touches that ours was trained on, and to all that are tested on.
     pub noise: Noise,

@@ -27,7 +27,7 @@ use std::ops::Range;
 const AT: [usize; 9] = [5, 10, 20, 30, 40, 60, 90, 120, 200];
 /// Those of them that tables show.
 const TABLE_AT: [usize; 3] = [10, 20, 60];
-/// The posterior that a recognizer waits for is one less this.
+/// The posterior that a recognizer waits for is 1 minus this.
 const ERROR_RATE: f64 = 0.01;
 /// The share of misses that a robot avoids which aims better than the simulation.
 const AVOIDED: f64 = 0.7;

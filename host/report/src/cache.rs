@@ -117,7 +117,7 @@ impl Surroundings {
     }
 }
 
-/// A checksum of all that results depend on.
+/// A checksum of everything that results depend on.
 fn key(settings: &impl Serialize, objects: &[Object], surroundings: &Surroundings) -> Result<u64> {
     let mut digest = CHECKSUM.digest();
     digest.update(&surroundings.program.to_le_bytes());

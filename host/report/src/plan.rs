@@ -1,4 +1,4 @@
-//! Where to touch next: approaches at random and under a plan; and what an object that is exchanged comes to.
+//! Where to touch next: approaches at random and under a plan; and the effect of exchanging the object.
 
 use super::approaches::approaches;
 use super::context::Context;
@@ -19,7 +19,7 @@ use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use serde::{Deserialize, Serialize};
 
-/// Thresholds: the recognizer stops when the posterior passes one less these.
+/// Thresholds: the recognizer stops when the posterior exceeds 1 minus one of these.
 const RATES: [f64; 9] = [0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.01, 0.003];
 /// The errors at which policies are compared.
 const ERRORS: f64 = 0.01;

@@ -44,7 +44,7 @@ pub(super) struct Promises {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Promised {
     rate: f64,
-    /// Stopping when the posterior passes one less the rate.
+    /// Stopping when the posterior exceeds 1 − rate.
     uncalibrated: Stopped,
     /// Promised on average.
     average: Option<Stopped>,

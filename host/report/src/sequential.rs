@@ -13,7 +13,7 @@ use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use serde::{Deserialize, Serialize};
 
-/// Thresholds: the recognizer stops when the posterior passes one less these.
+/// Thresholds: the recognizer stops when the posterior exceeds 1 minus one of these.
 const RATES: [f64; 13] = [0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003, 0.002, 0.001];
 /// Touches after which a sequence gives up: enough that hardly any does.
 const MOST: usize = 1_000;

@@ -75,7 +75,7 @@ pub fn report(settings: &Settings, directory: &Path, existing: Existing, progres
 }
 
 /// The same on the objects that `objects` gives, whatever the settings' sources are, such as objects with several
-/// instances or at their true size. They are to be sorted by name.
+/// instances or at their true size. They must be sorted by name.
 ///
 /// # Errors
 /// As [`report`] and `objects`.

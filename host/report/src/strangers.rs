@@ -43,7 +43,7 @@ pub(super) struct Column {
 /// Results of one way to meet strangers: means over the objects that were left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Way {
-    /// The share found out by 1, 2, 3 … touches.
+    /// The share detected by 1, 2, 3 … touches.
     detected: Vec<f64>,
     wrong_name: f64,
     false_alarms: f64,
@@ -51,7 +51,7 @@ struct Way {
     touches: f64,
     wrong: f64,
     undecided: f64,
-    /// For each object left out: its name, the share found out by each of [`DETECTED_BY`], and the share named.
+    /// For each object left out: its name, the share detected by each of [`DETECTED_BY`], and the share named.
     objects: Vec<(String, Vec<f64>, f64)>,
 }
 

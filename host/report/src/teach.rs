@@ -1,4 +1,4 @@
-//! The page of objects that were learned from recorded touches: how well, and what more approaches would come to.
+//! The page of objects that were learned from recorded touches: their accuracy, and the benefit of more approaches.
 
 use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Shape};

@@ -28,7 +28,7 @@ pub struct Terms {
     pub per: Per,
 }
 
-/// Thresholds that keep a promise, and what the sequences that they were tested on came to.
+/// Thresholds that keep a promise, and the results of the sequences that they were tested on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chosen {
     /// The thresholds.

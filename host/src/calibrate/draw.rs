@@ -190,7 +190,7 @@ pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_
     Ok(())
 }
 
-/// Follows one sequence; whether it came to its end before the touches did.
+/// Follows one sequence; returns true if it ended before the touches did.
 fn one<const N: usize>(
     object: usize,
     recognizer: &mut Recognizer<'_, N>,

@@ -1,7 +1,7 @@
 //! Learn-then-Test with fixed-sequence testing (Angelopoulos and others, 2022, arXiv 2110.01052).
 //!
 //! Thresholds are tried from strict to loose, an order that is fixed before the data are looked at. Each is a hypothesis:
-//! "at this threshold the error rate is above the promised one". It is rejected if so few errors as were found have a
+//! "at this threshold the error rate is above the promised one". It is rejected if as few errors as were found have a
 //! probability of at most 1 − confidence under it, by the binomial tail. The walk ends before the first threshold whose
 //! hypothesis is not rejected; the one before is kept. So the probability that a threshold is kept whose error rate is
 //! above the promised one is at most 1 − confidence, however many are tried.
@@ -53,7 +53,7 @@ pub enum Stop {
 ///
 /// With several tallies all rates are kept at once with that probability, without dividing it among them: the
 /// hypothesis is that one of the rates is above, and to reject it every test has to (an intersection-union test).
-/// Thresholds at which a tally is so small that it could not pass without any error say nothing and are passed over
+/// Thresholds whose tally is so small that it could not pass even without an error are uninformative and skipped
 /// (Tarone, 1990): how many cases there are decides that, not how many are errors. That is exact as long as how many there
 /// are at one threshold says nothing about how many are errors at another.
 ///

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// State that a capture begins with.
 pub(super) struct Admission {
-    /// The data set that is to be deleted first.
+    /// The data set to delete first.
     pub(super) replaced: Option<Listing>,
     /// The listing to start or go on from: it names every object of the capture.
     pub(super) listing: Listing,

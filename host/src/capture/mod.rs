@@ -519,7 +519,7 @@ mod tests {
 
     #[test]
     fn a_kill_while_old_touches_are_deleted_leaves_no_complete_listing() {
-        // The first file that is to be deleted cannot be: it stands for the moment of the kill.
+        // The first file to delete cannot be deleted: it stands for the moment of the kill.
         let directory = tempfile::tempdir().unwrap();
         capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
         let obstacle = directory.path().join("globe.txt");

@@ -28,7 +28,7 @@ struct Chunk {
     approaches: u64,
 }
 
-/// Captures all that the store does not have yet.
+/// Captures everything that the store does not have yet.
 pub(super) fn run(
     samplers: &[Sampler<'_>],
     settings: &Settings,

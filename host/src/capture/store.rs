@@ -90,7 +90,7 @@ impl Store {
     }
 
     /// Gives the object's file its name, once all its touches are there, and takes its checksum. An interruption between
-    /// any two of these steps is made up for when the capture is resumed.
+    /// any two of these steps is repaired when the capture is resumed.
     pub(super) fn complete(&mut self, object: usize) -> Result<()> {
         let format = self.listing.origin.format;
         let (part, done) = (self.part(object), self.entry(object).file(&self.directory, format));

@@ -55,13 +55,13 @@ pub struct Summary {
     pub compared: u64,
     /// Proposed approaches that were compared with the host's recognizer.
     pub approaches: u64,
-    /// Of all that was compared, with another verdict, posterior, evidence or approach.
+    /// Of everything that was compared, with another verdict, posterior, evidence or approach.
     pub differences: u64,
     /// The first of them.
     pub first_difference: Option<String>,
     /// Objects whose names were known and that were recognized correctly.
     pub right: u64,
-    /// Objects whose names were known and that were taken for others.
+    /// Objects whose names were known and that were mistaken for others.
     pub wrong: u64,
     /// Objects whose names were known and that were not recognized.
     pub undecided: u64,

@@ -25,8 +25,8 @@ pub struct Origin {
     pub touches: BTreeMap<String, u64>,
     /// The capture that made them, where that is known.
     pub captured: Option<Captured>,
-    /// The last object is a background: many other shapes, which stand for all that the ensemble does not know. It is a
-    /// rival of the others, and never named.
+    /// The last object is a background: many other shapes, which stand for everything that the ensemble does not know.
+    /// It is a rival of the others, and never named.
     pub background: bool,
     /// The file of another library that it was read from, if it was.
     pub imported: Option<Imported>,
@@ -229,7 +229,7 @@ impl Origin {
 pub fn compiled_trained_on<'d>(stated: &TrainedCapture<'_>, names: &[String], dataset: &'d Dataset) -> Vec<&'d str> {
     let captured = Captured::of(dataset);
     let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(stated));
-    // A capture of another seed has other touches; what is not captured is told by its first touches.
+    // A capture of another seed has other touches; what is not captured is identified by its first touches.
     let fingerprints = if captured.is_none() || stated.settings == 0 { fingerprints(dataset) } else { BTreeMap::new() };
     let same = |name: &&str| {
         let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));

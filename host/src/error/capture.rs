@@ -15,7 +15,7 @@ pub enum CaptureProblem {
         /// Description of the fault.
         problem: Box<Problem>,
     },
-    /// An object is to be touched at its true size, which is not known.
+    /// The true size of an object is needed and not known.
     #[error("{name}: the unit of its mesh is not known, and so its true size is not")]
     NoTrueSize {
         /// The object.
@@ -70,7 +70,7 @@ pub enum CaptureProblem {
         /// Number of touches.
         touches: u64,
     },
-    /// Objects that are to be added are there already.
+    /// Objects to add are there already.
     #[error("already holds touches of {}", list(objects))]
     AlreadyThere {
         /// The objects.

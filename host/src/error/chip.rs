@@ -112,7 +112,7 @@ pub enum ChipProblem {
         /// Its standard error.
         said: String,
     },
-    /// The emulated chip did not come to an end.
+    /// The emulated chip did not finish.
     #[error("the emulated chip did not finish within {seconds} s{}", after_colon(said))]
     EmulatorTimeout {
         /// Time that it was given, in seconds.

@@ -266,7 +266,7 @@ pub enum TouchesProblem {
     /// Another program has locked the directory.
     #[error("another program is writing into this directory")]
     Busy,
-    /// Touches are to be recorded into a directory that holds simulated ones.
+    /// Recording into a directory that holds simulated ones.
     #[error("holds {touches} simulated touches of {objects}")]
     HoldsSimulated {
         /// The objects.
@@ -274,13 +274,13 @@ pub enum TouchesProblem {
         /// Number of touches of them.
         touches: u64,
     },
-    /// Touches are to be recorded into a directory with files of touches that no listing names.
+    /// Recording into a directory with files of touches that no listing names.
     #[error("holds {files}, which dataset.json does not list")]
     Unlisted {
         /// The files' names.
         files: String,
     },
-    /// Recorded touches are to be added to others that were made in another way.
+    /// Adding recorded touches to others that were made in another way.
     #[error("cannot add to these recorded touches: {differences}")]
     OtherRecording {
         /// The settings that differ, with both values.
@@ -296,7 +296,7 @@ pub enum TouchesProblem {
         /// When they were recorded.
         began: String,
     },
-    /// A touch has no pose, and is to be recorded with one.
+    /// A touch has no pose, but the data set is recorded with one.
     #[error("no pose, but this data set is recorded with one")]
     NoPose,
     /// A text names no shard.

@@ -153,7 +153,7 @@ impl Curve {
         Estimate::share(self.correct[position][touches - 1], self.groups)
     }
 
-    /// The smallest number of touches from which on accuracy stays at or above one less `error_rate`, if there is one.
+    /// The smallest number of touches from which on accuracy stays at or above 1 − `error_rate`, if there is one.
     /// An empty curve has none.
     pub fn touches_to_error(&self, error_rate: f64) -> Option<usize> {
         let fails = |touches: &usize| self.accuracy(*touches).value < 1.0 - error_rate;

@@ -106,8 +106,8 @@ pub struct Settings {
     pub at_approaches: Vec<usize>,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
-    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
-    /// ensemble.
+    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds, 1 % for
+    /// an ensemble.
     pub error_rate: Option<f64>,
     /// Touches after which the recognizer gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble.
     pub max_touches: Option<u32>,

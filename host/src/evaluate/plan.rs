@@ -1,4 +1,4 @@
-//! A plan of approaches for a model: how well each pose of the probe tells each two objects apart.
+//! A plan of approaches for a model: how well each pose of the probe distinguishes each pair of objects.
 
 use super::margins::{Candidate, Margins, Values, row};
 use super::poses::ByPose;
@@ -34,7 +34,7 @@ pub struct Planned {
     pub hardest: Hardest,
 }
 
-/// Two objects, and how well the best pose tells them apart.
+/// Two objects, and how well the best pose distinguishes them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hardest {
     /// The objects.

@@ -242,7 +242,7 @@ fn at_least(errors: f64, trials: f64, rate: f64) -> f64 {
     tail.min(1.0)
 }
 
-/// Largest error rate of a model's thresholds by theory, with any priors and of any of its objects: one less the
+/// Largest error rate of a model's thresholds by theory, with any priors and of any of its objects: 1 minus the
 /// posterior at the loosest threshold. A touch that passes it with little to spare comes close to this, as touches that
 /// say little do; a calibration finds how much is to spare on average, for all objects together.
 ///

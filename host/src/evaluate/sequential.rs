@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 /// Settings for drawing and stopping sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SequentialSettings {
-    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
-    /// ensemble.
+    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds, 1 % for
+    /// an ensemble.
     pub error_rate: Option<f64>,
     /// Touches after which it gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble. An object
     /// with fewer test touches gives up when they are used up.

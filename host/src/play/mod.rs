@@ -152,7 +152,7 @@ impl<'m> Game<'m> {
         self.objects.get(object).map(|thing| &thing.scene)
     }
 
-    /// Begins to touch an object; `None` if there is no such object. The seed decides about all that is random.
+    /// Begins to touch an object; `None` if there is no such object. The seed determines all random numbers.
     pub fn round(&self, object: usize, seed: u64) -> Option<Round<'m>> {
         self.objects.get(object)?;
         let player = |model| {

@@ -18,8 +18,8 @@ const NEAR: f64 = 0.05;
 
 /// Means and covariances of the margins of one touch, in nats.
 pub(super) struct Moments {
-    /// Of each known object. Where it has several instances, or robots differ, their means are spread: what that comes to
-    /// in the mean of [`AT`] touches is in the covariance, so that no instance is taken for a stranger.
+    /// Of each known object. Where it has several instances, or robots differ, their means are spread; the
+    /// covariance has this spread in the mean of [`AT`] touches, so that no instance is taken for a stranger.
     of: Vec<(DVector<f64>, DMatrix<f64>)>,
     /// Of each of many other shapes, the mean.
     shapes: Vec<DVector<f64>>,
@@ -158,7 +158,7 @@ impl Fit {
     }
 }
 
-/// For each known object, and each number of touches up to `last`, the share of its sequences that are found out when
+/// For each known object, and each number of touches up to `last`, the share of its sequences that are detected when
 /// the model does not use its column: at a level of misfit of `threshold`.
 pub(super) fn left_out(moments: &Moments, supplies: &[Supply], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
     let of = |stranger: usize| {

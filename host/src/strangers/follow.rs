@@ -122,7 +122,7 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy,
     supplies.par_iter().map(of).collect()
 }
 
-/// Follows one sequence; whether it came to its end before the touches did.
+/// Follows one sequence; returns true if it ended before the touches did.
 fn one<'r>(
     model: &Model<'_>,
     rows: &mut impl Iterator<Item = &'r [i32]>,

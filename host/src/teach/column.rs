@@ -82,7 +82,7 @@ fn touches(part: &Part<'_>) -> usize {
     sources.len()
 }
 
-/// The posterior of each column, where the other objects' margins come to `log_sum`.
+/// The posterior of each column, where the logarithm of the sum over the other objects is `log_sum`.
 fn posteriors(log_sum: f64, margins: &[f64], shares: &mut [f64]) {
     let most = margins.iter().copied().fold(log_sum, f64::max);
     let mut all = (log_sum - most).exp();

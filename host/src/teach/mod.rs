@@ -124,7 +124,7 @@ pub struct TaughtObject {
     pub constant: f64,
     /// The share of its groups that are recognized.
     pub recognized: f64,
-    /// The share of the others' groups that are taken for it, added up over the other objects.
+    /// The share of the others' groups that are mistaken for it, summed over the other objects.
     pub taken_for_it: f64,
     /// The same results with fewer approaches, and with more.
     pub curve: Curve,

@@ -23,7 +23,8 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Touches that nothing is known about but their sources: no origin, no warnings. The objects are to be sorted by name.
+    /// Touches that nothing is known about but their sources: no origin, no warnings. The objects must be sorted by
+    /// name.
     pub fn new(objects: Vec<ObjectTouches>) -> Self {
         Self { objects, ..Self::default() }
     }

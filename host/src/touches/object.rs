@@ -81,7 +81,7 @@ impl ObjectTouches {
         Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), meshes: None }
     }
 
-    /// Touches of one source after the other: of each as many as are said, of the last one all that are left.
+    /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
     pub fn in_runs(name: impl Into<String>, touches: Vec<Touch>, runs: Vec<(Source, u64)>) -> Self {
         let last = runs.len().saturating_sub(1);
         let mut source_of = Vec::new();

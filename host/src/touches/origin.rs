@@ -16,7 +16,7 @@ use std::ops::Range;
 pub struct Origin {
     /// Number of touches of each object; with `approaches`, number of approaches. Of all shards together.
     pub touches: u64,
-    /// The seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Unit of the probe's lengths: units, with every object scaled to `length`, or millimeters, with objects at their
     /// true size. Before version 0.3.0, always units.

@@ -78,7 +78,7 @@ pub struct Settings {
     pub approaches: u64,
     /// Sequences of approaches for each object.
     pub sequences: usize,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -188,7 +188,7 @@ pub struct Trial {
     pub error: f64,
     /// The share of sequences that used up the test approaches without a verdict.
     pub undecided: f64,
-    /// The posterior at which the recognizer stopped is one less this.
+    /// The posterior at which the recognizer stopped is 1 minus this.
     pub threshold: f64,
     /// Approaches to a verdict on average, for each object.
     pub per_object: BTreeMap<String, f64>,

@@ -1,11 +1,11 @@
-//! Touches as a crooked probe would make them, for where no recorded ones are: for `.ci/probe`.
+//! Touches as an imperfect probe would make them, where there are no recorded ones: for `.ci/probe`.
 //!
 //! ```sh
 //! crooked DIR     # DIR/known, DIR/test, DIR/plate.txt, DIR/meshes
 //! ```
 //!
 //! What is wrong with the probe stands in [`CROOKED`]. None of this is shared with what fits a probe: it goes from the
-//! simulated contact times to those of the probe by a few lines of its own.
+//! simulated contact times to those of the probe by its own few lines.
 
 use palpate::capture;
 use palpate::mesh::{builtin, obj};

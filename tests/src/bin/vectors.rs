@@ -2,7 +2,7 @@
 //! `cargo run -p palpate-tests --bin vectors > shared/vectors/vectors.txt`.
 //!
 //! They are committed, and stay as they are: models that earlier releases made have to give the same. Write them again
-//! only where something is to be added.
+//! only where something must be added.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};

@@ -18,7 +18,7 @@ fn place() -> (TempDir, impl Fn(&str) -> String) {
     (directory, move |name: &str| root.join(name).to_str().unwrap().to_owned())
 }
 
-/// Kinds that are told by their content.
+/// Kinds that are recognized by their content.
 const MODELS: [&str; 8] = [
     "xgboost-1.6-binary.json",
     "xgboost-3.4-softprob.ubj",
@@ -334,7 +334,7 @@ fn equal_leaves_of_a_forest_stand_once_and_that_is_said_everywhere() {
     let different = shared["shared_leaves"].as_u64().unwrap();
     assert!(different >= 2 && different <= shared["leaves"].as_u64().unwrap(), "{shared}");
     assert_eq!((&plain["shared_leaves"], &plain["margin_error"]), (&Value::Null, &shared["margin_error"]));
-    // What is wrong with no tree of it is found out in both.
+    // A fault that is not in a tree is found in both.
     for model in ["yes", "no"] {
         let verified = json(run(["verify", &path(model), &forest, &rows, "--json"]));
         assert_eq!(verified["class_differs"], 0, "{verified}");

@@ -1,6 +1,6 @@
 //! A page on which objects can be touched, with the simulator and the recognizer inside.
 //!
-//! The page holds all that it needs and asks the network for nothing: the objects' surfaces, the compiled models, and the
+//! The page is self-contained and asks the network for nothing: the objects' surfaces, the compiled models, and the
 //! lines of Rust that touch the one and read the other ([`palpate::play`], compiled to WebAssembly by `host/web`). What a
 //! page says is what the program says; [`trace()`] writes that down, to compare.
 

@@ -1,6 +1,6 @@
 //! A page on which a mesh can be turned and looked at, with some approaches of the probe.
 //!
-//! The page holds all that it needs and asks the network for nothing. It answers what a user should know about a mesh
+//! The page is self-contained and asks the network for nothing. It answers what a user should know about a mesh
 //! before capturing millions of touches: is it right side out and closed, does its scale suit the fingers, where do the
 //! fingers touch it.
 

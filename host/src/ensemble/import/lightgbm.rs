@@ -254,7 +254,7 @@ fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result
 struct Grower<'a> {
     splits: &'a [Split],
     values: &'a [f64],
-    /// True if zeros are missing wherever they are, so that no split has to tell them apart.
+    /// True if zeros are missing wherever they are, so that no split has to distinguish them.
     zero_is_missing: bool,
     nodes: Vec<DraftNode>,
 }

@@ -1,4 +1,4 @@
-//! Ensembles that other libraries trained, told apart by the content of their files.
+//! Ensembles that other libraries trained, distinguished by the content of their files.
 //!
 //! | library | file | exactness of margins |
 //! |---|---|---|
@@ -44,7 +44,7 @@ pub struct Options<'a> {
 impl Ensemble {
     /// Reads an ensemble: XGBoost's JSON, which [`Ensemble::save`] and `palpate train` write, over features of touches
     /// if it has the attribute `palpate_descriptor`; else a file of XGBoost, LightGBM, CatBoost or an ONNX file, over
-    /// rows of features: see [`import`](self). The kind is told by the content.
+    /// rows of features: see [`import`](self). The content determines the kind.
     ///
     /// # Errors
     /// If the file cannot be read, is of no such kind, or has something in it that no compiled model can do

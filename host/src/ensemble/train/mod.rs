@@ -191,7 +191,7 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Or
 }
 
 /// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,
-/// which are to be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
+/// which should be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
 /// ensemble does not know, and is called [`BACKGROUND`].
 ///
 /// # Errors

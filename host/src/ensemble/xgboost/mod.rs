@@ -122,9 +122,9 @@ impl Ensemble {
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be
     /// [loaded](Self::load) again.
     ///
-    /// XGBoost predicts the same margins with it, bit for bit, for all that it takes (it refuses infinite values). Over
-    /// rows, one output is a regression, and two of which the first one's margin is 0 are `binary:logistic`, or
-    /// `binary:logitraw` where no probability in f32 stands for the base margin.
+    /// XGBoost predicts the same margins with it, bit for bit, for every input that it takes (it refuses infinite
+    /// values). Over rows, one output is a regression, and two of which the first one's margin is 0 are
+    /// `binary:logistic`, or `binary:logitraw` where no probability in f32 stands for the base margin.
     ///
     /// # Errors
     /// [`Error::Io`] naming `path`; [`EnsembleProblem`] for an ensemble that [`check`](Self::check) refuses, which none

@@ -50,7 +50,7 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
             (0x4E4F_534A, None) => json = Some((chunk, start as u64)),
             (_, None) => return Err(wrong(offset, "its first chunk is not JSON".into())),
             (0x004E_4942, Some(_)) if binary.is_none() => binary = Some(chunk),
-            // Chunks of kinds that are not known are to be skipped.
+            // Chunks of unknown kinds must be skipped.
             _ => {}
         }
         offset = end;

@@ -1,12 +1,13 @@
 //! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer.
 //!
-//! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many times,
-//! with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches' density, which
-//! is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum likelihood with a
-//! weak preference for probes that are not very crooked, by Nelder–Mead from several starts). Full and partial touches count, and approaches that touched nothing; where
-//! the pose was recorded, each touch is compared with approaches in its pose. Intervals are those of 95 % by profile
-//! likelihood (Wilks' theorem), made wider by experience: the tables are simulated and smoothed. What the simulation does
-//! not know, such as a finger that is bent aside, is in no interval.
+//! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many
+//! times, with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches'
+//! density, which is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum
+//! likelihood with a weak preference for probes with small errors, by Nelder–Mead from several starts). Full and
+//! partial touches count, and approaches that touched nothing; where the pose was recorded, each touch is compared with
+//! approaches in its pose. Intervals are those of 95 % by profile likelihood (Wilks' theorem), made wider by
+//! experience: the tables are simulated and smoothed. What the simulation does not know, such as a finger that is bent
+//! aside, is in no interval.
 //!
 //! Only differences of contact times are recorded, so an offset of all three fingers alike cannot be told, and changes
 //! nothing: offsets are relative to the first finger's.

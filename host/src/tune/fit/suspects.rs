@@ -1,11 +1,11 @@
 //! Recordings that look wrong: of another object than their name says, of two objects, of a probe that was changed.
 //!
-//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits all.
-//! If the touches are the right object's, the likelihood ratio of a wrong one against it passes e^x, at whatever touch one
-//! stops, with a probability of at most e^−x (Ville's inequality). That holds for one start and one share of the touches;
-//! where they are unknown the ratio's mean over all of them is compared, which is a martingale too (Robbins' method of
-//! mixtures), and not its maximum. At [`CERTAIN`] nats a comparison gives a false alarm with a probability of 6·10⁻⁶: three
-//! for each recording and rival, a few hundred in all, in one of 500 fits.
+//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits
+//! all. If the touches are the right object's, the likelihood ratio of a wrong one against it exceeds e^x, at whatever
+//! touch one stops, with a probability of at most e^−x (Ville's inequality). That holds for one start and one share of
+//! the touches; where they are unknown the ratio's mean over all of them is compared, which is a martingale too
+//! (Robbins' method of mixtures), and not its maximum. At [`CERTAIN`] nats a comparison gives a false alarm with a
+//! probability of 6·10⁻⁶: three for each recording and rival, a few hundred in all, in one of 500 fits.
 //!
 //! That is for densities that are known. These come from simulated touches and a fitted probe, so it says how little chance
 //! alone does, not how often a sound recording is named: touches that the simulation does not know, such as grazing ones,
