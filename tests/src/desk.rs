@@ -124,7 +124,7 @@ impl Desk {
 }
 
 impl Desk {
-    /// Cuts the power: bytes on the line are lost, those in the host are not.
+    /// Returns an error once the power is cut: bytes on the line are lost, those in the host are not.
     fn alive(&mut self) -> Result<(), PowerCut> {
         if self.power.get() {
             return Ok(());

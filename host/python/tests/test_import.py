@@ -346,7 +346,7 @@ def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
         (several, "several targets"),
         (folds, "lightgbm's CVBooster has no trees that can be read"),
         (xgboost.XGBModel(n_estimators=2).fit(TRAIN, TRAIN[:, 3] > 0), "xgboost's XGBModel has no trees that can be read"),
-        (object(), "builtins.object is no model"),
+        (object(), "builtins.object is not a model"),
     ]:
         with pytest.raises(palpate.InputError, match=message):
             palpate.compile(model)

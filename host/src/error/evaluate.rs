@@ -136,7 +136,7 @@ pub enum EvaluateProblem {
     },
 }
 
-/// Distinguishes the two cases in words.
+/// Message about too few sequences: too few in all, or too few that do not end as unknown.
 fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
     if (object_sequences as u64) < needed {
         format!(

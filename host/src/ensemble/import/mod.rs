@@ -134,7 +134,7 @@ fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
             Ok(value) => xgboost::from_ubjson(path, value, options),
             Err(at) => Err(Error::at(
                 Place::byte(path, at),
-                EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "no UBJSON from here on".into() },
+                EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "not UBJSON from here on".into() },
             )),
         },
         Kind::LightGbm => lightgbm::read(bytes, names).map_err(|refused| {
@@ -184,7 +184,7 @@ fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
         }
         _ if onnx::is_onnx(bytes) => Ok(Kind::Onnx),
         [] => refused("it is empty", KINDS),
-        _ => refused("it is no ensemble in a format that can be read", KINDS),
+        _ => refused("it is not an ensemble in a readable format", KINDS),
     }
 }
 

@@ -28,7 +28,7 @@ impl Document {
             Kind::Classes => classes,
             Kind::Binary | Kind::One if targets > 1 => {
                 return Err(EnsembleProblem::Unsupported {
-                    what: format!("it has {targets} targets, which are no classes of one object"),
+                    what: format!("it has {targets} targets, which are not classes of one object"),
                     way: "Train a model for each target.".into(),
                 });
             }
@@ -180,7 +180,7 @@ fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProbl
     let sentinel = match sentinel {
         None => None,
         Some([Some(low), Some(high)]) if low <= high => Some([low, high]),
-        Some(_) => return Err(wrong("the sentinel is no range of numbers".into())),
+        Some(_) => return Err(wrong("the sentinel is not a range of numbers".into())),
     };
     let prediction = Prediction { link, last_of_ties: stated.last_of_ties, scale: stated.scale };
     Ok(Rows { prediction, sentinel })

@@ -108,7 +108,7 @@ fn upright(root: Node<'_, '_>) -> Result<DAffine3, Wrong> {
         "X_UP" => DMat3::from_cols(DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y),
         "Y_UP" => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
         "Z_UP" => DMat3::IDENTITY,
-        other => return Err(wrong(axis, damaged(format!("{:?} is no upward axis", shown(other.as_bytes()))))),
+        other => return Err(wrong(axis, damaged(format!("{:?} is not an up axis", shown(other.as_bytes()))))),
     };
     Ok(DAffine3::from_mat3(turn))
 }

@@ -227,7 +227,7 @@ impl Faces {
             Some(5) => Ok(Some(Self::Strip)),
             Some(6) => Ok(Some(Self::Fan)),
             Some(0..4) => Ok(None),
-            Some(other) => Err(accessor::damaged(format!("{other} is no mode of a primitive"))),
+            Some(other) => Err(accessor::damaged(format!("{other} is not a primitive mode"))),
         }
     }
 

@@ -318,7 +318,7 @@ impl Findings {
         let long = touches.iter().filter(|touch| last(touch) > longest).count();
         let what = format!("{} last longer than the {longest:.2} s in which the probe passes the object", of(long));
         if 2 * long > count {
-            self.wrong(path, what + ": the times are no seconds", "Give times in seconds.");
+            self.wrong(path, what + ": the times are not in seconds", "Give times in seconds.");
         } else if long > 0 {
             self.note(path, &what, "Check those lines.");
         }

@@ -99,7 +99,7 @@ impl Weights {
                 outputs(node.attributes.get("n_targets").and_then(|attribute| attribute.integer).unwrap_or(1))?;
             if wanted > 1 {
                 return Err(unsupported(
-                    format!("it has {wanted} targets, which are no classes of one object"),
+                    format!("it has {wanted} targets, which are not classes of one object"),
                     "Train a model for each target.",
                 ));
             }
