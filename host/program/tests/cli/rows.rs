@@ -249,7 +249,7 @@ fn what_cannot_be_taken_over_is_refused_by_name_with_the_way_round() {
         (b"PLPT....", "the model is truncated: 8 bytes", "foreign"),
         (b"binf....", "XGBoost's old binary format", "model.json"),
         (b"\x1f\x8b....", "compressed", "Unpack"),
-        (b"<?xml version=\"1.0\"?>", "no ensemble in a format", "ONNX"),
+        (b"<?xml version=\"1.0\"?>", "not an ensemble in a readable format", "ONNX"),
         (b"{\"name\": \"tree\", \"tree_info\": []}", "LightGBM's dump_model", "model.txt"),
         (b"{\"learner\": {\"gradient_booster\": {\"name\": \"gblinear\"}}}", "gblinear, which has no trees", "gbtree"),
     ] {
