@@ -1,5 +1,5 @@
-//! The parts of the board's program that run anywhere, and so are tested on the machine that builds it: `cargo test
-//! --lib --target "$(rustc -vV | sed -n 's/^host: //p')"`.
+//! The parts of the board's program that run anywhere, and so are tested on the machine that builds it:
+//! `cargo test --lib --target "$(rustc -vV | sed -n 's/^host: //p')"`.
 #![no_std]
 
 use core::future::Future;
