@@ -47,7 +47,7 @@
 //! | `station` | [`station`], with both of these |
 //! | `compact`, `complete`, `grid`, `wide` | layouts of trees that can be read |
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
-//! | `shared-leaves` | trees whose equal leaves stand once |
+//! | `shared-leaves` | trees whose equal leaves are stored once |
 //! | `sentinel` | models over rows in which a number stands for a missing value |
 //! | `defmt` | touches, verdicts, refusals and faults can be logged; the only one that is off by default |
 //!

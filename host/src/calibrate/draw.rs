@@ -12,7 +12,7 @@ use palpate_shared::format::Plan;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
-/// What is known after a touch that is evidence.
+/// State after a touch that is evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'s> {
     /// The touch.
@@ -45,7 +45,7 @@ pub struct Supply<'d> {
     pools: Vec<Pool>,
     /// The pool of the next sequence.
     next: usize,
-    /// Whether a pool makes one sequence only.
+    /// True if a pool makes one sequence only.
     is_once: bool,
     /// The poses that the model's plan may propose; none where touches are taken in their order.
     candidates: Vec<u16>,
@@ -139,7 +139,7 @@ struct Order<'o, 'd, 'm> {
     candidates: &'o [u16],
     ahead: &'o mut Ahead<'m>,
     pool: &'o mut Pool,
-    /// Which pool it is.
+    /// Number of the pool.
     turn: usize,
     /// Position of the next touch in the pool's order.
     next: usize,
@@ -190,7 +190,7 @@ pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_
     Ok(())
 }
 
-/// Follows one sequence; whether it came to its end before the touches did.
+/// Follows one sequence; returns true if it ended before the touches did.
 fn one<const N: usize>(
     object: usize,
     recognizer: &mut Recognizer<'_, N>,

@@ -50,10 +50,10 @@ use std::time::Instant;
 pub use memory::in_memory;
 pub use sample::{MOST_ATTEMPTS, Sampler};
 
-/// What to capture, and what to do with what is there.
+/// Settings of a capture, and how it treats what is already there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Settings {
-    /// How objects are touched.
+    /// Origin of the touches.
     pub origin: Origin,
     /// Go on where an interrupted capture into the same directory stopped.
     pub resume: bool,
@@ -61,7 +61,7 @@ pub struct Settings {
     pub add: bool,
     /// Replace the data set in the directory, whatever it holds. Takes precedence over `resume` and `add`.
     pub force: bool,
-    /// How many threads to use, at most 256; by default as many as the machine has.
+    /// Number of threads to use, at most 256; by default as many as the machine has.
     pub threads: Option<usize>,
 }
 
@@ -88,27 +88,27 @@ impl Settings {
     }
 }
 
-/// What a capture did.
+/// Results of a capture.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Summary {
     /// The objects, sorted by name.
     pub objects: Vec<ObjectSummary>,
-    /// How long it took, in seconds.
+    /// Duration in seconds.
     pub seconds: f64,
 }
 
-/// What a capture did to one object, in this run.
+/// Results of a capture for one object, in this run.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct ObjectSummary {
     /// The object's name.
     pub name: String,
-    /// How many touches there are now.
+    /// Number of touches there are now.
     pub touches: u64,
-    /// How many approaches it took to get them, since the capture was first started.
+    /// Number of approaches that they took, since the capture was first started.
     pub approaches: u64,
-    /// How many approaches were made in this run.
+    /// Number of approaches made in this run.
     pub approaches_now: u64,
-    /// How long this run took for the object, in seconds.
+    /// Duration of this run for the object, in seconds.
     pub seconds: f64,
 }
 
@@ -148,7 +148,7 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
 }
 
-/// What the listing states about an object before it is touched.
+/// Entry of the listing for an object before it is touched.
 fn entry(object: &Object, origin: &Origin) -> Entry {
     let has_several = object.instances().len() > 1;
     Entry {

@@ -11,14 +11,7 @@ use palpate_shared::format::{Length, TrainedProbe};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What an ensemble over touches states of them: attributes of its [`Origin`], as JSON.
-///
-/// | attribute | content |
-/// |---|---|
-/// | `palpate_probe` | [`probe`](Self::probe), a JSON object |
-/// | `palpate_noise` | [`noise`](Self::noise), a JSON object |
-/// | `palpate_touches` | [`touches`](Self::touches), a JSON object of hexadecimal numbers |
-/// | `palpate_captured` | [`captured`](Self::captured), a JSON object |
+/// Statements of an ensemble about its training touches. Empty for ensembles from elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TouchOrigin {
     /// The probe that made them, where the data set states it.
@@ -141,7 +134,7 @@ pub struct StatedProbe {
     /// The probe's measures.
     #[serde(flatten)]
     pub probe: Probe,
-    /// What its lengths are measured in.
+    /// Unit of its lengths.
     #[serde(default = "tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning in millimeters.
@@ -161,7 +154,7 @@ impl StatedProbe {
         dataset.origin.as_ref().map(Self::from)
     }
 
-    /// What a compiled model states about it. Units are made tenths of the longest side, whatever side objects were
+    /// Statements of a compiled model about it. Units are made tenths of the longest side, whatever side objects were
     /// scaled to.
     pub fn trained(&self) -> TrainedProbe {
         let scale = match self.unit {

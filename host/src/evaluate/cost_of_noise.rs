@@ -1,4 +1,4 @@
-//! What noise would cost a model that was trained without.
+//! Cost of noise to a model that was trained without it.
 
 use super::{Candidate, Margins, add_noise};
 use crate::ensemble::train::{self, train};

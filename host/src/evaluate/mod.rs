@@ -1,4 +1,4 @@
-//! How often, and after how many touches, a model is right.
+//! Accuracy of a model, and the touches that it needs.
 //!
 //! Margins are computed once for every test touch ([`Margins`]); everything else is sums of them over groups of touches,
 //! each group drawn at random without replacement from one object's touches:
@@ -88,7 +88,7 @@ pub const ERROR_RATE: f64 = 0.01;
 /// Accuracies that rest on fewer different groups than this say little.
 pub const LEAST_GROUPS: u64 = 200;
 
-/// What is evaluated.
+/// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Numbers of touches after which accuracy is wanted.
@@ -97,14 +97,14 @@ pub struct Settings {
     pub at_approaches: Vec<usize>,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
-    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
-    /// ensemble.
+    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds, 1 % for
+    /// an ensemble.
     pub error_rate: Option<f64>,
     /// Touches after which the recognizer gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble.
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,
-    /// What was added to the touches: what a model promises is void with other noise.
+    /// Noise added to the touches: the promise of a model is void with other noise.
     pub noise: Noise,
 }
 
@@ -125,14 +125,14 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// How sequences are drawn and stopped.
+    /// Settings for drawing and stopping sequences.
     pub fn sequential(&self) -> SequentialSettings {
         let &Self { error_rate, max_touches, groups, seed, .. } = self;
         SequentialSettings { error_rate, max_touches, sequences: groups, seed }
     }
 }
 
-/// What an evaluation found; as JSON, `palpate evaluate --json`. Shares are between 0 and 1; maps go from numbers of
+/// Results of an evaluation; as JSON, `palpate evaluate --json`. Shares are between 0 and 1; maps go from numbers of
 /// touches or objects' names to values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
@@ -148,13 +148,13 @@ pub struct Evaluation {
     pub accuracy_standard_error: BTreeMap<usize, f64>,
     /// The same for each object.
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
-    /// What the recognizer does that stops by itself.
+    /// Results of the recognizer that stops by itself.
     pub sequential: Sequential,
     /// The same counted in approaches, where the data set holds those; touches that are no evidence to the model cost an
     /// approach and change nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub approaches: Option<Approaches>,
-    /// Whether the model keeps what it promises: counted in approaches where the data set holds those.
+    /// Check of the model's promise: counted in approaches where the data set holds those.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promise: Option<PromiseCheck>,
     /// Share of each contact pattern among the touches of the data set, each object weighted equally.

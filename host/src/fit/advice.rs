@@ -1,10 +1,10 @@
-//! What recordings cannot tell, and what to record next.
+//! Advice on what recordings cannot determine, and what to record next.
 
 use super::outcome::{Estimate, Fit, Warning};
 use super::timer::Timer;
 
-/// How wide an interval may be before there is a warning: of the speed, of offsets in milliseconds, of the noise as a share
-/// of it, of shares of missed contacts.
+/// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of the noise as a
+/// share of it, of shares of missed contacts.
 const SPEED: f64 = 0.08;
 const OFFSET: f64 = 5.0;
 const NOISE: f64 = 0.8;
@@ -35,7 +35,8 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
     let is_wide = |estimate: &Estimate, most: f64| estimate.width().is_none_or(|width| width > most);
     if is_wide(&fit.speed_factor, SPEED) {
         let record = format!(
-            "Record {}, to objects of known size with curved and slanted surfaces; presses on a plate say nothing about it.",
+            "Record {}, to objects of known size with curved and slanted surfaces; presses on a plate do not determine \
+             it.",
             more(fit.speed_factor.width(), SPEED)
         );
         warn("the speed's factor", said(&fit.speed_factor, 1.0, 2, ""), record);
@@ -51,7 +52,7 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
     }
     let coarse = fit.timer.is_some_and(|timer| fit.noise.high.is_some_and(|high| high < 0.35 * timer));
     if coarse {
-        let record = "It is less than the timer can tell; a finer timer would show it.".into();
+        let record = "It is below the timer's resolution; a finer timer would show it.".into();
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
     } else if is_wide(&fit.noise, NOISE * fit.noise.value.max(0.5)) {
         let record = match fit.presses {

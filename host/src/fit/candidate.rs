@@ -6,9 +6,9 @@ pub(super) const NOISE: [f64; 2] = [0.1, 25.0];
 /// A probe that may have made recorded touches. Times are in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Candidate {
-    /// What contact times are multiplied by: one over the speed's factor.
+    /// Factor applied to contact times: one over the speed's factor.
     pub(super) factor: f64,
-    /// How much later each finger touches than it should; 0 for the first.
+    /// Delay of each finger; 0 for the first.
     pub(super) late: [f64; 3],
     /// Standard deviation of each contact time, with what the timer adds.
     pub(super) noise: f64,
@@ -16,7 +16,7 @@ pub(super) struct Candidate {
     pub(super) missed: [f64; 3],
 }
 
-/// How many numbers a candidate has.
+/// Number of parameters of a candidate.
 pub(super) const NUMBERS: usize = 7;
 
 impl Candidate {
@@ -39,9 +39,9 @@ impl Candidate {
     }
 }
 
-/// How crooked probes usually are: standard deviations of the logarithm of the factor, of offsets in milliseconds, and of
-/// the logarithm of the noise about [`USUAL_NOISE`]. Of candidates that explain touches equally well the usual one is taken;
-/// a few dozen touches outweigh it wherever they say something.
+/// Prior of the probe's faults: standard deviations of the logarithm of the factor, of offsets in milliseconds, and of
+/// the logarithm of the noise about [`USUAL_NOISE`]. Of candidates that explain touches equally well the usual one is
+/// taken; a few dozen touches outweigh it wherever they say something.
 const USUAL: [f64; 3] = [0.15, 8.0, 1.0];
 /// In milliseconds.
 const USUAL_NOISE: f64 = 2.0;
@@ -58,7 +58,7 @@ impl Candidate {
     }
 }
 
-/// Which approaches were recorded: what the probability of a touch is relative to.
+/// The approaches that were recorded: the condition of the probability of a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kept {
     /// Every approach.

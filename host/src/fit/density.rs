@@ -1,4 +1,4 @@
-//! How likely contact times are: tables of densities, smoothed by the noise of the contacts.
+//! Likelihood of contact times: tables of densities, smoothed by the noise of the contacts.
 //!
 //! A full touch is two numbers, the curvature κ = t1 − 2·t2 + t3 and the signed slope t3 − t1. Independent noise σ of the
 //! three times is noise of √6·σ on the one and √2·σ on the other, and the two are not correlated. A touch with two
@@ -27,13 +27,13 @@ const SMOOTHING: f64 = 0.03;
 const GROWTH: f64 = 0.02;
 /// Cells to a standard deviation near 0.
 const CELLS: f64 = 2.0;
-/// How many standard deviations a kernel reaches.
+/// Reach of a kernel, in standard deviations.
 const REACH: f64 = 3.0;
 
 /// Simulated approaches that are kept as they are.
 const SOME: usize = 4_000;
 
-/// What was observed of a touch: which fingers touched, and how far apart in time, in milliseconds.
+/// Observation of a touch: which fingers touched, and how far apart in time, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Observed {
     /// Bit i: finger i touched.
@@ -67,7 +67,7 @@ impl Observed {
         Self { fingers, first, second }
     }
 
-    /// How many fingers touched.
+    /// Number of fingers that touched.
     pub(super) fn contacts(self) -> u32 {
         self.fingers.count_ones()
     }

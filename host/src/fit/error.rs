@@ -15,17 +15,17 @@ pub enum FitProblem {
         known: Vec<String>,
     },
     /// There are too few recorded touches to fit a probe to.
-    #[error("only {touches} recorded touches with two or three contacts, of at least {least} that a fit takes")]
+    #[error("only {touches} recorded touches with two or three contacts, and a fit needs at least {least}")]
     FewRecorded {
-        /// How many there are.
+        /// Number of touches.
         touches: usize,
-        /// How many it takes.
+        /// Number of touches needed.
         least: usize,
     },
     /// Recordings look wrong.
     #[error("recordings look wrong:\n  {}\nNothing was written", suspects.join("\n  "))]
     Suspects {
-        /// What looks wrong, each a sentence or two.
+        /// Suspicious findings, each a sentence or two.
         suspects: Vec<String>,
     },
 }

@@ -1,4 +1,4 @@
-//! How well a candidate probe explains recorded touches.
+//! Likelihood of recorded touches under a candidate probe.
 
 use super::candidate::{Candidate, Kept};
 use super::density::{Densities, FULL, OUTER, Observed};
@@ -6,10 +6,10 @@ use std::f64::consts::TAU;
 
 /// The share of touches that come from nowhere: so that one odd touch cannot decide a fit.
 const ODD: f64 = 0.004;
-/// How far the times of odd touches are apart, in milliseconds.
+/// Spread of the times of odd touches, in milliseconds.
 const ODD_SPREAD: f64 = 150.0;
 
-/// What a candidate makes of one object.
+/// Likelihood of one object's touches under a candidate.
 pub(super) struct Explained<'a> {
     candidate: Candidate,
     smoothed: super::density::Smoothed<'a>,
@@ -104,7 +104,7 @@ fn wide(x: f64) -> f64 {
 pub(super) struct Plate {
     /// Full touches of presses in one direction of the row, and in the other.
     pub(super) presses: Vec<(f64, Observed)>,
-    /// How many presses there were, and how many of them each finger missed.
+    /// Number of presses, and the number of them that each finger missed.
     pub(super) count: usize,
     pub(super) missed: [usize; 3],
 }
@@ -124,7 +124,7 @@ impl Plate {
         plate
     }
 
-    /// How likely they are, at the slope of the plate that suits them best.
+    /// Their log-likelihood, at the slope of the plate that suits them best.
     pub(super) fn log_likelihood(&self, candidate: &Candidate) -> f64 {
         let Candidate { late: [first, middle, third], noise, missed, .. } = *candidate;
         let [curvature, slope] = [first - 2.0 * middle + third, third - first];

@@ -1,12 +1,13 @@
-//! Which probe made recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer.
+//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer.
 //!
-//! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many times,
-//! with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches' density, which
-//! is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum likelihood with a
-//! weak preference for probes that are not very crooked, by Nelder–Mead from several starts). Full and partial touches count, and approaches that touched nothing; where
-//! the pose was recorded, each touch is compared with approaches in its pose. Intervals are those of 95 % by profile
-//! likelihood (Wilks' theorem), made wider by experience: the tables are simulated and smoothed. What the simulation does
-//! not know, such as a finger that is bent aside, is in no interval.
+//! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many
+//! times, with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches'
+//! density, which is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum
+//! likelihood with a weak preference for probes with small errors, by Nelder–Mead from several starts). Full and
+//! partial touches count, and approaches that touched nothing; where the pose was recorded, each touch is compared with
+//! approaches in its pose. Intervals are those of 95 % by profile likelihood (Wilks' theorem), made wider by
+//! experience: the tables are simulated and smoothed. What the simulation does not know, such as a finger that is bent
+//! aside, is in no interval.
 //!
 //! Only differences of contact times are recorded, so an offset of all three fingers alike cannot be told, and changes
 //! nothing: offsets are relative to the first finger's.
@@ -64,7 +65,7 @@ use recording::Recording;
 use search::Best;
 use timer::Timer;
 
-/// How a probe is fitted.
+/// Settings of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// The probe as it should be, the objects' size, and where its approaches aim. How many touches, the seed, the format
@@ -85,7 +86,7 @@ impl Default for Settings {
 /// The fewest recorded touches with two or three contacts from which a probe is fitted.
 pub const LEAST: usize = 20;
 
-/// What is known about the recordings and the simulated touches: what a candidate is compared with.
+/// Recordings and simulated touches: what a candidate is compared with.
 struct Evidence<'a> {
     recordings: Vec<Recording<'a>>,
     /// Simulated touches of all objects.
@@ -164,8 +165,8 @@ fn place(name: &str, objects: &[Object]) -> Result<usize> {
     })
 }
 
-/// Which approaches were recorded, as far as the touches say: every one if some touched nothing, only full touches if
-/// there are no others.
+/// The approaches that were recorded, as far as the touches say: every one if some touched nothing, only full touches
+/// if there are no others.
 fn kept(recorded: &Dataset) -> Kept {
     let any = |is: fn(&Touch) -> bool| recorded.touches().any(is);
     match (any(Touch::is_empty), any(|touch| !touch.is_full())) {
@@ -222,7 +223,7 @@ fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, V
     Ok((best, ends))
 }
 
-/// How many of the touches have three contacts, and how many two.
+/// Number of the touches with three contacts, and with two.
 fn counts(evidence: &Evidence<'_>) -> [usize; 2] {
     let touches = || evidence.recordings.iter().flat_map(|recording| &recording.touches);
     let pairs = touches().filter(|touch| touch.contacts() == 2).count();

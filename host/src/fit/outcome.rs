@@ -1,4 +1,4 @@
-//! What a fit found, and the probe file that states it.
+//! Results of a fit, and the probe file that states it.
 
 use super::candidate::{Candidate, Kept};
 use super::search::{Best, Ends};
@@ -28,7 +28,7 @@ impl Estimate {
         Some(self.high? - self.low?)
     }
 
-    /// Whether the interval holds a value.
+    /// True if the interval holds a value.
     pub fn holds(&self, value: f64) -> bool {
         self.low.is_none_or(|low| low <= value) && self.high.is_none_or(|high| value <= high)
     }
@@ -37,11 +37,11 @@ impl Estimate {
 /// Something that the recordings tell badly or not at all.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Warning {
-    /// What: "the speed's factor".
+    /// Name of the parameter: "the speed's factor".
     pub what: String,
-    /// How well it is told: "0.90 to 1.12".
+    /// Its interval: "0.90 to 1.12".
     pub told: String,
-    /// What to record, a sentence.
+    /// Advice on what to record, as a sentence.
     pub record: String,
 }
 
@@ -61,7 +61,7 @@ pub struct Fit {
     pub unit: Length,
     /// Its speed over the nominal one.
     pub speed_factor: Estimate,
-    /// How much later the second and the third finger touch than they should, relative to the first.
+    /// Delay of the second and the third finger, relative to the first.
     pub late: [Estimate; 2],
     /// Standard deviation of each contact time, without what the timer adds.
     pub noise: Estimate,
@@ -77,7 +77,7 @@ pub struct Fit {
     pub presses: usize,
     /// Names of the recorded objects.
     pub objects: Vec<String>,
-    /// What the recordings cannot tell, and what to record next.
+    /// Warnings about what the recordings cannot determine, and what to record next.
     pub warnings: Vec<Warning>,
     /// Recordings that look wrong.
     pub suspects: Vec<Suspect>,
@@ -127,7 +127,7 @@ pub(super) fn outcome(
 }
 
 impl Fit {
-    /// What the real probe adds to touches: the likeliest values.
+    /// Noise that the real probe adds to touches: the likeliest values.
     pub fn real(&self) -> Noise {
         let [middle, third] = self.late.map(|late| -1e3 * late.value);
         Noise {

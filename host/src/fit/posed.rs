@@ -1,4 +1,4 @@
-//! What the pose of a recorded touch says: simulated approaches in the very pose, aimed anywhere.
+//! Likelihood from the pose of a recorded touch: simulated approaches in the very pose, aimed anywhere.
 //!
 //! A touch whose pose is known is compared with approaches to its object in that pose, instead of in all. A flat face is
 //! then touched at a known slope, which tells offsets and speed far better. Poses are never exact and such approaches few,
@@ -22,7 +22,8 @@ const APPROACHES: usize = 160;
 const TRUSTED: f64 = 0.8;
 /// By how much of their distance from 0 simulated times are smoothed: poses are not exact.
 const SMOOTHING: f64 = 0.06;
-/// Which neighbor an approach is smoothed toward: there are few, and gaps between them must not be taken for noise.
+/// Number of the neighbor that an approach is smoothed toward: there are few, and gaps between them must not be taken
+/// for noise.
 const NEIGHBOR: usize = 3;
 
 /// Approaches in the pose of one recorded touch.
@@ -31,13 +32,13 @@ pub(super) struct InPose(Vec<Simulated>);
 
 #[derive(Clone, Copy, Debug)]
 struct Simulated {
-    /// Which fingers touched.
+    /// Set of the fingers that touched.
     touched: u8,
     /// Contact times in milliseconds.
     times: [f32; 3],
-    /// How far the differences of times are smoothed, in milliseconds: half the way to its third neighbor with the same
-    /// contacts. Method: Breiman, Meisel and Purcell, Variable kernel estimates of multivariate densities, Technometrics
-    /// 19 (1977).
+    /// Width by which the differences of times are smoothed, in milliseconds: half the way to its third neighbor with
+    /// the same contacts. Method: Breiman, Meisel and Purcell, Variable kernel estimates of multivariate densities,
+    /// Technometrics 19 (1977).
     gap: f32,
 }
 

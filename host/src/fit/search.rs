@@ -4,7 +4,7 @@ use super::candidate::{Candidate, NUMBERS};
 use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
 
-/// What is searched: the logarithm of the likelihood of a candidate.
+/// Objective of the search: the logarithm of the likelihood of a candidate.
 pub(super) type Likelihood<'a> = &'a (dyn Fn(&Candidate) -> f64 + Sync);
 
 /// A candidate, and the logarithm of its likelihood.
@@ -18,9 +18,9 @@ pub(super) struct Best {
 const ITERATIONS: u64 = 900;
 /// A search ends when the corners of its simplex are this close in nats.
 const CLOSE: f64 = 2e-4;
-/// What twice the loss of log-likelihood is at the ends of an interval of 95 %: 3.84, the quantile of chi squared with one
-/// degree of freedom, and more, because the tables come from touches that are simulated and smoothed. With 3.84, 47 of 56
-/// intervals of probes that were known held the speed, offsets and noise.
+/// Twice the loss of log-likelihood at the ends of an interval of 95 %: 3.84, the quantile of chi squared with one
+/// degree of freedom, and more, because the tables come from touches that are simulated and smoothed. With 3.84, 47 of
+/// 56 intervals of probes that were known held the speed, offsets and noise.
 const QUANTILE: f64 = 5.5;
 /// From how many points of a grid a search starts.
 const STARTS: usize = 3;

@@ -1,11 +1,11 @@
 //! Recordings that look wrong: of another object than their name says, of two objects, of a probe that was changed.
 //!
-//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits all.
-//! If the touches are the right object's, the likelihood ratio of a wrong one against it passes e^x, at whatever touch one
-//! stops, with a probability of at most e^−x (Ville's inequality). That holds for one start and one share of the touches;
-//! where they are unknown the ratio's mean over all of them is compared, which is a martingale too (Robbins' method of
-//! mixtures), and not its maximum. At [`CERTAIN`] nats a comparison gives a false alarm with a probability of 6·10⁻⁶: three
-//! for each recording and rival, a few hundred in all, in one of 500 fits.
+//! Another object is compared under the probe that fits the other recordings, the right one under the probe that fits
+//! all. If the touches are the right object's, the likelihood ratio of a wrong one against it exceeds e^x, at whatever
+//! touch one stops, with a probability of at most e^−x (Ville's inequality). That holds for one start and one share of
+//! the touches; where they are unknown the ratio's mean over all of them is compared, which is a martingale too
+//! (Robbins' method of mixtures), and not its maximum. At [`CERTAIN`] nats a comparison gives a false alarm with a
+//! probability of 6·10⁻⁶: three for each recording and rival, a few hundred in all, in one of 500 fits.
 //!
 //! That is for densities that are known. These come from simulated touches and a fitted probe, so it says how little chance
 //! alone does, not how often a sound recording is named: touches that the simulation does not know, such as grazing ones,
@@ -22,17 +22,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::fmt;
 
-/// How many nats better another explanation of a recording must be.
+/// Number of nats by which another explanation of a recording must be better.
 const CERTAIN: f64 = 12.0;
 /// The same for another probe, which has seven numbers to suit the touches: by Wilks' theorem twice the gain of a probe
 /// that is not another one is chi squared with seven degrees of freedom, and passes 44 with a probability of 2·10⁻⁷.
 const CERTAIN_PROBE: f64 = 22.0;
 /// The fewest touches that say anything about a part of a recording.
 const LEAST: usize = 20;
-/// How many standard errors less likely than under the fit touches must be to be like no object.
+/// Number of standard errors by which touches must be less likely than under the fit to be like no object.
 const UNLIKE: f64 = 7.0;
 
-/// What looks wrong about the recording of an object.
+/// Suspicion about the recording of an object.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "problem", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -63,21 +63,21 @@ pub enum Suspect {
         object: String,
         /// About the first touch after the change, counted from 1.
         from: usize,
-        /// What the probe was before and is then, in words.
+        /// The probe before and after, in words.
         what: String,
     },
     /// It was made by another probe than the other recordings.
     OtherProbe {
         /// The object.
         object: String,
-        /// What the other recordings say about the probe, and what this one does, in words.
+        /// The parameters of the probe by the other recordings and by this one, in words.
         what: String,
     },
     /// Its touches look like those of none of the objects.
     Unlike {
         /// The object by whose name it goes.
         object: String,
-        /// How many standard errors less likely they are than the object's.
+        /// Number of standard errors by which they are less likely than the object's.
         errors: f64,
     },
 }
@@ -126,7 +126,7 @@ struct Sound<'a> {
 }
 
 impl Sound<'_> {
-    /// Whether a recording is all that there is to go by.
+    /// True if there is no other recording.
     fn is_only(&self) -> bool {
         self.count() == 1 && self.evidence.plate.is_none()
     }
@@ -135,7 +135,7 @@ impl Sound<'_> {
         self.is_sound.iter().filter(|is_sound| **is_sound).count()
     }
 
-    /// How likely a candidate is by all sound recordings but this one.
+    /// Log-likelihood of a candidate under all sound recordings but this one.
     fn others(&self, candidate: &Candidate, index: usize) -> f64 {
         self.evidence.log_likelihood(candidate, |other| other != index && self.is_sound[other])
     }
@@ -187,7 +187,7 @@ pub(super) fn suspects(evidence: &Evidence<'_>, best: &Best, progress: &dyn Prog
     Ok(named.into_iter().map(|found| found.suspect).collect())
 }
 
-/// What looks wrong about a recording, and by how many nats.
+/// Finds the suspicion about a recording, and its strength in nats.
 fn suspect(sound: &Sound<'_>, index: usize) -> Option<(Suspect, f64)> {
     let (evidence, best) = (sound.evidence, &sound.best);
     let recording = &evidence.recordings[index];
@@ -279,9 +279,9 @@ fn longest_gain(theirs: &[f64], mine: &[f64]) -> (usize, usize, f64) {
     best
 }
 
-/// How many nats better another object explains the touches from an unknown one on, up to that at which it does so best:
-/// the logarithm of the likelihood ratio's mean over all starts, each as likely. Its exponential is a martingale if the
-/// touches are not the other object's.
+/// Number of nats by which another object better explains the touches from an unknown one on, up to that at which it
+/// does so best: the logarithm of the likelihood ratio's mean over all starts, each as likely. Its exponential is a
+/// martingale if the touches are not the other object's.
 fn begun_anywhere(theirs: &[f64], mine: &[f64]) -> f64 {
     let count = mine.len() as f64;
     // The logarithm of the sum over the starts so far; of each of the others the ratio is still 1.
@@ -318,7 +318,7 @@ fn mixture(theirs: &[f64], mine: &[f64]) -> (f64, f64) {
     (share, gains.fold(f64::NEG_INFINITY, log_sum) - (SHARES as f64).ln())
 }
 
-/// Whether another probe made the recording, or the rest of it, and by how many nats that is likelier.
+/// Finds out if another probe made the recording, or the rest of it, and by how many nats that is likelier.
 fn changed(sound: &Sound<'_>, rest: &Best, index: usize) -> Option<(Suspect, f64)> {
     let (evidence, best) = (sound.evidence, &sound.best);
     let recording = &evidence.recordings[index];
@@ -361,7 +361,7 @@ fn changed(sound: &Sound<'_>, rest: &Best, index: usize) -> Option<(Suspect, f64
         .then(|| (Suspect::OtherProbe { object: name, what: difference(&rest.candidate, &whole.candidate) }, gained))
 }
 
-/// What changed, in words.
+/// Describes the change in words.
 fn difference(before: &Candidate, after: &Candidate) -> String {
     let mut said = Vec::new();
     let mut say = |what: &str, [before, after]: [f64; 2], least: f64, digits: usize, unit: &str| {
@@ -380,7 +380,7 @@ fn difference(before: &Candidate, after: &Candidate) -> String {
     if said.is_empty() { "several small differences".into() } else { said.join(", ") }
 }
 
-/// Whether the touches are far less likely than the object's own would be, and about how many nats that is.
+/// Finds out if the touches are far less likely than the object's own would be, and about how many nats that is.
 fn unlike(evidence: &Evidence<'_>, rest: &Best, index: usize, mine: &[f64]) -> Option<(Suspect, f64)> {
     let recording = &evidence.recordings[index];
     let object = &evidence.objects[evidence.of[index]];

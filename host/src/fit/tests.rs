@@ -1,4 +1,4 @@
-//! A simulator of crooked probes that shares no code with the fit, and what is found out about its probes.
+//! A simulator of imperfect probes that shares no code with the fit, and the parameters fitted to its touches.
 
 use super::*;
 
@@ -7,7 +7,7 @@ use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
-/// What is wrong with a probe. Times are in milliseconds.
+/// Faults of a probe. Times are in milliseconds.
 #[derive(Clone, Copy)]
 struct Crooked {
     /// Times are this many times as long.
@@ -37,7 +37,7 @@ impl Numbers {
     }
 }
 
-/// A touch as the crooked probe records it, from times in milliseconds.
+/// A touch as the imperfect probe records it, from times in milliseconds.
 fn record(times: [Option<f64>; 3], probe: &Crooked, numbers: &mut Numbers) -> Touch {
     let mut ticks = [None; 3];
     let phase = numbers.uniform();

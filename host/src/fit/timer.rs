@@ -6,12 +6,12 @@ use palpate_shared::Touch;
 const RANGE: [f64; 2] = [20.0, 60_000.0];
 /// Times are used up to so many ticks: the farther, the more exactly must the resolution be known.
 const TICKS: f64 = 40.0;
-/// How close times are to whole ticks on average, as the length of the mean of unit vectors, where there is a timer.
+/// Mean resultant length of the times' phases within a tick, above which there is a timer.
 const CLOSE: f64 = 0.93;
 /// Times that it takes to tell.
 const LEAST: usize = 24;
 
-/// What the times say about the timer.
+/// Evidence of the times about the timer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Timer {
     /// Its resolution in microseconds.

@@ -31,14 +31,14 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use std::path::Path;
 
-/// What a probe file states.
+/// Contents of a probe file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeFile {
     /// The probe's measures.
     pub probe: Probe,
-    /// What they are measured in.
+    /// Unit of the lengths.
     pub unit: Length,
-    /// What the real probe adds.
+    /// Noise that the real probe adds.
     pub real: Noise,
 }
 

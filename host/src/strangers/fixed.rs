@@ -6,7 +6,7 @@ use palpate_shared::format::ObjectMisfit;
 
 /// The most that a number is stored as.
 const MOST: f64 = 32_767.0;
-/// What whitened evidence is stored in: 2^-8 √nats.
+/// Unit in which whitened evidence is stored: 2^-8 √nats.
 const ROOT: f64 = 256.0;
 
 /// Writes the record of an object's misfit; `unit` is that of margins, in nats.

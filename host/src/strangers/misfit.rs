@@ -1,4 +1,4 @@
-//! What touches of each object give, and how far evidence is from it.
+//! Expected evidence of touches of each object, and the distance of evidence from it.
 
 use super::follow::early;
 use super::{FIRST, Supply};
@@ -8,18 +8,18 @@ use rayon::prelude::*;
 
 /// The touches at which the spread of other shapes is weighed against that of touches.
 const AT: f64 = 40.0;
-/// How much of touches' own covariance is added to that of shapes, for the directions that few shapes show; and what
+/// Share of touches' own covariance that is added to that of shapes, for the directions that few shapes show; it
 /// takes the shapes' place where there are none.
 const OWN: f64 = 0.003;
 const WITHOUT_SHAPES: f64 = 0.03;
-/// How far an object may be behind the leader of a shape's touches, in nats per touch, for the shape to count e times
+/// Distance of an object behind the leader of a shape's touches, in nats per touch, at which the shape counts e times
 /// less.
 const NEAR: f64 = 0.05;
 
 /// Means and covariances of the margins of one touch, in nats.
 pub(super) struct Moments {
-    /// Of each known object. Where it has several instances, or robots differ, their means are spread: what that comes to
-    /// in the mean of [`AT`] touches is in the covariance, so that no instance is taken for a stranger.
+    /// Of each known object. Where it has several instances, or robots differ, their means are spread; the
+    /// covariance has this spread in the mean of [`AT`] touches, so that no instance is taken for a stranger.
     of: Vec<(DVector<f64>, DMatrix<f64>)>,
     /// Of each of many other shapes, the mean.
     shapes: Vec<DVector<f64>>,
@@ -27,7 +27,7 @@ pub(super) struct Moments {
     objects: usize,
 }
 
-/// What touches of one object give, in nats: see [`super`].
+/// Expected evidence of touches of one object, in nats: see [`super`].
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Misfit {
     /// Whose evidence against the object counts.
@@ -158,7 +158,7 @@ impl Misfit {
     }
 }
 
-/// For each known object, and each number of touches up to `last`, the share of its sequences that are found out when
+/// For each known object, and each number of touches up to `last`, the share of its sequences that are detected when
 /// the model does not use its column: at a level of misfit of `threshold`.
 pub(super) fn left_out(moments: &Moments, supplies: &[Supply], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
     let of = |stranger: usize| {

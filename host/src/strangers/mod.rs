@@ -12,11 +12,12 @@
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
 //! each object does; measured, that detects as many strangers as the exact ratio.
 //!
-//! Measured on ten real meshes, each left out in turn, with a background column, at most 2 % of known objects' sequences
-//! being taken for unknown (`tests/src/bin/left_out.rs`; 40 trees of depth 5 on curvature of full touches): [`Held::Certain`]
-//! finds out .28 of the strangers by 30 touches, .60 by 60, .88 by 120, and names .007; a known object takes 93 touches
-//! instead of 27.5; on oriented touches .95 by 30 and .97 by 60, and 20 touches instead of 7. [`Held::Likely`] finds out .53 by 60 touches and names .40, for 27.2 touches. Hopeless by curvature
-//! alone: a fork where a spoon is known (.23 by 120 touches), and until 60 touches a hammer where a paper clip is (.18).
+//! Measured on ten real meshes, each left out in turn, with a background column, at most 2 % of known objects'
+//! sequences being declared unknown (`tests/src/bin/left_out.rs`; 40 trees of depth 5 on curvature of full touches):
+//! [`Held::Certain`] detects .28 of the strangers by 30 touches, .60 by 60, .88 by 120, and names .007; a known
+//! object takes 93 touches instead of 27.5; on oriented touches .95 by 30 and .97 by 60, and 20 touches instead of 7.
+//! [`Held::Likely`] detects .53 by 60 touches and names .40, for 27.2 touches. Hopeless by curvature alone: a fork
+//! where a spoon is known (.23 by 120 touches), and until 60 touches a hammer where a paper clip is (.18).
 
 mod fixed;
 mod follow;
@@ -49,13 +50,13 @@ use std::collections::BTreeMap;
 
 /// Touches from which on a test is made.
 const FIRST: u32 = 5;
-/// How much higher the limits of misfit are at first, in nats, and the touches after which this has halved. Measured to
-/// find out most strangers after 60 and 120 touches.
+/// Amount by which the limits of misfit are higher at first, in nats, and the touches after which this has halved.
+/// Measured to detect most strangers after 60 and 120 touches.
 const EARLY: f64 = 12.0;
 const HALVED_AFTER: f64 = 21.0;
 /// With [`Held::Certain`] no name is given whose misfit is not this far below the threshold, in nats.
 const DOUBT: f64 = 8.0;
-/// The share of strangers that must have been found out before a name is given, and the most touches to wait for it.
+/// The share of strangers that must have been detected before a name is given, and the most touches to wait for it.
 const FOUND_OUT: f64 = 0.8;
 const MOST_HELD: u32 = 120;
 /// Between two thresholds that are tried, in nats, and how many are.
@@ -64,10 +65,10 @@ const STEPS: usize = 400;
 /// 2^-16 nats.
 const NAT: f64 = 65_536.0;
 
-/// What is asked of a test.
+/// Requirements on a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// How long names are held back.
+    /// Rule for holding names back.
     pub held: Held,
     /// The share of known objects' sequences that may end as unknown.
     pub alarms: f64,
@@ -98,7 +99,7 @@ pub struct Calibrated {
     pub mean_touches: f64,
     /// The same without a test.
     pub mean_touches_without: f64,
-    /// For each known object the share of its sequences that are found out after 30, 60 and 120 touches when the model
+    /// For each known object the share of its sequences that are detected after 30, 60 and 120 touches when the model
     /// does not use its column: an estimate of what happens to strangers.
     pub left_out: BTreeMap<String, BTreeMap<u32, f64>>,
 }
@@ -108,7 +109,7 @@ pub struct Calibrated {
 struct Supply {
     /// For each source, such as an instance, and each robot one row after the other, in units.
     pools: Vec<Vec<i32>>,
-    /// Whether a pool is a robot's, which makes one sequence.
+    /// True if a pool is a robot's, which makes one sequence.
     is_once: bool,
 }
 
@@ -293,7 +294,7 @@ fn of_shapes(model: &Model<'_>, shapes: &[ObjectTouches]) -> Vec<Vec<f64>> {
     of.filter(|touches| touches.len() >= 20).map(mean).collect()
 }
 
-/// How far below the threshold a misfit must be for a name, in nats.
+/// Amount by which a misfit must be below the threshold for a name, in nats.
 fn doubt(held: Held) -> f64 {
     match held {
         Held::Likely => 0.0,
@@ -301,7 +302,7 @@ fn doubt(held: Held) -> f64 {
     }
 }
 
-/// How far below a first guess, which was found without any name being given, thresholds are tried, in nats.
+/// Distance below a first guess, which was found without any name being given, to which thresholds are tried, in nats.
 fn below(held: Held) -> f64 {
     match held {
         Held::Likely => 6.0,
@@ -336,7 +337,7 @@ fn stated(model: &Model<'_>, terms: &MisfitTerms, misfits: &[misfit::Misfit]) ->
     Ok(restate(model, &Restated { sections, ..Restated::default() })?)
 }
 
-/// The touches after which four of five sequences of left-out objects are found out.
+/// The touches after which four of five sequences of left-out objects are detected.
 fn found_out(left_out: &[Vec<f64>]) -> u32 {
     let longest = left_out.iter().map(Vec::len).max().unwrap_or(0);
     let mean = |touches: usize| {
@@ -356,7 +357,8 @@ struct Kept {
 }
 
 /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): from strict to loose, up to the last
-/// threshold before the first at which so few false alarms would not be unlikely if the promise were broken.
+/// threshold before the first at which the observed number of false alarms would not be unlikely if the promise were
+/// broken.
 fn threshold(sequences: &[Vec<Sequence>], settings: &Settings, loosest: f64, least: u32, known: usize) -> Result<Kept> {
     let all = equally_many(sequences);
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);

@@ -26,7 +26,7 @@ use palpate_shared::format::Tag;
 /// The share of touches that the promise is tested on, and of the others the share that thresholds begin with.
 const PROMISED: f64 = 0.5;
 const BEGUN: f64 = 0.25;
-/// How much stricter than the first thresholds sequences are followed, in nats: room for the loosest that keeps the
+/// Amount by which sequences are followed beyond the first thresholds, in nats: room for the loosest that keeps the
 /// promise, as far as fewer touches say where it is.
 const STRICTER: f64 = 0.5;
 /// The confidence of the first thresholds, which promise nothing: that of an estimate.

@@ -177,8 +177,8 @@ fn promised(seed: u64, held: Held, rate: f64) -> (crate::calibrate::Calibrated, 
     calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), &shapes(), &settings, &promise, &()).unwrap()
 }
 
-/// What a model does with sequences of touches that nothing was made from, each touch in one of them: shares of the names
-/// that are wrong, and of the sequences that are unknown; and the touches used on average.
+/// Results of a model on sequences of touches that nothing was made from, each touch in one of them: shares of the
+/// names that are wrong, and of the sequences that are unknown; and the touches used on average.
 fn on_fresh_touches(bytes: &[u8], fresh: &Dataset) -> [f64; 3] {
     let model = compile::open(bytes).unwrap();
     let (mut sequences, mut given, mut wrong, mut unknown, mut used) = (0.0, 0.0, 0.0, 0.0, 0.0);

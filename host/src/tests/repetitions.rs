@@ -1,8 +1,8 @@
-//! How often tests repeat what may fail by chance, and how often it may fail.
+//! Repetitions of tests that may fail by chance, and the allowed probability of failure.
 
 use crate::calibrate::{Tally, binomial_tail};
 
-/// How many times a simulation is repeated: as the variable PALPATE_REPETITIONS says, else `few` times.
+/// Number of repetitions of a simulation: as the variable PALPATE_REPETITIONS says, else `few` times.
 pub(crate) fn repetitions(few: u64) -> u64 {
     std::env::var("PALPATE_REPETITIONS").map_or(few, |count| count.parse().expect("PALPATE_REPETITIONS is a number"))
 }

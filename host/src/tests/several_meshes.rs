@@ -1,5 +1,5 @@
-//! What is stated of objects with several very different meshes agrees with fresh touches: every call that states a figure
-//! or a promise, on the same three objects.
+//! Statements about objects with several very different meshes agree with fresh touches: every call that states a
+//! figure or a promise, on the same three objects.
 //!
 //! A sequence is of one mesh. Sequences of touches of several would agree with each other, and with nothing that a robot
 //! meets: an object would be known from the mean of its meshes.
@@ -75,7 +75,7 @@ fn cases(groups: usize, touches: usize, length: f64) -> f64 {
     (groups as f64).min(touches as f64 / length)
 }
 
-/// What a candidate does with touches of `dataset`: its accuracy after ten, and wrong and unknown ends of its sequences.
+/// Results of a candidate on touches of `dataset`: its accuracy after ten, and wrong and unknown ends of its sequences.
 fn measured(candidate: Candidate<'_>, dataset: &Dataset) -> [Share; 3] {
     let margins = Margins::new(candidate, dataset).unwrap();
     let settings = evaluate::Settings { at: vec![10], at_approaches: vec![10], ..evaluate::Settings::default() };
@@ -136,7 +136,7 @@ fn calibrated(dataset: Dataset, per: Per, seed: u64) -> calibrate::Calibrated {
     calibrate::calibrate(&MODEL.model(), dataset, &promise(per, seed), &()).unwrap()
 }
 
-/// What was promised; none where no threshold keeps the rate on these touches, which is said and breaks nothing.
+/// The promise; none where no threshold keeps the rate on these touches, which is said and breaks nothing.
 fn promised<T>(calibrated: crate::error::Result<T>) -> Option<T> {
     calibrated
         .map_err(|error| match error.problem() {

@@ -1,4 +1,4 @@
-//! Whether the touches so far fit the object with the most evidence, or none that the model knows.
+//! Test of fit: do the touches so far fit the object with the most evidence, or none that the model knows?
 
 use super::evidence::best;
 use super::expected::is_possible;
@@ -6,7 +6,7 @@ use crate::exponential::exp2_negative;
 use crate::model::Model;
 use palpate_shared::format::{MisfitTerms, MisfitTest, ObjectMisfit};
 
-/// The result of a model's misfit test.
+/// Result of a model's test of fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Familiarity {
@@ -23,12 +23,12 @@ pub(crate) fn leader(model: &Model<'_>, evidence: &[i64]) -> (usize, i64) {
     best(evidence.get(..model.known_count()).unwrap_or(evidence))
 }
 
-/// Whether the background has more evidence than any other object.
+/// True if the background has more evidence than any other object.
 pub(crate) fn is_background(model: &Model<'_>, evidence: &[i64], most: i64) -> bool {
     model.background().and_then(|background| evidence.get(background)).is_some_and(|&background| background > most)
 }
 
-/// What the model's test says about evidence, priors included, that is the sum of `touches` touches.
+/// Result of the model's test about evidence, priors included, that is the sum of `touches` touches.
 ///
 /// Cost: without a test a few instructions for each optional section; with one some more for each rival, a
 /// multiplication for each number of the triangle (45 for nine rivals, 55 for ten), an exponential and a 64-bit division.
@@ -51,8 +51,8 @@ pub(crate) fn familiarity(model: &Model<'_>, evidence: &[i64], leader: usize, to
 }
 
 impl Model<'_> {
-    /// How badly the evidence for each object, priors included, of `touches` touches fits the object with the most, in 2^-16
-    /// nats: what the model's test compares with its limits. `None` without a test.
+    /// Misfit of the evidence for each object, priors included, of `touches` touches with the object with the most, in
+    /// 2^-16 nats: the number that the model's test compares with its limits. `None` without a test.
     ///
     /// Cost: as the test in [`Recognizer::push`](crate::Recognizer::push). Cannot fail.
     pub fn misfit(&self, evidence: &[i64], touches: u32) -> Option<i64> {

@@ -1,4 +1,4 @@
-//! What a model knows about objects that it does not know: a background, and a test of fit.
+//! Statements of a model about objects that it does not know: a background, and a test of fit.
 //!
 //! The test compares the evidence so far with what touches of the leading object give. With r the evidence of *rivals*
 //! (other objects, and the background) against the leader, less its mean, summed over n touches, the misfit is
@@ -15,7 +15,8 @@ use super::codes::Held;
 /// The optional section: whether the last object is a background, and how to test whether touches fit the leading object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strangers<'a> {
-    /// The last of the model's objects stands for all that the model does not know: it is a rival and never named.
+    /// The last of the model's objects stands for everything that the model does not know: it is a rival and never
+    /// named.
     pub background: bool,
     /// The test, if there is one.
     pub test: Option<MisfitTest<'a>>,
@@ -34,7 +35,7 @@ pub struct MisfitTerms {
     pub least: u32,
     /// The misfit above which an object is a stranger, after many touches; in 2^-16 nats, as the next two.
     pub threshold: i32,
-    /// How much higher it is at first.
+    /// Amount by which it is higher at first.
     pub early: u32,
     /// The misfit above which no name is given yet, after many touches; at most `threshold`.
     pub doubt: i32,
@@ -57,7 +58,7 @@ pub struct MisfitTest<'a> {
     records: &'a [u8],
 }
 
-/// What touches of one object give.
+/// Expected evidence of touches of one object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjectMisfit<'a> {
     /// Means are multiples of 2^this units.
@@ -117,7 +118,7 @@ impl MisfitTerms {
     /// Bytes in the section.
     pub const LENGTH: usize = 40;
 
-    /// What stands in the section.
+    /// Returns the bytes of the section.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
         let Self { held, rivals, first, least, threshold, early, doubt, halving, alarms, sequences, confidence } =
             *self;
@@ -173,7 +174,7 @@ impl<'a> MisfitTest<'a> {
         Some(Self { terms: MisfitTerms::from_bytes(terms)?, records })
     }
 
-    /// Whether there are records of `known` objects, with rivals that exist among `objects`.
+    /// True if there are records of `known` objects, with rivals that exist among `objects`.
     fn makes_sense(&self, known: usize, objects: usize) -> bool {
         (0..known).all(|object| {
             self.object(object).is_some_and(|record| {
@@ -184,7 +185,7 @@ impl<'a> MisfitTest<'a> {
         })
     }
 
-    /// What touches of an object give; `None` for one that has no record.
+    /// Expected evidence of touches of an object; `None` for one that has no record.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn object(&self, object: usize) -> Option<ObjectMisfit<'a>> {

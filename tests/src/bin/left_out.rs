@@ -1,4 +1,4 @@
-//! How many strangers a model finds out, each object being left out in turn.
+//! Number of strangers that a model detects, each object being left out in turn.
 //!
 //! ```text
 //! palpate capture DIR -o train --touches 21000 --pose

@@ -30,7 +30,7 @@ mod xgboost;
 pub use small::Small;
 pub(crate) use small::train_each as train_small;
 
-/// What every margin starts from; the same for all objects, so it changes no verdict. XGBoost's default.
+/// Starting value of every margin; the same for all objects, so it changes no verdict. XGBoost's default.
 pub const BASE_MARGIN: f32 = 0.5;
 
 /// The trainer.
@@ -43,16 +43,17 @@ pub enum Engine {
     Xgboost,
 }
 
-/// How an ensemble is trained. Parameters have XGBoost's names and meanings.
+/// Settings of training. Parameters have XGBoost's names and meanings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Which features a touch is turned into. With partial touches its form for those is used
+    /// Features that a touch is turned into. With partial touches its form for those is used
     /// ([`Descriptor::for_contacts`]), without them its form for full touches.
     pub descriptor: Descriptor,
-    /// Which touches are trained on, and so evidence; `None` takes those with a contact from a data set of approaches,
+    /// Touches that are trained on, and so evidence; `None` takes those with a contact from a data set of approaches,
     /// full ones from others.
     pub counted: Option<Counted>,
-    /// Whether a leaf holds one value for each object (one tree per round) or one value (one tree per object and round).
+    /// True if a leaf holds one value for each object (one tree per round) or one value (one tree per object and
+    /// round).
     pub multi_output: bool,
     /// Boosting rounds.
     pub rounds: usize,
@@ -76,7 +77,7 @@ pub struct Settings {
     /// Needs [`multi_output`](Self::multi_output). With [`leaf_bits`](Self::leaf_bits) of 8 a model with leaves of one byte is
     /// exact.
     pub small: Option<Small>,
-    /// What is added to the touches before training, every touch made by a robot of its own; on top of what the data set
+    /// Noise added to the touches before training, every touch made by a robot of its own; on top of what the data set
     /// states that they have already ([`Dataset::real`]).
     pub noise: Noise,
     /// Seed of the noise.
@@ -179,7 +180,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     Ok(ensemble)
 }
 
-/// What an ensemble states that was trained so.
+/// Origin stated by an ensemble that was trained so.
 fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Origin {
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
@@ -187,7 +188,7 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Or
 }
 
 /// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,
-/// which are to be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
+/// which should be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
 /// ensemble does not know, and is called [`BACKGROUND`].
 ///
 /// # Errors
@@ -282,7 +283,7 @@ fn with_xgboost(_: &Rows, _: &Settings, _: Vec<String>, _: &dyn Progress) -> Res
     Err(Error::setting("trainer", "xgboost", allowed))
 }
 
-/// Whether there is something to learn from.
+/// Returns an error if there is nothing to learn from.
 fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
     let objects = &dataset.objects;
     match objects.len() {
@@ -378,7 +379,7 @@ impl<'d> Evidence<'d> {
         Ok(Self { objects: objects.collect::<Result<_>>()?, counted, needs_pose })
     }
 
-    /// What the ensemble states of them.
+    /// Statement of the ensemble about them.
     fn trained(&self) -> TrainedTouches {
         let touches = || self.objects.iter().flat_map(|touches| touches.iter());
         TrainedTouches {

@@ -165,7 +165,7 @@ mod xgboost {
     use super::*;
     use crate::evaluate::{Candidate, Margins};
 
-    /// What each trainer makes of the same touches.
+    /// Ensembles of both trainers from the same touches.
     fn both(dataset: &Dataset, settings: &Settings) -> [Ensemble; 2] {
         [Engine::Palpate, Engine::Xgboost]
             .map(|trainer| train(dataset, &Settings { trainer, threads: Some(1), ..settings.clone() }, &()).unwrap())

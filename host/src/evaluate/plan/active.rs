@@ -25,7 +25,7 @@ pub struct Active {
     left_out: usize,
 }
 
-/// What a plan's policy was tested with.
+/// Conditions under which a plan's policy was tested.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ActiveFacts {
     /// Rolls of the row of fingers for each of 26 directions.
@@ -65,7 +65,7 @@ impl Active {
         Ok(Self { candidates: touching.into_iter().filter(has_some).collect(), by_pose, poses, left_out })
     }
 
-    /// What it is tested with.
+    /// Conditions of the test.
     pub fn facts(&self) -> ActiveFacts {
         ActiveFacts {
             rolls: self.poses.rolls(),
@@ -90,7 +90,7 @@ impl Active {
     }
 }
 
-/// What is known after an approach.
+/// State after an approach.
 pub(super) struct Moment {
     /// The object with the most evidence.
     pub(super) best: usize,
@@ -101,7 +101,7 @@ pub(super) struct Moment {
     pub(super) verdict: Verdict,
 }
 
-/// What `see` says after each approach of a sequence: whether it is enough.
+/// Function called after each approach of a sequence; true ends it.
 type See<'s> = &'s mut dyn FnMut(&Moment) -> bool;
 
 impl Margins<'_> {
@@ -124,7 +124,7 @@ impl Margins<'_> {
         }
     }
 
-    /// How a sequence of approaches under the plan's policy ends.
+    /// Outcome of a sequence of approaches under the plan's policy.
     pub(super) fn active_outcome(&self, active: &Active, which: (usize, usize), rule: (Stopping, u64)) -> Outcome {
         let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
         self.follow_plan(active, which, rule, &mut |moment| {

@@ -9,7 +9,7 @@ use palpate_onboard::Stopping;
 use palpate_shared::ContactPattern;
 use rayon::prelude::*;
 
-/// What sequences of one object without a verdict came to.
+/// Counts over sequences of one object without a verdict.
 struct Counts {
     /// Sequences recognized after each number of touches.
     touches: Vec<usize>,
@@ -64,8 +64,8 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
 }
 
 impl Margins<'_> {
-    /// How often a tested object has the most evidence after the numbers of touches and approaches that are asked for. A
-    /// sequence that ends before keeps what it has; one without any evidence has recognized nothing.
+    /// Accuracy for a tested object after the numbers of touches and approaches that are asked for. A sequence that
+    /// ends before keeps what it has; one without any evidence has recognized nothing.
     fn counts(&self, active: &Active, position: usize, settings: &Settings) -> Counts {
         let Settings { at, at_approaches, groups, seed, .. } = settings;
         let most = |at: &[usize]| at.iter().copied().max().unwrap_or(0);

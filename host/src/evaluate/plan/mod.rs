@@ -1,4 +1,4 @@
-//! A plan of approaches for a model: how well each pose of the probe tells each two objects apart.
+//! A plan of approaches for a model: how well each pose of the probe distinguishes each pair of objects.
 
 mod active;
 mod figures;
@@ -42,7 +42,7 @@ pub struct Planned {
     pub hardest: Hardest,
 }
 
-/// Two objects, and how well the best pose tells them apart.
+/// Two objects, and how well the best pose distinguishes them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hardest {
     /// The objects.
@@ -213,7 +213,7 @@ mod tests {
         }
     }
 
-    /// What `touch` says for each direction, 20 times each.
+    /// Data set of the touches that `touch` returns for each direction, 20 times each.
     fn dataset(touch: impl Fn(usize, u16, usize) -> Touch) -> Dataset {
         let poses = Poses::with_rolls(1).unwrap();
         let all = |object| {

@@ -42,7 +42,7 @@ impl ByPose {
         &self.approaches
     }
 
-    /// How many approaches were made in a pose; 0 for one that does not exist.
+    /// Number of approaches made in a pose; 0 for one that does not exist.
     pub fn count(&self, pose: u16) -> usize {
         self.approaches.get(usize::from(pose)).map_or(0, Vec::len)
     }
@@ -65,7 +65,7 @@ pub struct Stock<'b> {
 }
 
 impl Stock<'_> {
-    /// How many approaches are left in a pose.
+    /// Number of approaches left in a pose.
     pub fn left(&self, pose: u16) -> usize {
         self.draws.get(&pose).map_or_else(|| self.of.count(pose), Draws::left)
     }

@@ -1,4 +1,4 @@
-//! How far recorded and simulated touches are apart, feature by feature and as a whole.
+//! Distance between recorded and simulated touches, feature by feature and as a whole.
 //!
 //! The one figure is how often a classifier tells a recorded touch of an object from a simulated one: trees are trained to
 //! do just that, and tested on touches that they were not trained on (cross-validation). Half of the time is guessing. It
@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How data sets are compared.
+/// Settings of a comparison of data sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The features that touches are compared by, and that the model is trained on.
@@ -69,28 +69,28 @@ impl Share {
     }
 }
 
-/// How recorded and simulated touches compare.
+/// Comparison of recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// The features that they were compared by.
     pub descriptor: String,
-    /// How often a classifier tells recorded from simulated touches of the same object: 0.5 is guessing. Each object
-    /// weighted equally.
+    /// Accuracy of a classifier that distinguishes recorded from simulated touches of the same object: 0.5 is guessing.
+    /// Each object weighted equally.
     pub told_apart: Share,
     /// The objects that both data sets hold, by name.
     pub objects: Vec<ObjectComparison>,
-    /// What it costs; none for fewer than two objects.
+    /// Cost of the difference; none for fewer than two objects.
     pub cost: Option<Cost>,
 }
 
-/// How recorded and simulated touches of an object compare.
+/// Comparison of recorded and simulated touches of an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObjectComparison {
     /// The object's name.
     pub name: String,
     /// Recorded touches, and the simulated ones that they are compared with.
     pub touches: [usize; 2],
-    /// How often a classifier tells them apart: 0.5 is guessing.
+    /// Accuracy of a classifier that distinguishes the two: 0.5 is guessing.
     pub told_apart: Share,
     /// The share of each contact pattern among recorded and among simulated touches.
     pub patterns: BTreeMap<String, [f64; 2]>,
@@ -99,15 +99,15 @@ pub struct ObjectComparison {
 }
 
 impl Comparison {
-    /// What the figure means, in a sentence.
+    /// Meaning of the figure, in a sentence.
     pub fn verdict(&self) -> &'static str {
         match self.told_apart {
-            Share { low, .. } if low <= 0.5 => "Nothing shows that the simulation is not right.",
-            Share { value, .. } if value < 0.55 => "They differ a little: the simulation is nearly right.",
+            Share { low, .. } if low <= 0.5 => "No difference was found: the simulation agrees with the recordings.",
+            Share { value, .. } if value < 0.55 => "They differ slightly: the simulation is nearly correct.",
             Share { value, .. } if value < 0.65 => {
                 "They differ: fit the probe to recorded touches, or record more of them."
             }
-            _ => "They differ much: the probe, a mesh or its size is not what is simulated.",
+            _ => "They differ strongly: the simulated probe, a mesh or its size is wrong.",
         }
     }
 }

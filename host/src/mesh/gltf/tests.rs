@@ -120,7 +120,7 @@ fn numbers_that_cannot_be_are_refused_by_their_place() {
         ("/buffers/0/uri", json!("cup.bin"), "in another file"),
         ("/buffers/0/uri", json!("data:,plain"), "without base64"),
         ("/meshes/0/primitives/0/attributes/POSITION", json!(7), "accessors[7] is missing"),
-        ("/meshes/0/primitives/0/mode", json!(7), "7 is no mode"),
+        ("/meshes/0/primitives/0/mode", json!(7), "7 is not a primitive mode"),
         ("/meshes/0/primitives/0/attributes", json!({}), "without positions"),
         ("/nodes/1/mesh", json!(5), "meshes[5] is missing"),
         ("/nodes/0/children", json!([9]), "nodes[9] is missing"),

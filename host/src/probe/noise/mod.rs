@@ -1,4 +1,4 @@
-//! What a real sensor, timer and robot add to touches.
+//! Noise that a real sensor, timer and robot add to touches.
 //!
 //! [`Noise`] describes it, for training as well as for testing. What differs from touch to touch is noise; what is the
 //! same for all touches of one robot is a bias.
@@ -31,8 +31,8 @@ use rand_distr::{Distribution, StandardNormal};
 use std::fmt;
 use std::str::FromStr;
 
-/// What is added to touches. Times are in microseconds, angles in degrees, shares between 0 and 1. The default adds
-/// nothing.
+/// Noise that is added to touches. Times are in microseconds, angles in degrees, shares between 0 and 1. The default
+/// adds nothing.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Noise {
@@ -41,18 +41,18 @@ pub struct Noise {
     /// The timer's resolution: times are rounded down to multiples of it, counted from a phase of the touch's own. 0 for
     /// none.
     pub timer: f64,
-    /// What a bouncing switch adds to every contact time: uniform from 0 to this.
+    /// Delay that a bouncing switch adds to every contact time: uniform from 0 to this.
     pub debounce: f64,
     /// The probability that a contact of each finger is missed. In files one number, if it is the same for all fingers.
     #[serde(with = "missed_shares")]
     pub missed: [f64; FINGERS],
-    /// How much earlier each finger touches than it should: a bent finger.
+    /// Time by which each finger touches too early: a bent finger.
     pub bent: [f64; FINGERS],
     /// The probe's speed over the nominal one.
     pub speed: f64,
-    /// How far the speed of a touch may be off, as a share of it, to either side.
+    /// Largest error of the speed of a touch, as a share of it, to either side.
     pub speed_error: f64,
-    /// How far the speed of a robot may be off, the same through all of its touches.
+    /// Largest error of the speed of a robot, the same through all of its touches.
     pub speed_bias: f64,
     /// The standard deviation of the angle by which the pose of a touch is turned about a random axis.
     pub pose: f64,
@@ -117,7 +117,7 @@ impl FromStr for Deviation {
     }
 }
 
-/// What is added, in words: "noise of 0 to 10 ms, a timer of 1 ms".
+/// Describes the noise in words: "noise of 0 to 10 ms, a timer of 1 ms".
 impl fmt::Display for Noise {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ms = |micros: f64| micros / 1e3;
@@ -158,29 +158,29 @@ impl Noise {
         Self { deviation: deviation.into(), ..Self::default() }
     }
 
-    /// What a usual switch adds: its contact closes up to 5 ms off, how much differs from touch to touch and switch to
+    /// Noise of a usual switch: its contact closes up to 5 ms off, how much differs from touch to touch and switch to
     /// switch, and a program that polls it every millisecond counts whole ones.
     pub fn switch() -> Self {
         Self { deviation: Deviation { least: 0.0, largest: 5_000.0 }, timer: 1_000.0, ..Self::default() }
     }
 
-    /// Whether it changes no touch.
+    /// True if it changes no touch.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Whether something is the same through all touches of a robot, so that touches of several robots must not be
+    /// True if something is the same through all touches of a robot, so that touches of several robots must not be
     /// mixed in a sequence.
     pub fn has_bias(&self) -> bool {
         self.speed_bias > 0.0 || self.pose_bias > 0.0
     }
 
-    /// Whether it can turn a contact into a missing one.
+    /// True if it can turn a contact into a missing one.
     pub fn misses(&self) -> bool {
         self.missed.iter().any(|share| *share > 0.0)
     }
 
-    /// What a compiled model states about it. A robot's bias counts as noise of the pose: in training, every touch is
+    /// Statement of a compiled model about it. A robot's bias counts as noise of the pose: in training, every touch is
     /// made by a robot of its own.
     pub fn trained(&self) -> TrainedNoise {
         let whole = |number: f64| number.round().clamp(0.0, f64::from(u32::MAX)) as u32;
@@ -192,7 +192,7 @@ impl Noise {
         }
     }
 
-    /// What the promise of a compiled model states about it.
+    /// Statement of a compiled model's promise about it.
     pub fn promised(&self) -> PromisedNoise {
         let whole = |number: f64| number.round().clamp(0.0, f64::from(u32::MAX)) as u32;
         let billionths = |share: f64| whole(1e9 * share);

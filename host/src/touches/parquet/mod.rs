@@ -26,10 +26,10 @@ use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::{Arc, Once};
 
-/// How many rows a row group has.
+/// Number of rows in a row group.
 const GROUP: usize = 1 << 20;
 
-/// How many rows are encoded or decoded at once.
+/// Number of rows encoded or decoded at once.
 const BATCH: usize = 1 << 14;
 
 const SCHEMA: &str = "
@@ -255,7 +255,7 @@ struct Column {
     reader: ColumnReader,
     /// The definition level of a value that is there.
     present: i16,
-    /// Whether rows are lists.
+    /// True if rows are lists.
     lists: bool,
 }
 

@@ -101,7 +101,7 @@ impl Device for Notebook {
     }
 }
 
-/// What a line does to what is sent over it; probabilities are for a byte, or for a frame.
+/// Faults of a line; probabilities are for a byte, or for a frame.
 #[derive(Clone, Copy, Debug)]
 struct Faults {
     byte_lost: f64,

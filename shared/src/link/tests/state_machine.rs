@@ -146,7 +146,7 @@ struct Host {
     connected: bool,
     /// Touches of this session, in order.
     given: Vec<u32>,
-    /// How many of them have an outcome.
+    /// Number of them that have an outcome.
     answered: usize,
     /// The number of the name or approach that was asked for.
     asked: Option<u8>,
@@ -177,7 +177,7 @@ struct World {
     next_touch: u32,
     next_session: u32,
     resets: u32,
-    /// How often each touch of a host was counted, on any chip, in any life.
+    /// Number of times that each touch of a host was counted, on any chip, in any life.
     counted: BTreeMap<u32, u32>,
     names: u8,
 }
@@ -217,13 +217,13 @@ impl World {
         }
     }
 
-    /// What a host sends.
+    /// Sends frames from a host.
     fn down(&mut self, host: usize, frames: Vec<Vec<u8>>) {
         let (to, resets) = (To::Chip(self.hosts[host].chip), self.resets);
         self.under_way.extend(frames.into_iter().map(|bytes| Frame { to, bytes, resets }));
     }
 
-    /// What a chip sends: every host that is plugged in hears it.
+    /// Sends frames from a chip: every host that is plugged in hears it.
     fn up(&mut self, chip: usize, frames: Vec<Vec<u8>>) {
         for bytes in frames {
             for (number, _) in self.hosts.iter().enumerate().filter(|(_, host)| host.chip == chip) {

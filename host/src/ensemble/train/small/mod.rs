@@ -23,12 +23,12 @@ use cases::Cases;
 use grow::{Grown, Growth};
 use rayon::prelude::*;
 
-/// How little flash the trees are to take.
+/// Limits on the flash of the trees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Small {
     /// The most different leaves: 1 to 65,536. Up to 256 a leaf takes one byte.
     pub leaves: usize,
-    /// What a threshold that no tree had before has to save: loss of a touch on average, in nats. At least 0.
+    /// Loss of a touch on average, in nats, that a threshold must save if no tree had it before. At least 0.
     pub threshold_cost: f64,
 }
 
