@@ -1,3 +1,4 @@
+use super::Global;
 use super::chips::{core, instructions};
 use super::stated::{
     Defaults, Feature, Noise, PlanOf, Predicts, Probe, Promised, Tested, Touches, TrainedOn, evidence, features, noise,
@@ -27,15 +28,12 @@ Examples:
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
-    /// Say what it costs on this processor
+    /// The processor; says what the model costs on it
     #[arg(long, value_parser = core, value_name = "m0+|m4f")]
     chip: Option<Core>,
     /// The processor's clock in MHz, to give the time per touch
-    #[arg(long, requires = "chip", value_parser = megahertz)]
+    #[arg(long, requires = "chip", value_name = "MHZ", value_parser = megahertz)]
     mhz: Option<f64>,
-    /// Print it as JSON
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(serde::Serialize)]
@@ -113,12 +111,12 @@ struct OnChip {
 /// Instructions of a verdict beyond the margins, where nothing is measured: between 500 and 1,400.
 const VERDICT: u64 = 1_000;
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
     let model = compiled.model();
     let mut inspected = inspect(&model);
     inspected.chip = arguments.chip.map(|core| on_chip(&model, core, arguments.mhz)).transpose()?;
-    if arguments.json { output::print_json(&inspected) } else { output::print(&text(&inspected)) }
+    if global.json { output::print_json(&inspected) } else { output::print(&text(&inspected)) }
 }
 
 fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {

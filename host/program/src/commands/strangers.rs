@@ -12,11 +12,11 @@ use std::path::PathBuf;
 /// Whether, and how, a model is to find out what it does not know.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct StrangersArguments {
-    /// Objects that the model does not know: off tests for none; likely gives a name once the threshold is passed and the touches fit it; certain also holds names back until four of five strangers would have been found out [default: off]
+    /// Detect objects that the model does not know; certain also holds names back until strangers would be detected
     #[arg(long, value_parser = held, value_name = "off|likely|certain")]
     strangers: Option<Wanted>,
-    /// Touches of many other shapes, to tell what strangers are like [default: of 200 shapes, captured as DIR was]
-    #[arg(long, value_name = "DIR2", requires = "strangers")]
+    /// Touches of many other shapes; they tell what strangers are like [default: of 200 shapes, captured as DIR was]
+    #[arg(long, value_name = "DIR", requires = "strangers")]
     background: Option<PathBuf>,
 }
 
