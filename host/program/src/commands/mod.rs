@@ -144,11 +144,15 @@ impl Global {
     /// Makes the options count that concern the whole process.
     fn apply(&self) -> Result<()> {
         QUIET.store(self.quiet, Ordering::Relaxed);
-        let Some(asked) = self.threads else { return Ok(()) };
+        // More are of no use, and cost memory.
+        let Some(asked) = self.threads.map(|asked| asked.min(MOST_THREADS)) else { return Ok(()) };
         let built = rayon::ThreadPoolBuilder::new().num_threads(asked).build_global();
         built.map_err(|error| CaptureProblem::Threads { asked, started: 0, message: error.to_string() }.into())
     }
 }
+
+/// The most threads that are started.
+const MOST_THREADS: usize = 256;
 
 fn threads(text: &str) -> Result<usize, String> {
     match numbers::count(text)? {
@@ -300,7 +304,7 @@ fn message(error: &Error, command: &str) -> String {
     let Error::At { place, problem: problem @ Problem::Setting { name, value, .. } } = error else {
         return error.to_string();
     };
-    let option = name.replace('_', "-");
+    let option = option_of(name).replace('_', "-");
     let cli = cli();
     // The command's own options, and those of the commands below it.
     let named = cli.find_subcommand(command).into_iter();
@@ -311,6 +315,15 @@ fn message(error: &Error, command: &str) -> String {
         return format!("{place}--{option} is {value}. {}", problem.fix());
     }
     error.to_string()
+}
+
+/// The option of a setting that the library calls otherwise.
+fn option_of(setting: &str) -> &str {
+    match setting {
+        "groups" => "sequences",
+        "rolls" => "plan",
+        other => other,
+    }
 }
 
 /// A share in percent, as it was meant: without the last bits.
