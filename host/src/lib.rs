@@ -91,12 +91,10 @@
 //! | `experiments` | yes | `probe::sweep::precision`: other precisions to compare the sweep with |
 //! | `xgboost` | no | XGBoost 1.6.2 as a second trainer, built from its C++ source |
 //!
-//! `palpate = { version = "0.2", default-features = false }` brings no terminal, no progress bar, no plots, no serial
+//! `palpate = { version = "0.3", default-features = false }` brings no terminal, no progress bar, no plots, no serial
 //! port and no trainer.
 
 pub mod error;
-pub mod output;
-pub mod progress;
 pub mod random;
 #[cfg(all(test, feature = "train"))]
 mod repetitions;
@@ -107,7 +105,6 @@ pub mod touches;
 
 pub mod capture;
 pub mod ensemble;
-pub mod rows;
 
 pub mod compile;
 pub mod evaluate;
@@ -133,4 +130,5 @@ pub use error::{Error, Result};
 pub use glam;
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;
+pub use palpate_trees::{self as trees, output, progress, rows};
 pub use rand;

@@ -8,13 +8,13 @@ use crate::calibrate::{self, Odds, Per, Supply, Until, follow};
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train::{self, train};
-use crate::error::{CalibrateProblem, Problem};
+use crate::error::CalibrateProblem;
 use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings, compare};
 use crate::repetitions::{assert_rare, repetitions};
 use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches, Source, folds, synthetic};
 use crate::{strangers, teach, tune};
-use palpate_onboard::{Model, Stopping};
+use palpate_onboard::Stopping;
 use palpate_shared::format::Held;
 use std::sync::LazyLock;
 
@@ -139,7 +139,7 @@ fn calibrated(dataset: Dataset, per: Per, seed: u64) -> calibrate::Calibrated {
 fn promised<T>(calibrated: crate::error::Result<T>) -> Option<T> {
     calibrated
         .map_err(|error| match error.problem() {
-            Some(Problem::Calibrate(CalibrateProblem::NotKept { .. })) => {}
+            Some(CalibrateProblem::NotKept { .. }) => {}
             _ => panic!("{error}"),
         })
         .ok()

@@ -153,7 +153,7 @@ fn restated_models_keep_all_other_sections_and_can_lose_what_they_got() {
     assert_eq!(std::array::from_fn(|object| model.prior(object)), [-3, 0, -1, 0]);
     assert!(matches!(
         restate(&model, &Restated { odds: Some(u64::MAX), ..Restated::default() }).unwrap_err().problem(),
-        Some(palpate::error::Problem::Compile(palpate::error::CompileProblem::Model(ModelError::Field { offset: 48 })))
+        Some(palpate::error::CompileProblem::Model(ModelError::Field { offset: 48 }))
     ));
 }
 

@@ -10,7 +10,7 @@ use palpate::calibrate::{self, Calibrated};
 use palpate::capture;
 use palpate::compile::{self, Compiled, CompiledModel};
 use palpate::ensemble::{StatedProbe, train};
-use palpate::error::{Problem, ReportProblem, Result};
+use palpate::error::{CalibrateProblem, Result};
 use palpate::evaluate::parity::{self, Parity};
 use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, SequentialSettings};
 use palpate::mesh::Object;
@@ -20,6 +20,7 @@ use palpate::touches::folds::{self, Split};
 use palpate::touches::noise::Noise;
 use palpate::touches::{Dataset, Listing, ObjectTouches, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_report::error::ReportProblem;
 use palpate_report::play::{self, Contender, Expected};
 use palpate_report::results;
 use palpate_report::run_page::{RunResults, run_page};
@@ -420,7 +421,7 @@ fn calibrated(bytes: &[u8], split: &Split, job: &Job<'_>) -> Result<Result<Calib
     let kept = &mut *job.kept.borrow_mut();
     match calibrate::calibrate_fresh(&compile::open(bytes)?, job.objects, &origin, &terms, kept, job.progress) {
         Err(error) => match error.problem() {
-            Some(Problem::Calibrate(problem)) => Ok(Err(problem.to_string())),
+            Some(problem) => Ok(Err(CalibrateProblem::to_string(problem))),
             _ => Err(error),
         },
         Ok(calibrated) => Ok(Ok(calibrated)),
@@ -468,7 +469,7 @@ fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::error::{Error, Problem};
+    use palpate::error::Error;
     use palpate::mesh::Mesh;
 
     fn objects() -> Vec<Object> {
@@ -540,7 +541,7 @@ mod tests {
         // The same again may replace them, and gives the same models; anything else may not, and changes nothing.
         let model = std::fs::read(out.join("model.palpate")).unwrap();
         let error = run(&objects()[..2], &settings(300), &out, &()).unwrap_err();
-        assert!(matches!(error.problem(), Some(Problem::Report(ReportProblem::OtherResults { .. }))), "{error}");
+        assert!(matches!(error.problem::<ReportProblem>(), Some(ReportProblem::OtherResults { .. })), "{error}");
         let fewer = Settings { approaches: 900, ..settings(200) };
         let error = run(&objects(), &fewer, &out, &()).unwrap_err().to_string();
         assert!(error.contains("summary.json: ") && error.contains("touches was 300, and is 200 now"), "{error}");

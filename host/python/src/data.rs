@@ -182,19 +182,19 @@ impl DataSet {
         self.dataset.names()
     }
 
-    /// How many touches each object has, in the order of the names.
+    /// The number of touches of each object, in the order of the names.
     #[getter]
     fn counts(&self) -> Vec<usize> {
         self.dataset.objects.iter().map(|object| object.len()).collect()
     }
 
-    /// How many approaches each object took, where that is known.
+    /// The number of approaches to each object, where it is known.
     #[getter]
     fn approaches(&self) -> Option<Vec<u64>> {
         self.approaches.clone()
     }
 
-    /// Whether every approach is kept, also those that not all three fingers touched.
+    /// True if every approach is kept, also those in which not all three fingers touched.
     #[getter]
     fn holds_approaches(&self) -> bool {
         self.dataset.holds_approaches()
@@ -206,7 +206,7 @@ impl DataSet {
         self.dataset.probe().copied().map(Probe)
     }
 
-    /// What looked wrong when the data set was read, and may be meant.
+    /// Warnings from reading the data set; what they name may be intended.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.dataset.warnings.iter().map(ToString::to_string).collect()
@@ -232,7 +232,7 @@ impl DataSet {
         Ok(Output(made.bind(py).clone()))
     }
 
-    /// Which object each touch is of: its position in the names.
+    /// The object of each touch, as its position in the names.
     #[getter]
     fn objects<'py>(&self, py: Python<'py>) -> PyResult<Output<'py, i16, Ix1>> {
         let made = self.objects.get_or_try_init(py, || {
@@ -273,7 +273,7 @@ impl DataSet {
         Ok(self.poses(py)?.map(|[_, alignment]| Output(alignment.bind(py).clone())))
     }
 
-    /// What a descriptor turns each touch into, one row of whole numbers per touch (microseconds, and direction cosines times
+    /// The features of each touch under a descriptor, one row of whole numbers per touch (microseconds, and direction cosines times
     /// 32767), NaN where one is missing: for training with another library. The code is the chip's.
     #[pyo3(signature = (descriptor="curvature"))]
     fn features<'py>(&self, py: Python<'py>, descriptor: &str) -> Result<Output<'py, f32, Ix2>, Failure> {

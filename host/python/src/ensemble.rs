@@ -137,19 +137,19 @@ impl Ensemble {
         self.ensemble.inputs.names().into_iter().map(String::from).collect()
     }
 
-    /// Which features a touch is turned into; `None` for an ensemble over rows of features.
+    /// The descriptor that turns touches into features; `None` for an ensemble over rows of features.
     #[getter]
     fn descriptor(&self) -> Option<&'static str> {
         self.ensemble.descriptor().map(Descriptor::name)
     }
 
-    /// How many trees there are.
+    /// The number of trees.
     #[getter]
     fn trees(&self) -> usize {
         self.ensemble.trees.len()
     }
 
-    /// What to know about an ensemble that another library trained, each a sentence.
+    /// Caveats of an ensemble that another library trained, each a sentence.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.ensemble.origin.imported.as_ref().map(|imported| imported.notes.clone()).unwrap_or_default()
@@ -202,7 +202,7 @@ impl Ensemble {
 /// `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
 /// approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
 /// `background` is a data set of many other shapes, which stand for all that the model does not know.
-/// `different_leaves` grows trees for little flash: their leaves share at most this many lists of values. A new threshold has
+/// `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
 /// to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
 ///
 /// >>> import palpate

@@ -1,6 +1,6 @@
 //! Errors of the library as exceptions of `palpate._errors`, with the same text.
 
-use palpate::error::{Error, Place, Problem};
+use palpate::error::{Error, Place, Setting};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -43,7 +43,7 @@ fn exception(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
     };
     let name = match error {
         Error::Io { .. } => "FileError",
-        Error::At { problem: Problem::Setting { .. }, .. } => "SettingError",
+        error if error.problem::<Setting>().is_some() => "SettingError",
         Error::At { .. } => "InputError",
         _ => "PalpateError",
     };

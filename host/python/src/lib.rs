@@ -14,7 +14,7 @@ mod recognizer;
 mod surface;
 mod work;
 
-/// What is written in Rust of the package palpate.
+/// The part of the package palpate that is written in Rust.
 #[pyo3::pymodule(module = "palpate")]
 mod _native {
     #[pymodule_export]

@@ -163,12 +163,12 @@ impl Model {
         PyBytes::new(py, self.model().bytes())
     }
 
-    /// What a pickle holds.
+    /// The arguments that a pickle holds.
     fn __getnewargs__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyBytes>,) {
         (self.to_bytes(py),)
     }
 
-    /// How many bytes the model has.
+    /// The size of the model in bytes.
     #[getter]
     fn size(&self) -> usize {
         self.model().bytes().len()
@@ -189,31 +189,31 @@ impl Model {
         }
     }
 
-    /// Which features a touch is turned into; `None` for a model over rows of features.
+    /// The descriptor that turns touches into features; `None` for a model over rows of features.
     #[getter]
     fn descriptor(&self) -> Option<&'static str> {
         self.model().descriptor().map(Descriptor::name)
     }
 
-    /// How the trees are laid out.
+    /// The layout of the trees.
     #[getter]
     fn layout(&self) -> &'static str {
         self.model().layout().name()
     }
 
-    /// What leaves are stored as: "i8", "i16" or "f32".
+    /// The type of stored leaves: "i8", "i16" or "f32".
     #[getter]
     fn leaf(&self) -> &'static str {
         self.model().leaf_type().name()
     }
 
-    /// The farthest that a margin can be from the full model's, in nats.
+    /// The largest possible difference of a margin from the full model's, in nats.
     #[getter]
     fn margin_error(&self) -> f32 {
         self.model().margin_error()
     }
 
-    /// A number that names the model: two with the same are the same.
+    /// A number that identifies the model: models with the same number are the same.
     #[getter]
     fn checksum(&self) -> u32 {
         self.model().checksum()

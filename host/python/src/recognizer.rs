@@ -138,7 +138,7 @@ impl Recognizer {
         self.say(py, Ok(self.cell.borrow_dependent().verdict()))
     }
 
-    /// How many touches were counted since the last `reset`.
+    /// The number of touches counted since the last `reset`.
     #[getter]
     fn touches(&self) -> u32 {
         self.cell.borrow_dependent().touches()

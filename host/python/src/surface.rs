@@ -85,7 +85,7 @@ impl Surface {
         (low.to_array(), high.to_array())
     }
 
-    /// How many triangles there are.
+    /// The number of triangles.
     #[getter]
     fn triangles(&self) -> usize {
         self.scene.triangles().len()

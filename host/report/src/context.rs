@@ -151,7 +151,7 @@ impl<'a> Context<'a> {
 
     /// Stops the stage if the report was cancelled.
     pub(super) fn check(&self) -> Result<()> {
-        progress::check(self.progress)
+        Ok(progress::check(self.progress)?)
     }
 
     /// How the paper's method is trained.

@@ -11,7 +11,7 @@ use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf};
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train;
-use palpate::error::{CompileProblem, Error, Problem, Result};
+use palpate::error::{CompileProblem, Error, Result};
 use palpate::evaluate::{Candidate, Margins, parity};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
@@ -111,7 +111,7 @@ fn fitting(ensemble: &Ensemble, leaf: Leaf, layout: Option<compile::Layout>) -> 
 }
 
 fn is_unfit(error: &Error) -> bool {
-    matches!(error.problem(), Some(Problem::Compile(CompileProblem::DoesNotFit { .. })))
+    matches!(error.problem::<CompileProblem>(), Some(CompileProblem::DoesNotFit { .. }))
 }
 
 fn member(

@@ -7,8 +7,9 @@
 //!
 //! The result is written as an [`Ensemble`] of a single tree with one leaf per cell, so that it is evaluated like any other model.
 
+use crate::error::ReportProblem;
 use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, feature_row};
-use palpate::error::{ReportProblem, Result};
+use palpate::error::Result;
 use palpate::touches::Dataset;
 use palpate_shared::Descriptor;
 use rayon::prelude::*;

@@ -13,6 +13,7 @@ mod cost;
 mod cross_validation;
 mod density;
 pub mod design;
+pub mod error;
 mod generalization;
 mod growth;
 mod instructions;

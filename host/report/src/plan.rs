@@ -9,7 +9,7 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf, compile};
 use palpate::ensemble::train;
-use palpate::error::{Error, EvaluateProblem, Problem, Result};
+use palpate::error::{EvaluateProblem, Result};
 use palpate::evaluate::{
     self, Active, ApproachSequential, Candidate, Evaluation, Margins, Rule, SequentialSettings, Switched,
 };
@@ -106,7 +106,7 @@ pub(super) fn measure(context: &Context) -> Result<Plans> {
     }];
     for rolls in ROLLS {
         let planned = match evaluate::plan(&model, &fresh, rolls) {
-            Err(Error::At { problem: Problem::Evaluate(EvaluateProblem::FewInPose { .. }), .. }) => continue,
+            Err(error) if matches!(error.problem(), Some(EvaluateProblem::FewInPose { .. })) => continue,
             planned => planned?,
         };
         policies.push(Policy {

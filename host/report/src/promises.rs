@@ -11,7 +11,7 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::calibrate::{self, Odds, Per, Sequence, Supply, Terms, Until, choose, follow, margin_of, odds_of};
 use palpate::compile;
-use palpate::error::{Problem, Result};
+use palpate::error::{CalibrateProblem, Result};
 use palpate::probe::scene::Scene;
 use palpate::touches::Origin;
 use palpate_onboard::Model;
@@ -105,7 +105,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
         let terms = Terms { rate, confidence: CONFIDENCE, per };
         match choose(sequences, &names, strictest(), &terms) {
             Ok(chosen) => Ok(Some(chosen.odds)),
-            Err(error) if matches!(error.problem(), Some(Problem::Calibrate(_))) => Ok(None),
+            Err(error) if matches!(error.problem::<CalibrateProblem>(), Some(_)) => Ok(None),
             Err(error) => Err(error),
         }
     };

@@ -1,6 +1,7 @@
 //! Whose results a directory holds, so that a run never replaces another one's unasked.
 
-use palpate::error::{Error, Place, ReportProblem, Result};
+use crate::error::ReportProblem;
+use palpate::error::{Error, Place, Result};
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
@@ -80,7 +81,7 @@ mod tests {
         std::fs::write(place.join("model.palpate"), "").unwrap();
         let error = check(&own).unwrap_err();
         assert!(error.to_string().contains("model.palpate: "), "{error}");
-        assert!(matches!(error.problem(), Some(palpate::error::Problem::Report(ReportProblem::OtherResults { .. }))));
+        assert!(matches!(error.problem::<ReportProblem>(), Some(ReportProblem::OtherResults { .. })));
         std::fs::create_dir(place.join("data")).unwrap();
         check(&own).unwrap();
 

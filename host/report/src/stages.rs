@@ -7,11 +7,12 @@ use super::{
     approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
     published, recorded, results, sequential, simulator, strangers,
 };
+use crate::error::ReportProblem;
 use crate::page::document::{Page, Section};
 use palpate::capture;
 use palpate::compile;
 use palpate::ensemble::train;
-use palpate::error::{ReportProblem, Result};
+use palpate::error::Result;
 use palpate::mesh::{Object, source};
 use palpate::output::write_json;
 use palpate::progress::{self, Progress};
@@ -219,7 +220,7 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::error::Problem;
+
     use palpate::mesh::Mesh;
     use palpate::mesh::obj;
     use palpate::output::write_whole;
@@ -369,8 +370,8 @@ mod tests {
         let summary = place.path().join("summary.json");
         std::fs::write(&summary, json!({"made_from": {"job": "run"}}).to_string()).unwrap();
         let error = report(&settings, place.path(), Existing::default(), &()).unwrap_err();
-        let problem = error.problem();
-        assert!(matches!(problem, Some(Problem::Report(ReportProblem::OtherResults { .. }))), "{error}");
+        let problem = error.problem::<ReportProblem>();
+        assert!(matches!(problem, Some(ReportProblem::OtherResults { .. })), "{error}");
         assert!(error.to_string().contains("summary.json: "), "{error}");
         assert_eq!(std::fs::read_to_string(summary).unwrap(), json!({"made_from": {"job": "run"}}).to_string());
     }

@@ -8,7 +8,7 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::ensemble::train;
-use palpate::error::{Error, EvaluateProblem, Problem, Result};
+use palpate::error::{Error, EvaluateProblem, Result};
 use palpate::evaluate::{DETECTED_BY, Outcome};
 use palpate::mesh::builtin;
 use palpate::strangers::{LeftOut, Sets, Settings, captured, leave_one_out};
@@ -83,7 +83,7 @@ pub(super) fn measure(context: &Context) -> Result<Measured> {
             "the test of fit could not be calibrated so that at most 2 % of known objects are taken for unknown, from {} \
              touches of each object: {}",
             counts[1],
-            error.problem().map(ToString::to_string).unwrap_or_default()
+            error.problem::<EvaluateProblem>().map(ToString::to_string).unwrap_or_default()
         ))),
         Err(error) => Err(error),
     }
@@ -91,7 +91,7 @@ pub(super) fn measure(context: &Context) -> Result<Measured> {
 
 fn is_too_few(error: &Error) -> bool {
     use EvaluateProblem::{TooFewForAlarms, TooFewForFit};
-    matches!(error.problem(), Some(Problem::Evaluate(TooFewForAlarms { .. } | TooFewForFit { .. })))
+    matches!(error.problem::<EvaluateProblem>(), Some(TooFewForAlarms { .. } | TooFewForFit { .. }))
 }
 
 /// Touches of the shapes that a background column is trained on.

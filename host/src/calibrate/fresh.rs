@@ -4,7 +4,7 @@ use super::draw::{Supply, Until, follow};
 use super::model::{Calibrated, Settings, calibrate};
 use crate::capture;
 use crate::error::Result;
-use crate::evaluate::Candidate;
+use crate::evaluate::{Candidate, OfTouches};
 use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::Progress;

@@ -35,6 +35,7 @@
 mod ahead;
 mod choose;
 mod draw;
+mod error;
 mod fresh;
 mod model;
 mod sequence;
@@ -45,6 +46,7 @@ mod walk;
 
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
+pub use error::{CalibrateProblem, Supplied};
 pub use fresh::fresh;
 pub use fresh::{Fresh, calibrate_fresh};
 pub use model::{Calibrated, OfObject, Settings, Worse, added_bytes, calibrate};

@@ -8,7 +8,7 @@ use super::{Per, Tally, binomial_tail};
 use crate::compile::{self, Restated, restate};
 use crate::ensemble::StatedProbe;
 use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result, Supplied};
-use crate::evaluate::Candidate;
+use crate::evaluate::{Candidate, OfTouches};
 use crate::progress::Progress;
 use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
@@ -151,7 +151,7 @@ pub(super) fn worse(objects: &BTreeMap<String, OfObject>, rate: f64) -> Vec<Wors
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or the data set lacks an
 /// object; as [`Margins::new`](crate::evaluate::Margins::new) for touches that the model cannot use;
-/// [`Problem::Setting`](crate::error::Problem::Setting) for settings out of their ranges;
+/// [`Setting`](crate::error::Setting) for settings out of their ranges;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn calibrate(
     model: &Model<'_>,

@@ -1,7 +1,7 @@
 use super::*;
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train;
-use crate::error::{CalibrateProblem, Problem};
+use crate::error::CalibrateProblem;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
 use crate::random::{Purpose, generator};
 use crate::repetitions::{assert_rare, repetitions};
@@ -36,7 +36,7 @@ fn of_robots(mut dataset: Dataset, robots: usize) -> Dataset {
 
 fn problem<T>(result: crate::Result<T>) -> CalibrateProblem {
     match result.err().unwrap().problem() {
-        Some(Problem::Calibrate(problem)) => problem.clone(),
+        Some(problem) => CalibrateProblem::clone(problem),
         other => panic!("{other:?}"),
     }
 }

@@ -26,16 +26,18 @@
 //! ```
 
 mod admission;
+mod error;
 mod memory;
 mod pipeline;
 mod sample;
 mod store;
 
-use crate::error::{CaptureProblem, Error, Result};
+use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Entry, ObjectTouches, Origin};
+pub use error::CaptureProblem;
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
@@ -71,7 +73,7 @@ impl Settings {
     /// Refuses settings that make no capture.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) naming the field.
+    /// [`Setting`](crate::error::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
         if self.threads == Some(0) {
             return Err(Error::setting("threads", 0, "1 or more, or none for all that the machine has"));
@@ -168,7 +170,8 @@ pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> 
         }
         Scene::new(&instance.mesh, length).map_err(|error| match error {
             Error::At { problem, .. } => {
-                CaptureProblem::Object { name: object.name.clone(), problem: Box::new(problem) }.into()
+                let (detail, fix) = (problem.to_string(), problem.fix());
+                CaptureProblem::Object { name: object.name.clone(), detail, fix }.into()
             }
             other => other.in_file(&object.name),
         })
@@ -202,7 +205,7 @@ pub fn numbered(scenes: &[Scene]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Problem;
+
     use crate::mesh::Mesh;
     use crate::probe::approach::Probe;
     use crate::touches::{Dataset, Listing, Shard};
@@ -399,10 +402,7 @@ mod tests {
         let error = capture(objects, settings, directory, &()).unwrap_err();
         assert_eq!(error.exit_code(), 1);
         assert_eq!(read_files(directory), before, "what is there must stay");
-        match error {
-            Error::At { problem: Problem::Capture(problem), .. } => problem,
-            other => panic!("{other}"),
-        }
+        error.problem::<CaptureProblem>().unwrap_or_else(|| panic!("{error}")).clone()
     }
 
     fn globe_called(name: &str) -> Object {
@@ -676,9 +676,9 @@ mod tests {
         let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 10.0 };
         let origin = Origin { unit, probe, ..origin(50) };
         let mut object = Object::new("globe", Mesh::globe(12));
-        let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem().cloned();
+        let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem::<CaptureProblem>().cloned();
         let unknown = problem(scenes(&[&object], &origin, &()));
-        assert_eq!(unknown, Some(Problem::Capture(CaptureProblem::NoTrueSize { name: "globe".into() })));
+        assert_eq!(unknown, Some(CaptureProblem::NoTrueSize { name: "globe".into() }));
         // Meters: about two of them.
         object.millimeters = Some(1_000.0);
         let [low, high] = scenes(&[&object], &origin, &()).unwrap()[0][0].bounds();

@@ -11,6 +11,7 @@
 mod bad_line;
 mod connection;
 mod emulator;
+mod error;
 pub mod instructions;
 mod journal;
 mod port;
@@ -24,6 +25,7 @@ pub mod watch;
 pub use bad_line::{BadLine, Faults};
 pub use connection::{ChipModel, Connection, Received};
 pub use emulator::Emulator;
+pub use error::ChipProblem;
 pub use journal::{Entry, Journal};
 pub use port::Port;
 pub use record::{Heard, RecordSummary, record};

@@ -1,7 +1,7 @@
 //! What a chip's own fingers report, into a data set.
 
 use super::{ChipModel, Connection, Received, Transport};
-use crate::error::{ChipProblem, Error, Problem, Result};
+use crate::error::{ChipProblem, Error, Result};
 use crate::touches::Recording;
 use palpate_shared::Touch;
 use palpate_shared::link::{Event, FaultKind, Refusal, VerdictMessage};
@@ -222,5 +222,5 @@ fn is_closed(problem: &ChipProblem) -> bool {
 }
 
 fn is(error: &Error, which: impl FnOnce(&ChipProblem) -> bool) -> bool {
-    matches!(error.problem(), Some(Problem::Chip(problem)) if which(problem))
+    matches!(error.problem::<ChipProblem>(), Some(problem) if which(problem))
 }

@@ -1,197 +1,32 @@
 //! The full model: boosted trees in f32 as the trainer left them.
 //!
-//! [`train::train`] makes an [`Ensemble`] from a [`Dataset`](crate::touches::Dataset); [`Ensemble::save`] and
-//! [`Ensemble::load`] write and read it as XGBoost's JSON; [`import`] reads what other libraries trained on rows of
-//! features of any kind; [`compile`](crate::compile::compile) turns it into the bytes
-//! that the chip reads.
+//! [`train::train`] makes an [`Ensemble`] from a [`Dataset`](crate::touches::Dataset), and [`load`] reads one. Ensembles and
+//! their files are those of `palpate_trees`; what touches state of themselves is a [`TouchOrigin`] in their attributes.
 
-mod check;
-pub mod import;
-mod inputs;
-mod nodes;
+#[cfg(all(test, feature = "train"))]
+mod file_tests;
 mod origin;
 #[cfg(feature = "train")]
 pub mod train;
-mod xgboost;
 
-#[cfg(feature = "train")]
-pub(crate) use check::check_names;
-pub(crate) use check::{MAX_FEATURES, MAX_OBJECTS, check_leaf};
-pub use inputs::Inputs;
-pub use nodes::Threshold;
-pub use origin::{Imported, Origin, StatedProbe, Trained, compiled_trained_on};
+pub use origin::{StatedProbe, TouchOrigin, compiled_trained_on};
+pub use palpate_trees::ensemble::*;
 
-use palpate_shared::format::{Prediction, TrainedTouches};
-use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
-use std::borrow::Cow;
+use crate::error::Result;
+use std::path::Path;
 
-/// Boosted trees over features of touches or of rows, with one margin for each object.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ensemble {
-    /// What the features are.
-    pub inputs: Inputs,
-    /// The names of the objects (classes), or of the one output of a regression; a margin's position is its object's
-    /// position here.
-    pub objects: Vec<String>,
-    /// What every margin starts from, one for each object.
-    pub base_margins: Vec<f32>,
-    /// The trees, in the order in which their leaves are added.
-    pub trees: Vec<Tree>,
-    /// What is known about the touches that it was trained on; changes no margin.
-    pub origin: Origin,
+/// Reads an ensemble, over touches or over rows, and checks what it states of its touches.
+///
+/// # Errors
+/// As [`Ensemble::load`]; [`EnsembleProblem::Attribute`](crate::error::EnsembleProblem::Attribute) for statements that this
+/// crate did not write.
+pub fn load(path: impl AsRef<Path>) -> Result<Ensemble> {
+    let path = path.as_ref();
+    checked(path, Ensemble::load(path)?)
 }
 
-/// One tree; its root is node 0.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tree {
-    /// Splits and leaves.
-    pub nodes: Vec<Node>,
-    /// Which margins the tree adds to.
-    pub output: Output,
-}
-
-/// Which margins a tree adds to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Output {
-    /// A leaf has one value, for the object with this index.
-    One(usize),
-    /// A leaf has one value for each object.
-    Each,
-}
-
-/// A node of a tree.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Node {
-    /// Left if `feature < threshold` in f32; a missing value (NaN) follows `missing_left`.
-    Split {
-        /// Index of the feature.
-        feature: usize,
-        /// The threshold.
-        threshold: f32,
-        /// Where a missing value goes.
-        missing_left: bool,
-        /// Index of the left child.
-        left: usize,
-        /// Index of the right child.
-        right: usize,
-    },
-    /// What the tree adds: one value, or one for each object, as the tree's [`Output`] says.
-    Leaf(Vec<f32>),
-}
-
-impl Node {
-    /// A leaf's values.
-    pub fn leaf(&self) -> Option<&[f32]> {
-        match self {
-            Self::Leaf(values) => Some(values),
-            Self::Split { .. } => None,
-        }
-    }
-}
-
-impl Tree {
-    /// The leaf that `features` (NaN where missing) reach.
-    ///
-    /// # Panics
-    /// If a child's or a feature's index is out of range, which [`Ensemble::check`] rules out.
-    pub fn leaf(&self, features: &[f32]) -> &[f32] {
-        self.nodes[self.leaf_node(features)].leaf().unwrap_or_default()
-    }
-
-    /// The index of that leaf among the nodes.
-    pub(crate) fn leaf_node(&self, features: &[f32]) -> usize {
-        let mut index = 0;
-        while let Node::Split { feature, threshold, missing_left, left, right } = &self.nodes[index] {
-            let value = features[*feature];
-            let goes_left = if value.is_nan() { *missing_left } else { value < *threshold };
-            index = if goes_left { *left } else { *right };
-        }
-        index
-    }
-}
-
-impl Ensemble {
-    /// The margins of one row of features, in f32, leaves added in tree order to the base margins: the trainer's own
-    /// prediction, bit for bit; times the [scale](Prediction::scale) that an imported ensemble states.
-    ///
-    /// # Panics
-    /// If there are fewer features than the ensemble splits on, or it is one that [`Ensemble::check`] refuses.
-    pub fn margins_of_features(&self, features: &[f32]) -> Vec<f32> {
-        let known = self.known_features(features);
-        self.margins_of_leaves(|_, tree| tree.leaf(&known))
-    }
-
-    /// The margins where `leaf` says which leaf of a tree is reached, given its number too.
-    pub(crate) fn margins_of_leaves<'t>(&'t self, leaf: impl Fn(usize, &'t Tree) -> &'t [f32]) -> Vec<f32> {
-        let mut margins = self.base_margins.clone();
-        for (number, tree) in self.trees.iter().enumerate() {
-            let leaf = leaf(number, tree);
-            match tree.output {
-                Output::One(object) => margins[object] += leaf[0],
-                Output::Each => margins.iter_mut().zip(leaf).for_each(|(margin, value)| *margin += value),
-            }
-        }
-        let scale = self.prediction().scale;
-        if scale != 1.0 {
-            margins.iter_mut().for_each(|margin| *margin *= scale);
-        }
-        margins
-    }
-
-    /// The features with NaN for those that stand for a missing value.
-    pub(crate) fn known_features<'f>(&self, features: &'f [f32]) -> Cow<'f, [f32]> {
-        let Some([low, high]) = self.origin.imported.as_ref().and_then(|imported| imported.sentinel) else {
-            return Cow::Borrowed(features);
-        };
-        let known = |&value: &f32| if (low..=high).contains(&value) { f32::NAN } else { value };
-        features.iter().map(known).collect()
-    }
-
-    /// How margins become a class or a value.
-    pub fn prediction(&self) -> Prediction {
-        self.origin.imported.as_ref().map(|imported| imported.prediction).unwrap_or_default()
-    }
-
-    /// The threshold of a split as the file has it that the ensemble is from; `None` for a leaf, or a node that does not
-    /// exist.
-    pub fn threshold(&self, tree: usize, node: usize) -> Option<Threshold> {
-        let Node::Split { threshold, .. } = self.trees.get(tree)?.nodes.get(node)? else { return None };
-        let stated = self.origin.imported.as_ref().and_then(|imported| imported.thresholds.get(tree)?.get(node));
-        Some(stated.copied().unwrap_or(Threshold::below(f64::from(*threshold))))
-    }
-
-    /// The margins of a touch.
-    ///
-    /// # Panics
-    /// If the ensemble is not over features of touches, or one that [`Ensemble::check`] refuses.
-    pub fn margins(&self, touch: &Touch) -> Vec<f32> {
-        match self.inputs {
-            Inputs::Touches(descriptor) => self.margins_of_features(&feature_row(descriptor, touch)),
-            Inputs::Rows(_) => panic!("an ensemble over rows of features has no margins of a touch"),
-        }
-    }
-
-    /// The descriptor, if the ensemble is over features of touches.
-    pub fn descriptor(&self) -> Option<Descriptor> {
-        self.inputs.descriptor()
-    }
-
-    /// How many objects can be named: all but the background.
-    pub fn known_count(&self) -> usize {
-        self.objects.len() - usize::from(self.origin.background && !self.objects.is_empty())
-    }
-
-    /// The touches that are evidence: those that the ensemble states; full touches, with a pose if the descriptor needs
-    /// one, where it states none. Every model compiled from it takes the same.
-    pub fn trained_touches(&self) -> TrainedTouches {
-        let unstated = TrainedTouches::full(self.descriptor().is_some_and(Descriptor::needs_pose));
-        self.origin.trained.map_or(unstated, |trained| trained.touches)
-    }
-}
-
-/// The features of a touch as a trainer sees them: f32, NaN where missing. Exact, since features are whole numbers
-/// below 2²⁴.
-pub fn feature_row(descriptor: Descriptor, touch: &Touch) -> Vec<f32> {
-    let to_f32 = |&feature: &i32| if feature == MISSING_FEATURE { f32::NAN } else { feature as f32 };
-    descriptor.features(touch).as_slice().iter().map(to_f32).collect()
+/// An ensemble that was read from `path`, if what it states of its touches can be read.
+pub(crate) fn checked(path: &Path, ensemble: Ensemble) -> Result<Ensemble> {
+    TouchOrigin::of(&ensemble.origin).map_err(|problem| crate::Error::from(problem).in_file(path))?;
+    Ok(ensemble)
 }

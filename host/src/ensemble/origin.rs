@@ -1,55 +1,137 @@
 //! Where the touches that an ensemble was trained on came from.
 
-use super::nodes::Threshold;
-use crate::error::{ProbeProblem, Result};
+use super::{Origin, Trained};
+use crate::compile::{self, CompiledModel};
+use crate::error::{EnsembleProblem, ProbeProblem, Result};
 use crate::probe::approach::Probe;
 use crate::touches::noise::Noise;
 use crate::touches::{self, Captured, Dataset, short, tenth, unit};
-use palpate_shared::format::{
-    Counted, Length, PatternShares, Prediction, TrainedCapture, TrainedProbe, TrainedTouches,
-};
-use palpate_shared::{ContactPattern, Patterns};
+use palpate_shared::format::{Length, TrainedProbe};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What an ensemble says about its training touches. Empty for ensembles from elsewhere.
+/// What an ensemble over touches states of them: attributes of its [`Origin`], as JSON.
+///
+/// | attribute | content |
+/// |---|---|
+/// | `palpate_probe` | [`probe`](Self::probe), a JSON object |
+/// | `palpate_noise` | [`noise`](Self::noise), a JSON object |
+/// | `palpate_touches` | [`touches`](Self::touches), a JSON object of hexadecimal numbers |
+/// | `palpate_captured` | [`captured`](Self::captured), a JSON object |
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Origin {
+pub struct TouchOrigin {
     /// The probe that made them, where the data set states it.
     pub probe: Option<StatedProbe>,
-    /// Which touches they were, and so which ones are evidence.
-    pub trained: Option<Trained>,
     /// What was added to them in training; none also where that is not known.
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
     /// The capture that made them, where that is known.
     pub captured: Option<Captured>,
-    /// The last object is a background: many other shapes, which stand for all that the ensemble does not know. It is a
-    /// rival of the others, and never named.
-    pub background: bool,
-    /// The file of another library that it was read from, if it was.
-    pub imported: Option<Imported>,
 }
 
-/// What is known about an ensemble that another library trained.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Imported {
-    /// The library and the kind of file, such as "LightGBM text".
-    pub kind: String,
-    /// The farthest that a margin can be from the library's own, since leaves and sums are f32 here and f64 there; 0
-    /// where the library adds the same f32 values in the same order.
-    pub rounding: f64,
-    /// What a user should know about it, each a sentence.
-    pub notes: Vec<String>,
-    /// How margins become a class or a value, as the library's `predict` does it. Its scale makes the library's margins of
-    /// what the trees add up to.
-    pub prediction: Prediction,
-    /// The least and the largest of the numbers that stand for a missing value, beside NaN.
-    pub sentinel: Option<[f32; 2]>,
-    /// For each node of each tree the threshold as the file has it, of no meaning for leaves; empty where all are the
-    /// ensemble's own.
-    pub thresholds: Vec<Vec<Threshold>>,
+impl TouchOrigin {
+    const PROBE: &str = "palpate_probe";
+    const NOISE: &str = "palpate_noise";
+    const TOUCHES: &str = "palpate_touches";
+    const CAPTURED: &str = "palpate_captured";
+
+    /// What touches say about themselves, and the probe that they were made with.
+    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
+        Self { probe, touches: fingerprints(dataset), captured: Captured::of(dataset), noise: None }
+    }
+
+    /// What `origin` states.
+    ///
+    /// # Errors
+    /// [`EnsembleProblem::Attribute`] for an attribute that is not what this crate writes.
+    pub fn of(origin: &Origin) -> Result<Self, EnsembleProblem> {
+        let attributes = &origin.attributes;
+        let touches: Option<BTreeMap<String, String>> =
+            parsed(attributes, Self::TOUCHES, "a JSON object of hexadecimal numbers")?;
+        let number = |(object, text): (String, String)| match u64::from_str_radix(&text, 16) {
+            Ok(number) => Ok((object, number)),
+            Err(error) => Err(EnsembleProblem::Attribute {
+                name: Self::TOUCHES,
+                expected: "a JSON object of hexadecimal numbers",
+                detail: error.to_string(),
+            }),
+        };
+        Ok(Self {
+            probe: parsed(attributes, Self::PROBE, "a JSON object of radius, spacing, speed, tilt and length")?,
+            noise: parsed(attributes, Self::NOISE, "a JSON object of what was added to the touches in training")?,
+            touches: touches.into_iter().flatten().map(number).collect::<Result<_, _>>()?,
+            captured: parsed(attributes, Self::CAPTURED, "a JSON object of settings, samples and objects")?,
+        })
+    }
+
+    /// Makes `origin` state this.
+    pub fn state(&self, origin: &mut Origin) {
+        let hexadecimal = self.touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
+        let hexadecimal = Some(hexadecimal.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
+        // Numbers and strings are always JSON.
+        let statements = [
+            (Self::PROBE, self.probe.and_then(|probe| serde_json::to_string(&probe).ok())),
+            (Self::NOISE, self.noise.and_then(|noise| serde_json::to_string(&noise).ok())),
+            (Self::TOUCHES, hexadecimal.and_then(|touches| serde_json::to_string(&touches).ok())),
+            (Self::CAPTURED, self.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok())),
+        ];
+        for (name, statement) in statements {
+            match statement {
+                Some(text) => origin.attributes.insert(name.into(), text),
+                None => origin.attributes.remove(name),
+            };
+        }
+    }
+
+    /// The same as [`state`](Self::state), of an ensemble that states nothing else but which touches are evidence.
+    pub fn origin(&self, trained: Option<Trained>) -> Origin {
+        let mut origin = Origin { trained, ..Origin::default() };
+        self.state(&mut origin);
+        origin
+    }
+
+    /// What a compiled model of these objects states.
+    pub fn stated(&self, objects: &[String]) -> compile::Stated {
+        // Where nothing is known, the published probe.
+        let probe = self.probe.map_or_else(Probe::default, |stated| stated.probe);
+        compile::Stated {
+            spacing: probe.spacing as f32,
+            speed: probe.speed as f32,
+            probe: self.probe.map(|stated| stated.trained()),
+            noise: self.noise.map(|noise| noise.trained()),
+            capture: self.section(objects),
+        }
+    }
+
+    /// The content of the section that says which touches they were, for a model of these objects; none where nothing is known.
+    fn section(&self, objects: &[String]) -> Option<Vec<u8>> {
+        let captured = self.captured.as_ref();
+        let stated = |name: &String| {
+            let captured = captured.and_then(|captured| captured.stated_of(name));
+            captured.or_else(|| self.touches.get(name).map(|&fingerprint| short(fingerprint))).unwrap_or_default()
+        };
+        let stated: Vec<u16> = objects.iter().map(stated).collect();
+        let (settings, samples) = captured.map_or((0, 0..u32::MAX), Captured::stated);
+        let is_known = stated.iter().any(|&object| object != 0);
+        is_known.then(|| {
+            let head = palpate_shared::format::TrainedCapture::head(settings, samples).into_iter();
+            head.chain(stated.iter().flat_map(|object| object.to_le_bytes())).collect()
+        })
+    }
+
+    /// The objects whose touches in `dataset` are of the capture that made those of the training, or begin like those: the
+    /// same touches, or more or fewer of them. What becomes of them elsewhere, such as noise, does not count. A part of a data
+    /// set that was trained on counts as the whole.
+    pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
+        let own = fingerprints(dataset);
+        let captured = self.captured.as_ref().zip(Captured::of(dataset));
+        let shared: Vec<String> = captured
+            .map_or_else(Vec::new, |(trained, tested)| trained.shared(&tested).into_iter().map(String::from).collect());
+        let begins = |name: &&str| own.get(*name).is_some_and(|own| self.touches.get(*name) == Some(own));
+        let same = |name: &&str| begins(name) || shared.iter().any(|shared| shared == name);
+        dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
+    }
 }
 
 /// The probe that a data set was made with, and the size of its objects.
@@ -122,113 +204,16 @@ impl From<&touches::Origin> for StatedProbe {
     }
 }
 
-/// The touches that an ensemble was trained on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stated", into = "Stated")]
-pub struct Trained {
-    /// Patterns, the largest spread, and whether a pose is needed: what is evidence to every model made of the ensemble.
-    pub touches: TrainedTouches,
-    /// The share of each contact pattern among all approaches, in the order of the patterns' codes, each object weighted
-    /// equally; `None` if the data set holds no approaches.
-    pub shares: Option<[f64; 6]>,
-}
-
-impl Trained {
-    /// What the chip's model states of [`Trained::shares`].
-    pub fn pattern_shares(&self) -> Option<PatternShares> {
-        // `as` saturates.
-        self.shares.map(|shares| PatternShares(shares.map(|share| (share * 65_535.0).round() as u16)))
-    }
-}
-
-/// [`Trained`] in files.
-#[derive(Serialize, Deserialize)]
-struct Stated {
-    counted: String,
-    patterns: Vec<String>,
-    needs_pose: bool,
-    largest_spread: u32,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    shares: Option<[f64; 6]>,
-}
-
-impl From<Trained> for Stated {
-    fn from(Trained { touches, shares }: Trained) -> Self {
-        Self {
-            counted: touches.counted.name().into(),
-            patterns: touches.patterns.iter().map(|pattern| pattern.name().into()).collect(),
-            needs_pose: touches.needs_pose,
-            largest_spread: touches.largest_spread,
-            shares,
-        }
-    }
-}
-
-impl TryFrom<Stated> for Trained {
-    type Error = String;
-
-    fn try_from(stated: Stated) -> Result<Self, String> {
-        let counted = Counted::ALL.iter().copied().find(|counted| counted.name() == stated.counted);
-        let counted = counted.ok_or_else(|| format!("{:?} is not full, contacts or all", stated.counted))?;
-        let pattern = |name: &String| {
-            let pattern = ContactPattern::ALL.into_iter().find(|pattern| pattern.name() == name);
-            pattern.filter(|pattern| counted.patterns().contains(*pattern)).ok_or_else(|| format!("pattern {name:?}"))
-        };
-        let patterns = stated.patterns.iter().map(pattern).collect::<Result<Patterns, _>>()?;
-        if patterns.is_empty() {
-            return Err("no pattern".into());
-        }
-        if let Some(share) = stated.shares.into_iter().flatten().find(|share| !(0.0..=1.0).contains(share)) {
-            return Err(format!("the share {share}"));
-        }
-        let Stated { needs_pose, largest_spread, shares, .. } = stated;
-        Ok(Self { touches: TrainedTouches { patterns, counted, needs_pose, largest_spread }, shares })
-    }
-}
-
 /// A fingerprint is made of this many touches at most.
 const FINGERPRINTED: usize = 16;
 
-impl Origin {
-    /// The content of the section that says which touches they were, for a model of these objects; none where nothing is known.
-    pub(crate) fn section(&self, objects: &[String]) -> Option<Vec<u8>> {
-        let captured = self.captured.as_ref();
-        let stated = |name: &String| {
-            let captured = captured.and_then(|captured| captured.stated_of(name));
-            captured.or_else(|| self.touches.get(name).map(|&fingerprint| short(fingerprint))).unwrap_or_default()
-        };
-        let stated: Vec<u16> = objects.iter().map(stated).collect();
-        let (settings, samples) = captured.map_or((0, 0..u32::MAX), Captured::stated);
-        let is_known = stated.iter().any(|&object| object != 0);
-        is_known.then(|| {
-            let head = TrainedCapture::head(settings, samples).into_iter();
-            head.chain(stated.iter().flat_map(|object| object.to_le_bytes())).collect()
-        })
-    }
-
-    /// What touches say about themselves, the probe that they were made with, and which of them were trained on.
-    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>, trained: Option<Trained>) -> Self {
-        Self { probe, trained, touches: fingerprints(dataset), captured: Captured::of(dataset), ..Self::default() }
-    }
-
-    /// The objects whose touches in `dataset` are of the capture that made those of the training, or begin like those: the
-    /// same touches, or more or fewer of them. What becomes of them elsewhere, such as noise, does not count. A part of a data
-    /// set that was trained on counts as the whole.
-    pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
-        let own = fingerprints(dataset);
-        let captured = self.captured.as_ref().zip(Captured::of(dataset));
-        let shared: Vec<String> = captured
-            .map_or_else(Vec::new, |(trained, tested)| trained.shared(&tested).into_iter().map(String::from).collect());
-        let begins = |name: &&str| own.get(*name).is_some_and(|own| self.touches.get(*name) == Some(own));
-        let same = |name: &&str| begins(name) || shared.iter().any(|shared| shared == name);
-        dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
-    }
-}
-
-/// The same for a compiled model of the objects `names`, as far as it states its training touches.
-pub fn compiled_trained_on<'d>(stated: &TrainedCapture<'_>, names: &[String], dataset: &'d Dataset) -> Vec<&'d str> {
+/// The objects whose touches in `dataset` a compiled model was trained on, as far as it states that: what it does on them
+/// says nothing about others. Of other touches, one object in 65,536 is taken for one of these.
+pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -> Vec<&'d str> {
+    let (model, names) = (compiled.model(), compiled.names());
+    let Some(stated) = model.trained_capture() else { return Vec::new() };
     let captured = Captured::of(dataset);
-    let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(stated));
+    let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(&stated));
     // A capture of another seed has other touches; what is not captured is told by its first touches.
     let fingerprints = if captured.is_none() || stated.settings == 0 { fingerprints(dataset) } else { BTreeMap::new() };
     let same = |name: &&str| {
@@ -238,6 +223,17 @@ pub fn compiled_trained_on<'d>(stated: &TrainedCapture<'_>, names: &[String], da
         object.is_some() && (is_captured || begins == object)
     };
     dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
+}
+
+/// An attribute, read as JSON.
+fn parsed<T: for<'t> Deserialize<'t>>(
+    attributes: &BTreeMap<String, String>,
+    name: &'static str,
+    expected: &'static str,
+) -> Result<Option<T>, EnsembleProblem> {
+    let Some(text) = attributes.get(name) else { return Ok(None) };
+    let refused = |error: serde_json::Error| EnsembleProblem::Attribute { name, expected, detail: error.to_string() };
+    serde_json::from_str(text).map(Some).map_err(refused)
 }
 
 /// A CRC-64 (XZ) of the contact times of each object's first touches.
@@ -261,10 +257,10 @@ mod tests {
     #[test]
     fn training_touches_are_known_again_and_others_are_not() {
         let trained = synthetic::dataset(&[100, 100, 100], 1);
-        let origin = Origin::new(&trained, None, None);
+        let origin = TouchOrigin::new(&trained, None);
         assert_eq!(origin.trained_on(&trained), ["object0", "object1", "object2"]);
         assert_eq!(origin.trained_on(&synthetic::dataset(&[30, 400, 100], 1)).len(), 3, "of the same capture");
         assert!(origin.trained_on(&synthetic::dataset(&[100, 100, 100], 2)).is_empty());
-        assert!(Origin::default().trained_on(&trained).is_empty());
+        assert!(TouchOrigin::default().trained_on(&trained).is_empty());
     }
 }

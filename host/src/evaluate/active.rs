@@ -1,6 +1,7 @@
 //! Approaches where the model's plan says.
 
-use super::margins::{Candidate, Margins, Tested, Values, row};
+use super::Candidate;
+use super::margins::{Margins, Tested, Values, row};
 use super::poses::{ByPose, Stock};
 use super::sequential::Outcome;
 use crate::error::{EvaluateProblem, Result};

@@ -1,7 +1,7 @@
 //! Counted in approaches, which is what a robot pays for.
 
+use super::Estimate;
 use super::draws::Draws;
-use super::estimate::Estimate;
 use super::margins::Margins;
 use super::sequential::{Outcome, SequentialSettings, Stated};
 use crate::error::{Error, Result};
@@ -86,7 +86,7 @@ impl Margins<'_> {
     /// itself, over as many sequences.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting): `at` if an object has fewer approaches or a number is 0, and
+    /// [`Setting`](crate::error::Setting): `at` if an object has fewer approaches or a number is 0, and
     /// as [`Margins::sequential`].
     pub fn approaches(&self, at: &[usize], settings: &SequentialSettings) -> Result<Approaches> {
         let stopping = self.stopping(settings)?;

@@ -8,7 +8,7 @@
 //! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
 //! recorded ones, and how many more approaches it takes there to be right as often as on simulated ones.
 
-use super::estimate::Estimate;
+use super::Estimate;
 use super::{Candidate, Margins, SequentialSettings};
 use crate::ensemble::{feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};
@@ -406,7 +406,7 @@ fn needed(accuracy: &BTreeMap<usize, Estimate>, wanted: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Problem;
+
     use crate::touches::noise::Noise;
     use crate::touches::synthetic;
 
@@ -449,7 +449,7 @@ mod tests {
     fn what_cannot_be_compared_is_refused_with_the_reason() {
         let dataset = synthetic::dataset(&[300, 300], 1);
         let refused = |one: &Dataset, other: &Dataset| match compare(one, other, &quick(), &()).unwrap_err().problem() {
-            Some(Problem::Evaluate(EvaluateProblem::Incomparable { detail })) => detail.clone(),
+            Some(EvaluateProblem::Incomparable { detail }) => detail.clone(),
             other => panic!("{other:?}"),
         };
         let mut other = dataset.clone();

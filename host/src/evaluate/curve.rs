@@ -1,7 +1,8 @@
 //! Accuracy after a fixed number of touches.
 
-use super::estimate::Estimate;
-use super::margins::{Candidate, Margins, rivals};
+use super::Candidate;
+use super::Estimate;
+use super::margins::{Margins, rivals};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -26,7 +27,7 @@ impl Margins<'_> {
     /// Accuracy after 1 to `most` touches, over `groups` groups drawn for each object. With a `most` of 0 it is empty.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting): `groups` if there are none, `at` if an object has fewer
+    /// [`Setting`](crate::error::Setting): `groups` if there are none, `at` if an object has fewer
     /// touches.
     pub fn curve(&self, most: usize, groups: usize, seed: u64) -> Result<Curve> {
         if most > 0 || groups == 0 {

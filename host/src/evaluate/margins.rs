@@ -1,25 +1,16 @@
 //! A model's margins for every test touch, computed once.
 
+use super::Candidate;
 use super::together::margins_of_touches;
-use crate::compile;
-use crate::ensemble::{Ensemble, StatedProbe, feature_row};
+use crate::ensemble::{StatedProbe, TouchOrigin, feature_row};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping};
-use palpate_shared::format::{TrainedProbe, TrainedTouches};
+use palpate_shared::format::TrainedProbe;
 use palpate_shared::{Descriptor, Touch};
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// A model that can be evaluated.
-#[derive(Clone, Copy, Debug)]
-pub enum Candidate<'m> {
-    /// The full model: f32 margins.
-    Full(&'m Ensemble),
-    /// A compiled model, evaluated by the onboard crate.
-    Compiled(&'m Model<'m>),
-}
 
 /// A model's margins for every touch of a data set.
 pub struct Margins<'m> {
@@ -75,64 +66,37 @@ pub(super) enum Values<'m> {
     Compiled(&'m Model<'m>, Vec<i32>),
 }
 
-impl Candidate<'_> {
-    /// Whether the model is over touches; otherwise it is over rows of features.
-    pub fn is_of_touches(&self) -> bool {
-        self.descriptor().is_some()
-    }
-
-    fn descriptor(&self) -> Option<Descriptor> {
-        match self {
-            Self::Full(ensemble) => ensemble.descriptor(),
-            Self::Compiled(model) => model.descriptor(),
-        }
-    }
-
-    fn trained_touches(&self) -> TrainedTouches {
-        match self {
-            Self::Full(ensemble) => ensemble.trained_touches(),
-            Self::Compiled(model) => model.trained_touches(),
-        }
-    }
-
+/// A [`Candidate`] and touches.
+pub(crate) trait OfTouches {
     /// The probe that the model states, if it states one.
-    pub fn probe(&self) -> Option<TrainedProbe> {
-        match self {
-            Self::Full(ensemble) => ensemble.origin.probe.as_ref().map(StatedProbe::trained),
-            Self::Compiled(model) => model.probe(),
-        }
-    }
-
-    /// How many objects can be named: all but a background.
-    pub(super) fn known_count(&self) -> usize {
-        match self {
-            Self::Full(ensemble) => ensemble.known_count(),
-            Self::Compiled(model) => model.known_count(),
-        }
-    }
-
-    fn objects(&self) -> Vec<String> {
-        match self {
-            Self::Full(ensemble) => ensemble.objects.clone(),
-            Self::Compiled(model) => compile::names(model),
-        }
-    }
-
+    fn probe(&self) -> Result<Option<TrainedProbe>>;
     /// The descriptor, if the data set's touches can be evidence; see [`Margins::new`].
+    fn takes(&self, dataset: &Dataset) -> Result<Descriptor>;
+    /// The same, and for each object of a data set its index in the model.
+    fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)>;
+}
+
+impl OfTouches for Candidate<'_> {
+    fn probe(&self) -> Result<Option<TrainedProbe>> {
+        Ok(match self {
+            Self::Full(ensemble) => TouchOrigin::of(&ensemble.origin)?.probe.as_ref().map(StatedProbe::trained),
+            Self::Compiled(model) => model.probe(),
+        })
+    }
+
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor> {
         let descriptor = self.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
         let mut touches = dataset.touches();
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
             return Err(EvaluateProblem::NoPose { descriptor }.into());
         }
-        if let Some((model, data)) = self.probe().zip(StatedProbe::of(dataset)) {
+        if let Some((model, data)) = self.probe()?.zip(StatedProbe::of(dataset)) {
             StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
         }
         Ok(descriptor)
     }
 
-    /// The same, and for each object of a data set its index in the model.
-    pub(crate) fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
+    fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
         let descriptor = self.takes(dataset)?;
         let mut known = self.objects();
         known.truncate(self.known_count());
@@ -212,7 +176,7 @@ impl<'m> Margins<'m> {
     /// they cannot be recognized, and are not tested.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) `prior` unless there is a weight for each object, and one of
+    /// [`Setting`](crate::error::Setting) `prior` unless there is a weight for each object, and one of
     /// a tested object is above 0.
     pub fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
         let objects = self.objects.len();

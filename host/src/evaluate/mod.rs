@@ -40,42 +40,39 @@ pub mod compare;
 mod cost_of_noise;
 mod curve;
 mod draws;
-mod estimate;
+mod error;
 mod full;
-mod isolated;
 mod margins;
 pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
 mod poses;
-pub mod predict;
 mod promise;
-mod reference;
-mod rows;
 mod sequential;
 mod strangers;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
-pub mod together;
 mod under_plan;
-pub mod verify;
 
 pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
-pub use estimate::Estimate;
+pub use error::EvaluateProblem;
+pub use margins::Margins;
+pub(crate) use margins::OfTouches;
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
-pub use margins::{Candidate, Margins};
 pub use noisy::{ROBOTS, add_noise};
+pub use palpate_trees::verify::{
+    self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict, together,
+};
 pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
 pub use poses::{ByPose, Stock};
 pub use promise::{Finding, PromiseCheck, by_theory};
-pub use rows::{Classes, Regression, RowsEvaluation, evaluate_rows};
 pub use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};
@@ -173,7 +170,7 @@ pub struct Evaluation {
 /// Evaluates a model on test touches.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting): `at` if a number of touches is 0 or more than an object has,
+/// [`Setting`](crate::error::Setting): `at` if a number of touches is 0 or more than an object has,
 /// `groups` if there are none, `error_rate` and `max_touches` if they are out of their ranges.
 pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation> {
     let most = settings.at.iter().copied().max().unwrap_or(0);

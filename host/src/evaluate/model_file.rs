@@ -1,7 +1,7 @@
 //! A model on disk: compiled, or still an ensemble.
 
 use crate::compile::CompiledModel;
-use crate::ensemble::{Ensemble, import};
+use crate::ensemble::{self, Ensemble, TouchOrigin, compiled_trained_on, import};
 use crate::error::{Error, Result};
 use crate::evaluate::Candidate;
 use crate::touches::Dataset;
@@ -26,16 +26,19 @@ impl ModelFile {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
         if bytes.starts_with(&MAGIC) {
-            return CompiledModel::from_file(path, bytes).map(Self::Compiled);
+            return Ok(Self::Compiled(CompiledModel::from_file(path, bytes)?));
         }
-        import::read(path, &bytes, None).map(|ensemble| Self::Full(Box::new(ensemble)))
+        let ensemble = ensemble::checked(path, import::read(path, &bytes, None)?)?;
+        Ok(Self::Full(Box::new(ensemble)))
     }
 
     /// The objects whose touches in `dataset` the model was trained on, as far as it states that.
     pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
         match self {
-            Self::Full(ensemble) => ensemble.origin.trained_on(dataset),
-            Self::Compiled(compiled) => compiled.trained_on(dataset),
+            Self::Full(ensemble) => {
+                TouchOrigin::of(&ensemble.origin).map_or_else(|_| Vec::new(), |origin| origin.trained_on(dataset))
+            }
+            Self::Compiled(compiled) => compiled_trained_on(compiled, dataset),
         }
     }
 

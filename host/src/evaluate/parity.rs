@@ -222,7 +222,7 @@ mod tests {
     use super::*;
     use crate::compile::{self, compile};
     use crate::ensemble::train::{self, train};
-    use crate::error::Problem;
+
     use crate::touches::synthetic;
 
     fn ensemble() -> Ensemble {
@@ -232,7 +232,7 @@ mod tests {
 
     fn problem<T>(result: Result<T>) -> EvaluateProblem {
         match result.err().unwrap().problem() {
-            Some(Problem::Evaluate(problem)) => problem.clone(),
+            Some(problem) => EvaluateProblem::clone(problem),
             other => panic!("{other:?}"),
         }
     }

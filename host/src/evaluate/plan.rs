@@ -1,6 +1,7 @@
 //! A plan of approaches for a model: how well each pose of the probe tells each two objects apart.
 
-use super::margins::{Candidate, Margins, Values, row};
+use super::Candidate;
+use super::margins::{Margins, Values, row};
 use super::poses::ByPose;
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
@@ -52,7 +53,7 @@ pub struct Hardest {
 /// the model counts as evidence of 0.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) `rolls`; as [`Margins::new`]; [`EvaluateProblem`] if the model has
+/// [`Setting`](crate::error::Setting) `rolls`; as [`Margins::new`]; [`EvaluateProblem`] if the model has
 /// fewer than two objects, if the data set has no approaches, none of one of the objects, none with a pose, or too few in
 /// a pose.
 pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> {
@@ -180,7 +181,7 @@ mod tests {
     use super::*;
     use crate::compile::compile;
     use crate::ensemble::{Ensemble, Node, Origin, Output, Tree};
-    use crate::error::Problem;
+
     use crate::touches::{self, ObjectTouches};
     use palpate_onboard::{Recognizer, Stopping};
     use palpate_shared::{ContactTime, Descriptor, Touch};
@@ -323,7 +324,7 @@ mod tests {
             plan(&model, &dataset, rolls).map(|_| ()).unwrap_err()
         };
         let problem = |error: Error| match error.problem() {
-            Some(Problem::Evaluate(problem)) => problem.clone(),
+            Some(problem) => EvaluateProblem::clone(problem),
             _ => panic!("{error}"),
         };
         assert!(plan(&model, &good, 1).is_ok());

@@ -1,7 +1,8 @@
 //! Whether a model keeps what it promises.
 
-use super::estimate::Estimate;
-use super::margins::{Candidate, Margins};
+use super::Candidate;
+use super::Estimate;
+use super::margins::Margins;
 use super::sequential::Outcome;
 use crate::touches::noise::Noise;
 use palpate_onboard::{Model, Stopping};

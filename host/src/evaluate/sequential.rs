@@ -1,8 +1,9 @@
 //! Touching until sure.
 
-use super::estimate::Estimate;
+use super::Candidate;
+use super::Estimate;
 use super::full::FullRecognizer;
-use super::margins::{Candidate, Margins, Values, row};
+use super::margins::{Margins, Values, row};
 use super::{ERROR_RATE, MAX_TOUCHES};
 use crate::compile;
 use crate::error::{Error, Result};
@@ -93,7 +94,7 @@ impl Margins<'_> {
     /// Pushes random sequences of each object's touches into a recognizer until it stops.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) if there are no sequences, or the error rate or the limit of
+    /// [`Setting`](crate::error::Setting) if there are no sequences, or the error rate or the limit of
     /// touches is out of its range.
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
         let SequentialSettings { sequences, seed, .. } = *settings;
@@ -198,7 +199,7 @@ impl Margins<'_> {
             (None, Candidate::Compiled(model)) if max_touches > 0 => {
                 Ok(Stopping::from_model(model).with_max_touches(max_touches))
             }
-            (error_rate, _) => compile::stopping(error_rate.unwrap_or(ERROR_RATE), max_touches),
+            (error_rate, _) => Ok(compile::stopping(error_rate.unwrap_or(ERROR_RATE), max_touches)?),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Objects that a model does not know.
 
-use super::margins::{Candidate, Margins};
+use super::Candidate;
+use super::margins::Margins;
 use super::sequential::{Outcome, Sequential, SequentialSettings};
 use crate::error::Result;
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! What happens when the object is exchanged while it is being touched, and what forgetting does about it.
 
-use super::estimate::Estimate;
+use super::Estimate;
 use super::margins::{Margins, Values, row};
 use super::sequential::{Outcome, SequentialSettings, until_sure};
 use crate::error::{Error, EvaluateProblem, Result};
@@ -61,7 +61,7 @@ impl Margins<'_> {
     /// [`Forgetting`] at `nats`.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) as [`Margins::sequential`], and `switch` if `nats` is not above
+    /// [`Setting`](crate::error::Setting) as [`Margins::sequential`], and `switch` if `nats` is not above
     /// 0; [`EvaluateProblem::NotCompiled`] for an ensemble, [`EvaluateProblem::NothingToSwitch`] for a data set of one
     /// object.
     pub fn switched(&self, settings: &SequentialSettings, nats: f32) -> Result<Switched> {

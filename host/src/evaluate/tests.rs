@@ -2,7 +2,7 @@ use super::*;
 use crate::compile::{self, Leaf, compile};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train;
-use crate::error::Problem;
+use crate::error::Setting;
 use crate::touches::Dataset;
 use crate::touches::synthetic;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -217,7 +217,7 @@ fn what_cannot_be_evaluated_says_so() {
     ] {
         let error = evaluate(&margins, &settings).unwrap_err();
         assert!(error.exit_code() == 2 && error.to_string().contains(expected), "{error}");
-        assert!(matches!(error.problem(), Some(Problem::Setting { .. })), "{error:?}");
+        assert!(matches!(error.problem::<Setting>(), Some(Setting { .. })), "{error:?}");
     }
     let unknown = synthetic::dataset(&[9, 9, 9, 9], 1);
     let error = Margins::new(Candidate::Full(&ensemble), &unknown).err().unwrap();

@@ -1,7 +1,7 @@
 //! The figures of an evaluation under a model's plan.
 
+use super::Estimate;
 use super::active::Active;
-use super::estimate::Estimate;
 use super::margins::Margins;
 use super::sequential::Outcome;
 use super::{Evaluation, Settings};
@@ -24,7 +24,7 @@ struct Counts {
 /// drawn at random. Touches, too, are those of such approaches.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) as [`evaluate`](super::evaluate()).
+/// [`Setting`](crate::error::Setting) as [`evaluate`](super::evaluate()).
 pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
     let Settings { at, at_approaches, groups, seed, .. } = settings;
     let rule = margins.stopping(&settings.sequences())?;

@@ -38,6 +38,7 @@ pub mod builtin;
 #[path = "no_builtin.rs"]
 mod builtin;
 mod collada;
+mod error;
 mod exact;
 pub mod facts;
 pub mod file;
@@ -53,6 +54,7 @@ mod stl;
 mod triangles;
 mod words;
 
+pub use error::MeshProblem;
 pub use triangles::Mesh;
 
 /// The name of the object of many different shapes, and of a model's background column.

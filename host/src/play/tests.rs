@@ -2,7 +2,7 @@ use super::*;
 use crate::capture;
 use crate::compile::{self, compile};
 use crate::ensemble::{self, Ensemble, Node, Output, Tree};
-use crate::error::Problem;
+
 use palpate_shared::Descriptor;
 
 /// A nat or less for the disc where the surface is flat, for the globe where it is bent; of full touches.
@@ -138,5 +138,5 @@ fn what_cannot_be_played_with_is_refused() {
     };
     let rows = compile(&rows, &compile::Settings::default()).unwrap().bytes;
     let error = Game::new(&Origin::default()).add_model(compile::open(&rows).unwrap()).unwrap_err();
-    assert!(matches!(error.problem(), Some(Problem::Evaluate(EvaluateProblem::RawFeatures))), "{error}");
+    assert!(matches!(error.problem::<EvaluateProblem>(), Some(EvaluateProblem::RawFeatures)), "{error}");
 }

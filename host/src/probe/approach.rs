@@ -41,7 +41,7 @@ impl Probe {
     /// microseconds on an object whose bounding box's longest side is `length` units.
     ///
     /// # Errors
-    /// A [`Problem::Setting`](crate::error::Problem::Setting) that names the field, or `length`.
+    /// A [`Setting`](crate::error::Setting) that names the field, or `length`.
     pub fn check(&self, length: f64) -> Result<()> {
         let positive = [("length", length), ("radius", self.radius), ("speed", self.speed)];
         for (name, value) in positive {

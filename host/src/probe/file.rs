@@ -23,7 +23,7 @@
 //! Radius, spacing, speed and unit are what a data set and a model state and what is compared. What the real probe adds
 //! is not compared: it is added to touches by a capture with this file or else in training and testing, and never twice.
 
-use crate::error::{Error, Place, ProbeProblem, Result, TouchesProblem};
+use crate::error::{Error, Place, ProbeProblem, Problem, Result, TouchesProblem};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::touches::noise::{Deviation, Noise, quantity};
 use palpate_shared::format::Length;
@@ -86,7 +86,7 @@ impl ProbeFile {
     ///
     /// # Errors
     /// If it cannot be read; with file and line [`ProbeProblem::BadFile`] if it is not TOML, lacks a measure or has what
-    /// a probe does not; with the file [`Problem::Setting`](crate::error::Problem::Setting) if a number is out of its
+    /// a probe does not; with the file [`Setting`](crate::error::Setting) if a number is out of its
     /// range.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();

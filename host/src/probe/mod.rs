@@ -37,11 +37,13 @@
 
 pub mod approach;
 pub mod cast;
+mod error;
 pub mod file;
 pub mod scene;
 pub mod sweep;
 
 pub use approach::{Aim, Approach, Probe};
+pub use error::ProbeProblem;
 pub use scene::Scene;
 
 /// The vectors in this room's signatures: [`DVec3`](glam::DVec3) for positions and directions, in units.

@@ -36,8 +36,8 @@ pub use shapes::captured;
 use crate::calibrate::{allowed, needed};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
-use crate::evaluate::Candidate;
 use crate::evaluate::together::margins_of_touches;
+use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
 use fit::Moments;
 use follow::{Policy, Sequence};
@@ -133,7 +133,7 @@ impl Supply {
 /// this test and does not hold with it: the model states it no more. [`calibrate_with_promise`] finds both.
 ///
 /// # Errors
-/// [`EvaluateProblem`] as for an evaluation, and for too few touches; [`Problem::Setting`](crate::error::Problem::Setting)
+/// [`EvaluateProblem`] as for an evaluation, and for too few touches; [`Setting`](crate::error::Setting)
 /// for shares that are none.
 pub fn calibrate(
     model: &Model<'_>,
@@ -196,7 +196,7 @@ pub fn without(model: &Model<'_>) -> Result<Vec<u8>> {
     let header = Strangers::header(true, false).to_vec();
     let section = model.background().map(|_| (true, header));
     let sections = vec![(Tag::Strangers, section), (Tag::Promise, None)];
-    restate(model, &Restated { sections, ..Restated::default() })
+    Ok(restate(model, &Restated { sections, ..Restated::default() })?)
 }
 
 fn check(settings: &Settings) -> Result<()> {
@@ -333,7 +333,7 @@ fn stated(model: &Model<'_>, terms: &FitTerms, fits: &[fit::Fit]) -> Result<Vec<
     section.extend(terms.to_bytes());
     fits.iter().for_each(|fit| fixed::write(fit, f64::from(model.unit()), &mut section));
     let sections = vec![(Tag::Strangers, Some((true, section))), (Tag::Promise, None)];
-    restate(model, &Restated { sections, ..Restated::default() })
+    Ok(restate(model, &Restated { sections, ..Restated::default() })?)
 }
 
 /// The touches after which four of five sequences of left-out objects are found out.

@@ -15,7 +15,7 @@
 use super::{Calibrated, Settings, calibrate, tested_means, without};
 use crate::calibrate::{self, STRICTEST, add_noise, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
-use crate::error::{CalibrateProblem, Problem, Result};
+use crate::error::{CalibrateProblem, Result};
 use crate::mesh::BACKGROUND;
 use crate::progress::Progress;
 use crate::touches::folds::split;
@@ -86,7 +86,7 @@ fn strictest(
     match calibrate::calibrate(untested, part, &settings, progress) {
         Ok(calibrated) => Ok(calibrated.margins.values().copied().fold(0.0, f64::max) + STRICTER),
         Err(error) => match error.problem() {
-            Some(Problem::Calibrate(CalibrateProblem::TooFew { .. } | CalibrateProblem::NotKept { .. })) => {
+            Some(CalibrateProblem::TooFew { .. } | CalibrateProblem::NotKept { .. }) => {
                 Ok(((1.0 - promise.rate) / promise.rate).ln() + STRICTEST[0])
             }
             _ => Err(error),

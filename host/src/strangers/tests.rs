@@ -1,7 +1,7 @@
 use super::*;
 use crate::compile::{Settings as Compilation, compile};
 use crate::ensemble::train::{self, train, train_with_background};
-use crate::error::Problem;
+
 use crate::evaluate::{self, Margins, SequentialSettings};
 use crate::repetitions::{assert_rare, repetitions};
 use crate::touches::synthetic;
@@ -165,8 +165,7 @@ fn what_cannot_be_calibrated_says_so() {
     assert!(message(&of(0..KNOWN, 1_000, 2), &Settings { alarms: 0.0, ..usual }).contains("alarms is 0"));
     let strangers = Margins::of_strangers(Candidate::Compiled(&model), &of(0..KNOWN, 100, 1));
     assert!(matches!(
-        strangers.err().unwrap().problem(),
-        Some(Problem::Evaluate(EvaluateProblem::KnownObject { object })) if object == "object0"
+        strangers.err().unwrap().problem::<EvaluateProblem>(), Some(EvaluateProblem::KnownObject { object }) if object == "object0"
     ));
 }
 

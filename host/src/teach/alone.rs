@@ -4,7 +4,7 @@ use super::balance::Held;
 use super::held_out::{Division, loss, places, repeated};
 use super::{Curve, JITTERS, Needed, Settings, Smoothing, Taught, TaughtObject, check, on_threads};
 use crate::ensemble::train::{self, train};
-use crate::ensemble::{Ensemble, Origin};
+use crate::ensemble::{Ensemble, TouchOrigin};
 use crate::error::Result;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, Source};
@@ -112,7 +112,7 @@ pub fn alone(
         let mut ensemble = fitted(jitter, &|_| true)?;
         // What is stated is what was recorded, not its copies.
         let trained = ensemble.origin.trained;
-        ensemble.origin = Origin { noise: None, ..Origin::new(recorded, training.probe, trained) };
+        ensemble.origin = TouchOrigin::new(recorded, training.probe).origin(trained);
         Ok((ensemble, taught))
     })
 }

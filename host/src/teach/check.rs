@@ -1,7 +1,7 @@
 //! Whether objects can be taught to an ensemble.
 
 use super::{LEAST, Settings};
-use crate::ensemble::{Ensemble, Output, StatedProbe};
+use crate::ensemble::{Ensemble, Output, StatedProbe, TouchOrigin};
 use crate::error::{Error, Result, TeachProblem};
 use crate::mesh::BACKGROUND;
 use crate::touches::noise::Noise;
@@ -31,7 +31,7 @@ pub(super) fn check(
         return Err(TeachProblem::Known { object: object.name.clone() }.into());
     }
     names(ensemble, recorded)?;
-    let stated = ensemble.origin.probe.or_else(|| StatedProbe::of(known));
+    let stated = TouchOrigin::of(&ensemble.origin)?.probe.or_else(|| StatedProbe::of(known));
     same_probe(stated, recorded)?;
     approaches(ensemble.trained_touches().counted, recorded)?;
     poses(descriptor, recorded)?;
@@ -94,7 +94,7 @@ pub(super) fn enough(recorded: &Dataset, evidence: &[usize]) -> Result<()> {
 
 /// What touches of the known objects lack of the noise that the ensemble was trained for.
 pub(super) fn missing_noise(ensemble: &Ensemble, known: &Dataset) -> Result<Noise> {
-    let (stated, there) = (ensemble.origin.noise.unwrap_or_default(), known.real());
+    let (stated, there) = (TouchOrigin::of(&ensemble.origin)?.noise.unwrap_or_default(), known.real());
     match there {
         _ if there == stated => Ok(Noise::default()),
         _ if there.is_none() => Ok(stated),

@@ -14,6 +14,7 @@ mod balance;
 mod check;
 mod column;
 mod curve;
+mod error;
 mod held_out;
 mod promise;
 mod rows;
@@ -22,10 +23,11 @@ mod tests;
 
 pub use alone::alone;
 pub use curve::{Curve, Point};
+pub use error::TeachProblem;
 pub use promise::Needed;
 
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
-use crate::ensemble::{Ensemble, Node, Origin};
+use crate::ensemble::{Ensemble, Node, TouchOrigin};
 use crate::error::Result;
 use crate::evaluate::ROBOTS;
 use crate::progress::Progress;
@@ -137,7 +139,7 @@ pub struct TaughtObject {
 /// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
 /// is known already, if touches are missing or too few, have no pose, or are not every approach;
 /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if probes do;
-/// [`Problem::Setting`](crate::error::Problem::Setting); [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Setting`](crate::error::Setting); [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn teach(
     ensemble: &Ensemble,
     known: &Dataset,
@@ -263,8 +265,11 @@ fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], const
             leaf += 1;
         }
     }
-    let own = Origin::new(recorded, None, None);
-    extended.origin.touches.extend(own.touches);
+    // What cannot be read was refused before.
+    if let Ok(mut stated) = TouchOrigin::of(&extended.origin) {
+        stated.touches.extend(TouchOrigin::new(recorded, None).touches);
+        stated.state(&mut extended.origin);
+    }
     let objects = (at, recorded.objects.len());
     if let Some(trained) = &mut extended.origin.trained {
         trained.touches = with(trained.touches, &recorded.objects);

@@ -6,7 +6,7 @@ use super::rows::{Leaves, Rows};
 use super::*;
 use crate::compile;
 use crate::ensemble::train::{self, train, train_with_background};
-use crate::error::{Problem, TeachProblem};
+use crate::error::TeachProblem;
 use crate::evaluate::{Candidate, Margins};
 use crate::repetitions::repetitions;
 use crate::touches::noise::Noise;
@@ -82,7 +82,7 @@ fn a_taught_ensemble_is_saved_loaded_and_compiled_without_error() {
     let file = tempfile::NamedTempFile::new().unwrap();
     extended.save(file.path()).unwrap();
     assert_eq!(Ensemble::load(file.path()).unwrap(), extended);
-    assert_eq!(extended.origin.trained_on(&recorded), ["object2"]);
+    assert_eq!(TouchOrigin::of(&extended.origin).unwrap().trained_on(&recorded), ["object2"]);
     let compiled = compile::compile(&extended, &compile::Settings::default()).unwrap();
     assert_eq!(compiled.margin_error, 0.0);
     let model = compile::open(&compiled.bytes).unwrap();
@@ -106,7 +106,7 @@ fn a_background_stays_the_last_and_is_no_name() {
     // Without the background's touches there is nothing to compare with.
     let error = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap_err();
     let missing = TeachProblem::Missing { objects: vec![crate::mesh::BACKGROUND.into()] };
-    assert_eq!(error.problem(), Some(&missing.into()));
+    assert_eq!(error.problem(), Some(&missing));
 }
 
 #[test]
@@ -318,8 +318,8 @@ fn errors_that_fall_with_a_power_are_carried_on() {
     assert!(expected(&[point(100, 0.0), point(200, 0.0)], 400) <= 1.001e-3);
 }
 
-fn problem(ensemble: &Ensemble, known: &Dataset, recorded: &Dataset) -> Problem {
-    teach(ensemble, known, recorded, &few_groups(), &()).unwrap_err().problem().cloned().unwrap()
+fn problem(ensemble: &Ensemble, known: &Dataset, recorded: &Dataset) -> TeachProblem {
+    teach(ensemble, known, recorded, &few_groups(), &()).unwrap_err().problem::<TeachProblem>().cloned().unwrap()
 }
 
 #[test]
@@ -381,8 +381,8 @@ fn recorded_touches_alone_make_an_ensemble_that_states_them() {
     let margins = Margins::new(Candidate::Full(&ensemble), &unseen).unwrap();
     let accuracy = margins.curve(20, 300, 1).unwrap().accuracy(20).value;
     assert!(accuracy > 0.85, "{accuracy}");
-    assert_eq!(ensemble.origin.trained_on(&recorded).len(), 2);
-    assert!(ensemble.origin.noise.is_none() && taught.others.is_none());
+    assert_eq!(TouchOrigin::of(&ensemble.origin).unwrap().trained_on(&recorded).len(), 2);
+    assert!(TouchOrigin::of(&ensemble.origin).unwrap().noise.is_none() && taught.others.is_none());
     let ends: Vec<usize> = taught.objects[0].curve.points.iter().map(|point| point.approaches).collect();
     assert_eq!(ends, [38, 75, 120]);
     let again = alone(&recorded, &quick(), &Settings { threads: Some(1), ..few_groups() }, &()).unwrap();

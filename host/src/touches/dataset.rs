@@ -327,7 +327,6 @@ pub(super) fn name_of(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Problem;
 
     /// A complete data set of two objects in a format, with its listing.
     fn captured(format: Format) -> tempfile::TempDir {
@@ -361,10 +360,8 @@ mod tests {
     }
 
     fn problem(directory: &Path) -> TouchesProblem {
-        match Dataset::read(directory).unwrap_err() {
-            Error::At { problem: Problem::Touches(problem), .. } => problem,
-            other => panic!("{other}"),
-        }
+        let error = Dataset::read(directory).unwrap_err();
+        error.problem::<TouchesProblem>().unwrap_or_else(|| panic!("{error}")).clone()
     }
 
     #[test]

@@ -119,7 +119,7 @@ impl Listing {
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, directory: &Path) -> Result<()> {
-        output::write_json(&Self::path(directory), self)
+        Ok(output::write_json(&Self::path(directory), self)?)
     }
 
     /// The touches of a listed object, and what each of them is of.
@@ -179,7 +179,6 @@ pub(super) fn is_file_name(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Problem;
 
     /// As version 0.1.0 wrote it.
     const OLD: &str = r#"{
@@ -223,7 +222,7 @@ mod tests {
         for name in ["", "..", ".", "../fork", "/etc/fork", "a/b", "a\\\\b", "fork/"] {
             let text = OLD.replace("\"fork\"", &format!("\"{name}\""));
             let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err();
-            assert!(matches!(error.problem(), Some(Problem::Touches(TouchesProblem::BadName { .. }))), "{error}");
+            assert!(matches!(error.problem::<TouchesProblem>(), Some(TouchesProblem::BadName { .. })), "{error}");
         }
     }
 

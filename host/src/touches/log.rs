@@ -1,4 +1,4 @@
-//! Touches out of a robot's log, which is an MCAP file: `docs/mcap.md` says what belongs in it.
+//! Touches out of a robot's log, which is an MCAP file: `docs/reference/mcap.md` says what belongs in it.
 
 use super::logged::{Channels, LoggedVerdict, Message, Said};
 use super::{ObjectTouches, Source, Warning, mcap, text};
@@ -221,7 +221,7 @@ impl LogWriter {
         let file = self.writer.finish()?.into_inner().map_err(|error| temporary(error.into_error()));
         let mut file = file?;
         file.seek(SeekFrom::Start(0)).map_err(temporary)?;
-        output::write_whole(path, |out| std::io::copy(&mut file, out).map(drop))
+        Ok(output::write_whole(path, |out| std::io::copy(&mut file, out).map(drop))?)
     }
 }
 

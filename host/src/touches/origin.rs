@@ -69,7 +69,7 @@ impl Origin {
     /// Refuses what no touches can be made by.
     ///
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) naming the field.
+    /// [`Setting`](crate::error::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
         if self.touches == 0 {
             return Err(Error::setting("touches", 0, "1 or more"));

@@ -136,7 +136,7 @@ fn write_parquet(path: &Path, _: &str, _: &[palpate_shared::Touch]) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Problem;
+
     use crate::touches::noise::Noise;
     use crate::touches::{ObjectTouches, Origin, Recorded, folds, parse_touch};
 
@@ -235,7 +235,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let refused =
             |dataset: &Dataset| match dataset.write(directory.path(), Format::Text, None).unwrap_err().problem() {
-                Some(Problem::Touches(problem)) => problem.clone(),
+                Some(problem) => TouchesProblem::clone(problem),
                 other => panic!("{other:?}"),
             };
         let unknown = Dataset { origin: None, ..instances.clone() };
@@ -252,7 +252,7 @@ mod tests {
         std::fs::write(directory.path().join("spoon.txt"), "0 0 0\n").unwrap();
         let error = dataset(None).write(directory.path(), Format::Text, None).unwrap_err();
         let holds = CaptureProblem::HoldsFiles { files: vec!["spoon.txt".into()] };
-        assert_eq!(error.problem(), Some(&Problem::Capture(holds)));
+        assert_eq!(error.problem::<CaptureProblem>(), Some(&holds));
         assert!(!directory.path().join("cup.txt").exists());
     }
 }

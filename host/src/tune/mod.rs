@@ -21,6 +21,7 @@
 //! # }
 //! ```
 
+mod error;
 mod family;
 pub mod fit;
 pub mod probe;
@@ -30,12 +31,13 @@ mod tests;
 use crate::calibrate::{self, Calibrated};
 use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
 use crate::ensemble::{Ensemble, StatedProbe};
-use crate::error::{CalibrateProblem, CompileProblem, Problem, Result, TuneProblem};
+use crate::error::{CalibrateProblem, CompileProblem, Result};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use crate::touches::folds;
 use crate::touches::noise::Noise;
+pub use error::TuneProblem;
 use palpate_shared::Descriptor;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -214,7 +216,7 @@ fn calibrated(
     };
     match calibrate::calibrate(&compile::open(model)?, fresh, &terms, progress) {
         Err(error) => match error.problem() {
-            Some(Problem::Calibrate(problem)) => Ok(Err(problem.clone())),
+            Some(problem) => Ok(Err(CalibrateProblem::clone(problem))),
             _ => Err(error),
         },
         Ok(calibrated) => Ok(Ok(calibrated)),
@@ -291,7 +293,7 @@ fn compiled_models<'e>(
 /// Not every ensemble fits every layout; all else that compiling refuses is an error.
 fn unless_unfit(compiled: Result<Compiled>) -> Result<Option<Compiled>> {
     match compiled {
-        Err(error) if matches!(error.problem(), Some(Problem::Compile(CompileProblem::DoesNotFit { .. }))) => Ok(None),
+        Err(error) if matches!(error.problem::<CompileProblem>(), Some(CompileProblem::DoesNotFit { .. })) => Ok(None),
         compiled => compiled.map(Some),
     }
 }

@@ -255,7 +255,7 @@ impl Design {
 /// design on any number of threads. Progress is counted in probes tried.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) for a setting out of its range; [`TuneProblem::FewObjects`] for
+/// [`Setting`](crate::error::Setting) for a setting out of its range; [`TuneProblem::FewObjects`] for
 /// fewer than two objects; an object that cannot be touched or whose true size is not known, by its name; as [`train::train`]; [`Error::Cancelled`] if
 /// `progress` cancels it.
 pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Design> {
@@ -481,7 +481,7 @@ impl Progress for Quiet<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Problem;
+    use crate::error::Setting;
     use crate::mesh::Mesh;
 
     /// A globe and a disc: a row of fingers sees how much they bend, if it is wide enough for that to stand out of noise.
@@ -581,9 +581,9 @@ mod tests {
         for (wrong, settings) in cases {
             let error = design(&objects(), &settings, &()).unwrap_err();
             assert_eq!(error.exit_code(), 2);
-            assert!(matches!(error.problem(), Some(Problem::Setting { name, .. }) if *name == wrong), "{error}");
+            assert!(matches!(error.problem::<Setting>(), Some(Setting { name, .. }) if *name == wrong), "{error}");
         }
         let error = design(&objects()[..1], &settings(), &()).unwrap_err();
-        assert_eq!(error.problem(), Some(&TuneProblem::FewObjects { objects: 1 }.into()));
+        assert_eq!(error.problem(), Some(&TuneProblem::FewObjects { objects: 1 }));
     }
 }

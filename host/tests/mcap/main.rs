@@ -27,10 +27,10 @@ fn error(bytes: &[u8]) -> String {
 /// What is wrong with these bytes, and at which of them.
 #[track_caller]
 fn problem(bytes: &[u8]) -> (TouchesProblem, Place) {
-    match read(bytes).map(|log| log.touches().len()).unwrap_err() {
-        Error::At { problem: Problem::Touches(problem), place } => (problem, place),
-        other => panic!("{other}"),
-    }
+    let error = read(bytes).map(|log| log.touches().len()).unwrap_err();
+    let problem = error.problem::<TouchesProblem>().unwrap_or_else(|| panic!("{error}")).clone();
+    let Error::At { place, .. } = error else { panic!("{error}") };
+    (problem, place)
 }
 
 /// The touches that make.py wrote, with and without their poses.
@@ -200,7 +200,10 @@ fn a_message_that_is_no_touch_is_named_with_file_byte_number_topic_and_what_is_w
         let place = log.windows(9).rposition(|window| window == record_head(text)).unwrap();
         let begin = format!("robot.mcap: byte {place}: message 3 on /touch: ");
         assert!(found.starts_with(&begin) && found.contains(what), "{text}: {found}");
-        assert!(found.ends_with("Correct what logged it: docs/mcap.md says what belongs in a message."), "{found}");
+        assert!(
+            found.ends_with("Correct what logged it: docs/reference/mcap.md says what belongs in a message."),
+            "{found}"
+        );
     }
     let late = file(&[
         schema(1, "palpate.Touch", "jsonschema", ""),
@@ -259,7 +262,7 @@ fn what_cannot_be_read_is_refused_by_name_with_the_way_round() {
     for (schema_encoding, encoding) in [("ros2idl", "cdr"), ("protobuf", "protobuf")] {
         let said = error(&plain(schema_encoding, encoding));
         assert!(said.contains(&format!("in the encoding {encoding:?} with a schema in {schema_encoding:?}")), "{said}");
-        assert!(said.contains("Log them as docs/mcap.md says"), "{said}");
+        assert!(said.contains("Log them as docs/reference/mcap.md says"), "{said}");
     }
     let said = error(&file(&[chunk("brotli", 4, 0, b"1234")]));
     assert!(

@@ -17,7 +17,6 @@ use palpate::Result;
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node, Output};
-use palpate::error::ReportProblem;
 use palpate::touches::Dataset;
 use palpate::touches::folds::{self, Split};
 use palpate_onboard::{Model, Recognizer, Stopping};
@@ -82,13 +81,13 @@ fn main() -> Result<()> {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    palpate::output::write_bytes(path, bytes)
+    Ok(palpate::output::write_bytes(path, bytes)?)
 }
 
 /// A run's touches, trained and tested on.
 fn split(run: &Path) -> Result<Split> {
-    let settings = palpate::run::Settings::default();
-    folds::split(&Dataset::read(&run.join("data"))?, settings.test_share, settings.capture.origin.seed)
+    // As `palpate run` divides them.
+    folds::split(&Dataset::read(&run.join("data"))?, 0.1, 1)
 }
 
 /// Trained where there is data; otherwise random, of the same shape and without missing splits.
@@ -121,7 +120,7 @@ fn times(touch: &Touch) -> Vec<u8> {
 }
 
 fn expected(model: &[u8], touches: &[Touch]) -> Result<Vec<u8>> {
-    let wrong = |error: &dyn std::fmt::Display| Error::from(ReportProblem::Compiled { reason: error.to_string() });
+    let wrong = |error: &dyn std::fmt::Display| Error::setting("model", error, "one that this crate compiled");
     let model = Model::new(model).map_err(|error| wrong(&error))?;
     let mut recognizer = Recognizer::<10>::new(&model, Stopping::from_model(&model)).map_err(|error| wrong(&error))?;
     Ok(touches.iter().flat_map(|touch| identity::record(&model, &mut recognizer, touch)).collect())

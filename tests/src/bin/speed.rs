@@ -1,5 +1,5 @@
-//! Speed against error: one row for each precision or approximation that can be chosen. The table of `docs/speed.md`, which
-//! `docs/tables/speed.sh` remakes with what chips and reports add to it.
+//! Speed against error: one row for each precision or approximation that can be chosen. The table of
+//! `docs/measurements/speed.md`, which `docs/measurements/tables/speed.sh` remakes with what chips and reports add to it.
 //!
 //! ```text
 //! cargo run --release -p palpate-tests --bin speed             about a minute

@@ -7,6 +7,7 @@ use super::strangers::{Found, StrangersArguments};
 use palpate::Result;
 use palpate::calibrate::{self, Calibrated, Per, Settings, Worse};
 use palpate::compile::{self, CompiledModel};
+use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
 use palpate::strangers;
@@ -80,7 +81,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
     let compiled = CompiledModel::read(&arguments.model)?;
     let dataset = super::dataset(&arguments.directory)?;
-    let trained_on = compiled.trained_on(&dataset);
+    let trained_on = compiled_trained_on(&compiled, &dataset);
     if !trained_on.is_empty() {
         let objects = trained_on.into_iter().map(String::from).collect();
         return Err(Error::at(Place::file(&arguments.directory), CalibrateProblem::TrainedOn { objects }));

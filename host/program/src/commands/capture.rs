@@ -130,7 +130,7 @@ fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, S
 
 /// Which options help, where the library refuses what is in the directory.
 pub(super) fn hint(error: &Error) -> Option<&'static str> {
-    let Some(Problem::Capture(problem)) = error.problem() else { return None };
+    let Some(problem) = error.problem::<CaptureProblem>() else { return None };
     match problem {
         CaptureProblem::HoldsOtherObjects { .. } => Some("--add adds to what is there, --force replaces it."),
         CaptureProblem::HoldsOtherSettings { .. } | CaptureProblem::Shorter { .. } => {

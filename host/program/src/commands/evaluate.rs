@@ -5,7 +5,7 @@ use super::numbers::{error_rate, sequences};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
-use palpate::error::{Problem, RowsProblem};
+use palpate::error::RowsProblem;
 use palpate::evaluate::model_file::ModelFile;
 use palpate::evaluate::{
     self, Active, Candidate, Classes, LEAST_GROUPS, Margins, Regression, RowsEvaluation, Settings, evaluate_rows,
@@ -172,7 +172,7 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let rows = super::verify::read_rows(&arguments.directory, &names, Some(label))?;
     let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| match error.problem() {
-        Some(Problem::Rows(RowsProblem::Label { .. })) => error.in_file(&arguments.directory),
+        Some(RowsProblem::Label { .. }) => error.in_file(&arguments.directory),
         _ => error.in_file(&arguments.model),
     })?;
     if global.json {

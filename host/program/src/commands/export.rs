@@ -201,6 +201,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         max_touches: arguments.max_touches,
         scales,
         priors: arguments.prior.of(&ensemble.objects)?,
+        ..Settings::default()
     };
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
         1 => error.in_file(&arguments.ensemble),

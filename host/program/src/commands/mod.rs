@@ -38,7 +38,7 @@ mod view;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{CaptureProblem, Problem, TouchesProblem};
+use palpate::error::{CaptureProblem, Setting, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing, Log, Warning};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -222,9 +222,7 @@ impl Command {
         match self {
             Self::Capture(_) => capture::hint,
             _ => |error| match error.problem() {
-                Some(Problem::Touches(TouchesProblem::Incomplete)) => {
-                    Some("Repeat the command of the capture with --resume.")
-                }
+                Some(TouchesProblem::Incomplete) => Some("Repeat the command of the capture with --resume."),
                 _ => None,
             },
         }
@@ -301,7 +299,7 @@ fn without_trailing(mut error: clap::Error) -> clap::Error {
 
 /// The error as the user of `command` understands it: where the library names a setting, this names the option.
 fn message(error: &Error, command: &str) -> String {
-    let Error::At { place, problem: problem @ Problem::Setting { name, value, .. } } = error else {
+    let (Error::At { place, problem }, Some(Setting { name, value, .. })) = (error, error.problem()) else {
         return error.to_string();
     };
     let option = option_of(name).replace('_', "-");

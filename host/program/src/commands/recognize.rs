@@ -4,7 +4,7 @@ use super::numbers::error_rate;
 use palpate::Result;
 use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
-use palpate::error::{Error, EvaluateProblem, Place, Problem, TouchesProblem};
+use palpate::error::{Error, EvaluateProblem, Place, TouchesProblem};
 use palpate::output;
 use palpate::touches::{Log, LogWriter, Logged, LoggedVerdict, begins_log, parse_touch};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -178,14 +178,14 @@ impl<'m> Stream<'m> {
             if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
                 break;
             }
-            let wrong = |problem: Problem| Error::at(Place::line(path, number), problem);
-            let line = std::str::from_utf8(&bytes).map_err(|_| wrong(TouchesProblem::NotText.into()))?.trim();
+            let place = || Place::line(path, number);
+            let line = std::str::from_utf8(&bytes).map_err(|_| Error::at(place(), TouchesProblem::NotText))?.trim();
             if line.is_empty() {
                 self.reset();
                 continue;
             }
-            let touch = parse_touch(line).map_err(|problem| wrong(problem.into()))?;
-            self.check(&touch).map_err(|problem| wrong(problem.into()))?;
+            let touch = parse_touch(line).map_err(|problem| Error::at(place(), problem))?;
+            self.check(&touch).map_err(|problem| Error::at(place(), problem))?;
             self.push(&touch, None, None)?;
         }
         Ok(())

@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let rows = read_rows(&arguments.data, &ensemble.inputs.names(), None)?;
     let library = arguments.library_margins.as_deref().map(read_margins).transpose()?;
     let place = |error: Error| match (&arguments.library_margins, error.problem()) {
-        (Some(path), Some(palpate::error::Problem::Rows(problem))) if problem.is_about_margins() => error.in_file(path),
+        (Some(path), Some(problem)) if RowsProblem::is_about_margins(problem) => error.in_file(path),
         _ => error.in_file(&arguments.model),
     };
     let verified = verify(&compiled.model(), &ensemble, &rows, library.as_deref(), &Bar::new()).map_err(place)?;

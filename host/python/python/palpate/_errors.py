@@ -1,4 +1,4 @@
-"""What calls fail with: the program's messages, which say where, what, and what to do."""
+"""Exceptions with the program's messages, which state the place, the problem, and what to do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often a model is right; how far it is from its ensemble."""
+"""Accuracy of a model, and its agreement with its ensemble."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ._types import Progress
 
 @dataclass(frozen=True)
 class Sequential:
-    """What a recognizer does that stops by itself, each object weighted by its prior."""
+    """Figures of a recognizer that stops by itself, each object weighted by its prior."""
 
     error_rate: float
-    """What it was asked to stay below."""
+    """The error rate that was requested."""
     mean: float
     """Touches (or approaches) used on average."""
     mean_standard_error: float
@@ -32,7 +32,7 @@ class Sequential:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How often a model is right, and after how many touches. Shares are between 0 and 1."""
+    """Accuracy of a model, and touches to a verdict. Shares are between 0 and 1."""
 
     descriptor: str
     touches: int
@@ -45,7 +45,7 @@ class Evaluation:
     per_object: dict[str, dict[int, float]]
     """The same for each object."""
     sequential: Sequential
-    """What it does when it stops by itself."""
+    """Figures when it stops by itself."""
     approach_accuracy: dict[int, float]
     """Accuracy after a number of approaches, where the data set holds those."""
     approach_sequential: Sequential | None
@@ -53,15 +53,15 @@ class Evaluation:
     patterns: dict[str, float]
     """Share of each contact pattern among the touches."""
     raw: dict[str, object]
-    """All that was found, as `palpate evaluate --json` prints it."""
+    """All figures, as `palpate evaluate --json` prints them."""
 
 
 @dataclass(frozen=True)
 class Parity:
-    """How far a compiled model is from its ensemble."""
+    """Agreement of a compiled model with its ensemble."""
 
     touches: int
-    """How many touches were compared."""
+    """The number of touches compared."""
     max_margin_error: float
     """The largest difference of a margin, in nats."""
     stated_bound: float
@@ -69,7 +69,7 @@ class Parity:
     best_differs: int
     """Touches after which another object is the best."""
     sequences: int
-    """How many random sequences were compared."""
+    """The number of random sequences compared."""
     verdict_differs: int
     """Sequences with another verdict."""
     touches_differ: int
@@ -88,7 +88,7 @@ def evaluate(
     timer: str = "",
     seed: int = 1,
 ) -> Evaluation:
-    """Measures how often a model is right on touches that it was not trained on.
+    """Measures the accuracy of a model on touches that it was not trained on.
 
     Accuracies are given after the numbers of touches (and approaches) in `at`, over `groups` groups drawn for each object.
     The recognizer stops at a posterior of 1 - `error_rate`, or where the model says. `noise` and `timer` are added to the

@@ -27,7 +27,7 @@ def to_ensemble(
     value in training, beside NaN: XGBoost's boosters and files do not hold it, its estimators do. `Ensemble.notes` says what
     to know about the trees.
 
-    Models are told apart by their class. Any other class, and one that is derived from these, is refused by name: it may
+    Models are identified by their exact class. Any other class, and one that is derived from these, is refused by name: it may
     predict in another way.
     """
     given = None if names is None else list(names)
@@ -48,7 +48,7 @@ def to_ensemble(
 
 @dataclass(frozen=True)
 class _Asked:
-    """What a caller says about a model."""
+    """Statements of a caller about a model."""
 
     names: list[str] | None
     all_trees: bool
@@ -106,7 +106,7 @@ def _class(kind: type) -> tuple[str, str]:
 
 
 def _refusal(model: object) -> InputError:
-    """Why an object of a class that no reader knows is refused, and what to do."""
+    """The reason why an object of an unknown class is refused, and what to do."""
     what = f"{type(model).__module__}.{type(model).__qualname__}"
     for kind in type(model).__mro__[1:]:
         library, name = _class(kind)
@@ -205,11 +205,11 @@ _READERS: dict[str, dict[str, _Reader]] = {
         ["Booster", "XGBClassifier", "XGBRFClassifier", "XGBRFRegressor", "XGBRanker", "XGBRegressor"], _xgboost
     ),
 }
-"""What is read, by library and class. A class that is not here is refused."""
+"""The readers, by library and class. A class that is not here is refused."""
 
 _INSIDE = {
     "lightgbm": "A booster inside it may be `model.booster_`. ",
     "sklearn": "Of a pipeline give the last step, and transform rows as its first steps do; of a search `best_estimator_`. ",
     "xgboost": "A booster inside it may be `model.get_booster()`. ",
 }
-"""Where a model that can be read may be found inside one that cannot."""
+"""Attributes in which a readable model may be found inside one that is not."""

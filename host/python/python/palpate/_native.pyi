@@ -1,5 +1,5 @@
 """
-What is written in Rust of the package palpate.
+The part of the package palpate that is written in Rust.
 """
 
 from _typeshed import SupportsGetItem
@@ -43,12 +43,12 @@ class DataSet:
     @property
     def approaches(self, /) -> list[int] | None:
         """
-        How many approaches each object took, where that is known.
+        The number of approaches to each object, where it is known.
         """
     @property
     def counts(self, /) -> list[int]:
         """
-        How many touches each object has, in the order of the names.
+        The number of touches of each object, in the order of the names.
         """
     @property
     def direction(self, /) -> NDArray[float32] | None:
@@ -57,7 +57,7 @@ class DataSet:
         """
     def features(self, /, descriptor: str = "curvature") -> NDArray[float32]:
         """
-        What a descriptor turns each touch into, one row of whole numbers per touch (microseconds, and direction cosines times
+        The features of each touch under a descriptor, one row of whole numbers per touch (microseconds, and direction cosines times
         32767), NaN where one is missing: for training with another library. The code is the chip's.
         """
     @staticmethod
@@ -73,7 +73,7 @@ class DataSet:
     @property
     def holds_approaches(self, /) -> bool:
         """
-        Whether every approach is kept, also those that not all three fingers touched.
+        True if every approach is kept, also those in which not all three fingers touched.
         """
     @property
     def instances(self, /) -> NDArray[int16]:
@@ -93,7 +93,7 @@ class DataSet:
     @property
     def objects(self, /) -> NDArray[int16]:
         """
-        Which object each touch is of: its position in the names.
+        The object of each touch, as its position in the names.
         """
     @property
     def probe(self, /) -> Probe | None:
@@ -133,7 +133,7 @@ class DataSet:
     @property
     def warnings(self, /) -> list[str]:
         """
-        What looked wrong when the data set was read, and may be meant.
+        Warnings from reading the data set; what they name may be intended.
         """
 
 @final
@@ -151,7 +151,7 @@ class Ensemble:
     @property
     def descriptor(self, /) -> str | None:
         """
-        Which features a touch is turned into; `None` for an ensemble over rows of features.
+        The descriptor that turns touches into features; `None` for an ensemble over rows of features.
         """
     @property
     def features(self, /) -> list[str]:
@@ -193,7 +193,7 @@ class Ensemble:
     @property
     def notes(self, /) -> list[str]:
         """
-        What to know about an ensemble that another library trained, each a sentence.
+        Caveats of an ensemble that another library trained, each a sentence.
         """
     @property
     def objects(self, /) -> list[str]:
@@ -207,7 +207,7 @@ class Ensemble:
     @property
     def trees(self, /) -> int:
         """
-        How many trees there are.
+        The number of trees.
         """
 
 @final
@@ -227,7 +227,7 @@ class Model:
     """
     def __getnewargs__(self, /) -> tuple[bytes]:
         """
-        What a pickle holds.
+        The arguments that a pickle holds.
         """
     def __new__(cls, /, content: SupportsGetItem[int, SupportsIndex]) -> Model:
         """
@@ -237,12 +237,12 @@ class Model:
     @property
     def checksum(self, /) -> int:
         """
-        A number that names the model: two with the same are the same.
+        A number that identifies the model: models with the same number are the same.
         """
     @property
     def descriptor(self, /) -> str | None:
         """
-        Which features a touch is turned into; `None` for a model over rows of features.
+        The descriptor that turns touches into features; `None` for a model over rows of features.
         """
     @property
     def features(self, /) -> list[str]:
@@ -252,12 +252,12 @@ class Model:
     @property
     def layout(self, /) -> str:
         """
-        How the trees are laid out.
+        The layout of the trees.
         """
     @property
     def leaf(self, /) -> str:
         """
-        What leaves are stored as: "i8", "i16" or "f32".
+        The type of stored leaves: "i8", "i16" or "f32".
         """
     @staticmethod
     def load(path: str | PathLike[str]) -> Model:
@@ -267,7 +267,7 @@ class Model:
     @property
     def margin_error(self, /) -> float:
         """
-        The farthest that a margin can be from the full model's, in nats.
+        The largest possible difference of a margin from the full model's, in nats.
         """
     def margins(self, /, rows: DataSet | ArrayLike) -> NDArray[float64]:
         """
@@ -295,7 +295,7 @@ class Model:
     @property
     def size(self, /) -> int:
         """
-        How many bytes the model has.
+        The size of the model in bytes.
         """
     def to_bytes(self, /) -> bytes:
         """
@@ -348,7 +348,7 @@ class Recognizer:
     @property
     def touches(self, /) -> int:
         """
-        How many touches were counted since the last `reset`.
+        The number of touches counted since the last `reset`.
         """
     @property
     def verdict(self, /) -> Verdict:
@@ -385,7 +385,7 @@ class Surface:
     @property
     def triangles(self, /) -> int:
         """
-        How many triangles there are.
+        The number of triangles.
         """
 
 def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
@@ -462,7 +462,7 @@ def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = No
     `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
     approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
     `background` is a data set of many other shapes, which stand for all that the model does not know.
-    `different_leaves` grows trees for little flash: their leaves share at most this many lists of values. A new threshold has
+    `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
     to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
 
     >>> import palpate

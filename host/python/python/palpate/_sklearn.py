@@ -18,15 +18,15 @@ _Tree = tuple["int | None", _Integers, _Integers, _Integers, _Floats, npt.NDArra
 
 @dataclass(frozen=True)
 class _Parts:
-    """What margins start from, the trees, and what to know about them."""
+    """Base margins, trees, and caveats."""
 
     base: list[float]
     trees: list[_Tree]
     notes: list[str]
     link: str = "identity"
-    """What makes a value of a margin."""
+    """The function from a margin to a value."""
     last_of_ties: bool = False
-    """Whether the last of several largest margins names the class, and not the first."""
+    """True if the last of several largest margins names the class, and not the first."""
 
 
 _VOTES = (
@@ -69,7 +69,7 @@ def _forest(model: Any) -> _Parts:
 
 
 def _votes(model: Any, estimators: Sequence[Any]) -> _Parts:
-    """Every tree says the share of each class, or a value; the forest's answer is their mean."""
+    """Every tree gives the share of each class, or a value; the forest's prediction is their mean."""
     is_classifier = _is_classifier(model)
     trees: list[_Tree] = []
     for estimator in estimators:
@@ -82,7 +82,7 @@ def _votes(model: Any, estimators: Sequence[Any]) -> _Parts:
 
 
 def _gradient(model: Any) -> _Parts:
-    """Trees of a learning rate, on what a constant model says first."""
+    """Trees scaled by a learning rate, on top of a constant model."""
     if not _is_constant(model.init_):
         raise InputError(
             f"the model's `init` is a {type(model.init_).__name__} whose prediction is no constant. Train without `init`."
@@ -111,7 +111,7 @@ def _gradient(model: Any) -> _Parts:
 
 
 def _is_constant(init: Any) -> bool:
-    """Whether what boosting starts from is the same for every row, and at every call."""
+    """True if boosting starts from the same value for every row, at every call."""
     kind = (type(init).__module__, type(init).__name__)
     if kind == ("sklearn.dummy", "DummyClassifier"):
         return bool(init.strategy != "stratified")
@@ -169,7 +169,7 @@ def _histogram(model: Any) -> _Parts:
 
 
 _LINKS = {"IdentityLink": "identity", "LogLink": "exponential"}
-"""What makes a prediction of a margin, by scikit-learn's class of the link."""
+"""The function from a margin to a prediction, by scikit-learn's class of the link."""
 
 KNOWN: dict[str, Callable[[Any], _Parts]] = {
     "DecisionTreeClassifier": _single,

@@ -47,27 +47,27 @@ class Probe:
     spacing: float = 1.5
     """The distance between neighboring fingers."""
     speed: float = 10.0
-    """How fast the probe moves, in units per second."""
+    """The probe's speed, in units per second."""
     tilt: float = 10.0
-    """How far the row may be tilted to either side, in degrees."""
+    """The largest tilt of the row to either side, in degrees."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is known after a touch."""
+    """The recognizer's answer after a touch."""
 
     state: Literal["undecided", "recognized", "unknown", "gave-up"]
-    """Whether an object was recognized, the touches fit none that the model knows, or the limit of touches was reached."""
+    """An object was recognized, the touches fit none that the model knows, or the limit of touches was reached."""
     object: str | None
     """The object that was recognized."""
     posterior: float | None
-    """How sure that is."""
+    """The posterior of that object."""
     touches: int
-    """How many touches were counted."""
+    """The number of touches counted."""
     refused: str | None = None
-    """Why the last touch was not counted, if it was not."""
+    """The reason why the last touch was not counted, if it was not."""
 
     @property
     def decided(self) -> bool:
-        """Whether further touches change nothing."""
+        """True if further touches change nothing."""
         return self.state != "undecided"

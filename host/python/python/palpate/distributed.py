@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 ATTEMPTS = 3
-"""How often a shard is submitted at most."""
+"""The largest number of times that a shard is submitted."""
 
 Format = Literal["text", "parquet"]
 
@@ -58,7 +58,7 @@ class Refused:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a capture did."""
+    """The result of a capture."""
 
     objects: int
     """Objects whose touches are all there."""
@@ -67,14 +67,14 @@ class Summary:
     kept: int
     """Shards that were there already."""
     resubmitted: int
-    """How often a shard was submitted again because its worker died or the scheduler was restarted."""
+    """The number of times that a shard was submitted again because its worker died or the scheduler was restarted."""
     refused: list[Refused] = field(default_factory=list)
-    """Shards that were not captured, and why."""
+    """Shards that were not captured, with reasons."""
 
 
 @dataclass(frozen=True)
 class _Job:
-    """What a worker needs to capture one shard."""
+    """The input of a worker that captures one shard."""
 
     name: str
     mesh: str | Mesh = field(compare=False)
@@ -93,7 +93,7 @@ class _Job:
 
     @property
     def path(self) -> str:
-        """Where the part is kept."""
+        """The path of the part."""
         return f"parts/{self.name}/{self.part}-of-{self.parts}.txt"
 
     def key(self, attempt: int) -> tuple[str, str, int]:
@@ -296,7 +296,7 @@ def _version() -> str:
 
 
 def _record(store: _Store, job: _Job) -> dict[str, Any] | None:
-    """What stands beside a finished part; `None` if it is of another capture, or the part is not there as a whole."""
+    """The record beside a finished part; `None` if it is of another capture, or the part is not there as a whole."""
     content = store.read(f"{job.path}.json")
     if content is None:
         return None

@@ -1,7 +1,8 @@
 //! Tables: shown in the page with columns that sort, and written as CSV.
 
 use super::axis::number;
-use palpate::error::{PageProblem, Result};
+use crate::page::PageProblem;
+use palpate::error::Result;
 
 /// One cell.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,13 +12,14 @@ pub use models::{Training, expect, train};
 pub use surfaces::{Surface, surfaces};
 pub use trace::trace;
 
+use crate::page::PageProblem;
 use crate::page::html;
 use crate::page::scene;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use palpate::compile::CompiledModel;
-use palpate::error::{CaptureProblem, EvaluateProblem, PageProblem, Result};
+use palpate::error::{CaptureProblem, EvaluateProblem, Result};
 use palpate::evaluate::ApproachSequential;
 use palpate::mesh::Object;
 use palpate::play::compress;

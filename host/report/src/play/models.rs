@@ -6,7 +6,7 @@ use palpate::capture::{capture, touches};
 use palpate::compile::{self, CompiledModel, compile};
 use palpate::ensemble::StatedProbe;
 use palpate::ensemble::train::{self as trainer, Settings};
-use palpate::error::{Error, Problem, Result};
+use palpate::error::{CalibrateProblem, Error, Result};
 use palpate::evaluate::{self, Candidate, Margins, SequentialSettings};
 use palpate::mesh::Object;
 use palpate::probe::scene::Scene;
@@ -104,7 +104,7 @@ fn promising(
     };
     match calibrate_fresh(&compile::open(&bytes)?, objects, fresh, &terms, &mut calibrate::Fresh::default(), progress) {
         Ok(calibrated) => Ok(calibrated.model),
-        Err(error) if matches!(error.problem(), Some(Problem::Calibrate(_))) => Ok(bytes),
+        Err(error) if matches!(error.problem::<CalibrateProblem>(), Some(_)) => Ok(bytes),
         Err(error) => Err(error),
     }
 }

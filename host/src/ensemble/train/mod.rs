@@ -8,8 +8,9 @@
 //! share. Otherwise each margin would hold the log of that share, and summing margins over touches would count that prior
 //! once per touch instead of once.
 
-use crate::ensemble::check::check_names;
-use crate::ensemble::{Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, Trained, Tree, feature_row};
+use crate::ensemble::{
+    Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, TouchOrigin, Trained, Tree, check_names, feature_row,
+};
 use crate::error::{EnsembleProblem, Error, Result};
 use crate::mesh::BACKGROUND;
 use crate::progress::Progress;
@@ -157,7 +158,7 @@ impl Settings {
 /// of threads. Progress is counted in rounds.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) if a setting is out of its range; [`EnsembleProblem`] if there are
+/// [`Setting`](crate::error::Setting) if a setting is out of its range; [`EnsembleProblem`] if there are
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
@@ -186,7 +187,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
 fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Origin {
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
-    Origin { noise, ..Origin::new(dataset, settings.probe, Some(trained)) }
+    TouchOrigin { noise, ..TouchOrigin::new(dataset, settings.probe) }.origin(Some(trained))
 }
 
 /// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,

@@ -72,7 +72,7 @@ pub fn all() -> Result<Vec<Object>> {
 /// The built-in object `name`, the same that [`all`] gives.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) if there is no such object; as [`all`].
+/// [`Setting`](crate::error::Setting) if there is no such object; as [`all`].
 pub fn one(name: &str) -> Result<Object> {
     make_one(&kind(name)?, None)
 }
@@ -81,7 +81,7 @@ pub fn one(name: &str) -> Result<Object> {
 /// same seed gives the same object. It has the kind's name.
 ///
 /// # Errors
-/// [`Problem::Setting`](crate::error::Problem::Setting) if there is no such kind; [`MeshProblem::NotMeshed`] if the
+/// [`Setting`](crate::error::Setting) if there is no such kind; [`MeshProblem::NotMeshed`] if the
 /// proportions that the seed gives have no closed mesh.
 pub fn varied(name: &str, seed: u64) -> Result<Object> {
     make_one(&kind(name)?, Some(seed))

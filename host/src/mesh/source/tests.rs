@@ -1,5 +1,4 @@
 use super::*;
-use crate::error::Problem;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -77,7 +76,7 @@ fn missing_and_empty_sources_are_refused() {
     assert!(objects(std::slice::from_ref(&source)).unwrap_err().to_string().contains("no mesh here"));
     let error = objects(&[source + "/bultin"]).unwrap_err();
     assert!(error.to_string().contains("bultin: cannot read the mesh"), "{error}");
-    assert!(matches!(error.problem(), Some(Problem::Mesh(MeshProblem::NoSuchSource { .. }))), "{error:?}");
+    assert!(matches!(error.problem::<MeshProblem>(), Some(MeshProblem::NoSuchSource { .. })), "{error:?}");
 }
 
 #[cfg(feature = "objects")]

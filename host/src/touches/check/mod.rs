@@ -11,7 +11,7 @@ use super::checksum::{Checked, checksum};
 use super::dataset::name_of;
 use super::warning::channels_said;
 use super::{Entry, Format, Listing, Log, Origin, Warning, is_log, logs, text};
-use crate::error::{Error, Place, Problem, Result, TouchesProblem};
+use crate::error::{Error, Place, Result, TouchesProblem};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use std::collections::HashMap;
@@ -278,7 +278,7 @@ impl Findings {
 
     fn error(&mut self, error: Error) {
         let (what, fix) = match &error {
-            Error::At { place, problem } => (format!("{place}{problem}"), Problem::fix(problem)),
+            Error::At { place, problem } => (format!("{place}{problem}"), problem.fix()),
             other => (other.to_string(), String::new()),
         };
         self.0.push(Finding { is_wrong: true, what, fix });

@@ -1,4 +1,4 @@
-//! Touches and verdicts in MCAP files, as robots log them and Foxglove shows them: `docs/mcap.md`.
+//! Touches and verdicts in MCAP files, as robots log them and Foxglove shows them: `docs/reference/mcap.md`.
 //!
 //! Channels are found by the names of their schemas: `palpate.Touch` and `palpate.Verdict`, or as in ROS 2
 //! `palpate_msgs/msg/Touch` and `palpate_msgs/msg/Verdict`; messages are JSON or CDR. Other channels are skipped.

@@ -1,7 +1,7 @@
 //! Settings of noise as users write them in one text: `noise=0..5ms,timer=1ms,missed=2%`.
 
 use super::{Deviation, Noise, quantity};
-use crate::error::{Error, Problem, TouchesProblem};
+use crate::error::{Setting, TouchesProblem};
 use crate::probe::approach::FINGERS;
 use std::fmt;
 use std::str::FromStr;
@@ -158,10 +158,11 @@ impl PartialNoise {
         // Ranges are those of any noise.
         match self.over(Noise::default()).check() {
             Ok(()) => Ok(()),
-            Err(Error::At { problem: Problem::Setting { allowed, .. }, .. }) => {
-                Err(BadNoise { key: key.into(), value: value.into(), wanted: allowed })
+            Err(error) => {
+                let wanted =
+                    error.problem::<Setting>().map_or_else(|| error.to_string(), |wrong| wrong.allowed.clone());
+                Err(BadNoise { key: key.into(), value: value.into(), wanted })
             }
-            Err(error) => Err(BadNoise { key: key.into(), value: value.into(), wanted: error.to_string() }),
         }
     }
 }

@@ -48,6 +48,7 @@ fn bad(text: &str, example: &'static str) -> TouchesProblem {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Problem;
 
     #[test]
     fn quantities_have_units() {

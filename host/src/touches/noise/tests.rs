@@ -1,4 +1,5 @@
 use super::*;
+use crate::error::Setting;
 
 fn touches(count: u32) -> Vec<Touch> {
     (0..count).map(|i| Touch::from_micros([i % 977, 500_000, 900_000 + i])).collect()
@@ -188,10 +189,7 @@ fn noise_that_cannot_be_is_refused_by_the_name_of_its_setting() {
         (Noise { pose_bias: f64::NAN, ..base }, "pose_bias"),
     ] {
         let error = noise.check().unwrap_err();
-        assert!(
-            matches!(error.problem(), Some(crate::error::Problem::Setting { name: found, .. }) if *found == name),
-            "{error}"
-        );
+        assert!(matches!(error.problem::<Setting>(), Some(Setting { name: found, .. }) if *found == name), "{error}");
     }
     assert!(base.check().is_ok() && base.is_none() && !Noise::gaussian(1.0).is_none());
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::error::Problem;
+
 use crate::touches::Dataset;
 use std::fs;
 
@@ -33,10 +33,7 @@ fn whole(directory: &Path, object: &str, numbers: std::ops::Range<u32>) {
 }
 
 fn problem(error: &Error) -> &TouchesProblem {
-    match error.problem() {
-        Some(Problem::Touches(problem)) => problem,
-        _ => panic!("{error}"),
-    }
+    error.problem().unwrap_or_else(|| panic!("{error}"))
 }
 
 fn read(directory: &Path) -> Dataset {

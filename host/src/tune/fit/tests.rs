@@ -1,7 +1,7 @@
 //! A simulator of crooked probes that shares no code with the fit, and what is found out about its probes.
 
 use super::*;
-use crate::error::Problem;
+
 use crate::mesh::builtin;
 use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
@@ -218,7 +218,7 @@ fn a_few_touches_give_warnings_and_too_few_an_error() {
     assert!(found.warnings.iter().any(|warning| warning.record.contains("approaches")), "{:?}", found.warnings);
     let few = recorded(&objects()[..1], 12, 12, &BENT);
     let error = fit(&few, &objects(), None, &settings(), &()).unwrap_err();
-    assert!(matches!(error.problem(), Some(Problem::Tune(TuneProblem::FewRecorded { .. }))), "{error}");
+    assert!(matches!(error.problem::<TuneProblem>(), Some(TuneProblem::FewRecorded { .. })), "{error}");
 }
 
 #[test]

@@ -6,10 +6,11 @@
 use super::layout::{Anchor, Layout, NARROW, SAMPLE, Text};
 use super::parts::{Chart, Key, Mark, Shape, Stroke, Svg};
 use super::text::SIZE;
+use crate::page::PageProblem;
 use crate::page::axis::Axis;
 use crate::page::color::{GRAY, GRID};
 use maud::html;
-use palpate::error::{PageProblem, Result};
+use palpate::error::Result;
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::element::{Circle, DashedPathElement, PathElement, Polygon, Rectangle, TriangleMarker};

@@ -10,10 +10,11 @@ mod simplified;
 pub(crate) use simplified::SimplifiedMesh;
 
 use super::html;
+use crate::page::PageProblem;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
-use palpate::error::{PageProblem, Result};
+use palpate::error::Result;
 
 #[cfg(test)]
 pub(crate) use simplified::MOST_TRIANGLES;

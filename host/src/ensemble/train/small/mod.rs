@@ -41,7 +41,7 @@ impl Default for Small {
 
 impl Small {
     /// # Errors
-    /// [`Problem::Setting`](crate::error::Problem::Setting) for a number out of its range, or for settings that go with other
+    /// [`Setting`](crate::error::Setting) for a number out of its range, or for settings that go with other
     /// trainings.
     pub(super) fn check(&self, settings: &Settings) -> Result<()> {
         if !(1..=1 << 16).contains(&self.leaves) {

@@ -1,7 +1,7 @@
 use super::super::train;
 use super::*;
 use crate::compile::{self, Layout, Leaf, compile};
-use crate::error::Problem;
+use crate::error::Setting;
 use crate::touches::synthetic;
 use palpate_shared::{Descriptor, Touch};
 use std::collections::BTreeSet;
@@ -154,6 +154,6 @@ fn settings_that_contradict_each_other_are_refused_by_name() {
         (Settings { rounds: 0, ..settings(8) }, "rounds"),
     ] {
         let error = train(&dataset(1), &how, &()).unwrap_err();
-        assert!(matches!(error.problem(), Some(Problem::Setting { name, .. }) if *name == expected), "{error}");
+        assert!(matches!(error.problem::<Setting>(), Some(Setting { name, .. }) if *name == expected), "{error}");
     }
 }

@@ -1,0 +1,59 @@
+//! What can be wrong with the report and the main job.
+
+use palpate::error::Problem;
+
+/// What can be wrong with the report and the main job.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportProblem {
+    /// There is nothing to compare an object with.
+    #[error("there is only one object, and nothing to distinguish it from")]
+    OneObject,
+    /// The directory holds results that this call did not make.
+    #[error("the directory holds results of another run: {found}")]
+    OtherResults {
+        /// What shows it: a file's name, or what its summary states.
+        found: String,
+    },
+    /// Densities are estimated over exactly two features.
+    #[error("the descriptor {descriptor} has {features} features, not two")]
+    NotTwoFeatures {
+        /// The descriptor's name.
+        descriptor: String,
+        /// How many features it has.
+        features: usize,
+    },
+    /// A model that was just compiled does not open.
+    #[error("a model that was just compiled does not open: {reason}")]
+    Compiled {
+        /// What the reader said.
+        reason: String,
+    },
+    /// A model knows more objects than the recognizer has room for.
+    #[error("a model of {objects} objects")]
+    TooManyObjects {
+        /// How many.
+        objects: usize,
+    },
+    /// A result cannot be written as JSON.
+    #[error("cannot write the {what} as JSON: {reason}")]
+    Json {
+        /// What was to be written.
+        what: &'static str,
+        /// What the JSON library said.
+        reason: String,
+    },
+}
+
+impl Problem for ReportProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::OneObject => "Give at least two objects.",
+            Self::OtherResults { .. } => "Choose another directory, or force the replacement.",
+            Self::NotTwoFeatures { .. } => "Estimate densities for the descriptor curvature only.",
+            Self::TooManyObjects { .. } => "Use at most 256 objects.",
+            Self::Compiled { .. } | Self::Json { .. } => "Report this as a bug.",
+        }
+        .into()
+    }
+}

@@ -1,0 +1,37 @@
+//! What can be wrong with drawing.
+
+use palpate::error::Problem;
+
+/// What can be wrong with drawing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PageProblem {
+    /// The plotting library refused a chart.
+    #[error("cannot draw the chart \"{title}\": {reason}")]
+    Chart {
+        /// The chart's title; may be empty.
+        title: String,
+        /// What the library said.
+        reason: String,
+    },
+    /// The CSV library refused a table.
+    #[error("cannot write CSV: {reason}")]
+    Csv {
+        /// What the library said.
+        reason: String,
+    },
+    /// A scene cannot be written as JSON.
+    #[error("cannot write the scene as JSON: {reason}")]
+    Scene {
+        /// What the JSON library said.
+        reason: String,
+    },
+}
+
+impl Problem for PageProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::Chart { .. } | Self::Csv { .. } | Self::Scene { .. } => "Report this as a bug.".into(),
+        }
+    }
+}

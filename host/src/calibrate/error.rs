@@ -1,0 +1,98 @@
+//! What can be wrong with calibrating.
+
+use crate::error::Problem;
+
+/// What can be wrong with calibrating.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateProblem {
+    /// Even without any error the sequences would not be enough to promise the rate.
+    #[error("{found} names given{} are too few to promise {} %: at least {needed} are needed, none of them wrong{}", of_object(object), percent(*rate), in_touches(*supplied, *found, *needed))]
+    TooFew {
+        /// The object whose names are too few, if the promise is for each.
+        object: Option<String>,
+        /// The promised rate.
+        rate: f64,
+        /// Names given.
+        found: u64,
+        /// Names needed, if none is wrong.
+        needed: u64,
+        /// What the sequences were drawn from, if it was used up.
+        supplied: Option<Supplied>,
+    },
+    /// No threshold keeps the promise.
+    #[error("no threshold keeps {} %: at the strictest {wrong} of {given} names{} are wrong", percent(*rate), of_object(object))]
+    NotKept {
+        /// The object that is named, or touched, if the promise is for each.
+        object: Option<String>,
+        /// The promised rate.
+        rate: f64,
+        /// Wrong names.
+        wrong: u64,
+        /// Names given.
+        given: u64,
+    },
+    /// The data set lacks objects of the model.
+    #[error("the data set has no touches of {}", objects.join(", "))]
+    Missing {
+        /// Objects that the model knows and the data set does not have.
+        objects: Vec<String>,
+    },
+    /// The touches are those that the model was trained on.
+    #[error("the model was trained on these touches of {}: a promise that they keep would not hold for others", objects.join(", "))]
+    TrainedOn {
+        /// The objects.
+        objects: Vec<String>,
+    },
+    /// There are no objects to choose between.
+    #[error("the model knows one object only, which it cannot take for another")]
+    OneObject,
+}
+
+/// The touches of a data set that sequences used up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Supplied {
+    /// Whether it holds approaches, or full touches only.
+    pub approaches: bool,
+    /// How many of these it holds of the object that it has the fewest of.
+    pub fewest: u64,
+}
+
+impl Problem for CalibrateProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::TooFew { supplied: None, .. } => "Allow more sequences, or promise a higher error rate.",
+            Self::TooFew { supplied: Some(_), .. } => "Record or capture more touches, or promise a higher error rate.",
+            Self::NotKept { .. } => {
+                "Train the model for the noise of these touches, or promise a higher error rate; more touches of the \
+                 calibration may also help."
+            }
+            Self::Missing { .. } => "Capture them too, with another seed than the training's.",
+            Self::TrainedOn { .. } => "Calibrate on others: capture them with another seed (--seed), or record more.",
+            Self::OneObject => "Give a model of two or more objects.",
+        }
+        .into()
+    }
+}
+
+fn percent(rate: f64) -> f64 {
+    (rate * 1e9).round() / 1e7
+}
+
+/// How many touches of each object as many names take, in words: in proportion.
+fn in_touches(supplied: Option<Supplied>, found: u64, needed: u64) -> String {
+    let Some(Supplied { approaches, fewest }) = supplied else { return String::new() };
+    let what = if approaches { "approaches" } else { "touches" };
+    if found == 0 {
+        return format!(", and {fewest} {what} of an object give no name");
+    }
+    let enough = fewest as f64 * needed as f64 / found as f64;
+    // Two digits: it is no more than an estimate.
+    let digit = 10.0_f64.powf((enough.max(1.0).log10().floor() - 1.0).max(0.0));
+    let enough = (enough / digit).ceil() * digit;
+    format!(", which takes about {enough:.0} {what} of each object or more; there are {fewest} of one")
+}
+
+fn of_object(object: &Option<String>) -> String {
+    object.as_ref().map_or_else(String::new, |object| format!(" for {object}"))
+}

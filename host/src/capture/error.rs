@@ -1,0 +1,171 @@
+//! What can be wrong with captures.
+
+use crate::error::Problem;
+use std::io::ErrorKind;
+
+/// What can be wrong with captures.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CaptureProblem {
+    /// An object's mesh makes no scene.
+    #[error("{name}: {detail}")]
+    Object {
+        /// The object.
+        name: String,
+        /// What is wrong with it.
+        detail: String,
+        /// What to do about it, as a sentence.
+        fix: String,
+    },
+    /// An object is to be touched at its true size, which is not known.
+    #[error("{name}: the unit of its mesh is not known, and so its true size is not")]
+    NoTrueSize {
+        /// The object.
+        name: String,
+    },
+    /// An object cannot be touched with all fingers.
+    #[error("{name}: none of {approaches} approaches touched with all three fingers")]
+    Untouchable {
+        /// The object.
+        name: String,
+        /// How many approaches were tried.
+        approaches: u64,
+    },
+    /// Another capture has locked the directory.
+    #[error("another capture is writing into this directory")]
+    Busy,
+    /// The directory holds a data set of objects that the capture would not write.
+    #[error("holds {touches} touches of {}, which this capture would not write", list(objects))]
+    HoldsOtherObjects {
+        /// The objects.
+        objects: Vec<String>,
+        /// How many touches there are of them.
+        touches: u64,
+    },
+    /// The directory holds a data set of the same objects that was made in another way.
+    #[error("holds touches of {} that were made with other settings: {differences}", list(objects))]
+    HoldsOtherSettings {
+        /// The objects.
+        objects: Vec<String>,
+        /// Which settings differ, and how.
+        differences: String,
+    },
+    /// The directory holds files of touches that no listing names.
+    #[error("holds {}, which no capture listed: once this capture has, they would never be used", list(files))]
+    HoldsFiles {
+        /// The files' names.
+        files: Vec<String>,
+    },
+    /// The directory holds recorded touches, which no capture could make again.
+    #[error("holds {touches} recorded touches of {}", list(objects))]
+    HoldsRecorded {
+        /// The objects.
+        objects: Vec<String>,
+        /// How many touches there are of them.
+        touches: u64,
+    },
+    /// The directory holds an unfinished capture.
+    #[error("holds an unfinished capture of {}, with {touches} touches so far", list(objects))]
+    HoldsUnfinished {
+        /// Its objects.
+        objects: Vec<String>,
+        /// How many touches there are.
+        touches: u64,
+    },
+    /// Objects that are to be added are there already.
+    #[error("already holds touches of {}", list(objects))]
+    AlreadyThere {
+        /// The objects.
+        objects: Vec<String>,
+    },
+    /// Objects cannot be added to a data set that was made in another way.
+    #[error("cannot add to these touches: other settings: {differences}")]
+    AddsOtherSettings {
+        /// Which settings differ, and how.
+        differences: String,
+    },
+    /// The capture to resume was started by another version.
+    #[error("cannot resume: started by version {found}, this is {}", env!("CARGO_PKG_VERSION"))]
+    ResumesOtherVersion {
+        /// That version.
+        found: String,
+    },
+    /// The capture to resume was started with other settings.
+    #[error("cannot resume: other settings: {differences}")]
+    ResumesOtherSettings {
+        /// Which settings differ, and how.
+        differences: String,
+    },
+    /// The capture to resume was started with other objects.
+    #[error("cannot resume: other objects: it was started with {}", list(objects))]
+    ResumesOtherObjects {
+        /// Its objects.
+        objects: Vec<String>,
+    },
+    /// A part lost what was checkpointed.
+    #[error("shorter than the {bytes} bytes that dataset.json states")]
+    Shorter {
+        /// What is stated.
+        bytes: u64,
+    },
+    /// Touches could not be written.
+    #[error("cannot write the touches: {message}")]
+    NotWritten {
+        /// The kind of the operating system's error.
+        kind: ErrorKind,
+        /// What the operating system said.
+        message: String,
+    },
+    /// The operating system refused a thread.
+    #[error("the system started only {started} of {asked} threads ({message})")]
+    Threads {
+        /// How many were to start.
+        asked: usize,
+        /// How many did.
+        started: usize,
+        /// What the operating system said.
+        message: String,
+    },
+    /// A worker ended without a result.
+    #[error("a worker stopped")]
+    WorkerStopped,
+}
+
+impl Problem for CaptureProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::Object { fix, .. } => return fix.clone(),
+            Self::Untouchable { .. } => {
+                "Leave the object out, or give a larger radius, a smaller spacing or a greater length."
+            }
+            Self::NoTrueSize { .. } => "State the unit of the mesh: mm, cm, m or in.",
+            Self::Busy => "Wait until it is done, or give another directory.",
+            Self::HoldsOtherObjects { .. } => "Give another directory, add to these touches, or replace them.",
+            Self::HoldsOtherSettings { .. } => "Give another directory, or replace these touches.",
+            Self::HoldsRecorded { .. } => "Give another directory: recorded and simulated touches are not mixed.",
+            Self::HoldsFiles { .. } => "Give another directory, or move the files away.",
+            Self::HoldsUnfinished { .. } => "Resume that capture, replace it, or give another directory.",
+            Self::AlreadyThere { .. } => "Leave them out, or give another directory.",
+            Self::AddsOtherSettings { .. } => {
+                "Capture with the settings and meshes of these touches, or give another directory."
+            }
+            Self::ResumesOtherVersion { .. } | Self::ResumesOtherSettings { .. } | Self::ResumesOtherObjects { .. } => {
+                "Repeat the arguments and restore the meshes of the first capture, or give another directory."
+            }
+            Self::Shorter { .. } => "Capture again from the beginning, replacing these touches.",
+            Self::NotWritten { kind: ErrorKind::StorageFull | ErrorKind::QuotaExceeded, .. } => {
+                "Free some space, then resume the capture: what is checkpointed is safe."
+            }
+            Self::NotWritten { .. } => "Check the disk, then resume the capture: what is checkpointed is safe.",
+            Self::Threads { .. } => "Use fewer threads.",
+            Self::WorkerStopped => "Report this as a bug.",
+        }
+        .into()
+    }
+}
+
+/// Names, the first ten of them.
+fn list(names: &[String]) -> String {
+    let shown = names[..names.len().min(10)].join(", ");
+    if names.len() > 10 { format!("{shown} and {} more", names.len() - 10) } else { shown }
+}

@@ -1,0 +1,15 @@
+//! What can go wrong, said so that the user knows where and what to do next. Each room has its own problems; one error holds
+//! any of them, and the place.
+
+pub use crate::calibrate::{CalibrateProblem, Supplied};
+pub use crate::capture::CaptureProblem;
+pub use crate::chip::ChipProblem;
+pub use crate::evaluate::EvaluateProblem;
+pub use crate::mesh::MeshProblem;
+pub use crate::probe::ProbeProblem;
+#[cfg(feature = "train")]
+pub use crate::teach::TeachProblem;
+pub use crate::touches::TouchesProblem;
+#[cfg(feature = "train")]
+pub use crate::tune::TuneProblem;
+pub use palpate_trees::error::*;

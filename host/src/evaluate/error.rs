@@ -1,0 +1,201 @@
+//! What can be wrong with evaluating.
+
+use crate::error::Problem;
+use palpate_shared::Descriptor;
+
+/// What can be wrong with evaluating.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EvaluateProblem {
+    /// The model does not know an object of the data set.
+    #[error("the model does not know the object {object}, only {}", known.join(", "))]
+    UnknownObject {
+        /// The object.
+        object: String,
+        /// The objects that it knows.
+        known: Vec<String>,
+    },
+    /// The model knows an object that was to be one that it does not know.
+    #[error("the model knows the object {object}, so that it is no stranger")]
+    KnownObject {
+        /// The object.
+        object: String,
+    },
+    /// An object that the model knows is not in a data set that must hold all of them.
+    #[error("there are no touches of {object}, which the model knows")]
+    MissingObject {
+        /// The object.
+        object: String,
+    },
+    /// An object has too few touches to say what its touches give.
+    #[error("an object has only {found} touches to learn from what its touches give, or they are all alike")]
+    TooFewForFit {
+        /// How many there are.
+        found: usize,
+    },
+    /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
+    #[error("{}", too_few_for_alarms(*object_sequences, *needed))]
+    TooFewForAlarms {
+        /// Sequences of the object with the fewest.
+        object_sequences: usize,
+        /// How many of each object it takes.
+        needed: u64,
+    },
+    /// The model works on other rows than touches.
+    #[error("the model works on rows of features, not on touches")]
+    RawFeatures,
+    /// The descriptor needs the probe's pose.
+    #[error("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())]
+    NoPose {
+        /// The descriptor.
+        descriptor: Descriptor,
+    },
+    /// A compiled model and an ensemble are not of the same objects and descriptor.
+    #[error("the model was not compiled from this ensemble: its objects or its descriptor are others")]
+    OtherModel,
+    /// There is nothing to compare models on.
+    #[error("there are no touches to compare the models on")]
+    NoTouches,
+    /// The model has more objects than a recognizer has room for.
+    #[error("the model has {objects} objects, and the recognizer has room for {capacity}")]
+    TooManyObjects {
+        /// Objects of the model.
+        objects: usize,
+        /// Room of the recognizer.
+        capacity: usize,
+    },
+    /// A compiled model's margins are not its ensemble's.
+    #[error(
+        "not exported from this ensemble: margins differ by up to {found:.2e} nats, where the model states {stated:.2e} at most"
+    )]
+    NotExported {
+        /// The largest difference, in nats.
+        found: f64,
+        /// The largest one that the model states.
+        stated: f64,
+    },
+    /// The model has no plan of approaches.
+    #[error("the model has no plan of approaches")]
+    NoPlan,
+    /// A plan was asked for a model of one object.
+    #[error("the model has one object: there is nothing to tell it from")]
+    OneObjectToPlan,
+    /// A plan needs approaches, also those that missed.
+    #[error("the data set holds full touches only, without the approaches in between")]
+    NoApproaches,
+    /// A plan needs approaches to every object.
+    #[error("the data set has no approaches to {object}")]
+    NoneOf {
+        /// The object.
+        object: String,
+    },
+    /// A plan needs the probe's pose.
+    #[error("there are approaches to {object} without the probe's pose")]
+    NoPoseOf {
+        /// The object.
+        object: String,
+    },
+    /// There are too few approaches in a pose.
+    #[error("only {found} approaches to {object} are in one of the poses, and a plan needs {needed}")]
+    FewInPose {
+        /// The object.
+        object: String,
+        /// The fewest approaches in a pose.
+        found: usize,
+        /// How many there must be.
+        needed: usize,
+    },
+    /// Something was asked for that only compiled models do.
+    #[error("forgetting is what a compiled model's recognizer does, and this is an ensemble")]
+    NotCompiled,
+    /// There is one object only.
+    #[error("the data set has one object: there is nothing to exchange it for")]
+    NothingToSwitch,
+    /// Recorded and simulated touches cannot be compared.
+    #[error("the touches cannot be compared: {detail}")]
+    Incomparable {
+        /// Why not.
+        detail: String,
+    },
+    /// A line is not a touch.
+    #[error("{detail}")]
+    Touch {
+        /// What is wrong with it.
+        detail: String,
+    },
+    /// A contact time is longer than an object can make it.
+    #[error(
+        "a finger touched {seconds:.1} s after the first, but no object of the model's scale takes longer than {longest:.2} s at its speed of {speed} units per second"
+    )]
+    TimeTooLong {
+        /// Seconds after the first contact.
+        seconds: f64,
+        /// The most seconds that make sense.
+        longest: f64,
+        /// The speed that the model states, in units per second.
+        speed: f32,
+    },
+}
+
+/// Which of the two it is.
+fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
+    if (object_sequences as u64) < needed {
+        format!(
+            "the touches make only {object_sequences} sequences of an object, and the promise takes at least {needed}"
+        )
+    } else {
+        format!(
+            "of {object_sequences} sequences of each object too many end as unknown at every threshold, so the promise takes \
+             more sequences"
+        )
+    }
+}
+
+impl Problem for EvaluateProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
+            Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
+            Self::MissingObject { .. } => "Capture touches of every object that the model knows.",
+            Self::TooFewForFit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
+            Self::RawFeatures => {
+                "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
+            }
+            Self::NoPose { .. } => "Capture the touches with their pose.",
+            Self::OtherModel | Self::NotExported { .. } => "Give the ensemble that the model was exported from.",
+            Self::NoTouches => "Give at least one touch of each object.",
+            Self::TooManyObjects { .. } => "Use a model of fewer objects.",
+            Self::NoPlan => {
+                "Add one: `palpate plan MODEL DIR -o OUT`, from approaches with pose. An ensemble (JSON) has to be exported first."
+            }
+            Self::OneObjectToPlan => "Train a model of two objects or more.",
+            Self::NoApproaches => "Capture every approach: --approaches --pose.",
+            Self::NoneOf { .. } => "Capture all of the model's objects.",
+            Self::NoPoseOf { .. } => "Capture the approaches with their pose: --approaches --pose.",
+            Self::FewInPose { found, needed, .. } => {
+                return format!(
+                    "Capture {} times as many approaches, or plan fewer rolls.",
+                    needed.div_ceil((*found).max(1)).max(2)
+                );
+            }
+            Self::NotCompiled => "Export the ensemble first.",
+            Self::NothingToSwitch => "Capture another object.",
+            Self::Incomparable { .. } => "Give recorded and simulated touches of the same objects, and simulate every approach (--approaches).",
+            Self::Touch { .. } => "Correct the line.",
+            Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
+        }
+        .into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn enough_sequences_with_too_many_alarms_are_not_said_to_be_too_few() {
+        let said = |object_sequences| EvaluateProblem::TooFewForAlarms { object_sequences, needed: 30 }.to_string();
+        assert!(said(29).contains("only 29 sequences of an object") && said(29).ends_with("at least 30"));
+        assert!(said(37).starts_with("of 37 sequences of each object too many end as unknown"), "{}", said(37));
+    }
+}

@@ -1,0 +1,180 @@
+//! What can be wrong with meshes and where they come from.
+
+use crate::error::Problem;
+use std::path::PathBuf;
+
+/// What can be wrong with meshes and where they come from.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshProblem {
+    /// A source is nothing that exists, and not the name of a built-in object.
+    #[error("cannot read the mesh: this is neither a file, a directory nor a built-in object")]
+    NoSuchSource {
+        /// The names of the built-in objects.
+        builtin: Vec<&'static str>,
+    },
+    /// A directory holds no mesh.
+    #[error("no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb or .dae")]
+    NoMeshes,
+    /// Several objects where one is asked for.
+    #[error("{count} objects, where one is needed")]
+    SeveralObjects {
+        /// How many there are.
+        count: usize,
+    },
+    /// Two sources give objects of one name.
+    #[error("two objects are called {name}: {first} and {second}")]
+    SameName {
+        /// The name.
+        name: String,
+        /// Where the first comes from: a file, or `builtin`.
+        first: PathBuf,
+        /// Where the second comes from.
+        second: PathBuf,
+    },
+    /// A vertex line has fewer than three coordinates.
+    #[error("a vertex without {axis}")]
+    MissingCoordinate {
+        /// The first one that is missing: `x`, `y` or `z`.
+        axis: char,
+    },
+    /// A coordinate is no number.
+    #[error("{text:?} is not a number")]
+    NotANumber {
+        /// What stands there instead, shortened.
+        text: String,
+    },
+    /// A coordinate is infinite, not a number, or beyond the range of an `f32`.
+    #[error("the coordinate {axis} = {text:?} is not finite")]
+    NotFinite {
+        /// Which one: `x`, `y` or `z`.
+        axis: char,
+        /// What stands there, shortened.
+        text: String,
+    },
+    /// A face has something else than vertex indices.
+    #[error("{text:?} is not a vertex of a face")]
+    NotAnIndex {
+        /// What stands there instead, shortened.
+        text: String,
+    },
+    /// A face's index is 0, or counts back to before the first vertex.
+    #[error("vertex {index} of a face is out of range: {vertices} vertices before it")]
+    IndexBeforeFirst {
+        /// The index as it stands in the file: negative ones count back from the last vertex.
+        index: i64,
+        /// How many vertices the file has before the face.
+        vertices: u64,
+    },
+    /// A face's index is larger than the number of vertices.
+    #[error("vertex {index} of a face is out of range: the file has {vertices} vertices")]
+    IndexAfterLast {
+        /// The index, counted from 1.
+        index: u64,
+        /// How many vertices the file has.
+        vertices: u64,
+    },
+    /// A face's index is negative, or larger than the number of vertices.
+    #[error("vertex {index} of a face is missing: there are {vertices} vertices, counted from 0")]
+    NoSuchVertex {
+        /// The index as it stands in the file, counted from 0.
+        index: i64,
+        /// How many vertices there are.
+        vertices: u64,
+    },
+    /// A file is not what a file of its kind must be.
+    #[error("the {format} file is damaged: {what}")]
+    Damaged {
+        /// The kind of file: `STL`.
+        format: &'static str,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A file uses what is not read and would change the surface.
+    #[error("{what} is not read")]
+    Unsupported {
+        /// What it is, by name.
+        what: String,
+        /// What to do instead, as a sentence without its full stop.
+        instead: &'static str,
+    },
+    /// The meshes of a file, placed as often as it says, are too large for a file of its length; or a pipe does not end.
+    #[error("the mesh would take more than {limit} bytes")]
+    TooLarge {
+        /// How many bytes it may take.
+        limit: u64,
+    },
+    /// More vertices than an index can tell apart.
+    #[error("the mesh has more than 4294967295 vertices")]
+    TooManyVertices,
+    /// The parser refuses the file for another reason.
+    #[error("cannot be read as a mesh ({reason})")]
+    Unreadable {
+        /// What the parser says.
+        reason: String,
+    },
+    /// The mesh has no triangles.
+    #[error("the mesh has no faces")]
+    NoFaces,
+    /// Each triangle of the mesh is a single point.
+    #[error("the mesh has no extent: each of its faces is a single point")]
+    NoExtent,
+    /// A triangle names a vertex that the mesh does not have.
+    #[error("vertex {index} of the mesh is missing: it has {vertices} vertices, counted from 0")]
+    MissingVertex {
+        /// The index, counted from 0.
+        index: u32,
+        /// How many vertices the mesh has.
+        vertices: usize,
+    },
+    /// A triangle has a vertex that is infinite or not a number.
+    #[error("vertex {index} of the mesh is not finite")]
+    VertexNotFinite {
+        /// The index, counted from 0.
+        index: u32,
+    },
+    /// A built-in object cannot be meshed without gaps at any resolution that is tried.
+    #[error("the built-in object {name} {} has no closed mesh", variation(seed))]
+    NotMeshed {
+        /// The object's name.
+        name: String,
+        /// The seed of its proportions; none for the canonical ones.
+        seed: Option<u64>,
+    },
+}
+
+fn variation(seed: &Option<u64>) -> String {
+    seed.map_or("in its canonical proportions".into(), |seed| format!("with seed {seed}"))
+}
+
+impl Problem for MeshProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::NoSuchSource { builtin } => {
+                format!("Check the path, or give one of the built-in objects: {}.", builtin.join(", "))
+            }
+            Self::NoMeshes => "Give a directory that holds such files.".into(),
+            Self::SeveralObjects { .. } => "Give one mesh file, or the name of one built-in object.".into(),
+            Self::SameName { .. } => "Rename one of the files, or leave one out.".into(),
+            Self::MissingCoordinate { .. }
+            | Self::NotANumber { .. }
+            | Self::NotFinite { .. }
+            | Self::NotAnIndex { .. }
+            | Self::IndexBeforeFirst { .. }
+            | Self::IndexAfterLast { .. } => "Correct the line, or export the mesh again.".into(),
+            Self::NoSuchVertex { .. } | Self::Damaged { .. } => {
+                "Export the mesh again, or convert it to another of OBJ, STL, PLY, GLB and COLLADA.".into()
+            }
+            Self::Unsupported { instead, .. } => format!("{instead}."),
+            Self::TooLarge { .. } | Self::TooManyVertices => "Simplify the mesh, or export it in parts.".into(),
+            Self::Unreadable { .. } | Self::NoFaces | Self::NoExtent => {
+                "Export the mesh as a file with faces: OBJ, STL, PLY, GLB or COLLADA.".into()
+            }
+            Self::MissingVertex { .. } | Self::VertexNotFinite { .. } => {
+                "Give a mesh whose faces have finite vertices.".into()
+            }
+            Self::NotMeshed { seed: Some(_), .. } => "Use another seed.".into(),
+            Self::NotMeshed { seed: None, .. } => "Report this as a bug.".into(),
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! What can be wrong with scenes, probes and casts.
+
+use crate::error::Problem;
+
+/// What can be wrong with scenes, probes and casts.
+///
+/// What is wrong with a scene's mesh is a [`MeshProblem`](super::MeshProblem), what is wrong with a probe's measures a
+/// [`Setting`](crate::error::Setting).
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProbeProblem {
+    /// Two sides state different probes.
+    #[error("{first} and {second} state different probes: {differences}")]
+    Differs {
+        /// One side, such as "the model".
+        first: String,
+        /// The other.
+        second: String,
+        /// What differs: "radius 0.15 and 0.3".
+        differences: String,
+    },
+    /// A probe file is not TOML, or not a probe.
+    #[error("not a usable probe file: {message}")]
+    BadFile {
+        /// What is wrong.
+        message: String,
+    },
+    /// A line of a file of casts has too few or too many fields.
+    #[error("{fields} fields where a cast has 7, or 8 with a time")]
+    CastFields {
+        /// How many fields the line has.
+        fields: usize,
+    },
+    /// A coordinate of a cast is not a finite number.
+    #[error("{text:?} is not a finite number")]
+    CastCoordinate {
+        /// What stands there instead.
+        text: String,
+    },
+    /// The known time of a cast is neither a number that is at least 0 nor `miss`.
+    #[error("{text:?} is neither a time nor `miss`")]
+    CastTime {
+        /// What stands there instead.
+        text: String,
+    },
+}
+
+impl Problem for ProbeProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::Differs { .. } => "Use both with the same probe: times mean something else with another.".into(),
+            Self::BadFile { .. } => {
+                "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, timer and [real].".into()
+            }
+            Self::CastFields { .. } | Self::CastCoordinate { .. } | Self::CastTime { .. } => {
+                "Give set,ox,oy,oz,dx,dy,dz and, if known, t.".into()
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! What can be wrong with teaching objects from recorded touches.
+
+use crate::error::Problem;
+use palpate_shared::Descriptor;
+use palpate_shared::format::Counted;
+
+/// What can be wrong with teaching objects from recorded touches.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TeachProblem {
+    /// The ensemble is over rows of features.
+    #[error("objects are taught by touches, and the ensemble is over rows of features")]
+    NotOfTouches,
+    /// Leaves have no room for another object.
+    #[error("a leaf of the ensemble holds one value, so that no object can be added to its trees")]
+    OneValue,
+    /// There is nothing to teach.
+    #[error("there are no recorded touches")]
+    Nothing,
+    /// Objects that the ensemble knows have no touches to compare with.
+    #[error("there are no touches of {}, which the ensemble knows", objects.join(", "))]
+    Missing {
+        /// The objects.
+        objects: Vec<String>,
+    },
+    /// A name is taken.
+    #[error("{object} is known already: an object that is taught needs a name of its own")]
+    Known {
+        /// The name.
+        object: String,
+    },
+    /// Partial touches are evidence, but none were recorded.
+    #[error(
+        "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never give \
+         other touches",
+        match counted { Counted::All => "every approach", _ => "every touch with a contact" }
+    )]
+    FullTouches {
+        /// Which touches are evidence.
+        counted: Counted,
+    },
+    /// The known objects' touches have other noise than the ensemble was trained for.
+    #[error("the ensemble was trained for {stated}, and the touches of its objects have {there} already")]
+    OtherNoise {
+        /// What the ensemble was trained for.
+        stated: String,
+        /// What the touches have.
+        there: String,
+    },
+    /// A pose is missing.
+    #[error("touches of {object} have no pose, which the descriptor {} needs", descriptor.name())]
+    NoPose {
+        /// The object.
+        object: String,
+        /// The descriptor.
+        descriptor: Descriptor,
+    },
+    /// There are too few touches to hold a part of them out.
+    #[error("only {touches} recorded touches of {object} are evidence, of at least {least} that are needed")]
+    TooFew {
+        /// The object.
+        object: String,
+        /// Its touches that are evidence.
+        touches: usize,
+        /// How many are needed.
+        least: usize,
+    },
+}
+
+impl Problem for TeachProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::NotOfTouches => "Give an ensemble that was trained on touches.",
+            Self::OneValue => "Train with leaves that hold a value for each object, as the preset compact does.",
+            Self::Nothing => "Record approaches to the object, one line per approach.",
+            Self::Missing { .. } => {
+                "Give the data set that the ensemble was trained on, or another one of the same objects."
+            }
+            Self::Known { .. } => {
+                "Teaching adds objects and does not adjust known ones: to train for the probe that made the recordings, fit it \
+                 (`palpate probe fit`) and capture with the file; to learn the object from the recordings alone, leave it out \
+                 of the simulated touches; or rename its recording to teach it as another object."
+            }
+            Self::FullTouches { .. } => {
+                "Record every approach, also those that missed a finger, or train on full touches."
+            }
+            Self::OtherNoise { .. } => "Give simulated touches without noise, or train again on these.",
+            Self::NoPose { .. } => "Record the pose with every touch, or train without.",
+            Self::TooFew { .. } => "Record more approaches; 300 are a good start.",
+        }
+        .into()
+    }
+}

@@ -1,0 +1,439 @@
+//! What can be wrong with data sets and files of touches.
+
+use crate::error::Problem;
+use std::path::PathBuf;
+
+/// What can be wrong with data sets and files of touches.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TouchesProblem {
+    /// A line has neither three nor nine fields.
+    #[error("{count} fields where a touch has three times, or three times and six direction cosines")]
+    Fields {
+        /// How many there are.
+        count: usize,
+    },
+    /// A field is not a number.
+    #[error("{text:?} is not a number")]
+    NotANumber {
+        /// The field.
+        text: String,
+    },
+    /// A field is infinite or not a number.
+    #[error("{text} is not finite")]
+    NotFinite {
+        /// The field.
+        text: String,
+    },
+    /// A contact time is before the clock's start.
+    #[error("the time {seconds} is negative")]
+    NegativeTime {
+        /// The time.
+        seconds: f64,
+    },
+    /// A contact time is beyond what a touch can hold.
+    #[error("the time {seconds} is longer than the 4294 s that a touch can hold")]
+    LongTime {
+        /// The time.
+        seconds: f64,
+    },
+    /// A direction or alignment is not a unit vector.
+    #[error("the {vector} has length {length:.3} where a unit vector has 1")]
+    NotUnit {
+        /// Which vector: "direction" or "alignment".
+        vector: &'static str,
+        /// Its length.
+        length: f64,
+    },
+    /// A row has one half of a pose.
+    #[error("{} without {}", with_article(there), with_article(missing))]
+    HalfPose {
+        /// The vector that is there.
+        there: &'static str,
+        /// The vector that is missing.
+        missing: &'static str,
+    },
+    /// A line is not UTF-8.
+    #[error("not text (no UTF-8)")]
+    NotText,
+    /// A row of a Parquet file is wrong.
+    #[error("row {row}: {problem}")]
+    Row {
+        /// The row, counted from 1.
+        row: u64,
+        /// What is wrong with it.
+        problem: Box<Self>,
+    },
+    /// A row of a file of touches names another object than the file.
+    #[error("a touch of {found:?} in the file of {object:?}")]
+    OtherObject {
+        /// The object that the row names.
+        found: String,
+        /// The object that the file is called after.
+        object: String,
+    },
+    /// A file is not Parquet, or its structure is damaged.
+    #[error("not a usable Parquet file ({message})")]
+    NotParquet {
+        /// What the reader said.
+        message: String,
+    },
+    /// A Parquet file lacks a column.
+    #[error("no column {name}")]
+    NoColumn {
+        /// The column.
+        name: &'static str,
+    },
+    /// A column of a Parquet file does not hold what it should.
+    #[error("column {name}: {message}")]
+    Column {
+        /// The column.
+        name: &'static str,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Touches could not be written as Parquet.
+    #[error("cannot write the touches ({message})")]
+    ParquetNotWritten {
+        /// What the writer said.
+        message: String,
+    },
+    /// A Parquet file, read by a build without Parquet.
+    #[error("this program was built without Parquet")]
+    NoParquet,
+    /// A file is no log in MCAP, or is damaged.
+    #[error("not a usable MCAP file: {message}")]
+    NotMcap {
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A log, for a build without MCAP.
+    #[error("this program was built without MCAP")]
+    NoMcap,
+    /// Something in a log is larger than what is read.
+    #[error("{what} of {bytes} bytes, where at most {most} are read")]
+    TooLarge {
+        /// What: "a record".
+        what: String,
+        /// How large it is.
+        bytes: u64,
+        /// How large it may be.
+        most: u64,
+    },
+    /// A log has more touches than are read.
+    #[error("more than {most} touches")]
+    TooMany {
+        /// How many are read.
+        most: usize,
+    },
+    /// A chunk of a log is compressed by something that nobody here knows.
+    #[error("a chunk is compressed as {name:?}, where zstd and lz4 are known")]
+    OtherCompression {
+        /// Its name.
+        name: String,
+    },
+    /// A channel with touches or verdicts is in an encoding that is not read.
+    #[error("{channel} is in the encoding {encoding:?} with a schema in {schema:?}")]
+    OtherEncoding {
+        /// The channel: its topic, with the name of its schema.
+        channel: String,
+        /// The messages' encoding.
+        encoding: String,
+        /// The schema's encoding.
+        schema: String,
+    },
+    /// A channel with touches or verdicts has a schema of another definition.
+    #[error("{channel} is defined as {found:?}, where Palpate has {expected:?}")]
+    OtherDefinition {
+        /// The channel: its topic, with the name of its schema.
+        channel: String,
+        /// What the log says.
+        found: String,
+        /// What it should say.
+        expected: String,
+    },
+    /// A log has no channel of touches.
+    #[error("no channel of touches in this log: {}", channels_or_none(channels))]
+    NoTouchChannel {
+        /// The channels that it has: topics, with the names of their schemas.
+        channels: Vec<String>,
+    },
+    /// A message of a log is wrong.
+    #[error("message {number} on {topic}: {problem}")]
+    Message {
+        /// The channel's topic.
+        topic: String,
+        /// The message among those of its channel, counted from 1.
+        number: u64,
+        /// What is wrong with it.
+        problem: Box<Self>,
+    },
+    /// A message of a log is not what its schema says.
+    #[error("no {what}: {message}")]
+    BadMessage {
+        /// What it should be: "touch in JSON".
+        what: &'static str,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Some touches of a log name an object and others do not.
+    #[error("this touch names no object, and others of the log do")]
+    NamelessTouch,
+    /// A log has no touch of an object.
+    #[error("no touch of {object} in this log, only of {objects}")]
+    NotInLog {
+        /// The object.
+        object: String,
+        /// The objects that it has.
+        objects: String,
+    },
+    /// A file holds no touch.
+    #[error("no touches in it")]
+    NoTouches,
+    /// A directory holds no file of touches.
+    #[error("no touches here (no .txt, .parquet or .mcap file)")]
+    NoObjects,
+    /// A directory holds one object.
+    #[error("only one object here, {name}, and nothing to distinguish it from")]
+    OneObject {
+        /// The object.
+        name: String,
+    },
+    /// An object has files in two formats, and no listing says which counts.
+    #[error("two files of the object {name}: {} and {}", file.display(), other.display())]
+    TwoFiles {
+        /// The object.
+        name: String,
+        /// One file.
+        file: PathBuf,
+        /// The other.
+        other: PathBuf,
+    },
+    /// The capture of a data set was interrupted.
+    #[error("the capture of these touches is not complete")]
+    Incomplete,
+    /// `dataset.json` is no listing.
+    #[error("not the listing of a data set ({message})")]
+    BadListing {
+        /// What the parser said.
+        message: String,
+    },
+    /// Touches of several instances or logs, without an origin that `dataset.json` could state.
+    #[error(
+        "{name} has {sources} instances or logs, and without a known probe no dataset.json says which touch is of which"
+    )]
+    Unsaid {
+        /// The object's name.
+        name: String,
+        /// How many there are.
+        sources: usize,
+    },
+    /// Touches of robots that differ, which no file can say.
+    #[error("the touches of {name} are of robots with biases of their own, and no file says which touch is of which")]
+    OfRobots {
+        /// The object's name.
+        name: String,
+    },
+    /// `dataset.json` names an object that no file of the directory can be called after.
+    #[error("no file can be called after the object {name:?}")]
+    BadName {
+        /// The name.
+        name: String,
+    },
+    /// `dataset.json` names an object twice.
+    #[error("the object {name} is listed twice")]
+    ListedTwice {
+        /// The object.
+        name: String,
+    },
+    /// A listed object's file is not there.
+    #[error("missing, although dataset.json lists the object {name}")]
+    Missing {
+        /// The object.
+        name: String,
+    },
+    /// A file has another number of touches than listed.
+    #[error("{found} touches where dataset.json states {stated}")]
+    OtherCount {
+        /// How many are listed.
+        stated: u64,
+        /// How many there are.
+        found: u64,
+    },
+    /// A Parquet file is not the one that was captured.
+    #[error("damaged or changed: its checksum is not the one in dataset.json")]
+    OtherChecksum,
+    /// Another program has locked the directory.
+    #[error("another program is writing into this directory")]
+    Busy,
+    /// Touches are to be recorded into a directory that holds simulated ones.
+    #[error("holds {touches} simulated touches of {objects}")]
+    HoldsSimulated {
+        /// The objects.
+        objects: String,
+        /// How many touches there are of them.
+        touches: u64,
+    },
+    /// Touches are to be recorded into a directory with files of touches that no listing names.
+    #[error("holds {files}, which dataset.json does not list")]
+    Unlisted {
+        /// The files' names.
+        files: String,
+    },
+    /// Recorded touches are to be added to others that were made in another way.
+    #[error("cannot add to these recorded touches: {differences}")]
+    OtherRecording {
+        /// What differs, and how.
+        differences: String,
+    },
+    /// The same lines were recorded before.
+    #[error("the same {touches} touches of {object} were recorded before, on {began}")]
+    RecordedBefore {
+        /// The object.
+        object: String,
+        /// How many touches they are.
+        touches: u64,
+        /// When they were recorded.
+        began: String,
+    },
+    /// A touch has no pose, and is to be recorded with one.
+    #[error("no pose, and it is to be recorded with one")]
+    NoPose,
+    /// A text names no shard.
+    #[error("{text:?} is no shard")]
+    BadShard {
+        /// The text.
+        text: String,
+    },
+    /// A text names no format of touches.
+    #[error("{name:?} is no format of touches")]
+    UnknownFormat {
+        /// The text.
+        name: String,
+    },
+    /// A text is no duration, angle or share.
+    #[error("{text:?} is not a quantity with its unit")]
+    BadQuantity {
+        /// The text.
+        text: String,
+        /// What to write, with an example.
+        example: &'static str,
+    },
+    /// A file whose name does not say what it holds.
+    #[error("not a file of touches by its name")]
+    NoFormat,
+    /// An object was recorded in two places.
+    #[error("the object {name} was given twice")]
+    RecordedTwice {
+        /// The object.
+        name: String,
+    },
+    /// A check of a data set found what would make training wrong.
+    #[error("training on these touches would be wrong, for {count} reason{}", if *count == 1 { "" } else { "s" })]
+    WouldTrainWrong {
+        /// How many reasons there are.
+        count: usize,
+    },
+    /// An object has too few touches to be divided.
+    #[error("{name} has only {touches} touches, too few to split")]
+    TooFew {
+        /// The object.
+        name: String,
+        /// How many touches it has.
+        touches: usize,
+        /// How many it needs.
+        least: usize,
+    },
+}
+
+impl Problem for TouchesProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::Fields { .. }
+            | Self::NotANumber { .. }
+            | Self::NotFinite { .. }
+            | Self::NegativeTime { .. }
+            | Self::LongTime { .. }
+            | Self::NotUnit { .. }
+            | Self::NotText => {
+                "Correct the line: three times in seconds, - for a missing contact, and optionally direction and \
+                 alignment."
+            }
+            Self::HalfPose { .. } => "Give both or neither.",
+            Self::OtherObject { .. } => "Give each object a file that is called like it.",
+            Self::Row { problem, .. } => match **problem {
+                Self::HalfPose { .. } => "Give both or neither.",
+                Self::OtherObject { .. } => "Give each object a file that is called like it.",
+                _ => "Correct the row, or capture the object again.",
+            },
+            Self::NotParquet { .. } | Self::NoColumn { .. } | Self::Column { .. } | Self::NoTouches => {
+                "Capture the object again, or remove the file."
+            }
+            Self::ParquetNotWritten { .. } => "Check the disk and the space on it, then resume the capture.",
+            Self::NotMcap { .. } => "Repair it with `mcap recover`, or copy the log again.",
+            Self::NoMcap => "Build it with the feature mcap, which is on by default.",
+            Self::TooLarge { .. } => {
+                "If it is meant, keep the touches alone: mcap filter LOG -o TOUCHES.mcap -y TOPIC."
+            }
+            Self::TooMany { .. } => "Divide the log: mcap filter LOG -o PART.mcap --start TIME --end TIME.",
+            Self::OtherCompression { .. } => "Compress it again: mcap compress LOG -o OTHER.mcap --compression zstd.",
+            Self::OtherEncoding { .. } | Self::OtherDefinition { .. } => {
+                "Log them as docs/reference/mcap.md says: JSON, or CDR by the definitions in host/msg."
+            }
+            Self::NoTouchChannel { .. } => {
+                "Name the schema of the touches palpate.Touch, or in ROS 2 palpate_msgs/msg/Touch: docs/reference/mcap.md."
+            }
+            Self::Message { .. } | Self::BadMessage { .. } => {
+                "Correct what logged it: docs/reference/mcap.md says what belongs in a message."
+            }
+            Self::NamelessTouch => "Name the object in every message, or in none.",
+            Self::NotInLog { .. } => "Give one of these names, or the log of the other object.",
+            Self::NoParquet => "Build it with the feature parquet, which is on by default.",
+            Self::NoObjects => "Fill it with: palpate capture builtin -o DIR.",
+            Self::OneObject { .. } => "Capture at least two objects into the directory.",
+            Self::TwoFiles { .. } => "Remove one of them.",
+            Self::Incomplete => "Resume the capture.",
+            Self::BadListing { .. } | Self::BadName { .. } | Self::ListedTwice { .. } => {
+                "Remove the file if the touches are from elsewhere, else capture them again."
+            }
+            Self::Unsaid { .. } => {
+                "Say which probe made them (from Python `probe=`), or record each log with `palpate data record`."
+            }
+            Self::OfRobots { .. } => "Write them without noise, and add it where they are read.",
+            Self::Missing { .. } | Self::OtherCount { .. } => {
+                "Restore the file or capture the objects again, or remove dataset.json if this is meant."
+            }
+            Self::Busy => "Wait until it is done, or give another directory.",
+            Self::HoldsSimulated { .. } => "Give another directory: recorded and simulated touches are not mixed.",
+            Self::Unlisted { .. } => "Give another directory, or move the files away.",
+            Self::OtherRecording { .. } => "Record as these touches were, or into another directory.",
+            Self::RecordedBefore { .. } => "Give other lines.",
+            Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
+            Self::OtherChecksum => "Capture the objects again.",
+            Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
+            Self::NoFormat => "Call it like the object, with the ending .txt or .parquet.",
+            Self::RecordedTwice { .. } => "Put its touches into one file.",
+            Self::UnknownFormat { .. } => "Use text or parquet.",
+            Self::BadQuantity { example, .. } => return format!("Give {example}."),
+            Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
+            Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
+        }
+        .into()
+    }
+}
+
+fn channels_or_none(channels: &[String]) -> String {
+    const SHOWN: usize = 20;
+    match channels.len() {
+        0 => "it has no channel at all".into(),
+        count => {
+            let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+            let more = count.saturating_sub(SHOWN);
+            if more == 0 { format!("it has {shown}") } else { format!("it has {shown} and {more} more") }
+        }
+    }
+}
+
+fn with_article(noun: &str) -> String {
+    format!("{} {noun}", if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" })
+}

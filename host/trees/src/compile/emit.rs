@@ -1,0 +1,184 @@
+//! A compiled model as source code, for programs that have no files.
+
+use palpate_onboard::Model;
+use std::fmt::Write as _;
+
+/// A language that a model is written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// C99 or C++11, for `palpate.h`.
+    C,
+    /// Rust, for `palpate-onboard`.
+    Rust,
+}
+
+impl Language {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::C, Self::Rust];
+
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::C => "c",
+            Self::Rust => "rust",
+        }
+    }
+
+    /// What the names of its files end with.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::C => "h",
+            Self::Rust => "rs",
+        }
+    }
+}
+
+/// The model as an array in a source file, `name` being what the array is called after. Characters that an identifier
+/// cannot have become `_`.
+pub fn emit(model: &Model<'_>, name: &str, language: Language) -> String {
+    let name = identifier(name);
+    match language {
+        Language::C => c(model, &name),
+        Language::Rust => rust(model, &name),
+    }
+}
+
+/// Bytes in a line.
+const LINE: usize = 20;
+
+fn c(model: &Model<'_>, name: &str) -> String {
+    let guard = format!("{}_MODEL_H", name.to_uppercase());
+    let layout = model.layout().name().to_uppercase();
+    let leaf = model.leaf_type().name().to_uppercase();
+    let strangers = u8::from(model.strangers().is_some());
+    let shared = u8::from(model.shared_leaves().is_some());
+    let sentinel = u8::from(model.sentinel().is_some());
+    let (objects, length) = (model.object_count(), model.bytes().len());
+    format!(
+        "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
+         #ifndef {guard}\n#define {guard}\n\n\
+         /* What of palpate.h this model needs. For several models in one file: define these before including the first. */\n\
+         #ifndef PALPATE_LAYOUTS\n#define PALPATE_LAYOUTS PALPATE_{layout}\n#endif\n\
+         #ifndef PALPATE_LEAVES\n#define PALPATE_LEAVES PALPATE_{leaf}\n#endif\n\
+         #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\
+         #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
+         #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
+         #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
+         #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
+         #include \"palpate.h\"\n\n\
+         {checks}\n\
+         /* palpate_open(&model, {name}_model, sizeof {name}_model) */\n\
+         static const uint8_t {name}_model[{length}]\n\
+         #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
+         {array}}};\n\n#endif\n",
+        about = about(model).replace("*/", "* /"),
+        checks = checks(&name.to_uppercase(), &layout, &leaf, [strangers, shared, sentinel], objects),
+        array = array(model.bytes()),
+    )
+}
+
+/// What says, where another model or the program itself has left out what this one needs, which line makes room for all.
+fn checks(name: &str, layout: &str, leaf: &str, [strangers, shared, sentinel]: [u8; 3], objects: usize) -> String {
+    let several =
+        |all: &str, own: &str| (format!("({all} & {own}) == 0"), format!("{all} ({own} | those of the others)"));
+    let number = |all: &str, own: usize| (format!("{all} < {own}"), format!("{all} {own}"));
+    let mut checks = vec![
+        several("PALPATE_LAYOUTS", &format!("PALPATE_{layout}")),
+        several("PALPATE_LEAVES", &format!("PALPATE_{leaf}")),
+        number("PALPATE_MAX_OBJECTS", objects),
+    ];
+    checks.extend((strangers == 1).then(|| number("PALPATE_STRANGERS", 1)));
+    checks.extend((shared == 1).then(|| number("PALPATE_SHARED", 1)));
+    checks.extend((sentinel == 1).then(|| number("PALPATE_SENTINEL", 1)));
+    let check = |(fails, line): (String, String)| {
+        format!("#if {fails}\n#error \"model {name}: before the first model is included, #define {line}\"\n#endif\n")
+    };
+    checks.into_iter().map(check).collect()
+}
+
+fn rust(model: &Model<'_>, name: &str) -> String {
+    format!(
+        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}.\n\n\
+         /// The model: `Model::new(&{constant}.0)`.\n\
+         #[rustfmt::skip]\n\
+         pub static {constant}: palpate_onboard::Aligned<[u8; {length}]> = palpate_onboard::Aligned([\n\
+         {array}]);\n",
+        about = about(model),
+        layout = model.layout().name(),
+        leaf = model.leaf_type().name(),
+        shared = if model.shared_leaves().is_some() { ", shared-leaves" } else { "" },
+        sentinel = if model.sentinel().is_some() { ", sentinel" } else { "" },
+        constant = name.to_uppercase(),
+        length = model.bytes().len(),
+        array = array(model.bytes()),
+    )
+}
+
+/// What the model is, in one line.
+fn about(model: &Model<'_>) -> String {
+    let names: Vec<&str> = (0..model.object_count()).map(|object| model.object_name(object)).collect();
+    let text = format!("{} objects: {}; checksum {:08x}.", names.len(), names.join(", "), model.checksum());
+    text.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
+}
+
+fn array(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(5 * bytes.len());
+    for line in bytes.chunks(LINE) {
+        text += "    ";
+        for byte in line {
+            // Writing to a string cannot fail.
+            _ = write!(text, "{byte},");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// A name as C and Rust take it.
+fn identifier(name: &str) -> String {
+    let part = |character: char| if character.is_ascii_alphanumeric() { character.to_ascii_lowercase() } else { '_' };
+    let name: String = name.chars().map(part).collect();
+    if name.starts_with(|first: char| first.is_ascii_digit()) || name.is_empty() { format!("_{name}") } else { name }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOUSEHOLD: &[u8] = include_bytes!("../../../../models/household.palpate");
+
+    /// The numbers between the last `open` and the end.
+    fn numbers(source: &str, open: &str) -> Vec<u8> {
+        let start = source.rfind(open).expect("an array") + open.len();
+        source[start..].split([',', '\n', ' ', '}', ']']).filter_map(|number| number.parse().ok()).collect()
+    }
+
+    #[test]
+    fn the_array_is_the_model() {
+        let model = Model::new(HOUSEHOLD).unwrap();
+        assert_eq!(numbers(&emit(&model, "household", Language::C), "= {"), HOUSEHOLD);
+        assert_eq!(numbers(&emit(&model, "household", Language::Rust), "Aligned(["), HOUSEHOLD);
+    }
+
+    #[test]
+    fn any_file_name_becomes_an_identifier() {
+        for (name, expected) in [("model", "model"), ("My model-2", "my_model_2"), ("30trees", "_30trees"), ("", "_")] {
+            assert_eq!(identifier(name), expected);
+        }
+    }
+
+    #[test]
+    fn names_of_objects_do_not_end_the_comment() {
+        let mut bytes = HOUSEHOLD.to_vec();
+        // The first object's name is "bowl", after the exporter's version.
+        let at = bytes.windows(4).position(|window| window == b"bowl").unwrap();
+        bytes[at..at + 4].copy_from_slice(b"*/\n\x1b");
+        let body = bytes.len() - 4;
+        let sum = palpate_shared::format::checksum(&bytes[..body]);
+        bytes[body..].copy_from_slice(&sum.to_le_bytes());
+        let source = emit(&Model::new(&bytes).unwrap(), "model", Language::C);
+        let first = source.split("*/").next().unwrap();
+        assert!(first.contains("wristwatch") && first.ends_with("not to be edited. "), "{first}");
+        assert!(!emit(&Model::new(&bytes).unwrap(), "model", Language::Rust).lines().next().unwrap().contains('\x1b'));
+    }
+}

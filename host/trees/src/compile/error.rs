@@ -1,0 +1,132 @@
+//! What can be wrong with compiling, and compiled models.
+
+use crate::error::Problem;
+use crate::error::TreeProblem;
+use palpate_onboard::ModelError;
+use palpate_shared::format::Layout;
+
+/// What can be wrong with compiling, and compiled models.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompileProblem {
+    /// Bytes are not a model.
+    #[error("{0}")]
+    Model(ModelError),
+    /// There are too few or too many objects, or other base margins than objects.
+    #[error("cannot compile an ensemble of {objects} objects and {base_margins} base margins")]
+    Objects {
+        /// Objects.
+        objects: usize,
+        /// Base margins.
+        base_margins: usize,
+    },
+    /// A tree contradicts itself.
+    #[error("cannot compile the ensemble: tree {tree}: {problem}")]
+    Tree {
+        /// The tree, counted from 0.
+        tree: usize,
+        /// What is wrong with it.
+        problem: TreeProblem,
+    },
+    /// Leaves or base margins are too large.
+    #[error(
+        "cannot compile the ensemble: the margin of {of} can reach {range:e} (the largest single value is {largest:e}), beyond the {most} that a model can hold"
+    )]
+    MarginRange {
+        /// The object or class, by name.
+        of: String,
+        /// How far from 0 its margin can be.
+        range: f64,
+        /// The largest single value.
+        largest: f32,
+        /// The most that there may be, in nats.
+        most: f64,
+    },
+    /// There are too few or too many features.
+    #[error("cannot compile an ensemble over {features} features, which is not 1 to {most}")]
+    Features {
+        /// Features.
+        features: usize,
+        /// The most that there may be.
+        most: usize,
+    },
+    /// Thresholds change when they are rounded up to whole numbers.
+    #[error(
+        "the ensemble was not trained on whole numbers: the threshold {example} of {feature} is neither whole nor halfway between two, and of {thresholds} thresholds {rounded} stay different when rounded to the whole microseconds or Q15 units of touches"
+    )]
+    Thresholds {
+        /// The feature.
+        feature: &'static str,
+        /// Different thresholds.
+        thresholds: usize,
+        /// Different thresholds after rounding.
+        rounded: usize,
+        /// One that changes.
+        example: f32,
+    },
+    /// The ensemble does not fit the layout that was asked for.
+    #[error("the ensemble does not fit the layout {}: {}", layout.name(), limit(*layout))]
+    DoesNotFit {
+        /// The layout.
+        layout: Layout,
+    },
+    /// The ensemble fits no layout.
+    #[error("the ensemble fits no layout of the model format")]
+    FitsNoLayout,
+    /// A name is too long.
+    #[error("the name {name:?} is too long for a model")]
+    NameTooLong {
+        /// The name.
+        name: String,
+    },
+    /// There is more of something than the format can count.
+    #[error("the ensemble is too large for the model format")]
+    TooLarge,
+    /// There is no room for the model.
+    #[error("the model has {bytes} bytes at least, more than the {most} that there is room for")]
+    OverBudget {
+        /// The fewest bytes that were found.
+        bytes: usize,
+        /// The most that were asked for.
+        most: usize,
+    },
+}
+
+fn limit(layout: Layout) -> &'static str {
+    match layout {
+        Layout::Complete => "its trees are deeper than 8 splits, or have more thresholds than 256 columns hold",
+        Layout::Grid => {
+            "it uses more than two features, has more than 255 thresholds of one, or its margins are too large for a byte"
+        }
+        Layout::Patterns => {
+            "its descriptor is not contacts-curvature, it has more than 255 thresholds of a feature, or its margins are too large for a byte"
+        }
+        Layout::Compact | Layout::Wide => "it has more thresholds than 65,536, or a tree with more splits than that",
+    }
+}
+
+impl Problem for CompileProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::Model(ModelError::NotAModel) => "Give a file that `palpate export` wrote.",
+            Self::Model(ModelError::Version(_)) => "Export the ensemble again with this version of palpate.",
+            Self::Model(ModelError::Length { .. } | ModelError::Checksum { .. }) => {
+                "Copy the model again, or export it again."
+            }
+            Self::Model(_) => "Export the model again with `palpate export`.",
+            Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",
+            Self::Tree { .. } => "Train it again, or check the program that wrote it.",
+            Self::MarginRange { .. } => {
+                "Margins are logarithms of probabilities, of which a few dozen are sure enough: train it again, or check the program that wrote it."
+            }
+            Self::Features { .. } => "Train on the features that matter, at most 256.",
+            Self::Thresholds { .. } => {
+                "Train on features in whole units: times in microseconds, direction cosines times 32767. If it is not a model of touches, remove its attribute palpate_descriptor: then its features are compared as they are."
+            }
+            Self::DoesNotFit { .. } => "Choose another layout, or leave the choice to the compiler (auto).",
+            Self::FitsNoLayout | Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",
+            Self::NameTooLong { .. } => "Use names of at most 255 bytes.",
+        }
+        .into()
+    }
+}

@@ -1,0 +1,137 @@
+//! Compiled models, opened.
+
+use crate::error::{CompileProblem, Error, Place, Result};
+use palpate_onboard::{Model, ModelError};
+use palpate_shared::format::{Axis, HEADER_LENGTH, Layout};
+use std::path::{Path, PathBuf};
+
+/// A compiled model that was checked: its bytes, and the file that they came from.
+///
+/// ```no_run
+/// # fn main() -> palpate_trees::Result<()> {
+/// let compiled = palpate_trees::compile::CompiledModel::read("model.palpate")?;
+/// println!("{} bytes, knows {}", compiled.bytes().len(), compiled.names().join(", "));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CompiledModel {
+    path: Option<PathBuf>,
+    bytes: Vec<u8>,
+}
+
+impl CompiledModel {
+    /// Reads and checks a model.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file cannot be read; [`CompileProblem::Model`] at the byte where it goes wrong when it is
+    /// not a model of this version, whole and unchanged.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
+        Self::from_file(path, bytes)
+    }
+
+    /// Checks a model that was read from `path`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn from_file(path: &Path, bytes: Vec<u8>) -> Result<Self> {
+        match Model::new(&bytes) {
+            Ok(_) => Ok(Self { path: Some(path.into()), bytes }),
+            Err(error) => {
+                let offset = u64::try_from(error.offset()).unwrap_or(u64::MAX);
+                Err(Error::at(Place::byte(path, offset), CompileProblem::Model(error)))
+            }
+        }
+    }
+
+    /// Checks a model in memory.
+    ///
+    /// # Errors
+    /// [`CompileProblem::Model`] for bytes that are not a model of this version, whole and unchanged.
+    pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
+        open(&bytes)?;
+        Ok(Self { path: None, bytes })
+    }
+
+    /// The model, to be recognized with. Cannot fail: the bytes were checked. Cost: the check again, about a millisecond
+    /// for 100 KB.
+    pub fn model(&self) -> Model<'_> {
+        Model::new(&self.bytes).unwrap_or_else(|_| unreachable!("the bytes were checked and do not change"))
+    }
+
+    /// The file that the model came from, if it was one.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// The model's bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The model's bytes, kept.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
+    /// The names of the objects that the model knows, in its order.
+    pub fn names(&self) -> Vec<String> {
+        names(&self.model())
+    }
+}
+
+/// Opens the bytes of a compiled model in place, such as [`Compiled::bytes`](super::Compiled::bytes).
+///
+/// # Errors
+/// [`CompileProblem::Model`] for bytes that are not a model of this version, whole and unchanged; none for what
+/// [`compile`](super::compile) returned.
+pub fn open(bytes: &[u8]) -> Result<Model<'_>> {
+    Model::new(bytes).map_err(|error: ModelError| CompileProblem::Model(error).into())
+}
+
+/// The names of the objects that a model knows, in its order.
+pub fn names(model: &Model<'_>) -> Vec<String> {
+    (0..model.object_count()).map(|object| model.object_name(object).to_owned()).collect()
+}
+
+/// The longest time between two contacts that a model's touches can plausibly have, in seconds; for finding times in
+/// another unit.
+///
+/// A model states its probe's spacing and speed. An object of at most 10 units on its longest side has a diagonal of at
+/// most 10·√3, so that no contact comes later than (10·√3 + 2 · spacing) / speed after the first, and no feature of a
+/// full touch is larger than twice that. A model with thresholds beyond was trained on larger objects, and takes up to
+/// four times its largest threshold.
+pub fn longest_time(model: &Model<'_>) -> f64 {
+    let header = model.header();
+    let of_ten_units = (10.0 * 3.0_f64.sqrt() + 2.0 * f64::from(header.spacing())) / f64::from(header.speed());
+    let largest = thresholds(model).iter().fold(0.0_f64, |most, cut| most.max(f64::from(cut.unsigned_abs()) * 1e-6));
+    if largest > 2.0 * of_ten_units { 4.0 * largest } else { of_ten_units }
+}
+
+/// The thresholds of all features together.
+fn thresholds(model: &Model<'_>) -> Vec<i32> {
+    let header = model.header();
+    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
+    let base_start = HEADER_LENGTH + length(header.text_length()) + length(header.optional_length());
+    let axes_start = base_start + 8 * model.object_count();
+    let cuts_start = axes_start + Axis::LENGTH * usize::from(header.axes());
+    let section = |start: usize, end: usize| model.bytes().get(start..end).unwrap_or_default();
+    let mut cuts = section(cuts_start, cuts_start + length(header.cuts_length()));
+    if model.layout() == Layout::Wide {
+        return cuts.as_chunks().0.iter().map(|cut| i32::from_le_bytes(*cut)).collect();
+    }
+    let mut thresholds = Vec::new();
+    for axis in section(axes_start, cuts_start).as_chunks().0.iter().filter_map(|axis| Axis::from_bytes(*axis)) {
+        let Some((own, rest)) = cuts.split_at_checked(axis.cuts_length()) else { break };
+        cuts = rest;
+        let number = |bytes: &[u8]| {
+            // Sign-extended from the highest byte that is stored.
+            let sign = if bytes.last().is_some_and(|byte| byte & 0x80 != 0) { 0xff } else { 0 };
+            i32::from_le_bytes(std::array::from_fn(|index| bytes.get(index).copied().unwrap_or(sign)))
+        };
+        thresholds.extend(own.chunks(usize::from(axis.width)).map(number));
+    }
+    thresholds
+}

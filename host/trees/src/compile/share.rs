@@ -1,0 +1,93 @@
+//! Equal leaves once: what stands for a leaf is its number in a table.
+
+use super::groups::leaves_of_trees;
+use super::parts::Parts;
+use crate::error::Result;
+use palpate_onboard::Model;
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, Group, HEADER_LENGTH, HeaderBuilder, LeafType, SharedLeaves, Tag, checksum,
+};
+use std::collections::HashMap;
+
+/// The most leaves that two bytes number.
+const MOST: usize = 1 << 16;
+
+/// The same parts with each leaf once; `None` where leaves are not all of one length, or too many of them differ.
+pub(super) fn share(parts: &Parts, leaf: LeafType, objects: usize) -> Option<Parts> {
+    let length = |group: &Group| leaf.size() * if group.object.is_some() { 1 } else { objects };
+    let first = length(parts.groups.first()?);
+    if parts.groups.iter().any(|group| length(group) != first) {
+        return None;
+    }
+    let leaves = || parts.leaves.chunks_exact(first);
+    // The commonest first: then what is loaded most is close together.
+    let mut places: HashMap<&[u8], (usize, usize)> = HashMap::new();
+    for (index, values) in leaves().enumerate() {
+        places.entry(values).or_insert((0, index)).0 += 1;
+    }
+    if places.len() > MOST {
+        return None;
+    }
+    let mut order: Vec<(&[u8], (usize, usize))> = places.into_iter().collect();
+    order.sort_unstable_by_key(|&(_, (count, index))| (std::cmp::Reverse(count), index));
+    let is_wide = order.len() > 1 << 8;
+    let numbers: HashMap<&[u8], usize> =
+        order.iter().enumerate().map(|(number, &(values, _))| (values, number)).collect();
+    let mut table = SharedLeaves::header(is_wide).to_vec();
+    order.iter().for_each(|(values, _)| table.extend_from_slice(values));
+    let mut short = Vec::new();
+    for values in leaves() {
+        let [low, high, ..] = numbers[values].to_le_bytes();
+        short.push(low);
+        if is_wide {
+            short.push(high);
+        }
+    }
+    Some(Parts { leaves: short, shared: Some(table), ..parts.clone() })
+}
+
+/// The bytes of a model whose leaves are shared, with every leaf's values where the leaf is; `None` if they are there already.
+/// Its margins are the same.
+///
+/// # Errors
+/// [`CompileProblem`](crate::error::CompileProblem) for more than 4 GB.
+pub fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
+    let Some(shared) = model.shared_leaves() else { return Ok(None) };
+    let (bytes, header) = (model.bytes(), model.header());
+    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
+    let end = bytes.len() - CHECKSUM_LENGTH;
+    let numbers = &bytes[end - length(header.leaves_length())..end];
+    let mut leaves = Vec::new();
+    let mut index = 0;
+    for (group, trees) in leaves_of_trees(model) {
+        let values = if group.object.is_some() { 1 } else { model.object_count() };
+        let length = values * model.leaf_type().size();
+        for _ in 0..trees.into_iter().sum() {
+            let start = usize::from(shared.number(numbers, index)) * length;
+            leaves.extend_from_slice(&shared.values()[start..start + length]);
+            index += 1;
+        }
+    }
+    let text_end = HEADER_LENGTH + length(header.text_length());
+    let mut sections = Vec::new();
+    let others = model.optional_sections().filter(|section| section.tag != Tag::SharedLeaves.code());
+    others.for_each(|section| section.write(&mut |part| sections.extend_from_slice(part)));
+    let rest = &bytes[text_end + length(header.optional_length())..end - numbers.len()];
+    let mut all = [&bytes[..text_end], &sections, rest, &leaves].concat();
+    let header = HeaderBuilder::from(header)
+        .with_length(super::write::count(all.len() + CHECKSUM_LENGTH)?)
+        .with_sections(super::write::count(sections.len())?)
+        .with_leaves_length(super::write::count(leaves.len())?);
+    all[..HEADER_LENGTH].copy_from_slice(header.bytes());
+    let sum = checksum(&all);
+    all.extend(sum.to_le_bytes());
+    Ok(Some(all))
+}
+
+/// How many leaves stand in a model's table; `None` if its leaves are where they belong. Where some have one value and some
+/// one for each object, how many values.
+pub fn different_leaves(model: &Model<'_>) -> Option<usize> {
+    let values = model.shared_leaves()?.values().len() / model.leaf_type().size();
+    let has_one_for_each = leaves_of_trees(model).iter().all(|(group, _)| group.object.is_none());
+    Some(if has_one_for_each { values / model.object_count() } else { values })
+}

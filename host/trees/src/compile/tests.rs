@@ -1,0 +1,511 @@
+use super::*;
+use crate::ensemble::{Inputs, Node, Origin, Output, Tree};
+use crate::error::{Setting, TreeProblem};
+use palpate_onboard::ModelError;
+use palpate_shared::format::Length;
+use palpate_shared::{ContactTime, Descriptor, Touch};
+
+fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
+    Node::Split { feature, threshold, missing_left: true, left, right }
+}
+
+fn leaf(values: &[f32]) -> Node {
+    Node::Leaf(values.into())
+}
+
+/// An ensemble of two objects over these trees, whose leaves have a value for each.
+fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
+    Ensemble {
+        inputs: descriptor.into(),
+        objects: vec!["bowl".into(), "fork".into()],
+        base_margins: vec![0.0; 2],
+        trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
+        origin: Origin::default(),
+    }
+}
+
+/// One split.
+fn stump(threshold: f32, leaves: [[f32; 2]; 2]) -> Ensemble {
+    ensemble(Descriptor::Curvature, vec![vec![split(0, threshold, 1, 2), leaf(&leaves[0]), leaf(&leaves[1])]])
+}
+
+/// A tree that is a chain of splits, one below the other to the right, at whole thresholds.
+fn chain(splits: usize, feature: impl Fn(usize) -> usize) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for number in 0..splits {
+        nodes.push(split(feature(number), 1_000.0 * (number + 1) as f32, 2 * number + 1, 2 * number + 2));
+        nodes.push(leaf(&[0.5, -0.5]));
+    }
+    nodes.push(leaf(&[-0.5, 0.5]));
+    nodes
+}
+
+fn with(layout: Option<Layout>, leaf: Leaf) -> Settings {
+    Settings { layout, leaf, ..Settings::default() }
+}
+
+fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
+    let error = compile(ensemble, settings).unwrap_err();
+    error.problem::<CompileProblem>().unwrap_or_else(|| panic!("{error}")).clone()
+}
+
+/// What setting was refused.
+fn setting(settings: &Settings) -> &'static str {
+    let error = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), settings).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    match error.problem() {
+        Some(Setting { name, .. }) => name,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_layout_chosen_is_the_fastest_of_those_that_are_not_three_times_the_smallest() {
+    let shallow: Vec<Vec<Node>> = (0..40).map(|_| chain(2, |number| number)).collect();
+    let deep: Vec<Vec<Node>> = (0..10).map(|_| chain(20, |number| number % 8)).collect();
+    let full = {
+        // Seven splits over eight features: no table.
+        let mut nodes: Vec<Node> = (0..7).map(|n| split(n, 1_000.0 * n as f32, 2 * n + 1, 2 * n + 2)).collect();
+        nodes.extend((0..8).map(|_| leaf(&[0.5, 0.25])));
+        vec![nodes; 30]
+    };
+    for (ensemble, expected) in [
+        (ensemble(Descriptor::Curvature, shallow), Layout::Grid),
+        (ensemble(Descriptor::Oriented, deep), Layout::Compact),
+        (ensemble(Descriptor::Oriented, full), Layout::Complete),
+    ] {
+        let chosen = compile(&ensemble, &Settings::default()).unwrap();
+        assert_eq!(chosen.layout, expected);
+        let bytes = |candidate: &Candidate| candidate.bytes;
+        let smallest = chosen.candidates.iter().map(bytes).min().unwrap();
+        for other in &chosen.candidates {
+            let shared_leaves = Some(other.shared_leaves);
+            let how = Settings { shared_leaves, ..with(Some(other.layout), Leaf::I16) };
+            let compiled = compile(&ensemble, &how).unwrap();
+            assert_eq!((other.bytes, other.instructions), (compiled.bytes.len(), compiled.instructions));
+            let is_large = other.bytes > 3 * smallest;
+            assert!(is_large || other.instructions.m4f >= chosen.instructions.m4f, "{:?}", other.layout);
+        }
+        let goal = |goal| compile(&ensemble, &Settings { goal, ..Settings::default() }).unwrap();
+        assert_eq!(goal(Goal::Size).bytes.len(), smallest);
+        let fastest = chosen.candidates.iter().map(|candidate| candidate.instructions.m4f).min().unwrap();
+        assert_eq!(goal(Goal::Speed).instructions.m4f, fastest);
+    }
+}
+
+#[test]
+fn an_ensemble_that_does_not_fit_a_layout_says_so_in_a_variant() {
+    let deep = ensemble(Descriptor::Oriented, vec![chain(9, |number| number % 8)]);
+    for layout in [Layout::Complete, Layout::Grid] {
+        assert_eq!(refusal(&deep, &with(Some(layout), Leaf::I16)), CompileProblem::DoesNotFit { layout });
+    }
+    assert!(compile(&deep, &with(Some(Layout::Compact), Leaf::I16)).is_ok());
+}
+
+#[test]
+fn trees_with_more_left_splits_than_a_byte_counts_take_the_wide_layout() {
+    /// A full tree: 2^depth − 1 splits, then the leaves.
+    fn full(depth: u32) -> Vec<Node> {
+        let splits = 2_usize.pow(depth) - 1;
+        let mut nodes: Vec<Node> =
+            (0..splits).map(|n| split(n % 8, 1_000.0 * (n % 100) as f32, 2 * n + 1, 2 * n + 2)).collect();
+        nodes.extend((0..=splits).map(|_| leaf(&[0.5, 0.25])));
+        nodes
+    }
+    // 255 splits below the root's left side, then 511.
+    for (depth, expected) in [(9, Layout::Compact), (10, Layout::Wide)] {
+        let deep = ensemble(Descriptor::Oriented, vec![full(depth)]);
+        assert_eq!(compile(&deep, &with(Some(Layout::Compact), Leaf::I16)).unwrap().layout, expected);
+    }
+}
+
+#[test]
+fn the_stated_margin_error_is_what_rounding_does_and_no_more() {
+    // Leaves that no power of two divides: i8 has 127 units for 1 nat.
+    let leaves = [[1.0, -0.3], [0.123_456, 0.7]];
+    let ensemble = stump(500.0, leaves);
+    for (kind, most) in [(Leaf::I8, 127.0), (Leaf::I16, 32_767.0), (Leaf::F32, f64::INFINITY)] {
+        for layout in [Layout::Compact, Layout::Complete, Layout::Grid] {
+            let compiled = compile(&ensemble, &with(Some(layout), kind)).unwrap();
+            let model = open(&compiled.bytes).unwrap();
+            let mut worst = 0.0_f64;
+            for (curvature, leaf) in [(0, leaves[0]), (500, leaves[1])] {
+                let mut margins = [0; 2];
+                model.margins(&Touch::from_micros([0, 0, curvature]), &mut margins);
+                for (margin, value) in margins.into_iter().zip(leaf) {
+                    worst = worst.max((f64::from(margin) * f64::from(model.unit()) - f64::from(value)).abs());
+                }
+            }
+            let stated = f64::from(compiled.margin_error);
+            assert_eq!(model.margin_error(), compiled.margin_error);
+            assert!(worst <= stated, "{worst} > {stated} with {kind:?} in {layout:?}");
+            assert!(stated <= 0.5 / most * 1.01 || kind == Leaf::F32, "{stated} with {kind:?} in {layout:?}");
+            if kind != Leaf::F32 {
+                assert!(worst > 0.0 && stated <= 1.001 * worst, "{stated} for {worst} with {kind:?} in {layout:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn leaves_of_a_common_power_of_two_are_exact_in_every_width() {
+    for kind in [Leaf::I8, Leaf::I16] {
+        let compiled = compile(&stump(500.0, [[1.5, -0.25], [0.75, 0.5]]), &with(None, kind)).unwrap();
+        assert_eq!(compiled.margin_error, 0.0);
+    }
+}
+
+#[test]
+fn the_header_says_what_was_compiled() {
+    let mut ensemble = stump(500.0, [[1.0, -0.3], [0.1, 0.7]]);
+    let settings = Settings { error_rate: 0.05, max_touches: 77, priors: Some(vec![1.0, 4.0]), ..Settings::default() };
+    let compiled = compile(&ensemble, &settings).unwrap();
+    let model = open(&compiled.bytes).unwrap();
+    let header = model.header();
+    assert_eq!(usize::try_from(header.length()).unwrap(), compiled.bytes.len());
+    assert_eq!((header.trees(), header.splits(), header.leaves()), (1, 1, 2));
+    assert_eq!((compiled.splits, compiled.leaves), (1, 2));
+    assert_eq!((model.descriptor(), model.layout()), (Some(Descriptor::Curvature), compiled.layout));
+    assert_eq!(model.leaf_type(), Leaf::I16);
+    assert_eq!(model.tool_version(), env!("CARGO_PKG_VERSION"));
+    assert_eq!(names(&model), ["bowl", "fork"]);
+    let stopping = Stopping::from_model(&model);
+    assert!((stopping.error_rate() - 0.05).abs() < 1e-12 && stopping.max_touches() == 77);
+    let prior = f64::from(model.prior(0)) * f64::from(model.unit());
+    assert!((prior - 0.25_f64.ln()).abs() <= f64::from(model.unit()) && model.prior(1) == 0, "{prior}");
+    // Which ensemble it was, wherever that came from.
+    let hash = |ensemble: &Ensemble| open(&compile(ensemble, &settings).unwrap().bytes).unwrap().header().ensemble();
+    let first = hash(&ensemble);
+    ensemble.origin.attributes.insert("palpate_touches".into(), "{}".into());
+    assert_eq!(hash(&ensemble), first);
+    ensemble.base_margins[0] = 0.25;
+    assert_ne!(hash(&ensemble), first);
+}
+
+#[test]
+fn a_model_states_the_probe_of_its_touches_and_the_published_one_only_where_none_is_known() {
+    let ensemble = stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
+    let header = |stated: Stated| {
+        let compiled = compile(&ensemble, &Settings { stated, ..Settings::default() }).unwrap();
+        let model = open(&compiled.bytes).unwrap();
+        (model.header().spacing(), model.header().speed())
+    };
+    assert_eq!(header(Stated::default()), (1.5, 10.0));
+    assert_eq!(header(Stated { spacing: 2.0, speed: 25.0, ..Stated::default() }), (2.0, 25.0));
+}
+
+#[test]
+fn every_ensemble_that_contradicts_itself_is_refused_by_what_is_wrong() {
+    let sound = || stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
+    let refused = |change: &dyn Fn(&mut Ensemble)| {
+        let mut changed = sound();
+        change(&mut changed);
+        refusal(&changed, &Settings::default())
+    };
+    let tree = |problem| CompileProblem::Tree { tree: 0, problem };
+    assert_eq!(refused(&|e| e.objects.push("cup".into())), CompileProblem::Objects { objects: 3, base_margins: 2 });
+    assert_eq!(
+        refused(&|e| {
+            e.objects.clear();
+            e.base_margins.clear();
+        }),
+        CompileProblem::Objects { objects: 0, base_margins: 0 }
+    );
+    assert_eq!(refused(&|e| e.trees[0].nodes.clear()), tree(TreeProblem::NoNodes));
+    assert_eq!(refused(&|e| e.trees[0].output = Output::One(2)), tree(TreeProblem::Object { object: 2, objects: 2 }));
+    assert_eq!(
+        refused(&|e| e.trees[0].output = Output::One(1)),
+        tree(TreeProblem::LeafValues { node: 1, found: 2, wanted: 1 })
+    );
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[0] = split(2, 500.0, 1, 2)),
+        tree(TreeProblem::Feature { node: 0, feature: 2, features: 2 })
+    );
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 9, 2)),
+        tree(TreeProblem::Child { node: 0, side: "left", child: 9, nodes: 3 })
+    );
+    assert_eq!(refused(&|e| e.trees[0].nodes = chain(257, |_| 0)), tree(TreeProblem::TooDeep { most: 256 }));
+    assert!(matches!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, f32::NAN, 1, 2)),
+        CompileProblem::Tree { problem: TreeProblem::Threshold { node: 0, .. }, .. }
+    ));
+    assert!(matches!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 0, 2)),
+        CompileProblem::Tree { problem: TreeProblem::ReachedTwice { .. } | TreeProblem::TooDeep { .. }, .. }
+    ));
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, f32::INFINITY])),
+        tree(TreeProblem::LeafValue { node: 2, value: f32::INFINITY })
+    );
+    match refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5])) {
+        CompileProblem::MarginRange { of, largest, .. }
+            if of.starts_with("the object ") && (1e5..1.1e5).contains(&f64::from(largest)) => {}
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(refused(&|e| e.objects[0] = "x".repeat(256)), CompileProblem::NameTooLong { name: "x".repeat(256) });
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    assert_eq!(setting(&Settings { error_rate: 0.5, ..Settings::default() }), "error_rate");
+    assert_eq!(setting(&Settings { error_rate: f64::NAN, ..Settings::default() }), "error_rate");
+    assert_eq!(setting(&Settings { max_touches: 0, ..Settings::default() }), "max_touches");
+    assert_eq!(setting(&Settings { priors: Some(vec![1.0]), ..Settings::default() }), "priors");
+    assert_eq!(setting(&Settings { priors: Some(vec![1.0, 0.0]), ..Settings::default() }), "priors");
+    // Touches are whole numbers already, and a row has a scale for each feature.
+    assert_eq!(setting(&Settings { scales: Some(vec![1.0, 1.0]), ..Settings::default() }), "scales");
+}
+
+#[test]
+fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
+    // Trained on seconds: curvature from -0.2 to 0.2.
+    let seconds: Vec<Vec<Node>> = (0..9)
+        .map(|number| vec![split(0, number as f32 * 0.05 - 0.2, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])])
+        .collect();
+    let problem = refusal(&ensemble(Descriptor::Curvature, seconds.clone()), &Settings::default());
+    assert_eq!(problem, CompileProblem::Thresholds { feature: "curvature", thresholds: 9, rounded: 2, example: -0.2 });
+    // Rows of features are compared as they are, fractions and all.
+    let rows = Ensemble { inputs: Inputs::unnamed(2), ..ensemble(Descriptor::Curvature, seconds) };
+    compile(&rows, &Settings { leaf: Leaf::F32, ..Settings::default() }).unwrap();
+    for scales in [vec![1.0], vec![1.0, 0.0], vec![f32::NAN, 1.0]] {
+        let error = compile(&rows, &Settings { scales: Some(scales), ..Settings::default() }).unwrap_err();
+        assert!(matches!(error.problem::<Setting>(), Some(Setting { name: "scales", .. })), "{error}");
+    }
+    // Whole thresholds, and halves between neighbors, are what trainers put between whole numbers.
+    for step in [1.0, 0.5] {
+        let whole = (0..9).map(|n| vec![split(0, n as f32 * step, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])]);
+        compile(&ensemble(Descriptor::Curvature, whole.collect()), &Settings::default()).unwrap();
+    }
+}
+
+#[test]
+fn a_compiled_model_opens_in_one_place_and_says_what_is_wrong_at_which_byte() {
+    let compiled = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), &Settings::default()).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("model.palpate");
+    std::fs::write(&path, &compiled.bytes).unwrap();
+    let read = CompiledModel::read(&path).unwrap();
+    assert_eq!((read.bytes(), read.path()), (&compiled.bytes[..], Some(&*path)));
+    assert_eq!(read.names(), ["bowl", "fork"]);
+    assert_eq!(read.model().checksum(), open(&compiled.bytes).unwrap().checksum());
+    let cut = &compiled.bytes[..50];
+    std::fs::write(&path, cut).unwrap();
+    let problem = CompileProblem::Model(ModelError::Length { expected: 96, found: 50 });
+    let error = CompiledModel::read(&path).unwrap_err();
+    assert!(error.to_string().contains("model.palpate: byte 50: the model is truncated"), "{error}");
+    for error in [error, CompiledModel::from_bytes(cut.to_vec()).unwrap_err(), open(cut).map(|_| ()).unwrap_err()] {
+        assert_eq!(error.problem(), Some(&problem));
+    }
+}
+
+#[test]
+fn estimates_from_a_models_bytes_are_those_of_its_compilation() {
+    let trees: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 2)).collect();
+    let many: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 8)).collect();
+    let mut seen = std::collections::HashSet::new();
+    let some: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 4)).collect();
+    let kinds = [(Descriptor::Curvature, trees), (Descriptor::Oriented, many), (Descriptor::ContactsCurvature, some)];
+    for (descriptor, trees) in kinds {
+        let ensemble = ensemble(descriptor, trees);
+        for &layout in Layout::ALL {
+            for kind in [Leaf::I8, Leaf::I16, Leaf::F32] {
+                let Ok(compiled) = compile(&ensemble, &with(Some(layout), kind)) else { continue };
+                let model = open(&compiled.bytes).unwrap();
+                assert_eq!(Instructions::of_model(&model), compiled.instructions, "{layout:?} {kind:?}");
+                seen.insert(layout);
+            }
+        }
+    }
+    assert_eq!(seen.len(), 5);
+}
+
+#[test]
+fn what_is_read_from_a_model_is_found_behind_its_optional_sections() {
+    let trees = (1..8).map(|splits| chain(splits, |number| number % 2)).collect();
+    let ensemble = ensemble(Descriptor::Curvature, trees);
+    let probe = TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth };
+    for &layout in Layout::ALL {
+        let compiled = |probe| {
+            let stated = Stated { probe, ..Stated::default() };
+            compile(&ensemble, &Settings { stated, ..with(Some(layout), Leaf::I16) })
+        };
+        let [Ok(plain), Ok(stated)] = [None, Some(probe)].map(compiled) else {
+            continue;
+        };
+        assert!(stated.bytes.len() > plain.bytes.len());
+        let [plain, stated] = [&plain, &stated].map(|compiled| open(&compiled.bytes).unwrap());
+        assert_eq!(Instructions::of_model(&stated), Instructions::of_model(&plain), "{layout:?}");
+        assert_eq!(longest_time(&stated), longest_time(&plain), "{layout:?}");
+    }
+}
+
+/// A tree over patterns and differences: a chain of splits, with a missing value to either side in turn.
+fn chain_over_patterns(splits: usize, tree: usize) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for number in 0..splits {
+        let feature = (number + tree) % 4;
+        let threshold = if feature == 0 { (number % 6) as f32 } else { 500.0 * (number + tree) as f32 - 2_000.0 };
+        let (left, right) = (2 * number + 1, 2 * number + 2);
+        nodes.push(Node::Split { feature, threshold, missing_left: number % 3 == 0, left, right });
+        nodes.push(leaf(&[0.5 - 0.015_625 * number as f32, 0.25 * (tree % 3) as f32]));
+    }
+    nodes.push(leaf(&[-0.5, 0.5]));
+    nodes
+}
+
+/// Touches of every contact pattern, at thresholds of `chain_over_patterns` and elsewhere.
+fn touches_of_every_pattern() -> Vec<Touch> {
+    let some = ContactTime::from_micros;
+    let times = [0, 1, 499, 500, 999, 1_000, 1_500, 2_999, 7_000, 40_000].map(some);
+    let mut touches = vec![];
+    for fingers in 0..8 {
+        for first in times {
+            for last in times {
+                let of = |finger: u32, time| if fingers >> finger & 1 == 1 { time } else { ContactTime::MISSING };
+                touches.push(Touch::new([of(0, first), of(1, some(0)), of(2, last)]));
+            }
+        }
+    }
+    touches
+}
+
+#[test]
+fn tables_by_contact_pattern_give_the_ensembles_margins_for_touches_of_every_pattern() {
+    for splits in [1, 7, 30] {
+        let trees = (0..12).map(|tree| chain_over_patterns(splits, tree)).collect();
+        let ensemble = ensemble(Descriptor::ContactsCurvature, trees);
+        let [table, trees] = [Layout::Patterns, Layout::Compact]
+            .map(|layout| compile(&ensemble, &with(Some(layout), Leaf::I16)).unwrap());
+        // Leaves are whole multiples of a power of two: nothing is rounded in 16 bits.
+        assert_eq!((table.margin_error, trees.margin_error), (0.0, 0.0));
+        let bytes = compile(&ensemble, &with(Some(Layout::Patterns), Leaf::I8)).unwrap();
+        assert!(bytes.margin_error < 0.1, "{}", bytes.margin_error);
+        let floats = compile(&ensemble, &with(Some(Layout::Patterns), Leaf::F32)).unwrap();
+        for touch in touches_of_every_pattern() {
+            let full = ensemble.margins(&touch);
+            for compiled in [&table, &trees, &bytes, &floats] {
+                let model = open(&compiled.bytes).unwrap();
+                let mut margins = vec![0; full.len()];
+                assert!(model.margins(&touch, &mut margins));
+                for (full, margin) in full.iter().zip(margins) {
+                    let error = (f64::from(*full) - f64::from(margin) * f64::from(model.unit())).abs();
+                    assert!(error <= f64::from(compiled.margin_error), "{error} for {touch:?}, {:?}", compiled.layout);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_table_for_each_contact_pattern_has_no_cell_that_no_touch_reaches() {
+    // Thresholds: the pattern's below 3 and below 5, three of κ, two of slope and one of pair.
+    let cuts = [(0, 3.0), (0, 5.0), (1, -7.0), (1, 0.0), (1, 9.0), (2, 4.0), (2, 8.0), (3, 2.0)];
+    let trees = cuts.map(|(feature, cut)| vec![split(feature, cut, 1, 2), leaf(&[0.5, 0.25]), leaf(&[-0.5, 0.125])]);
+    let ensemble = ensemble(Descriptor::ContactsCurvature, trees.into());
+    let compiled = compile(&ensemble, &with(Some(Layout::Patterns), Leaf::I16)).unwrap();
+    let model = open(&compiled.bytes).unwrap();
+    assert_eq!(model.header().leaves_length(), 2 * 2 * (3 + 2 + 3 + 4 * 3));
+    // Full touches are not what it is for, nor rows of features.
+    let problem = CompileProblem::DoesNotFit { layout: Layout::Patterns };
+    let rows = Ensemble { inputs: Inputs::unnamed(4), ..ensemble };
+    assert_eq!(refusal(&rows, &with(Some(Layout::Patterns), Leaf::I16)), problem);
+    assert_eq!(refusal(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), &with(Some(Layout::Patterns), Leaf::I16)), problem);
+}
+
+#[test]
+fn the_longest_time_is_that_of_ten_units_or_follows_larger_thresholds() {
+    let longest = |threshold: f32, layout| {
+        let compiled = compile(&stump(threshold, [[1.0, -1.0], [-1.0, 1.0]]), &with(Some(layout), Leaf::I16)).unwrap();
+        longest_time(&open(&compiled.bytes).unwrap())
+    };
+    for layout in [Layout::Compact, Layout::Wide, Layout::Grid] {
+        assert!((longest(500_000.0, layout) - (10.0 * 3.0_f64.sqrt() + 3.0) / 10.0).abs() < 1e-9);
+        assert!((longest(-16_000_000.0, layout) - 64.0).abs() < 1e-9, "{}", longest(-16_000_000.0, layout));
+    }
+}
+
+#[test]
+fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
+    let leaf_of = |compiled: &Compiled| open(&compiled.bytes).unwrap().leaf_type();
+    let trees = (0..40).map(|i| vec![split(0, 10.0 * i as f32, 1, 2), leaf(&[0.7, -0.3]), leaf(&[-0.123, 0.456])]);
+    let ensemble = ensemble(Descriptor::Oriented, trees.collect());
+    let settings = with(Some(Layout::Compact), Leaf::F32);
+    let [f32, i16, i8] = [Leaf::F32, Leaf::I16, Leaf::I8]
+        .map(|leaf| compile(&ensemble, &with(Some(Layout::Compact), leaf)).unwrap().bytes.len());
+    assert!(f32 > i16 && i16 > i8);
+    for (most, leaf) in
+        [(usize::MAX, Leaf::F32), (f32, Leaf::F32), (f32 - 1, Leaf::I16), (i16 - 1, Leaf::I8), (i8, Leaf::I8)]
+    {
+        let compiled = compile_within(&ensemble, &settings, most).unwrap();
+        assert!(compiled.bytes.len() <= most && leaf_of(&compiled) == leaf, "{most}");
+    }
+    let problem = compile_within(&ensemble, &settings, i8 - 1).unwrap_err().problem::<CompileProblem>().cloned();
+    let over = CompileProblem::OverBudget { bytes: i8, most: i8 - 1 };
+    assert_eq!(problem, Some(over));
+}
+
+/// Trees of three splits over the oriented touch's features, whose leaves are taken from the start of a sequence.
+fn few_leaves(trees: usize, different: usize) -> Ensemble {
+    let values = |number: usize| leaf(&[(number % different) as f32 / 1024.0, -((number % different) as f32) / 2048.0]);
+    let tree = |tree: usize| {
+        let at = |number: usize| 1_000.0 * ((7 * tree + number) % 90) as f32;
+        let splits =
+            [split(tree % 8, at(0), 1, 2), split((tree + 1) % 8, at(1), 3, 4), split((tree + 3) % 8, at(2), 5, 6)];
+        splits.into_iter().chain((0..4).map(|number| values(4 * tree + number))).collect()
+    };
+    ensemble(Descriptor::Oriented, (0..trees).map(tree).collect())
+}
+
+#[test]
+fn equal_leaves_stand_once_where_that_is_smaller_and_give_the_same_margins() {
+    let forest = few_leaves(100, 5);
+    for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {
+        for &leaf in Leaf::ALL {
+            let how = |shared| Settings { shared_leaves: Some(shared), ..with(Some(layout), leaf) };
+            let (plain, shared) = (compile(&forest, &how(false)).unwrap(), compile(&forest, &how(true)).unwrap());
+            assert_eq!((plain.shared_leaves, shared.shared_leaves), (None, Some(5)));
+            assert!(shared.bytes.len() < plain.bytes.len(), "{layout:?} {leaf:?}");
+            // What stands for a leaf is put back where the leaf was.
+            let model = open(&shared.bytes).unwrap();
+            assert_eq!(unshared(&model).unwrap().unwrap(), plain.bytes);
+            assert_eq!(unshared(&open(&plain.bytes).unwrap()).unwrap(), None);
+            let mut margins = [[0; 2]; 2];
+            for touch in (0..50).map(|at| Touch::from_micros([1_900 * at, 0, 700 * at])) {
+                open(&plain.bytes).unwrap().margins(&touch, &mut margins[0]);
+                model.margins(&touch, &mut margins[1]);
+                assert_eq!(margins[0], margins[1]);
+            }
+        }
+        let small = compile(&forest, &Settings { goal: Goal::Size, ..with(Some(layout), Leaf::I16) }).unwrap();
+        assert_eq!((small.candidates.len(), small.shared_leaves), (2, Some(5)));
+    }
+    // Where all of them differ, a number is only more.
+    let all = compile(&few_leaves(100, 400), &Settings { goal: Goal::Size, ..with(None, Leaf::I16) }).unwrap();
+    assert!(all.candidates.iter().all(|candidate| !candidate.shared_leaves), "{:?}", all.candidates);
+    // Tables have none.
+    let table = Settings { shared_leaves: Some(true), ..with(Some(Layout::Grid), Leaf::I16) };
+    assert_eq!(compile(&stump(500.0, [[1.0, -1.0], [1.0, -1.0]]), &table).unwrap().shared_leaves, None);
+}
+
+#[test]
+fn the_number_of_a_leaf_has_two_bytes_if_more_than_256_leaves_differ() {
+    for (different, width) in [(256, 1), (257, 2)] {
+        let how = Settings { shared_leaves: Some(true), ..with(Some(Layout::Compact), Leaf::I16) };
+        let compiled = compile(&few_leaves(100, different), &how).unwrap();
+        assert_eq!(compiled.shared_leaves, Some(different));
+        let model = open(&compiled.bytes).unwrap();
+        assert_eq!(model.shared_leaves().unwrap().number_length(), width);
+        assert_eq!(model.header().leaves_length(), 400 * width as u32);
+    }
+}
+
+#[test]
+fn what_is_restated_about_a_model_leaves_its_table_of_leaves_alone() {
+    let how = Settings { shared_leaves: Some(true), ..with(Some(Layout::Compact), Leaf::I16) };
+    let compiled = compile(&few_leaves(20, 5), &how).unwrap();
+    let restated = Restated { max_touches: Some(7), priors: Some(vec![0, -5]), ..Restated::default() };
+    let bytes = restate(&open(&compiled.bytes).unwrap(), &restated).unwrap();
+    let (model, own) = (open(&bytes).unwrap(), open(&compiled.bytes).unwrap());
+    assert_eq!((model.shared_leaves(), model.header().max_touches(), model.prior(1)), (own.shared_leaves(), 7, -5));
+}

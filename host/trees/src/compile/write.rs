@@ -1,0 +1,248 @@
+//! The bytes, in the order of `FORMAT.md`.
+
+use super::Settings;
+use super::forest::Forest;
+use super::parts::Parts;
+use crate::ensemble::{Ensemble, Node, Output};
+use crate::error::{CompileProblem, Error, Result};
+use crate::rows::whole;
+use palpate_onboard::Stopping;
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, checksum,
+    f32_key, write_section,
+};
+
+/// The model's bytes; `hash` is that of the ensemble as it was read.
+pub(super) fn write(
+    ensemble: &Ensemble,
+    hash: u64,
+    settings: &Settings,
+    forest: &Forest<'_>,
+    stopping: Stopping,
+    layout: Layout,
+    parts: &Parts,
+) -> Result<Vec<u8>> {
+    let mut text = text(ensemble)?;
+    let priors = priors(settings, forest.objects(), parts.unit)?;
+    let (unit_bits, unit_shift) = unit_bits(parts.unit);
+    // In the order of the tags.
+    let optional = [
+        optional(ensemble, settings, forest)?,
+        parts.section(),
+        of_rows(ensemble, settings),
+        captured(ensemble, settings),
+    ]
+    .concat();
+    let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
+    // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
+    text.resize(text.len().next_multiple_of(4), 0);
+    let length = HeaderBuilder::default().bytes().len()
+        + text.len()
+        + optional.len()
+        + records
+        + parts.cuts.len()
+        + parts.nodes.len()
+        + parts.leaves.len()
+        + 4;
+    let header = HeaderBuilder::default()
+        .with_layout(layout.code())
+        .with_leaf(settings.leaf.code())
+        .with_length(count(length)?)
+        .with_descriptor(forest.descriptor.map_or(RAW_FEATURES, palpate_shared::Descriptor::code))
+        .with_key(forest.key.code())
+        .with_last_object(byte(forest.objects() - 1)?)
+        .with_last_feature(byte(forest.features - 1)?)
+        .with_axes(parts.axes.len() as u16)
+        .with_groups(parts.groups.len() as u16)
+        .with_trees(count(forest.trees.len())?)
+        .with_splits(count(forest.splits())?)
+        .with_leaves(count(forest.leaves())?)
+        .with_unit(parts.unit)
+        .with_unit_bits(unit_bits)
+        .with_unit_shift(unit_shift)
+        .with_margin_error(parts.margin_error)
+        .with_odds(stopping.odds())
+        .with_max_touches(stopping.max_touches())
+        .with_spacing(settings.stated.spacing)
+        .with_speed(settings.stated.speed)
+        .with_text_length(count(text.len())?)
+        .with_sections(count(optional.len())?)
+        .with_ensemble(hash)
+        .with_cuts_length(count(parts.cuts.len())?)
+        .with_nodes_length(count(parts.nodes.len())?)
+        .with_leaves_length(count(parts.leaves.len())?);
+    let mut bytes = header.bytes().to_vec();
+    bytes.extend(text);
+    bytes.extend(optional);
+    bytes.extend(parts.base.iter().chain(&priors).flat_map(|number| number.to_le_bytes()));
+    bytes.extend(parts.axes.iter().flat_map(|axis| axis.to_bytes()));
+    bytes.extend(&parts.cuts);
+    bytes.extend(parts.groups.iter().flat_map(|group| group.to_bytes()));
+    bytes.extend(&parts.nodes);
+    bytes.extend(&parts.leaves);
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    Ok(bytes)
+}
+
+/// Bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
+pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
+    let sections = optional(ensemble, settings, forest)?.len()
+        + of_rows(ensemble, settings).len()
+        + captured(ensemble, settings).len();
+    Ok(text(ensemble)?.len().next_multiple_of(4) + sections + CHECKSUM_LENGTH)
+}
+
+/// What the model states about its training.
+fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let origin = &ensemble.origin;
+    // Rows of features are no touches of any probe.
+    if forest.descriptor.is_some() {
+        let trained = Trained {
+            probe: settings.stated.probe,
+            touches: origin.trained.map(|trained| trained.touches),
+            noise: settings.stated.noise,
+            shares: origin.trained.and_then(|trained| trained.pattern_shares()),
+        };
+        // In the order of the tags.
+        Trained { shares: None, ..trained }.write(|part| bytes.extend_from_slice(part));
+        if origin.background {
+            // Whoever does not know it would name the background.
+            let section = Strangers::header(true, false);
+            write_section(Tag::Strangers, true, &section, &mut |part| bytes.extend_from_slice(part));
+        }
+        Trained { shares: trained.shares, ..Trained::default() }.write(|part| bytes.extend_from_slice(part));
+    } else if settings.scales.is_some() || ensemble.inputs.are_named() {
+        let mut features = Vec::new();
+        for (index, name) in ensemble.inputs.names().into_iter().enumerate() {
+            let scale = settings.scales.as_ref().map_or(1.0, |scales| scales[index]);
+            features.extend(scale.to_le_bytes());
+            features.push(u8::try_from(name.len()).map_err(|_| CompileProblem::NameTooLong { name: name.into() })?);
+            features.extend(name.bytes());
+        }
+        write_section(Tag::FeatureNames, false, &features, &mut |part: &[u8]| bytes.extend_from_slice(part));
+    }
+    Ok(bytes)
+}
+
+/// What a model over rows predicts, and which features stand for a missing value.
+fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let Some(imported) = ensemble.origin.imported.as_ref().filter(|_| ensemble.descriptor().is_none()) else {
+        return bytes;
+    };
+    let mut put = |part: &[u8]| bytes.extend_from_slice(part);
+    let prediction = imported.prediction;
+    if prediction != Prediction::default() {
+        // Whoever does not know it would take scaled margins for values.
+        write_section(Tag::Prediction, prediction.scale != 1.0, &prediction.to_bytes(), &mut put);
+    }
+    if let Some([low, high]) = imported.sentinel {
+        let ends = |scale: Option<f32>| match scale {
+            None => [f32_key(low), f32_key(high)],
+            Some(scale) => [whole(low, scale), whole(high, scale)],
+        };
+        // The same for every feature, which was checked.
+        let [low, high] = ends(settings.scales.as_ref().and_then(|scales| scales.first().copied()));
+        write_section(Tag::Sentinel, true, &Sentinel { low, high }.to_bytes(), &mut put);
+    }
+    bytes
+}
+
+/// The section that says which touches it was trained on; nothing where that is not known.
+fn captured(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if let Some(content) = settings.stated.capture.as_ref().filter(|_| ensemble.descriptor().is_some()) {
+        write_section(Tag::Capture, false, content, &mut |part| bytes.extend_from_slice(part));
+    }
+    bytes
+}
+
+/// Whether the features that stand for a missing value are the same whole numbers for every feature: a model states one
+/// range of them.
+pub(super) fn check_sentinel(ensemble: &Ensemble, settings: &Settings) -> Result<()> {
+    let sentinel = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);
+    let (Some(sentinel), Some(scales)) = (sentinel, &settings.scales) else { return Ok(()) };
+    let ends = |scale: &f32| sentinel.map(|end| whole(end, *scale));
+    if scales.iter().any(|scale| ends(scale) != ends(&scales[0])) {
+        let text = scales.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        let allowed =
+            format!("the same scale for all features, since {} stands for a missing value in each", sentinel[0]);
+        return Err(Error::setting("scales", text, allowed));
+    }
+    Ok(())
+}
+
+/// The program's version and the objects' names, each with its length in a byte.
+fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
+    let mut text = Vec::new();
+    for string in std::iter::once(env!("CARGO_PKG_VERSION")).chain(ensemble.objects.iter().map(String::as_str)) {
+        let length = u8::try_from(string.len()).map_err(|_| CompileProblem::NameTooLong { name: string.into() })?;
+        text.push(length);
+        text.extend(string.bytes());
+    }
+    Ok(text)
+}
+
+/// The logarithms of the priors in units, the largest 0.
+fn priors(settings: &Settings, objects: usize, unit: f32) -> Result<Vec<i32>> {
+    let Some(priors) = &settings.priors else { return Ok(vec![0; objects]) };
+    if priors.len() != objects || !priors.iter().all(|prior| prior.is_finite() && *prior > 0.0) {
+        let priors = priors.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        return Err(Error::setting("priors", priors, format!("{objects} positive numbers, one for each object")));
+    }
+    let largest = priors.iter().copied().fold(0.0, f64::max);
+    Ok(priors.iter().map(|prior| ((prior / largest).ln() / f64::from(unit)).round() as i32).collect())
+}
+
+/// A unit in bits, in Q32, as a number of 32 binary digits and a shift.
+fn unit_bits(unit: f32) -> (u32, u8) {
+    let bits = f64::from(unit) * std::f64::consts::LOG2_E * 4_294_967_296.0;
+    // Units are from 2^-24 to 0.5 nats, so the shift is from 1 to 32.
+    let shift = (0..=63_u8).rev().find(|&shift| bits * f64::from(shift).exp2() < 4_294_967_295.0).unwrap_or(0);
+    ((bits * f64::from(shift).exp2()).round() as u32, shift)
+}
+
+/// A CRC-64 (XZ) of everything that makes up an ensemble.
+pub(super) fn hash(ensemble: &Ensemble) -> u64 {
+    const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
+    let mut digest = CRC.digest();
+    digest.update(&[ensemble.descriptor().map_or(RAW_FEATURES, palpate_shared::Descriptor::code)]);
+    for name in &ensemble.objects {
+        digest.update(name.as_bytes());
+        digest.update(&[0]);
+    }
+    ensemble.base_margins.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
+    for tree in &ensemble.trees {
+        let object = match tree.output {
+            Output::One(object) => object as u64,
+            Output::Each => u64::MAX,
+        };
+        digest.update(&object.to_le_bytes());
+        for node in &tree.nodes {
+            match node {
+                Node::Leaf(values) => values.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes())),
+                Node::Split { feature, threshold, missing_left, left, right } => {
+                    for number in [*feature, usize::from(*missing_left), *left, *right] {
+                        digest.update(&(number as u64).to_le_bytes());
+                    }
+                    digest.update(&threshold.to_bits().to_le_bytes());
+                }
+            }
+        }
+    }
+    digest.finalize()
+}
+
+fn byte(number: usize) -> Result<u8> {
+    u8::try_from(number).map_err(|_| too_large())
+}
+
+/// A length in the header.
+pub(super) fn count(number: usize) -> Result<u32> {
+    u32::try_from(number).map_err(|_| too_large())
+}
+
+fn too_large() -> Error {
+    CompileProblem::TooLarge.into()
+}

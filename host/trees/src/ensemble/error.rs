@@ -1,0 +1,419 @@
+//! What can be wrong with ensembles, their files and their training.
+
+use crate::error::Problem;
+use palpate_shared::Descriptor;
+use palpate_shared::format::Counted;
+
+/// What can be wrong with ensembles, their files and their training.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EnsembleProblem {
+    /// The file is of a kind, or has something in it, that cannot be read.
+    #[error("{what}")]
+    Unsupported {
+        /// What.
+        what: String,
+        /// The way round, as a sentence.
+        way: String,
+    },
+    /// A file of another library contradicts itself.
+    #[error("not a whole model in the format {kind}: {what}")]
+    Damaged {
+        /// The format.
+        kind: &'static str,
+        /// What is wrong.
+        what: String,
+    },
+    /// There are too few or too many features.
+    #[error("it has {count} features, of which its trees use {used}, and not 1 to {most}")]
+    FeatureCount {
+        /// Features.
+        count: usize,
+        /// Those that some tree splits on.
+        used: usize,
+        /// The most that there may be.
+        most: usize,
+    },
+    /// A name that no feature can have.
+    #[error("the feature's name {name:?} is longer than 255 bytes or has a control character in it")]
+    FeatureName {
+        /// The name.
+        name: String,
+    },
+    /// There are other names than outputs.
+    #[error("{names} names were given for {outputs} outputs")]
+    Names {
+        /// Names.
+        names: usize,
+        /// Objects (classes), or the one output of a regression.
+        outputs: usize,
+    },
+    /// A file is not JSON, or not of XGBoost's schema.
+    #[error("not an ensemble in XGBoost's JSON format: {detail}")]
+    NotJson {
+        /// What the parser said.
+        detail: String,
+    },
+    /// The objective is not one whose margins are known.
+    #[error("its objective is {found}")]
+    Objective {
+        /// What it is.
+        found: String,
+    },
+    /// The booster has no trees.
+    #[error("its booster is {found}, which has no trees")]
+    Booster {
+        /// What it is.
+        found: String,
+    },
+    /// An attribute is missing.
+    #[error("it has no attribute {name}")]
+    NoAttribute {
+        /// Its name.
+        name: &'static str,
+        /// A value in Python that it could have.
+        example: &'static str,
+    },
+    /// An attribute does not hold what it should.
+    #[error("{name} is not {expected}: {detail}")]
+    Attribute {
+        /// Its name.
+        name: &'static str,
+        /// What it should hold.
+        expected: &'static str,
+        /// What the parser said.
+        detail: String,
+    },
+    /// The descriptor's name is unknown.
+    #[error("its descriptor {found:?} is unknown")]
+    UnknownDescriptor {
+        /// The name.
+        found: String,
+    },
+    /// Too few objects, or too many.
+    #[error("it names {count} objects")]
+    ObjectCount {
+        /// How many.
+        count: usize,
+    },
+    /// A name that no object can have.
+    #[error("{}", bad_name(name, *why))]
+    ObjectName {
+        /// The name.
+        name: String,
+        /// Why it cannot be one.
+        why: NameProblem,
+    },
+    /// There are other classes than objects.
+    #[error("it has {classes} classes, but palpate_objects names {objects} objects")]
+    Classes {
+        /// Classes in the file.
+        classes: usize,
+        /// Objects that the attribute names.
+        objects: usize,
+    },
+    /// There are other features than the descriptor has.
+    #[error(
+        "it has {found} features, but its descriptor {} has {} ({})",
+        descriptor.name(), descriptor.feature_count(), descriptor.feature_names().join(", ")
+    )]
+    Features {
+        /// Features in the file.
+        found: usize,
+        /// The descriptor that it names.
+        descriptor: Descriptor,
+    },
+    /// The base score cannot be used.
+    #[error("its base_score {text:?} is neither a number nor {objects} numbers, or is not finite")]
+    BaseScore {
+        /// The base score.
+        text: String,
+        /// How many objects there are.
+        objects: usize,
+    },
+    /// There is no margin to start from for each object.
+    #[error("it has {found} finite base margins for {objects} objects")]
+    BaseMargins {
+        /// Finite base margins.
+        found: usize,
+        /// Objects.
+        objects: usize,
+    },
+    /// There are no trees.
+    #[error("it has no trees")]
+    NoTrees,
+    /// A list of XGBoost's has another length than there are trees.
+    #[error("tree_info has {found} entries for {trees} trees")]
+    TreeInfo {
+        /// Entries.
+        found: usize,
+        /// Trees.
+        trees: usize,
+    },
+    /// There are other weights of a dart booster than trees.
+    #[error("weight_drop has {found} entries for {trees} trees")]
+    WeightDrop {
+        /// Entries.
+        found: usize,
+        /// Trees.
+        trees: usize,
+    },
+    /// A number is written as something else.
+    #[error("{name} is {text:?}, not a count")]
+    Count {
+        /// The field.
+        name: &'static str,
+        /// What it holds.
+        text: String,
+    },
+    /// A tree contradicts itself.
+    #[error("tree {tree}: {problem}")]
+    Tree {
+        /// The tree, counted from 0.
+        tree: usize,
+        /// What is wrong with it.
+        problem: TreeProblem,
+    },
+    /// One object cannot be distinguished from anything.
+    #[error("there is only one object to train on")]
+    OneObject,
+    /// There are more objects than a model can hold.
+    #[error("there are {objects} objects to train on, more than the 256 that a model can distinguish")]
+    TooManyObjects {
+        /// Objects.
+        objects: usize,
+    },
+    /// An object has no touches.
+    #[error("{object} has no touches to train on")]
+    NoTouches {
+        /// The object.
+        object: String,
+    },
+    /// A background does not go with a data set.
+    #[error("the background does not go with the data set: {detail}")]
+    Background {
+        /// Why not.
+        detail: &'static str,
+    },
+    /// An object has no touch of those that were asked for.
+    #[error("no touch of {object} is evidence: {}", none_of(*counted))]
+    NothingCounts {
+        /// Its name.
+        object: String,
+        /// Which touches were to be evidence.
+        counted: Counted,
+    },
+    /// The descriptor needs the probe's pose.
+    #[error("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())]
+    NoPose {
+        /// The descriptor.
+        descriptor: Descriptor,
+    },
+    /// The trainer refused what it was given, or failed.
+    #[error("the trainer {trainer} refused the touches: {detail}")]
+    Trainer {
+        /// Its name.
+        trainer: &'static str,
+        /// What it said.
+        detail: String,
+    },
+}
+
+/// Why a name cannot be an object's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NameProblem {
+    /// It is empty.
+    Empty,
+    /// It has a control character.
+    Control,
+    /// It has more than 255 bytes.
+    Long,
+    /// Another object has it.
+    Twice,
+}
+
+/// What can be wrong with a tree. Nodes are counted from 0.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TreeProblem {
+    /// There is not even a root.
+    #[error("it has no nodes")]
+    NoNodes,
+    /// A column of the file does not have one entry for each node.
+    #[error("{column} has {found} entries instead of {wanted}")]
+    Column {
+        /// The column.
+        column: &'static str,
+        /// Its entries.
+        found: usize,
+        /// Nodes.
+        wanted: usize,
+    },
+    /// A number is written as something else.
+    #[error("{name} is {text:?}, not a count")]
+    Count {
+        /// The field.
+        name: &'static str,
+        /// What it holds.
+        text: String,
+    },
+    /// Splits by category.
+    #[error("it splits on categories of the feature {feature}")]
+    Categorical {
+        /// The feature's name.
+        feature: String,
+    },
+    /// It adds to an object that does not exist.
+    #[error("it is for object {object} of {objects}")]
+    Object {
+        /// The object, counted from 0.
+        object: u64,
+        /// Objects.
+        objects: usize,
+    },
+    /// Its leaves hold another number of values than there are objects.
+    #[error("its leaves hold {values} values for {objects} objects")]
+    LeafWidth {
+        /// Values of each leaf.
+        values: usize,
+        /// Objects.
+        objects: usize,
+    },
+    /// A child does not exist.
+    #[error("node {node}: its {side} child {child} is not one of {nodes} nodes")]
+    Child {
+        /// The node.
+        node: usize,
+        /// Left or right.
+        side: &'static str,
+        /// The child.
+        child: i64,
+        /// Nodes.
+        nodes: usize,
+    },
+    /// A node has two parents, or is its own ancestor.
+    #[error("node {node} is reached twice: the tree has a cycle or a shared branch")]
+    ReachedTwice {
+        /// The node.
+        node: usize,
+    },
+    /// There are too many splits one below the other.
+    #[error("it is deeper than {most} splits")]
+    TooDeep {
+        /// The most that there may be.
+        most: usize,
+    },
+    /// A split is at a feature that does not exist.
+    #[error("node {node}: it splits on feature {feature}, but there are {features}")]
+    Feature {
+        /// The node.
+        node: usize,
+        /// The feature, counted from 0.
+        feature: u64,
+        /// Features.
+        features: usize,
+    },
+    /// A threshold is not a number.
+    #[error("node {node}: its threshold {threshold} is not finite")]
+    Threshold {
+        /// The node.
+        node: usize,
+        /// The threshold.
+        threshold: f32,
+    },
+    /// A leaf's values are not in the file.
+    #[error("node {node}: {column} has no {values} values for this leaf")]
+    NoValues {
+        /// The leaf.
+        node: usize,
+        /// Where they should be.
+        column: &'static str,
+        /// How many there should be.
+        values: usize,
+    },
+    /// A leaf has another number of values than the tree's others.
+    #[error("leaf {node} has {found} values instead of {wanted}")]
+    LeafValues {
+        /// The leaf.
+        node: usize,
+        /// Its values.
+        found: usize,
+        /// What the tree's output asks for.
+        wanted: usize,
+    },
+    /// A leaf's value cannot be added.
+    #[error("leaf {node} has the value {value}, which is not finite")]
+    LeafValue {
+        /// The leaf.
+        node: usize,
+        /// The value.
+        value: f32,
+    },
+}
+
+fn bad_name(name: &str, why: NameProblem) -> String {
+    match why {
+        NameProblem::Empty => "an object has an empty name".into(),
+        NameProblem::Control => format!("the object's name {name:?} has a control character in it"),
+        NameProblem::Long => format!("the object's name {name:?} has more than 255 bytes"),
+        NameProblem::Twice => format!("it has the object {name:?} twice"),
+    }
+}
+
+impl Problem for EnsembleProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::Unsupported { way, .. } => way.clone(),
+            Self::Damaged { .. } => "Save the model again with the library that trained it.".into(),
+            Self::FeatureCount { most, .. } => format!("Train on the features that matter, at most {most}."),
+            Self::FeatureName { .. } => "Give the feature a shorter name before training.".into(),
+            Self::Names { .. } => "Give one name for each class, in the order of the labels.".into(),
+            Self::NotJson { .. } => {
+                "Give a file that `palpate train` or XGBoost's `save_model(\"….json\")` wrote.".into()
+            }
+            Self::Objective { .. } => {
+                "Train with multi:softprob, binary:logistic or a regression of one target; a model of touches with multi:softprob."
+                    .into()
+            }
+            Self::Booster { .. } => "Train with booster=gbtree or dart.".into(),
+            Self::NoAttribute { name, example } => {
+                format!("Before saving it in Python, set it: `booster.set_attr({name}={example})`.")
+            }
+            Self::Attribute { .. } => "Correct the attribute, or remove it if it is not palpate_objects.".into(),
+            Self::UnknownDescriptor { .. } => {
+                format!("Use one of {}.", Descriptor::ALL.map(Descriptor::name).join(", "))
+            }
+            Self::ObjectCount { .. } | Self::ObjectName { .. } => {
+                "Use 2 to 256 different names of at most 255 bytes, without tabs and line ends.".into()
+            }
+            Self::Classes { .. } => "Name every class once, in the order of the labels.".into(),
+            Self::Features { .. } => "Train it on that descriptor's features, or name the right descriptor.".into(),
+            Self::Tree { problem: TreeProblem::Categorical { .. }, .. } => {
+                "Encode categories as numbers before training, one column of 0 and 1 for each (one-hot).".into()
+            }
+            Self::BaseScore { .. }
+            | Self::BaseMargins { .. }
+            | Self::NoTrees
+            | Self::TreeInfo { .. }
+            | Self::WeightDrop { .. }
+            | Self::Count { .. }
+            | Self::Tree { .. } => "The ensemble is damaged or was changed by hand; train or export it again.".into(),
+            Self::OneObject => "Capture at least two.".into(),
+            Self::TooManyObjects { .. } => "Leave some objects out of the data set.".into(),
+            Self::NoTouches { .. } => "Capture it again.".into(),
+            Self::Background { .. } => "Capture the background as the data set: `palpate capture background`.".into(),
+            Self::NothingCounts { .. } => "Capture more approaches, or train on touches with any contact.".into(),
+            Self::NoPose { .. } => "Capture the touches with their pose, or use the descriptor curvature.".into(),
+            Self::Trainer { .. } => "Report this as a bug, with the data.".into(),
+        }
+    }
+}
+
+fn none_of(counted: Counted) -> &'static str {
+    match counted {
+        Counted::Full => "none has three contacts",
+        Counted::Contacts => "none has a contact",
+        Counted::All => "none has what the descriptor needs",
+    }
+}

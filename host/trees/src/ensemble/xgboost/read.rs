@@ -1,0 +1,292 @@
+//! From XGBoost's schema to an ensemble, everything checked.
+
+use super::objective::{Kind, Objective};
+use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
+use super::trees::{Shape, tree};
+use crate::ensemble::check::check_names;
+use crate::ensemble::import::{MISSING_UNKNOWN, Options, default_names, named};
+use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, Node, Origin};
+use crate::error::EnsembleProblem;
+use palpate_shared::Descriptor;
+use palpate_shared::format::{Link as Inverse, Prediction};
+use std::collections::{BTreeMap, BTreeSet};
+
+type Attributes = BTreeMap<String, String>;
+
+impl Document {
+    /// The ensemble in the document: over touches if it names a descriptor, else over rows. `names` are the objects'
+    /// names; `kind` is JSON or UBJSON.
+    pub(super) fn into_ensemble(self, options: &Options<'_>, kind: &str) -> Result<Ensemble, EnsembleProblem> {
+        let names = options.names;
+        let version = self.version.map(|number| number.to_string()).join(".");
+        let Learner { attributes, feature_names, gradient_booster, learner_model_param, objective, .. } = self.learner;
+        let (forest, weights) = forest(gradient_booster)?;
+        let Objective { kind: outputs, link, inverse } = Objective::named(&objective.name)?;
+        let classes = count("num_class", &learner_model_param.num_class)?;
+        let targets = count("num_target", &learner_model_param.num_target)?;
+        let groups = match outputs {
+            Kind::Classes => classes,
+            Kind::Binary | Kind::One if targets > 1 => {
+                return Err(EnsembleProblem::Unsupported {
+                    what: format!("it has {targets} targets, which are no classes of one object"),
+                    way: "Train a model for each target.".into(),
+                });
+            }
+            Kind::Binary | Kind::One => 1,
+        };
+        let first = usize::from(outputs == Kind::Binary);
+        let objects = groups + first;
+        let features = count("num_feature", &learner_model_param.num_feature)?;
+        let (inputs, objects) = match attributes.get("palpate_descriptor") {
+            Some(name) => {
+                if outputs != Kind::Classes {
+                    return Err(EnsembleProblem::Objective { found: objective.name });
+                }
+                let descriptor = descriptor(name)?;
+                if features != descriptor.feature_count() {
+                    return Err(EnsembleProblem::Features { found: features, descriptor });
+                }
+                let own = object_names(&attributes)?.ok_or(EnsembleProblem::NoAttribute {
+                    name: "palpate_objects",
+                    example: "'[\"bowl\", \"fork\"]'",
+                })?;
+                if classes != own.len() {
+                    return Err(EnsembleProblem::Classes { classes, objects: own.len() });
+                }
+                (Inputs::Touches(descriptor), named(names, own)?)
+            }
+            None => {
+                let own = object_names(&attributes)?.unwrap_or_else(|| default_names(objects));
+                if own.len() != objects {
+                    return Err(EnsembleProblem::Classes { classes: objects, objects: own.len() });
+                }
+                check_feature_count(features, &forest)?;
+                let are_named = feature_names.len() == features;
+                let inputs = if are_named { Inputs::Rows(feature_names) } else { Inputs::unnamed(features) };
+                (inputs, named(names, own)?)
+            }
+        };
+        let mut base_margins = vec![0.0; first];
+        base_margins.extend(base_scores(&learner_model_param.base_score, groups)?.into_iter().map(|b| link.margin(b)));
+        if base_margins.iter().any(|margin| !margin.is_finite()) {
+            return Err(EnsembleProblem::BaseScore { text: learner_model_param.base_score, objects: groups });
+        }
+        let mut notes = Vec::new();
+        let taken = taken(&forest, &attributes, groups, options.all_trees, &mut notes)?;
+        let Forest { tree_info, trees, .. } = forest;
+        if trees.is_empty() {
+            return Err(EnsembleProblem::NoTrees);
+        }
+        if tree_info.len() != trees.len() {
+            return Err(EnsembleProblem::TreeInfo { found: tree_info.len(), trees: trees.len() });
+        }
+        if let Some(found) = weights.as_ref().map(Vec::len).filter(|&found| found != trees.len()) {
+            return Err(EnsembleProblem::WeightDrop { found, trees: trees.len() });
+        }
+        let shape = Shape {
+            features: inputs.names().into_iter().map(String::from).collect(),
+            groups,
+            first,
+            infinite: inputs.descriptor().is_none(),
+        };
+        let read = |((number, columns), group): ((usize, &TreeColumns), u64)| {
+            tree(columns, group, &shape).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
+        };
+        let trees = trees.iter().enumerate().zip(tree_info).take(taken).map(read).collect::<Result<_, _>>()?;
+        let mut origin = origin(&attributes)?;
+        if inputs.descriptor().is_none() {
+            let Rows { prediction, sentinel } = rows(&attributes, inverse)?;
+            if sentinel.is_none() {
+                notes.push(MISSING_UNKNOWN.into());
+            }
+            let kind = format!("XGBoost {version} {kind}");
+            origin.imported = Some(Imported { kind, notes, prediction, sentinel, ..Imported::default() });
+        }
+        let mut ensemble = Ensemble { inputs, objects, base_margins, trees, origin };
+        if let Some(weights) = weights {
+            weigh(&mut ensemble, &weights);
+        }
+        // Rows may have any number of features, and names; touches and trees were checked above.
+        ensemble.check()?;
+        Ok(ensemble)
+    }
+}
+
+/// How many of the trees are taken: those up to the best iteration, if training stopped early and not all are asked for.
+fn taken(
+    forest: &Forest,
+    attributes: &Attributes,
+    groups: usize,
+    all: bool,
+    notes: &mut Vec<String>,
+) -> Result<usize, EnsembleProblem> {
+    let trees = forest.trees.len();
+    let Some(best) = attributes.get("best_iteration") else { return Ok(trees) };
+    let best = count("best_iteration", best)?;
+    let parallel = count("num_parallel_tree", &forest.gbtree_model_param.num_parallel_tree)?.max(1);
+    let is_each = forest.trees.iter().any(|tree| !matches!(tree.tree_param.size_leaf_vector.as_str(), "" | "0" | "1"));
+    let per_iteration = if is_each { 1 } else { groups }.saturating_mul(parallel);
+    let stated = forest.iteration_indptr.get(best.saturating_add(1)).and_then(|&end| usize::try_from(end).ok());
+    let wanted = stated.unwrap_or_else(|| best.saturating_add(1).saturating_mul(per_iteration)).min(trees);
+    if wanted == 0 || wanted == trees {
+        return Ok(trees);
+    }
+    if all {
+        notes.push(format!(
+            "Training stopped early; its best iteration was {best}, with {wanted} trees. All {trees} trees are used, as asked."
+        ));
+        return Ok(trees);
+    }
+    notes.push(format!(
+        "Training stopped early: the {wanted} trees up to the best iteration, {best}, are used, as by XGBClassifier and \
+         XGBRegressor, and not all {trees}, which Booster.predict uses. Ask for all trees to take those."
+    ));
+    Ok(wanted)
+}
+
+/// What an ensemble over rows predicts, and what stands for a missing value in it.
+#[derive(serde::Serialize, serde::Deserialize)]
+pub(super) struct StatedRows {
+    pub(super) link: String,
+    pub(super) last_of_ties: bool,
+    pub(super) scale: f32,
+    /// As text, since JSON has no infinities.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) sentinel: Option<[String; 2]>,
+}
+
+#[derive(Default)]
+struct Rows {
+    prediction: Prediction,
+    sentinel: Option<[f32; 2]>,
+}
+
+/// What the attribute says, or the objective.
+fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProblem> {
+    let name = "palpate_prediction";
+    let expected = "a JSON object of link, last_of_ties and scale";
+    let Some(text) = attributes.get(name) else {
+        return Ok(Rows { prediction: Prediction { link: inverse, ..Prediction::default() }, sentinel: None });
+    };
+    let stated: StatedRows = parsed(name, expected, text)?;
+    let wrong = |detail: String| EnsembleProblem::Attribute { name, expected, detail };
+    let link = Inverse::ALL.iter().copied().find(|link| link.name() == stated.link);
+    let link = link.ok_or_else(|| wrong(format!("the link {:?}", stated.link)))?;
+    if !(stated.scale.is_finite() && stated.scale > 0.0) {
+        return Err(wrong(format!("the scale {}", stated.scale)));
+    }
+    let number = |text: String| text.parse::<f32>().ok().filter(|number| !number.is_nan());
+    let sentinel = stated.sentinel.map(|ends| ends.map(number));
+    let sentinel = match sentinel {
+        None => None,
+        Some([Some(low), Some(high)]) if low <= high => Some([low, high]),
+        Some(_) => return Err(wrong("the sentinel is no range of numbers".into())),
+    };
+    let prediction = Prediction { link, last_of_ties: stated.last_of_ties, scale: stated.scale };
+    Ok(Rows { prediction, sentinel })
+}
+
+/// The trees, and the weight of each in a dart booster: up to 3.2 it wraps another booster, then weights stand beside the
+/// model, then in it.
+fn forest(booster: GradientBooster) -> Result<(Forest, Option<Vec<f32>>), EnsembleProblem> {
+    let found = booster.name;
+    if !matches!(found.as_str(), "gbtree" | "dart") {
+        return Err(EnsembleProblem::Booster { found });
+    }
+    let inner = booster.gbtree.map_or((None, None), |inner| (inner.model, inner.weight_drop));
+    let Some(mut forest) = booster.model.or(inner.0) else { return Err(EnsembleProblem::NoTrees) };
+    let weights = booster.weight_drop.or(inner.1).or(forest.weight_drop.take());
+    // gbtree writes no weights, or none for its trees.
+    Ok((forest, weights.filter(|weights| !weights.is_empty())))
+}
+
+fn check_feature_count(count: usize, forest: &Forest) -> Result<(), EnsembleProblem> {
+    if (1..=MAX_FEATURES).contains(&count) {
+        return Ok(());
+    }
+    let splits = |tree: &TreeColumns| {
+        let splits = tree.left_children.iter().zip(&tree.split_indices).filter(|(left, _)| **left != -1);
+        splits.map(|(_, &feature)| feature).collect::<Vec<_>>()
+    };
+    let used = forest.trees.iter().flat_map(splits).collect::<BTreeSet<_>>().len();
+    Err(EnsembleProblem::FeatureCount { count, used, most: MAX_FEATURES })
+}
+
+/// Multiplies leaves by their tree's weight, in f32 as XGBoost does.
+fn weigh(ensemble: &mut Ensemble, weights: &[f32]) {
+    for (tree, weight) in ensemble.trees.iter_mut().zip(weights) {
+        for node in &mut tree.nodes {
+            if let Node::Leaf(values) = node {
+                values.iter_mut().for_each(|value| *value *= weight);
+            }
+        }
+    }
+}
+
+fn descriptor(name: &str) -> Result<Descriptor, EnsembleProblem> {
+    Descriptor::from_name(name).ok_or_else(|| EnsembleProblem::UnknownDescriptor { found: name.into() })
+}
+
+fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, EnsembleProblem> {
+    let name = "palpate_objects";
+    let Some(text) = attributes.get(name) else { return Ok(None) };
+    let names: Vec<String> = parsed(name, "a JSON array of names", text)?;
+    // Over rows there may be one output; over touches the whole is checked in the end.
+    if names.len() != 1 {
+        check_names(&names)?;
+    }
+    Ok(Some(names))
+}
+
+/// What the optional attributes say about the training touches.
+fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
+    let trained = attributes.get("palpate_trained").map(|text| {
+        let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
+        parsed("palpate_trained", expected, text)
+    });
+    let background = attributes.get("palpate_background").map(|text| {
+        let expected = "true where the last object is a background, else false";
+        parsed("palpate_background", expected, text)
+    });
+    // What the crate that trained it states, and this one does not read.
+    let is_read = |name: &str| READ.contains(&name) || !name.starts_with("palpate_");
+    let others = attributes.iter().filter(|(name, _)| !is_read(name));
+    Ok(Origin {
+        background: background.transpose()?.unwrap_or_default(),
+        trained: trained.transpose()?,
+        imported: None,
+        attributes: others.map(|(name, text)| (name.clone(), text.clone())).collect(),
+    })
+}
+
+/// Attributes that this crate reads.
+const READ: [&str; 5] =
+    ["palpate_background", "palpate_descriptor", "palpate_objects", "palpate_prediction", "palpate_trained"];
+
+fn parsed<'t, T: serde::Deserialize<'t>>(
+    name: &'static str,
+    expected: &'static str,
+    text: &'t str,
+) -> Result<T, EnsembleProblem> {
+    serde_json::from_str(text).map_err(|error| EnsembleProblem::Attribute { name, expected, detail: error.to_string() })
+}
+
+/// A count; XGBoost leaves out some that older versions did not know.
+fn count(name: &'static str, text: &str) -> Result<usize, EnsembleProblem> {
+    if text.is_empty() {
+        return Ok(0);
+    }
+    text.parse().map_err(|_| EnsembleProblem::Count { name, text: text.into() })
+}
+
+fn base_scores(text: &str, objects: usize) -> Result<Vec<f32>, EnsembleProblem> {
+    let list = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+    let parsed: Result<Vec<f32>, _> = list.unwrap_or(text).split(',').map(|number| number.trim().parse()).collect();
+    match parsed {
+        Ok(margins) if margins.iter().any(|margin| !margin.is_finite()) => {}
+        Ok(margins) if margins.len() == 1 => return Ok(vec![margins[0]; objects]),
+        Ok(margins) if margins.len() == objects => return Ok(margins),
+        _ => {}
+    }
+    Err(EnsembleProblem::BaseScore { text: text.into(), objects })
+}

@@ -1,0 +1,151 @@
+//! What can be wrong with rows of features, and with comparing models on them.
+
+use crate::error::Problem;
+use crate::verify::ClassDiffers;
+
+/// What `verify` compares with.
+const RAW_SCORES: &str = "Give the library's raw scores, before the softmax or the logistic function: one column per output, or one for a binary model (its second class), in the order of the classes. XGBoost: `output_margin=True`; LightGBM: `raw_score=True`; CatBoost: `prediction_type=\"RawFormulaVal\"`; scikit-learn: `decision_function`, of forests `predict_proba`; onnxruntime: a model converted with `options={id(model): {\"raw_scores\": True}}`, of forests its probabilities.";
+
+/// What can be wrong with rows of features, and with comparing models on them.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RowsProblem {
+    /// The file is not a table.
+    #[error("not rows of features as CSV: {detail}")]
+    NotRows {
+        /// What the parser said.
+        detail: String,
+    },
+    /// There is no row.
+    #[error("it has no rows")]
+    Empty,
+    /// Columns cannot be matched to features.
+    #[error("it has {found} columns for {wanted} features, and no column {missing:?}")]
+    Columns {
+        /// Columns.
+        found: usize,
+        /// Features.
+        wanted: usize,
+        /// A feature that no column is named after.
+        missing: String,
+    },
+    /// A column that was asked for is not there.
+    #[error("it has no column {name:?}")]
+    NoColumn {
+        /// Its name.
+        name: String,
+    },
+    /// A cell is not a number.
+    #[error("{text:?} in the column {column} is not a number")]
+    Number {
+        /// The column's name, or its number from 1.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// There are margins of other rows.
+    #[error("it has margins of {margins} rows, but there are {rows} rows")]
+    MarginRows {
+        /// Rows of margins.
+        margins: usize,
+        /// Rows of features.
+        rows: usize,
+    },
+    /// There are margins of other outputs.
+    #[error("row {row} has {found} margins for {outputs} outputs")]
+    MarginColumns {
+        /// The row, counted from 1.
+        row: usize,
+        /// Its margins.
+        found: usize,
+        /// Outputs of the model.
+        outputs: usize,
+    },
+    /// The model is over touches.
+    #[error("the model is over touches, not over rows of features")]
+    Touches,
+    /// A model and an ensemble do not belong together.
+    #[error("the model has {}, the ensemble {}", of(*model), of(*ensemble))]
+    OtherModel {
+        /// Features, outputs and trees of the model.
+        model: [usize; 3],
+        /// Those of the ensemble.
+        ensemble: [usize; 3],
+    },
+    /// Margins are farther apart than the model states.
+    #[error("{whose} margins differ by up to {error:.3e}, more than the {bound:.3e} that the model states{}", tree.as_ref().map(|tree| format!("; {tree}")).unwrap_or_default())]
+    Beyond {
+        /// Whose margins: "the ensemble's" or "the library's".
+        whose: &'static str,
+        /// The largest difference.
+        error: f64,
+        /// What the model states.
+        bound: f64,
+        /// Which tree is the first to differ.
+        tree: Option<String>,
+    },
+    /// The library's margins are something else.
+    #[error("the library's numbers look like probabilities, and margins are needed")]
+    Probabilities,
+    /// Classes are others than the library's.
+    #[error(
+        "{rows} rows get another class than the library gives them, and the rounding that the model states does not explain it: the first is row {}, of {:?}, and {:?} by the library, whose margins of the two are {:.3e} apart",
+        first.row, first.classes[0], first.classes[1], first.gap
+    )]
+    Class {
+        /// How many.
+        rows: usize,
+        /// The first of them.
+        first: ClassDiffers,
+    },
+    /// A label is none of the model's classes.
+    #[error("the label {label:?} in row {row} is none of the model's classes: {}", known.join(", "))]
+    Label {
+        /// The label.
+        label: String,
+        /// The row, counted from 1.
+        row: usize,
+        /// The classes.
+        known: Vec<String>,
+    },
+}
+
+fn of([features, outputs, trees]: [usize; 3]) -> String {
+    format!("{features} features, {outputs} outputs and {trees} trees")
+}
+
+impl RowsProblem {
+    /// Whether the file of the library's margins is what is wrong.
+    pub fn is_about_margins(&self) -> bool {
+        matches!(self, Self::MarginRows { .. } | Self::MarginColumns { .. } | Self::Probabilities)
+    }
+}
+
+impl Problem for RowsProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::NotRows { .. } => "Give a header line with the features' names, then one row per line.",
+            Self::Empty => "Give at least one row below the header.",
+            Self::Columns { .. } => {
+                "Name the columns as the features (`palpate inspect` lists them), or give as many columns as features."
+            }
+            Self::NoColumn { .. } => "Name one of the columns in the header.",
+            Self::Number { .. } => "Give a number, or leave the cell empty where the value is missing.",
+            Self::MarginRows { .. } => "Give one line of margins for each row, without a header.",
+            Self::MarginColumns { .. } => RAW_SCORES,
+            Self::Probabilities => RAW_SCORES,
+            Self::Class { .. } => {
+                "Export with `--leaf f32`, and check that the margins are the library's raw scores of these rows."
+            }
+            Self::Touches => "Use `palpate parity` and `palpate evaluate` for models of touches.",
+            Self::OtherModel { .. } => {
+                "Give the file that the model was exported from, and --all-trees if it was exported with that."
+            }
+            Self::Beyond { .. } => {
+                "Check that the model was exported from this file, with the same --missing and --all-trees, and the margins are the library's raw scores of these rows."
+            }
+            Self::Label { .. } => "Correct the label, or name the model's classes with `export --names`.",
+        }
+        .into()
+    }
+}

@@ -1,0 +1,223 @@
+//! Rows of features, for models that other libraries trained: CSV files, and what a chip gets of a row.
+
+mod error;
+mod generate;
+pub mod scales;
+
+pub use error::RowsProblem;
+pub use generate::generate;
+
+use crate::error::{Error, Place, Result};
+use palpate_onboard::Model;
+use palpate_shared::MISSING_FEATURE;
+use palpate_shared::format::{Key, f32_key};
+use std::path::Path;
+
+/// Rows of features, NaN where one is missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rows {
+    /// Features of a row.
+    pub features: usize,
+    /// Row after row, as the file has them: models compare them as f32, or as whole numbers of units.
+    pub values: Vec<f64>,
+    /// The label of each row, if a column of them was asked for.
+    pub labels: Vec<String>,
+    /// Whether columns were taken by their position, since the header does not hold all of the features' names.
+    pub by_position: bool,
+}
+
+/// How a value becomes what a model compares: see `FORMAT.md`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Encoder {
+    /// The key of an f32 value.
+    Real,
+    /// The value times the feature's scale, rounded to the nearest whole number.
+    Scaled(Vec<f32>),
+}
+
+impl Rows {
+    /// Reads a CSV file: a header, then one row per line; a cell that is empty or NaN is missing.
+    ///
+    /// Columns are matched by name if the header holds the names of all `features`; other columns are ignored then.
+    /// Otherwise they are taken by position, if there are as many as features. The column `label` is none of them.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`RowsProblem`] naming the line: a file that is not such a table or has no rows, columns that cannot
+    /// be matched, a cell that is no number.
+    pub fn read(path: &Path, features: &[&str], label: Option<&str>) -> Result<Self> {
+        let file = std::fs::File::open(path).map_err(|source| Error::io(path, "read the rows", source))?;
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(std::io::BufReader::new(file));
+        let wrong = |problem: RowsProblem| Error::at(Place::file(path), problem);
+        let header = reader.headers().map_err(|error| not_rows(path, &error))?.clone();
+        let position = |name: &str| header.iter().position(|column| column == name);
+        let label = match label {
+            Some(name) => Some(position(name).ok_or_else(|| wrong(RowsProblem::NoColumn { name: name.into() }))?),
+            None => None,
+        };
+        let by_name: Option<Vec<usize>> = features.iter().map(|name| position(name)).collect();
+        let mut others = (0..header.len()).filter(|column| Some(*column) != label).collect::<Vec<_>>();
+        let by_position = by_name.is_none();
+        if by_position && others.len() != features.len() {
+            let missing = features.iter().find(|name| position(name).is_none()).map_or("", |name| name);
+            let (found, wanted) = (others.len(), features.len());
+            return Err(wrong(RowsProblem::Columns { found, wanted, missing: missing.into() }));
+        }
+        let columns = by_name.unwrap_or_else(|| std::mem::take(&mut others));
+        let (mut values, mut labels) = (Vec::new(), Vec::new());
+        let mut record = csv::StringRecord::new();
+        while reader.read_record(&mut record).map_err(|error| not_rows(path, &error))? {
+            let line = record.position().map_or(0, csv::Position::line);
+            for &column in &columns {
+                let text = record.get(column).unwrap_or_default();
+                let value = number(text).ok_or_else(|| {
+                    let column = header.get(column).unwrap_or_default().to_owned();
+                    Error::at(Place::line(path, line), RowsProblem::Number { column, text: text.into() })
+                })?;
+                values.push(value);
+            }
+            labels.extend(label.map(|column| record.get(column).unwrap_or_default().to_owned()));
+        }
+        if values.is_empty() {
+            return Err(wrong(RowsProblem::Empty));
+        }
+        Ok(Self { features: features.len(), values, labels, by_position })
+    }
+
+    /// How many rows there are.
+    pub fn len(&self) -> usize {
+        self.values.len() / self.features.max(1)
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// The rows, in order.
+    pub fn iter(&self) -> std::slice::ChunksExact<'_, f64> {
+        self.values.chunks_exact(self.features.max(1))
+    }
+}
+
+/// Reads a CSV file of margins: no header, one row per line, as many numbers in each.
+///
+/// # Errors
+/// [`Error::Io`]; [`RowsProblem`] naming the line.
+pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
+    let file = std::fs::File::open(path).map_err(|source| Error::io(path, "read the margins", source))?;
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).has_headers(false).from_reader(std::io::BufReader::new(file));
+    let mut margins = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| not_rows(path, &error))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |(column, text): (usize, &str)| {
+            let margin = text.parse::<f64>().ok().filter(|margin| margin.is_finite());
+            let problem = || RowsProblem::Number { column: (column + 1).to_string(), text: text.into() };
+            margin.ok_or_else(|| Error::at(Place::line(path, line), problem()))
+        };
+        margins.push(record.iter().enumerate().map(number).collect::<Result<Vec<f64>>>()?);
+    }
+    Ok(margins)
+}
+
+/// A cell's number; NaN if it is empty.
+fn number(text: &str) -> Option<f64> {
+    if text.is_empty() || matches!(text, "NA" | "N/A" | "null" | "None") {
+        return Some(f64::NAN);
+    }
+    text.parse().ok()
+}
+
+fn not_rows(path: &Path, error: &csv::Error) -> Error {
+    let place = match error.position() {
+        Some(position) => Place::line(path, position.line()),
+        None => Place::file(path),
+    };
+    Error::at(place, RowsProblem::NotRows { detail: error.to_string() })
+}
+
+impl Encoder {
+    /// What a model compares. A model over touches compares whole numbers as they are.
+    pub fn of(model: &Model<'_>) -> Self {
+        if model.key() == Key::Real {
+            return Self::Real;
+        }
+        let stated = model.features().map(|feature| feature.scale);
+        Self::Scaled(stated.chain(std::iter::repeat(1.0)).take(model.feature_count()).collect())
+    }
+
+    /// What the model compares of a row.
+    pub fn row<V: Copy + Into<f64>>(&self, row: &[V]) -> Vec<i32> {
+        match self {
+            Self::Real => row.iter().map(|&value| f32_key(value.into() as f32)).collect(),
+            Self::Scaled(scales) => row.iter().zip(scales).map(|(&value, &scale)| whole(value, scale)).collect(),
+        }
+    }
+}
+
+/// A value as a whole number of its feature's units: the nearest, halves away from zero; values beyond ±(2³¹ − 1) become
+/// that, and NaN a missing value.
+pub fn whole(value: impl Into<f64>, scale: f32) -> i32 {
+    let value: f64 = value.into();
+    if value.is_nan() {
+        return MISSING_FEATURE;
+    }
+    // `as` saturates; −2³¹ is a missing value.
+    ((value * f64::from(scale)).round() as i32).max(-i32::MAX)
+}
+
+/// The names of a model's features: those that it states, or f0, f1 and so on.
+pub fn feature_names(model: &Model<'_>) -> Vec<String> {
+    let stated: Vec<String> = model.features().map(|feature| feature.name.to_owned()).collect();
+    if stated.len() == model.feature_count() {
+        return stated;
+    }
+    (0..model.feature_count()).map(crate::ensemble::Inputs::default_name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str, features: &[&str], label: Option<&str>) -> Result<Rows, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        Rows::read(file.path(), features, label).map_err(|error| {
+            let error = error.to_string();
+            error.trim_start_matches(&file.path().display().to_string()).to_owned()
+        })
+    }
+
+    #[test]
+    fn columns_are_matched_by_name_or_else_by_position() {
+        let rows = read("b,x,a\n1,9,2\n,8,inf\n", &["a", "b"], None).unwrap();
+        assert_eq!((rows.values[..2].to_vec(), rows.by_position), (vec![2.0, 1.0], false));
+        assert_eq!((rows.values[2], rows.values[3].is_nan(), rows.len()), (f64::INFINITY, true, 2));
+        let rows = read("p,q\n1,2\n", &["a", "b"], None).unwrap();
+        assert_eq!((rows.values, rows.by_position), (vec![1.0, 2.0], true));
+        let rows = read("p,kind,q\n1,cup,2\n", &["a", "b"], Some("kind")).unwrap();
+        assert_eq!((rows.values, rows.labels), (vec![1.0, 2.0], vec!["cup".to_owned()]));
+        for (text, expected) in [
+            ("p,q,r\n1,2,3\n", "3 columns for 2 features, and no column \"a\""),
+            ("a,b\n", "no rows"),
+            ("", "for 2 features"),
+            ("a,b\n1,x\n", ":2: \"x\" in the column b is not a number"),
+            ("a,b\n1\n", ":2: "),
+        ] {
+            let complaint = read(text, &["a", "b"], None).unwrap_err();
+            assert!(complaint.contains(expected), "{complaint}");
+        }
+        assert!(read("a,b\n1,2\n", &["a", "b"], Some("kind")).unwrap_err().contains("no column \"kind\""));
+    }
+
+    #[test]
+    fn whole_numbers_saturate_and_a_missing_value_stays_missing() {
+        assert_eq!(whole(1.25, 10.0), 13);
+        assert_eq!(whole(-1.25, 10.0), -13);
+        assert_eq!(whole(f64::NAN, 10.0), MISSING_FEATURE);
+        for value in [f64::INFINITY, 1e30] {
+            assert_eq!((whole(value, 1.0), whole(-value, 1.0)), (i32::MAX, -i32::MAX));
+        }
+    }
+}
