@@ -69,7 +69,7 @@
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `teach` | objects that are learned from recorded touches | `teach::teach` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
-//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate play` | [`play::Game`] |
+//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate view --play` | [`play::Game`] |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
 //!
