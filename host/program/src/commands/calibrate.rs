@@ -3,14 +3,14 @@ use super::numbers::{count, error_rate, share};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
-use super::strangers::{Found, StrangersArguments};
+use super::strangers::StrangersArguments;
 use palpate::Result;
 use palpate::calibrate::{self, Calibrated, Per, Settings, Worse};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
-use palpate::strangers;
+use palpate::strangers::{self, Found};
 use palpate::touches::noise::Noise;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -124,7 +124,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json {
         return output::print_json_about(&arguments.output, &Both { calibrated: &calibrated, strangers: &found });
     }
-    let strangers = found.map_or_else(String::new, |found| found.text() + "\n");
+    let strangers = found.map_or_else(String::new, |found| super::strangers::text(&found) + "\n");
     let text = format!("{}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
     output::print_about(&arguments.output, &text)
 }

@@ -1,15 +1,13 @@
 use super::Global;
-use super::expected::{self, ExpectedArguments};
-use super::figures::{Confusion, Evaluated, confusion_table, text};
+use super::expected::ExpectedArguments;
+use super::figures::{confusion_table, text};
 use super::numbers::{error_rate, sequences};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
 use palpate::error::RowsProblem;
 use palpate::evaluate::model_file::ModelFile;
-use palpate::evaluate::{
-    self, Active, Candidate, Classes, LEAST_GROUPS, Margins, Regression, RowsEvaluation, Settings, evaluate_rows,
-};
+use palpate::evaluate::{self, Classes, Confusion, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
 use palpate::progress::Progress;
 use palpate::rows::feature_names;
@@ -111,48 +109,21 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         Ok((directory, dataset))
     });
     let unknown = unknown.transpose()?;
-    let evaluated = file.with(|candidate| {
-        let mut margins = Margins::new(candidate, &dataset)?;
-        let own = match candidate {
-            Candidate::Compiled(model) => expected::own_weights(model),
-            Candidate::Full(ensemble) => vec![1.0; ensemble.objects.len()],
-        };
-        if let Some(weights) = arguments.expected.weights(margins.objects(), &own)? {
-            margins = margins.expecting(weights)?;
-        }
-        let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
-        let settings = Settings {
-            at,
-            at_approaches: numbers_of_approaches(&margins, arguments.at.as_deref()),
-            groups: arguments.sequences,
-            error_rate: arguments.error_rate,
-            max_touches: arguments.max_touches,
-            seed: global.seed(),
-            noise: stated,
-        };
-        let confusion = arguments.confusion.map(|touches| -> Result<_> {
-            Ok(Confusion {
-                touches,
-                touched: margins.tested_names().to_vec(),
-                recognized: margins.objects().to_vec(),
-                counts: margins.confusion(touches, arguments.sequences, global.seed())?,
-            })
-        });
-        let active = arguments.active.then(|| Active::new(&margins, &dataset)).transpose()?;
-        let evaluation = match &active {
-            Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
-            None => evaluate::evaluate(&margins, &settings)?,
-        };
-        let switch = arguments.switch.map(|nats| margins.switched(&settings.sequences(), nats)).transpose()?;
-        let strangers = unknown.as_ref().map(|(directory, dataset)| {
-            let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
-            let known = (&margins, &evaluation.sequential);
-            evaluate::strangers(known, &unknown, &settings.sequences())
-        });
-        let (confusion, strangers) = (confusion.transpose()?, strangers.transpose()?);
-        let (instances, active) = (dataset.several(), active.map(|active| active.facts()));
-        Ok(Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch, strangers })
-    })?;
+    let wanted = Wanted {
+        at: arguments.at.clone(),
+        groups: arguments.sequences,
+        error_rate: arguments.error_rate,
+        max_touches: arguments.max_touches,
+        seed: global.seed(),
+        noise: stated,
+        confusion: arguments.confusion,
+        active: arguments.active,
+        switch: arguments.switch,
+        unknown: unknown.as_ref().map(|(directory, dataset)| (*directory, dataset)),
+    };
+    let expecting = |objects: &[String], own: &[f64]| arguments.expected.weights(objects, own);
+    let measured = file.with(|candidate| evaluate::measure(candidate, &dataset, &wanted, &expecting))?;
+    let evaluated = Evaluated { robots, trained_on, ..measured };
     drop(progress);
     if global.json {
         return output::print_json(&evaluated);
@@ -198,36 +169,4 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -
         );
     }
     output::print(&text)
-}
-
-/// The numbers of touches to give the accuracy after: those asked for, or the usual ones that enough groups can be drawn
-/// of.
-fn numbers_of_touches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Result<Vec<usize>> {
-    let few = |at: usize| margins.distinct_groups(at) < LEAST_GROUPS;
-    let Some(wanted) = wanted else {
-        return Ok(Settings::default().at.into_iter().filter(|&at| !few(at)).collect());
-    };
-    // None at all is said by the evaluation, with the object that has too few touches.
-    match wanted.iter().find(|&&at| at > 0 && at <= margins.fewest_touches() && few(at)) {
-        Some(&at) => {
-            let (groups, touches) = (margins.distinct_groups(at), margins.fewest_touches());
-            let allowed = format!(
-                "another number, or capture more: of {touches} touches only {groups} different groups of {at} can be drawn, \
-                 too few for an accuracy"
-            );
-            Err(Error::setting("at", at, allowed))
-        }
-        None => Ok(wanted.to_vec()),
-    }
-}
-
-/// The numbers of approaches to give the accuracy after: those asked for, or the usual ones, as far as the approaches go.
-fn numbers_of_approaches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Vec<usize> {
-    match wanted {
-        Some(wanted) => wanted.to_vec(),
-        None => {
-            let few = |at: &usize| *at <= margins.fewest_approaches();
-            Settings::default().at_approaches.into_iter().filter(few).collect()
-        }
-    }
 }

@@ -80,11 +80,6 @@ impl ExpectedArguments {
     }
 }
 
-/// The weights that a model's own priors stand for.
-pub(crate) fn own_weights(model: &palpate_onboard::Model<'_>) -> Vec<f64> {
-    (0..model.object_count()).map(|object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect()
-}
-
 fn position(option: &'static str, name: &str, names: &[String]) -> Result<usize> {
     names
         .iter()

@@ -26,7 +26,6 @@ mod renamed;
 mod report;
 mod run;
 mod shell;
-mod stated;
 mod strangers;
 mod teach;
 mod train;

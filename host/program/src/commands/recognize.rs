@@ -1,5 +1,5 @@
 use super::Global;
-use super::expected::{self, ExpectedArguments};
+use super::expected::ExpectedArguments;
 use super::numbers::error_rate;
 use palpate::Result;
 use palpate::chip::Entry;
@@ -114,7 +114,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.active && model.plan().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
-    let weights = arguments.expected.weights(&compiled.names(), &expected::own_weights(&model))?;
+    let weights = arguments.expected.weights(&compiled.names(), &palpate::evaluate::own_weights(&model))?;
     let longest = compile::longest_time(&model);
     let (active, json) = (arguments.active, global.json);
     let log = arguments.mcap.as_deref().map(|log| log_to(log, &arguments, &compiled.names())).transpose()?;
