@@ -1,7 +1,7 @@
 //! Two models compared: the published method and the compact preset, on the same touches that neither was trained on.
 //!
 //! ```text
-//! cargo run --release --example compare_models -- touches/
+//! cargo run --release -p palpate --example compare_models -- touches/
 //! ```
 //!
 //! The argument is a directory that `palpate capture` wrote. Without it, two small meshes are touched.

@@ -1,7 +1,7 @@
 //! What more objects cost, and what helps: models of 20 to 256 objects, trained in different ways on the same approaches.
 //!
 //! ```text
-//! cargo run --release --example growth -- 100 4000 30x6 30x6:i8 8x6:eta=0.5:i8 30x6:stages=10
+//! cargo run --release -p palpate --example growth -- 100 4000 30x6 30x6:i8 8x6:eta=0.5:i8 30x6:stages=10
 //! ```
 //!
 //! The arguments are the numbers of objects ([`builtin::many`]; `20,50,100`), the approaches to each, half as many more of

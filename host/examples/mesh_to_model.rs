@@ -1,7 +1,7 @@
 //! Your own meshes to a model that a chip reads.
 //!
 //! ```text
-//! cargo run --release --example mesh_to_model -- meshes/ model.palpate
+//! cargo run --release -p palpate --example mesh_to_model -- meshes/ model.palpate
 //! ```
 //!
 //! Without arguments it makes two small meshes itself and writes the model to a temporary directory.

@@ -1,7 +1,7 @@
 //! Trees from your own trainer into a model that a chip reads.
 //!
 //! ```text
-//! cargo run --release --example own_trees
+//! cargo run --release -p palpate --example own_trees
 //! ```
 //!
 //! Any trainer of boosted trees will do, as long as its trees split on the features of a descriptor: here curvature

@@ -1,7 +1,7 @@
 //! A stream of touches to verdicts.
 //!
 //! ```text
-//! cargo run --release --example touches_to_verdicts -- model.palpate < touches.txt
+//! cargo run --release -p palpate --example touches_to_verdicts -- model.palpate < touches.txt
 //! ```
 //!
 //! Each line holds three contact times in seconds. Without arguments it simulates touches of two built-in objects, one

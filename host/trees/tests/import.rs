@@ -1,15 +1,15 @@
 //! Files that other libraries wrote, with their own margins: `tests/data/import`.
 
-use palpate::compile::{self, Goal, Leaf, Settings};
-use palpate::ensemble::import::{Options, read};
-use palpate::ensemble::{Ensemble, Inputs, Node};
-use palpate::evaluate::Candidate;
-use palpate::evaluate::predict::{Predicted, predict};
-use palpate::rows::scales;
+use palpate_trees::compile::{self, Goal, Leaf, Settings};
+use palpate_trees::ensemble::import::{Options, read};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node};
+use palpate_trees::rows::scales;
+use palpate_trees::verify::Candidate;
+use palpate_trees::verify::predict::{Predicted, predict};
 use std::path::{Path, PathBuf};
 
 fn directory() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/import")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import")
 }
 
 /// The models, in order.
