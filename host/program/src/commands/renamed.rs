@@ -199,6 +199,19 @@ mod tests {
     }
 
     #[test]
+    fn the_table_in_the_documentation_has_every_old_name() {
+        let table = include_str!("../../../../docs/reference/renamed.md");
+        for Renamed { command, option, .. } in RENAMED {
+            let old = match (*command, *option) {
+                (command, "") => format!("palpate {command}"),
+                ("*", option) => option.to_owned(),
+                (command, option) => format!("{command} {option}"),
+            };
+            assert!(table.contains(&format!("| `{old}` |")), "{old}");
+        }
+    }
+
+    #[test]
     fn what_was_never_a_name_is_left_to_the_parser() {
         assert_eq!(said_to(&["evaluate", "m", "d", "--frobnicate"]), None);
         assert_eq!(said_to(&["frobnicate"]), None);
