@@ -1,4 +1,4 @@
-// Put into a copy of a page of `palpate play` by .ci/play: plays as a visitor would, compares what the page computes with
+// Put into a copy of a page of `palpate view --play` by .ci/play: plays as a visitor would, compares what the page computes with
 // what the program computed (lines in the element "trace"), and leaves a verdict in the title.
 (() => {
   const wrong = [];

@@ -70,7 +70,7 @@
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `teach` | objects that are learned from recorded touches | `teach::teach` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
-//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate play` | [`play::Game`] |
+//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate view --play` | [`play::Game`] |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //!
 //! [`shared`] (touches, descriptors, the model format) and [`onboard`] (models, recognizers) are the crates that run on

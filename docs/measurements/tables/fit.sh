@@ -11,7 +11,7 @@ meshes=$1
 out=$2
 touches=${3:-21000}
 palpate=${PALPATE:-target/release/palpate}
-trees="--rounds 40 --depth 5 --descriptor curvature"
+trees="--trees rounds=40,depth=5 --descriptor curvature"
 
 mkdir -p "$out"
 rm -rf "$out"/*
@@ -43,8 +43,8 @@ while read -r factor middle outer noise; do
     quiet capture "$meshes" -o "$out/test" --touches 5000 --seed 99 --probe "$out/true.toml" --force
     printf '| %s, %s, %s, %s ms ' "$factor" "$middle" "$outer" "$noise"
     printf '| %s ' "$(trained "$out/clean" "$out/test")"
-    printf '| %s ' "$(trained "$out/clean" "$out/test" --noise "${noise}ms" --timer 1ms)"
-    printf '| %s ' "$(trained "$out/clean" "$out/test" --noise 0..6ms --timer 1ms --speed-error 15%)"
+    printf '| %s ' "$(trained "$out/clean" "$out/test" --real noise="${noise}ms",timer=1ms)"
+    printf '| %s ' "$(trained "$out/clean" "$out/test" --real noise=0..6ms,timer=1ms,speed_error=15%)"
     for count in 75 250; do
         # shellcheck disable=SC2086
         quiet capture $known -o "$out/recorded" --touches "$count" --seed 7 --probe "$out/true.toml" --force

@@ -45,12 +45,12 @@ row() { # name, full touches, approaches, more options of train
 
 if [ ! -e "$out/../clean-all/dataset.json" ]; then
     quiet capture "$meshes" -o "$out/../clean" --touches "$touches" --force
-    quiet capture "$meshes" -o "$out/../clean-all" --approaches --touches "$approaches" --force
+    quiet capture "$meshes" -o "$out/../clean-all" --approaches "$approaches" --force
 fi
 echo "| $(basename "$robot") | full touches: correct after 10 / 30 | wrong | every contact: after 10 / 30 / 60 approaches | wrong |"
 echo "|---|---|---|---|---|"
 row "trained clean" "$out/../clean" "$out/../clean-all"
-row "mixture" "$out/../clean" "$out/../clean-all" --noise 0..6ms --timer 1ms --speed-error 15% --missed 2%
+row "mixture" "$out/../clean" "$out/../clean-all" --real noise=0..6ms,timer=1ms,speed_error=15%,missed=2%
 
 fitted() { # name, recorded touches, more options of fit
     name=$1 recorded=$2
@@ -58,7 +58,7 @@ fitted() { # name, recorded touches, more options of fit
     # shellcheck disable=SC2086
     "$palpate" probe fit "$recorded" $known -o "$out/probe.toml" "$@" >"$out/fit.txt"
     quiet capture "$meshes" -o "$out/fitted" --touches "$touches" --probe "$out/probe.toml" --force
-    quiet capture "$meshes" -o "$out/fitted-all" --approaches --touches "$approaches" --probe "$out/probe.toml" --force
+    quiet capture "$meshes" -o "$out/fitted-all" --approaches "$approaches" --probe "$out/probe.toml" --force
     row "$name" "$out/fitted" "$out/fitted-all"
     sed -n '/interval/,/^timer/p' "$out/fit.txt" >"$out/$name.txt"
 }

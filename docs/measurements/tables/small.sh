@@ -17,7 +17,7 @@ quiet() { "$palpate" "$@" >/dev/null 2>>"$out/log"; }
 row() { # how, touches, model
     bytes=$(wc -c <"$3")
     instructions=$("$palpate" inspect "$3" | awk '$1 == "instructions" { print $2 }')
-    "$palpate" evaluate "$3" "$out/test" --at 10 --groups 10000 2>>"$out/log" |
+    "$palpate" evaluate "$3" "$out/test" --at 10 --sequences 10000 2>>"$out/log" |
         awk -v how="$1" -v touches="$2" -v bytes="$bytes" -v instructions="$instructions" '
             $1 == "all" { right = $2; stops = $4; wrong = $5 }
             $1 == "±" {
@@ -25,12 +25,12 @@ row() { # how, touches, model
                 exit
             }'
 }
-small() { # bytes allowed, options of the training
+small() { # bytes allowed, how trees are grown
     limit=$1
     shift
-    quiet train "$out/train" -o "$out/$limit.json" --leaf-bits 8 --bins 512 --eta 0.3 "$@"
-    quiet export "$out/$limit.json" -o "$out/$limit.palpate" --leaf i8 --for size
-    row "train $*" "${TOUCHES:-210000}" "$out/$limit.palpate"
+    quiet train "$out/train" -o "$out/$limit.json" --trees "leaf_bits=8,bins=512,eta=0.3,$1"
+    quiet export "$out/$limit.json" -o "$out/$limit.palpate" --leaf i8 --layout size
+    row "train --trees $1" "${TOUCHES:-210000}" "$out/$limit.palpate"
 }
 
 quiet capture "$meshes" -o "$out/train" --touches "${TOUCHES:-210000}" --seed 1 --format parquet
@@ -38,8 +38,8 @@ quiet capture "$meshes" -o "$out/tune" --touches "${TUNE:-21000}" --seed 1
 quiet capture "$meshes" -o "$out/test" --seed 3
 echo "| how | touches of an object | bytes | instructions, M4F | right after 10 touches | touches to stop | wrong |"
 echo "|---|---|---|---|---|---|---|"
-small 5700 --rounds 15 --depth 6 --different-leaves 160 --threshold-cost 2.4e-5
-small 3072 --rounds 16 --depth 5 --different-leaves 56 --threshold-cost 3.6e-5
+small 5700 rounds=15,depth=6,different_leaves=160,threshold_cost=2.4e-5
+small 3072 rounds=16,depth=5,different_leaves=56,threshold_cost=3.6e-5
 for limit in 5700 3072; do
     quiet tune "$out/tune" --seed 2 --max-bytes $limit -o "$out/tuned-$limit.palpate"
     row "tune --max-bytes $limit" "${TUNE:-21000}" "$out/tuned-$limit.palpate"

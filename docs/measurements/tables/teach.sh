@@ -25,16 +25,16 @@ recall() { # ensemble, taught object
         on && NF > 3 { sum += $2; count++ }'
 }
 
-[ -e "$out/test/dataset.json" ] || quiet capture "$meshes" -o "$out/test" --approaches --pose --touches 6000 --seed 9
+[ -e "$out/test/dataset.json" ] || quiet capture "$meshes" -o "$out/test" --approaches 6000 --pose --seed 9
 echo "| taught | no pose: 300 approaches | 1,000 | all simulated | oriented: 300 | 1,000 | all simulated |"
 echo "|---|---|---|---|---|---|---|"
-quiet capture "$meshes" -o "$out/all" --approaches --pose --touches "$approaches" --force
+quiet capture "$meshes" -o "$out/all" --approaches "$approaches" --pose --force
 for object; do
     others=""
     for mesh in "$meshes"/*.obj; do [ "$(basename "$mesh" .obj)" = "$object" ] || others="$others $mesh"; done
     # shellcheck disable=SC2086
-    quiet capture $others -o "$out/others" --approaches --pose --touches "$approaches" --force
-    quiet capture "$meshes/$object.obj" -o "$out/recorded" --approaches --pose --touches 1000 --seed 77 --force
+    quiet capture $others -o "$out/others" --approaches "$approaches" --pose --force
+    quiet capture "$meshes/$object.obj" -o "$out/recorded" --approaches 1000 --pose --seed 77 --force
     printf '| %s |' "$object"
     for descriptor in contacts-curvature oriented; do
         for count in 300 1000; do

@@ -63,7 +63,7 @@ pub(crate) fn evaluate(
 }
 
 /// Compares a compiled model with its ensemble on every touch of a data set and on random sequences, and returns what
-/// `palpate parity --json` prints.
+/// `palpate verify --json` prints.
 #[pyo3::pyfunction]
 #[pyo3(signature = (ensemble, model, data, *, sequences=10_000, seed=1, progress=None))]
 pub(crate) fn parity(

@@ -213,7 +213,7 @@ pub(super) fn section(context: &Context, by_approach: &ByApproach) -> Result<Sec
         Some(sizes) => section.table(sizes_table(context, sizes, by_approach.true_probe)),
         None => section.text(
             "How objects compare at their true sizes was not measured: the unit of these meshes is not known. \
-             `--true-size --unit mm --probe probe.toml` states it.",
+             `--true-size mm --probe probe.toml` states it.",
         ),
     };
     Ok(section)

@@ -12,6 +12,7 @@ mod bad_line;
 mod connection;
 mod emulator;
 mod error;
+pub mod inspect;
 pub mod instructions;
 mod journal;
 mod port;

@@ -166,12 +166,12 @@ impl Problem for EvaluateProblem {
             Self::NoTouches => "Give at least one touch of each object.",
             Self::TooManyObjects { .. } => "Use a model of fewer objects.",
             Self::NoPlan => {
-                "Add one: `palpate plan MODEL DIR -o OUT`, from approaches with pose. An ensemble (JSON) has to be exported first."
+                "Add one: `palpate calibrate MODEL DIR -o OUT --plan 4`, from approaches with pose. An ensemble (JSON) has to be exported first."
             }
             Self::OneObjectToPlan => "Train a model of two objects or more.",
-            Self::NoApproaches => "Capture every approach: --approaches --pose.",
+            Self::NoApproaches => "Capture every approach: --approaches N --pose.",
             Self::NoneOf { .. } => "Capture all of the model's objects.",
-            Self::NoPoseOf { .. } => "Capture the approaches with their pose: --approaches --pose.",
+            Self::NoPoseOf { .. } => "Capture the approaches with their pose: --approaches N --pose.",
             Self::FewInPose { found, needed, .. } => {
                 return format!(
                     "Capture {} times as many approaches, or plan fewer rolls.",
@@ -180,7 +180,7 @@ impl Problem for EvaluateProblem {
             }
             Self::NotCompiled => "Export the ensemble first.",
             Self::NothingToSwitch => "Capture another object.",
-            Self::Incomparable { .. } => "Give recorded and simulated touches of the same objects, and simulate every approach (--approaches).",
+            Self::Incomparable { .. } => "Give recorded and simulated touches of the same objects, and simulate every approach (--approaches N).",
             Self::Touch { .. } => "Correct the line.",
             Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
         }

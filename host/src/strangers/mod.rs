@@ -21,6 +21,7 @@
 
 mod fixed;
 mod follow;
+mod found;
 mod leave_one_out;
 mod misfit;
 mod promised;
@@ -29,6 +30,7 @@ mod shapes;
 #[cfg(test)]
 mod tests;
 
+pub use found::Found;
 pub use leave_one_out::{LeftOut, Sets, leave_one_out};
 pub use promised::calibrate_with_promise;
 #[cfg(feature = "objects")]

@@ -231,7 +231,7 @@ def irithyll(ensemble, directory):
 
 
 def export(palpate, ensemble, directory, leaf, goal):
-    command = [palpate, "export", ensemble.path, "-o", directory / "model.palpate", "--leaf", leaf, "--for", goal]
+    command = [palpate, "export", ensemble.path, "-o", directory / "model.palpate", "--leaf", leaf, "--layout", goal]
     done = subprocess.run([*command, "--emit", "c", "--json"], capture_output=True, text=True)
     if done.returncode != 0:
         raise Refused(done.stderr.strip().splitlines()[0])

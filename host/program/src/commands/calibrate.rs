@@ -1,8 +1,9 @@
-use super::noise::NoiseArguments;
+use super::Global;
 use super::numbers::{count, error_rate, share};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
-use super::strangers::{Found, StrangersArguments};
+use super::real::RealArguments;
+use super::strangers::StrangersArguments;
 use palpate::Result;
 use palpate::calibrate::{self, Calibrated, Per, Settings, Worse};
 use palpate::compile::{self, CompiledModel};
@@ -10,72 +11,73 @@ use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
 use palpate::probe::noise::Noise;
-use palpate::strangers;
+use palpate::strangers::{self, Found};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 /// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. Those that it states to be trained on are refused. 100,000 sequences at an error rate of 1 % take some 50 touches each; with fewer touches there are fewer sequences, which leaves more of the error rate unused. No touch is used twice.
+Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. Wrong names break it; a sequence without a name is undecided, neither right nor wrong. docs/reference/options.md says how thresholds are found, and how many touches that takes.
 
-A name that is given and wrong is an error. A sequence that ends at the limit of touches without a name is undecided: neither right nor wrong. With --per average the rate is that of all names given, with objects touched equally often (or as often as the model's priors say); with name that of each name, when it is given, for which each name gets a threshold of its own, learned on a third of the sequences and tested on the others; with object that of the names given to each object, which needs more touches. The rates of all names, or objects, are kept at once with the stated probability.
+With --strangers the model also tests whether touches fit any object that it knows; at most 2 % of known objects' sequences end as unknown. likely costs hardly a touch and detects about half of the strangers; certain detects nearly all that can be detected.
 
-With --active each next approach is one in the pose that the plan proposes. A sequence that proposes a pose whose approaches are used up ends the object's sequences, so more approaches are needed for as many sequences.
-
-The thresholds are found by Learn-then-Test: from strict to loose, up to the last at which so few errors have a probability of at most 5 % (--confidence) if the rate were higher than promised. So of calibrations on touches captured anew at most 5 % give a model that breaks its promise. The model then states what it promises, and a temperature that makes its posteriors ones to believe.
-
-With --strangers the model also gets a test of whether touches fit any object that it knows: at most 2 % of known objects' sequences end as unknown. The error rate is then that of the model with its test; the test is found on three eighths of the touches, the thresholds under it on half of them, so more touches are needed. likely costs hardly a touch and finds out about half of what the model does not know before it gets a name; certain finds out nearly all of what can be found out, and takes as many touches as that needs. A model with a background column (`palpate train --background`) finds out more. Objects that feel like a known one are not found out.
+With --plan the model gets a plan of approaches instead of thresholds. DIR then holds approaches with pose to all of its objects, 20 or more of each in every pose.
 
 Examples:
-  palpate capture builtin -o fresh --approaches --touches 100000 --seed 3
+  palpate capture builtin -o fresh --approaches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
   palpate calibrate model.palpate fresh -o names.palpate --per name
   palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
-  palpate calibrate model.palpate fresh -o noisy.palpate --noise 0..5ms
-  palpate evaluate calibrated.palpate unseen --json | jq .promise
+  palpate calibrate model.palpate fresh -o noisy.palpate --real noise=0..5ms
+  palpate calibrate model.palpate posed -o planned.palpate --plan 4
   palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
 pub(crate) struct Arguments {
     /// Compiled model
-    model: PathBuf,
-    /// Directory that `palpate capture` filled
-    directory: PathBuf,
-    /// Where to write the calibrated model
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
-    /// The error rate to promise, such as 0.01 or 1%
+    pub(super) model: PathBuf,
+    /// Touches to calibrate on: a directory that `palpate capture` filled
+    #[arg(value_name = "DIR")]
+    pub(super) directory: PathBuf,
+    /// Where to write; the calibrated model
+    #[arg(short, long, value_name = "PATH")]
+    pub(super) output: PathBuf,
+    /// The share of wrong names to accept, such as 1%; what is promised
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
-    /// Of what: of all names on average, of each name, or of the names given to each object
+    /// Promise it of all names on average, of each name, or of the names given to each object
     #[arg(long, value_parser = per, default_value = "average", value_name = "average|name|object")]
     per: Per,
     /// The probability that the promise is kept
     #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
     confidence: f64,
-    /// The most sequences, of all objects together
+    /// Sequences of touches to draw; of all objects together, at most
     #[arg(long, default_value = "100000", value_name = "N", value_parser = count)]
     sequences: u64,
-    /// Touches after which recognizers give up [default: the model's own limit]
+    /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
-    /// Make every approach where the model's plan says (see `palpate plan`): the promise holds for a robot that goes there
+    /// Follow the model's plan of approaches; the promise holds for a robot that does
     #[arg(long)]
     active: bool,
-    /// Seed of the order of the touches, and of the noise
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Print what was found as JSON
-    #[arg(long)]
-    json: bool,
+    /// Add a plan of approaches with so many rolls of the row of fingers instead: 1, 2 or 4
+    #[arg(long, value_name = "ROLLS", conflicts_with_all = PROMISE)]
+    pub(super) plan: Option<u8>,
     #[command(flatten)]
     strangers: StrangersArguments,
     #[command(flatten)]
-    probe: ProbeArguments,
+    pub(super) probe: ProbeArguments,
     #[command(flatten)]
-    noise: NoiseArguments,
+    pub(super) real: RealArguments,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+/// The options that a plan has no use for.
+const PROMISE: [&str; 8] =
+    ["error_rate", "per", "confidence", "sequences", "max_touches", "active", "strangers", "background"];
+
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    if let Some(rolls) = arguments.plan {
+        return super::plan::run(&arguments, rolls, global);
+    }
     output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
     let compiled = CompiledModel::read(&arguments.model)?;
     let dataset = super::dataset(&arguments.directory)?;
@@ -92,9 +94,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         confidence: arguments.confidence,
         sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
         max_touches: arguments.max_touches,
-        noise: arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?),
+        noise: arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?,
         active: arguments.active,
-        seed: arguments.seed,
+        seed: global.seed(),
     };
     let wrong = |error: palpate::Error| error.in_file(&arguments.directory);
     let (calibrated, found) = match arguments.strangers.held() {
@@ -119,10 +121,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         }
     };
     output::write_bytes(&arguments.output, &calibrated.model)?;
-    if arguments.json {
+    if global.json {
         return output::print_json_about(&arguments.output, &Both { calibrated: &calibrated, strangers: &found });
     }
-    let strangers = found.map_or_else(String::new, |found| found.text() + "\n");
+    let strangers = found.map_or_else(String::new, |found| super::strangers::text(&found) + "\n");
     let text = format!("{}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
     output::print_about(&arguments.output, &text)
 }

@@ -1,11 +1,12 @@
 use super::numbers::count;
-use super::probe::{IN_MILLIMETERS, SizeArguments};
+use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
+use super::{Global, remark};
 use palpate::capture::{self, Settings, Summary};
 use palpate::error::{CaptureProblem, Problem, TouchesProblem};
 use palpate::mesh::facts::Facts;
 use palpate::output;
-use palpate::probe::approach::{Aim, Probe};
+use palpate::probe::approach::Aim;
 use palpate::touches::{Format, Listing, Origin, Shard};
 use palpate::{Error, Result};
 use std::fmt::Write as _;
@@ -13,95 +14,69 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-The touches go to DIR/<object>.txt, one line per touch: three contact times in seconds after the first contact, `-` for \
-a finger that never touched. DIR/dataset.json says how they were made. Touches that are there already are kept: a \
-capture that would replace others is refused.
+The directory gets NAME.txt for each object, one line per touch: three contact times in seconds after the first contact, `-` for a finger that never touched; dataset.json says how they were made. Touches that are there already are kept: a capture that would replace others is refused.
 
 Examples:
-  palpate capture builtin -o data                 21,000 touches per object
-  palpate capture cup.stl bowls/ builtin -o data  your own meshes beside them
-  palpate capture jug.obj -o data --add           one more object, touched alike
-  palpate capture meshes/ -o data --pose          with the probe's direction
-  palpate capture meshes/ -o data --approaches    every approach, also misses
-  palpate capture meshes/ -o data --true-size --unit mm --probe probe.toml
-                                                  as large as they are
-  palpate capture meshes/ -o data --probe probe.toml
-                                                  as your probe would, with
-                                                  what [real] says of it
-  palpate capture meshes/ -o data --instances     a directory for each object
-  palpate capture builtin -o data --instances 20  twenty forks are a fork
-  palpate capture meshes/ -o part2 --shard 2/8    the second of eight parts
-  palpate capture meshes/ -o data --resume        continue an interrupted one")]
+  palpate capture builtin -o data                  21,000 touches per object
+  palpate capture cup.stl bowls/ builtin -o data   your meshes beside them
+  palpate capture jug.obj -o data --add            one more, touched alike
+  palpate capture meshes/ -o data --pose           with the probe's direction
+  palpate capture meshes/ -o data --approaches 60000
+                                                   also those that miss
+  palpate capture meshes/ -o data --true-size mm --probe probe.toml
+                                                   as large as they are
+  palpate capture meshes/ -o data --instances      a directory for each object
+  palpate capture builtin -o data --instances 20   twenty forks are a fork
+  palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory that is searched for meshes
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
-    /// The directory for the touches
-    #[arg(short, long, value_name = "DIR")]
+    /// Where to write; a directory for the touches
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// How many touches of each object (with --approaches: how many approaches) [default: 21000]
-    #[arg(long, value_name = "N", value_parser = count)]
+    /// Touches of each object; with all three fingers [default: 21000]
+    #[arg(long, value_name = "N", value_parser = count, conflicts_with = "approaches")]
     touches: Option<u64>,
-    /// The seed of all that is random [default: 1]
+    /// Approaches to each object; all of them kept, also those that miss, instead of full touches
     #[arg(long, value_name = "N", value_parser = count)]
-    seed: Option<u64>,
+    approaches: Option<u64>,
     /// The longest side of each object's bounding box, in units [default: 10]
     #[arg(long, value_name = "UNITS", conflicts_with = "true_size")]
     length: Option<f64>,
-    /// The fingers' radius, in units, or at true size in millimeters [default: 0.15]
-    #[arg(long, value_name = "UNITS")]
-    radius: Option<f64>,
-    /// The distance between neighboring fingers, in units or millimeters [default: 1.5]
-    #[arg(long, value_name = "UNITS")]
-    spacing: Option<f64>,
-    /// How fast the probe moves, in units or millimeters per second [default: 10]
-    #[arg(long, value_name = "UNITS")]
-    speed: Option<f64>,
-    /// How far the row of fingers may be tilted to either side, in degrees [default: 10]
-    #[arg(long, value_name = "DEGREES")]
-    tilt: Option<f64>,
     #[command(flatten)]
     size: SizeArguments,
-    /// Where approaches aim: anywhere in the bounding box, in its middle (half the sides), or near the surface's center of mass (a quarter of the sides), such as --aim middle [default: box]
+    /// Where approaches aim; in the bounding box, its middle, or near the surface's center of mass [default: box]
     #[arg(long, value_name = "box|middle|mass", value_parser = aim)]
     aim: Option<Aim>,
-    /// Append the probe's direction and alignment to each line (six numbers)
+    /// With the probe's direction and alignment; six more numbers in each line
     #[arg(long)]
     pose: bool,
-    /// Keep every approach, also those that not all fingers touch
-    #[arg(long)]
-    approaches: bool,
-    /// How to keep the touches: text, or parquet (columns t1, t2, t3, direction, alignment, object) [default: text]
+    /// How to keep the touches [default: text]
     #[arg(long, value_name = "text|parquet", value_parser = parsed::<Format>)]
     format: Option<Format>,
     /// Capture only the K-th of N parts; the parts, one after the other, are the whole [default: 1/1]
     #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
     shard: Option<Shard>,
-    /// Resume an interrupted capture
+    /// Continue what was interrupted, with the same program, settings and objects
     #[arg(long, conflicts_with = "force")]
     resume: bool,
     /// Add the objects to the data set in the directory, touched as the others were
     #[arg(long, conflicts_with = "force")]
     add: bool,
-    /// Replace the data set in the directory, whatever it holds
+    /// Write all the same; replaces the data set in the directory
     #[arg(long)]
     force: bool,
-    /// How many threads to use [default: all]
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Print the summary as JSON
-    #[arg(long)]
-    json: bool,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
     let settings = Settings {
-        origin: arguments.origin()?,
+        origin: arguments.origin(global.seed)?,
         resume: arguments.resume,
         add: arguments.add,
         force: arguments.force,
-        threads: arguments.threads,
+        threads: global.threads,
     };
     settings.check()?;
     let objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
@@ -110,12 +85,12 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
             if !complaints.is_empty() {
                 let name = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
-                eprintln!("{}{name}: {}", object.name, complaints.join(" "));
+                remark(&format!("{}{name}: {}", object.name, complaints.join(" ")));
             }
         }
     }
     let summary = capture::capture(&objects, &settings, &arguments.output, &Bar::new())?;
-    if arguments.json {
+    if global.json {
         return output::print_json(&summary);
     }
     output::print(&if settings.origin.approaches { kept(&summary) } else { table(&summary) })
@@ -123,31 +98,23 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 
 impl Arguments {
     /// What the options say, and where they say nothing the defaults or, for objects to add, the data set.
-    fn origin(&self) -> Result<Origin> {
+    fn origin(&self, seed: Option<u64>) -> Result<Origin> {
         let there = if self.add { Listing::read(&self.output)? } else { None };
         let base = self.size.origin(there.map_or_else(Origin::default, |listing| listing.origin))?;
-        let stated = [self.radius, self.spacing, self.speed].iter().all(Option::is_some);
-        if self.size.lacks_probe() && !stated && !self.add {
-            let allowed = format!("{IN_MILLIMETERS}; or give --radius, --spacing and --speed in millimeters");
-            return Err(Error::setting("probe", "not given", allowed));
+        if !self.add {
+            refuse_unstated(&self.size)?;
         }
         Ok(Origin {
-            unit: base.unit,
-            touches: self.touches.unwrap_or(base.touches),
-            seed: self.seed.unwrap_or(base.seed),
+            touches: self.approaches.or(self.touches).unwrap_or(base.touches),
+            seed: seed.unwrap_or(base.seed),
             length: self.length.unwrap_or(base.length),
-            probe: Probe {
-                radius: self.radius.unwrap_or(base.probe.radius),
-                spacing: self.spacing.unwrap_or(base.probe.spacing),
-                speed: self.speed.unwrap_or(base.probe.speed),
-                tilt: self.tilt.unwrap_or(base.probe.tilt),
-            },
             aim: self.aim.unwrap_or(base.aim),
             pose: self.pose || base.pose,
-            approaches: self.approaches || base.approaches,
+            approaches: self.approaches.is_some() || base.approaches,
             format: self.format.unwrap_or(base.format),
             shard: self.shard.unwrap_or(base.shard),
             real: self.size.probe.read()?.map_or(base.real, |file| file.real),
+            ..base
         })
     }
 }
@@ -171,9 +138,9 @@ pub(super) fn hint(error: &Error) -> Option<&'static str> {
         }
         CaptureProblem::HoldsUnfinished { .. } => Some("--resume resumes it, --force replaces it."),
         CaptureProblem::NotWritten { .. } => Some("To resume, repeat the command with --resume."),
-        CaptureProblem::Untouchable { .. } => Some("See --radius, --spacing and --length."),
+        CaptureProblem::Untouchable { .. } => Some("See --probe and --length."),
         CaptureProblem::Threads { .. } => Some("See --threads."),
-        CaptureProblem::NoTrueSize { .. } => Some("See --unit."),
+        CaptureProblem::NoTrueSize { .. } => Some("See --true-size."),
         _ => None,
     }
 }

@@ -1,3 +1,4 @@
+use super::Global;
 use clap_complete::Shell;
 use palpate::Result;
 use palpate::output::print;
@@ -13,7 +14,7 @@ pub(crate) struct Arguments {
     shell: Shell,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, _: &Global) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut super::cli(), "palpate", &mut script);
     print(&String::from_utf8_lossy(&script))

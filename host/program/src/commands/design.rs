@@ -1,19 +1,23 @@
 //! `palpate probe`, and `palpate probe design`.
 
+use super::Global;
 use super::numbers::error_rate;
 use super::probe::UnitArguments;
 use super::progress::Bar;
+use super::real::RealArguments;
 use palpate::Result;
 use palpate::error::Error;
 use palpate::mesh::Object;
 use palpate::output;
 use palpate::probe::approach::Aim;
+use palpate::probe::noise::Noise;
 use palpate::tune::probe::{Design, Settings, Trial, design};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use std::fmt::Write as _;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 #[derive(clap::Args)]
 #[command(arg_required_else_help = true, subcommand_required = true)]
@@ -26,88 +30,119 @@ pub(crate) struct Arguments {
 enum Command {
     /// Find the probe that needs the fewest approaches to recognize your objects
     Design(DesignArguments),
-    /// Find out what is crooked about your probe from touches that it made of objects whose meshes you have
+    /// Find out how your probe differs from the ideal, from touches that it made of known objects
     Fit(super::fit::FitArguments),
 }
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Tries probes in the simulator: spacing and radius of the fingers, tilt, and where approaches aim. For each, a model is trained and tested on other approaches; the best probe needs the fewest approaches at the error rate. Lengths are in units, a tenth of the object's longest side, or with --true-size in millimeters. DIR gets probe.toml, the best probe, and design.html, what another one would cost.
+Tries probes in the simulator. For each, a model is trained and tested on other approaches; the best probe needs the fewest approaches at the error rate. DIR gets probe.toml, the best probe, and design.html, which says what another one would cost. Lengths are in units, a tenth of the object's longest side, or with --true-size in millimeters. Figures compare probes and promise nothing.
 
-Figures compare probes and promise nothing: thresholds are set, and the best is chosen, on the very touches that are counted, so the best of many looks somewhat better than it is. A model of the chosen probe is calibrated with `palpate calibrate`.
+Keys of --search: spacing, radius and tilt, each a range such as 1..2 or one number; aim, such as box+middle+mass; speed, one number.
 
 Examples:
   palpate probe design meshes/ -o design
-  palpate probe design builtin -o design --spacing 1..2 --radius 0.2
-  palpate probe design meshes/ -o design --true-size --unit m --spacing 8..30 --radius 2
-  palpate probe design meshes/ -o design --aim box --noise 5ms
+  palpate probe design builtin -o design --search spacing=1..2,radius=0.2
+  palpate probe design meshes/ -o design --true-size m --search spacing=8..30
+  palpate probe design meshes/ -o design --search aim=box --real noise=5ms
   palpate probe design meshes/ -o design --error-rate 0.1% --approaches 20000")]
 struct DesignArguments {
-    /// What to touch: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory that is searched for meshes
-    #[arg(value_name = "MESHES", required = true)]
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
+    #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
-    /// Directory for probe.toml and design.html, such as design; created if it is missing
-    #[arg(short, long, value_name = "DIR")]
+    /// Where to write; a directory for probe.toml and design.html
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Distances between neighboring fingers to search, in units or millimeters, such as 0.5..3, or one number [default: 0.5 to 3 units; at true size a unit of the median object]
-    #[arg(long, value_name = "A..B", value_parser = range)]
-    spacing: Option<RangeInclusive<f64>>,
-    /// Radii of the fingers to search, in units or millimeters, such as 0.1..0.3, or one number [default: 0.1 to 0.3 units]
-    #[arg(long, value_name = "A..B", value_parser = range)]
-    radius: Option<RangeInclusive<f64>>,
-    /// Largest tilts of the row of fingers to search, in degrees, such as 0..20, or one number
-    #[arg(long, value_name = "A..B", value_parser = range, default_value = "0..20")]
-    tilt: RangeInclusive<f64>,
-    /// Where approaches may aim: anywhere in the bounding box, in its middle, or near the center of mass, such as box,middle
-    #[arg(long, value_name = "AIM[,AIM…]", value_delimiter = ',', value_parser = super::capture::aim, default_value = "box,middle,mass")]
-    aim: Vec<Aim>,
-    /// The probe's speed, in units or millimeters per second, such as 5 [default: 10 units]
-    #[arg(long, value_name = "UNITS")]
-    speed: Option<f64>,
-    /// Standard deviation of the noise on contact times, such as 1ms for a switch polled every few ms; 0ms for none
-    #[arg(long, value_name = "DURATION", value_parser = super::noise::duration, default_value = "1ms")]
-    noise: f64,
-    /// The share of wrong verdicts to reach, such as 0.01 or 1%
+    /// What to try instead of the usual: distances, radii and tilts of fingers, where approaches aim, the speed
+    #[arg(long, value_name = "KEY=VALUE,…", default_value = "", hide_default_value = true)]
+    search: Search,
+    /// The share of wrong names to accept, such as 1%; approaches are counted up to it
     #[arg(long, value_name = "RATE", value_parser = error_rate, default_value = "0.01")]
     error_rate: f64,
-    /// Which features a touch is turned into, such as oriented for a robot that knows the object's orientation
-    #[arg(long, value_name = "NAME", value_parser = super::train::descriptor, default_value = "curvature")]
+    /// Which features a touch is turned into
+    #[arg(long, value_name = "times|curvature|gravity|oriented", value_parser = super::train::descriptor, default_value = "curvature")]
     descriptor: Descriptor,
-    /// Which approaches are evidence, such as full for those that all three fingers touch: full, contacts or all
-    #[arg(long, value_name = "full|contacts|all", value_parser = counted, default_value = "contacts")]
-    touches: Counted,
-    /// Approaches per object that a model is trained on in the last round, and tested on others, such as 20000
+    /// Which approaches are evidence; those with three contacts, with at least one, or all
+    #[arg(long, value_name = "full|contacts|all", value_parser = super::train::evidence, default_value = "contacts")]
+    evidence: Counted,
+    /// Approaches to each object; to train on in the last round, and others to test on
     #[arg(long, value_name = "N", value_parser = super::numbers::count, default_value = "8000")]
     approaches: u64,
-    /// Sequences of approaches to draw for each object, such as 1000
-    #[arg(long, value_name = "N", default_value_t = Settings::default().sequences)]
+    /// Sequences of touches to draw; of each object
+    #[arg(long, value_name = "N", value_parser = super::numbers::sequences, default_value_t = Settings::default().sequences)]
     sequences: usize,
-    /// Seed of all that is random, such as 2
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Print all probes tried, and the best, as JSON
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     units: UnitArguments,
+    #[command(flatten)]
+    real: RealArguments,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    match arguments.command {
-        Command::Design(arguments) => run_design(&arguments),
-        Command::Fit(arguments) => super::fit::run(&arguments),
+/// Probes to try.
+#[derive(Clone, Debug, Default)]
+struct Search {
+    spacing: Option<RangeInclusive<f64>>,
+    radius: Option<RangeInclusive<f64>>,
+    tilt: Option<RangeInclusive<f64>>,
+    aims: Option<Vec<Aim>>,
+    speed: Option<f64>,
+}
+
+impl FromStr for Search {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut search = Self::default();
+        let mut seen = Vec::new();
+        for part in text.split(',').filter(|_| !text.is_empty()) {
+            let (key, value) = part.split_once('=').map_or((part, ""), |(key, value)| (key.trim(), value.trim()));
+            if seen.contains(&key) {
+                return Err(format!("{key} is given twice; use each key once"));
+            }
+            seen.push(key);
+            let said = |wanted: String| format!("{key} is {value:?}; {wanted}");
+            match key {
+                "spacing" => search.spacing = Some(range(value).map_err(said)?),
+                "radius" => search.radius = Some(range(value).map_err(said)?),
+                "tilt" => search.tilt = Some(range(value).map_err(said)?),
+                "aim" => {
+                    let aims = value.split('+').map(|aim| super::capture::aim(aim.trim())).collect::<Result<_, _>>();
+                    search.aims = Some(aims.map_err(said)?);
+                }
+                "speed" => {
+                    let speed = value.parse::<f64>().ok().filter(|speed| speed.is_finite());
+                    search.speed = Some(speed.ok_or_else(|| said("give a number".into()))?);
+                }
+                _ => {
+                    return Err(format!("{part:?} is nothing to search; use spacing=1..2, radius, tilt, aim or speed"));
+                }
+            }
+        }
+        Ok(search)
     }
 }
 
-fn run_design(arguments: &DesignArguments) -> Result<()> {
+/// Tilts that are tried without a range, in degrees.
+const TILT: RangeInclusive<f64> = 0.0..=20.0;
+
+/// The standard deviation of the noise without another, in microseconds: that of a switch polled every few milliseconds.
+const NOISE: f64 = 1_000.0;
+
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    match arguments.command {
+        Command::Design(arguments) => run_design(&arguments, global),
+        Command::Fit(arguments) => super::fit::run(&arguments, global),
+    }
+}
+
+fn run_design(arguments: &DesignArguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
-    let objects = arguments.units.objects(&arguments.sources, arguments.seed)?;
-    let settings = arguments.settings(&objects)?;
+    let objects = arguments.units.objects(&arguments.sources, global.seed())?;
+    let settings = arguments.settings(&objects, global.seed())?;
     let found = design(&objects, &settings, &Bar::new())?;
     let files = [arguments.output.join("probe.toml"), arguments.output.join("design.html")];
     output::write_bytes(&files[0], found.toml().as_bytes())?;
     palpate_report::design::page(&found, &arguments.words(&settings))?.write(&files[1])?;
-    if arguments.json {
+    if global.json {
         return output::print_json(&found);
     }
     let mut text = table(&found);
@@ -119,25 +154,35 @@ fn run_design(arguments: &DesignArguments) -> Result<()> {
 }
 
 impl DesignArguments {
-    fn settings(&self, objects: &[Object]) -> Result<Settings> {
-        let unknown = || Error::setting("true-size", "given", "meshes of a known unit, such as with --unit mm");
+    /// The standard deviation of the noise on contact times, which is all that a design can disturb.
+    fn noise(&self) -> Result<f64> {
+        let real = self.real.over(Noise::gaussian(NOISE))?;
+        match real == Noise::gaussian(real.deviation.largest) {
+            true => Ok(real.deviation.largest),
+            false => Err(Error::setting("real", real, "one level of noise on contact times, such as noise=5ms")),
+        }
+    }
+
+    fn settings(&self, objects: &[Object], seed: u64) -> Result<Settings> {
+        let unknown = || Error::setting("true-size", "stated", "a unit such as mm for meshes that state none");
         let usual = match self.units.is_true_size() {
             true => Settings::at_true_size(objects).ok_or_else(unknown)?,
             false => Settings::default(),
         };
+        let Search { spacing, radius, tilt, aims, speed } = self.search.clone();
         Ok(Settings {
-            spacing: self.spacing.clone().unwrap_or_else(|| usual.spacing.clone()),
-            radius: self.radius.clone().unwrap_or_else(|| usual.radius.clone()),
-            tilt: self.tilt.clone(),
-            aims: self.aim.clone(),
-            speed: self.speed.unwrap_or(usual.speed),
-            noise: self.noise,
+            spacing: spacing.unwrap_or_else(|| usual.spacing.clone()),
+            radius: radius.unwrap_or_else(|| usual.radius.clone()),
+            tilt: tilt.unwrap_or(TILT),
+            aims: aims.unwrap_or_else(|| Aim::ALL.into()),
+            speed: speed.unwrap_or(usual.speed),
+            noise: self.noise()?,
             descriptor: self.descriptor,
-            counted: self.touches,
+            counted: self.evidence,
             error_rate: self.error_rate,
             approaches: self.approaches,
             sequences: self.sequences,
-            seed: self.seed,
+            seed,
             ..usual
         })
     }
@@ -145,24 +190,24 @@ impl DesignArguments {
     /// The command that remakes the page, with every option that changes it.
     fn words(&self, settings: &Settings) -> String {
         let range = |range: &RangeInclusive<f64>| format!("{}..{}", range.start(), range.end());
-        let aims: Vec<&str> = self.aim.iter().map(|aim| aim.name()).collect();
+        let aims: Vec<&str> = settings.aims.iter().map(|aim| aim.name()).collect();
         format!(
-            "palpate probe design {} -o {} --spacing {} --radius {} --tilt {} --aim {} --speed {} --noise {}us \
-             --error-rate {} --descriptor {} --touches {} --approaches {} --sequences {} --seed {}{}",
+            "palpate probe design {} -o {} --search spacing={},radius={},tilt={},aim={},speed={} --real noise={}us \
+             --error-rate {} --descriptor {} --evidence {} --approaches {} --sequences {} --seed {}{}",
             self.sources.join(" "),
             self.output.display(),
             range(&settings.spacing),
             range(&settings.radius),
-            range(&self.tilt),
-            aims.join(","),
+            range(&settings.tilt),
+            aims.join("+"),
             settings.speed,
-            self.noise,
+            settings.noise,
             self.error_rate,
             self.descriptor.name(),
-            self.touches.name(),
+            self.evidence.name(),
             self.approaches,
             self.sequences,
-            self.seed,
+            settings.seed,
             self.units.words().iter().map(|word| format!(" {word}")).collect::<String>(),
         )
     }
@@ -251,9 +296,4 @@ fn range(text: &str) -> Result<RangeInclusive<f64>, String> {
         (Some(_), Some(_)) => Err("write the smaller number first, as in 0.5..3".into()),
         _ => Err("give a number, or two as in 0.5..3".into()),
     }
-}
-
-fn counted(name: &str) -> Result<Counted, String> {
-    let found = Counted::ALL.iter().copied().find(|counted| counted.name() == name);
-    found.ok_or_else(|| "use one of full, contacts, all".to_owned())
 }

@@ -1,14 +1,13 @@
-use super::expected::{self, ExpectedArguments};
-use super::figures::{Confusion, Evaluated, confusion_table, text};
-use super::noise::NoiseArguments;
-use super::numbers::error_rate;
+use super::Global;
+use super::expected::ExpectedArguments;
+use super::figures::{confusion_table, text};
+use super::numbers::{error_rate, sequences};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
+use super::real::RealArguments;
 use palpate::error::RowsProblem;
 use palpate::evaluate::model_file::ModelFile;
-use palpate::evaluate::{
-    self, Active, Candidate, Classes, LEAST_GROUPS, Margins, Regression, RowsEvaluation, Settings, evaluate_rows,
-};
+use palpate::evaluate::{self, Classes, Confusion, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
@@ -22,89 +21,58 @@ use std::path::PathBuf;
 /// Measure how often a model is right, and after how many touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The model is a compiled one (model.palpate), evaluated by the code that runs on the chip, or an ensemble (ensemble.json), evaluated in f32. The same seed draws the same groups of touches for both.
-
-Evaluate on touches that the model was not trained on: capture them with another seed. A model knows its training touches again, and says so.
-
-With --probe, what the file says under [real] is added to the touches, and the data set must have been captured with the probe of the file.
-
-On a data set of approaches, figures are also given per approach: a touch that the model was not trained for, such as one with a missing contact where it knows full touches only, costs an approach and changes nothing.
-
-Without --error-rate a compiled model stops by its own thresholds. If it was calibrated, the figures show whether it keeps what it promises. With other touches than those of the calibration (other noise, priors or objects, full touches instead of every approach) the promise is void, which is said, and so is by how much it is broken.
-
-Two shares of wrong names are shown: wrong is of all sequences, of names is of those that got a name, which is what a promise is about. An object that mostly stays undecided can have few wrong sequences and many wrong names.
-
-With --active, on approaches with pose, each next approach is drawn from those of the same object in the pose that the model's plan proposes, none twice in a sequence. A pose whose approaches are used up is not proposed again in the sequence; where none is left, it ends without a verdict.
-
-With --label the file has rows of features for a model that was exported from another library's (CSV): each row is classified alone, and compared with the class in the column, its name or its number from 0; or for a model with one output with the number there.
-
-A robot's log (MCAP, see docs/reference/mcap.md) is a data set of the objects that its messages name. A directory may hold logs too: NAME.mcap beside NAME.txt, where messages name no object.
-
-No accuracy is given after a number of touches that fewer than 200 different groups can be drawn of.
+Evaluate on touches that the model was not trained on: capture them with another seed. A compiled model is evaluated by the code that runs on the chip, an ensemble in f32. A compiled model stops by its own thresholds; if it was calibrated, the figures show whether it keeps its promise. Two shares of wrong names are shown: of all sequences, and of those that got a name. docs/reference/options.md explains every figure.
 
 Examples:
-  palpate capture builtin -o unseen --touches 2000 --seed 2
+  palpate capture builtin -o unseen --approaches 6000 --seed 2
   palpate evaluate model.palpate unseen
   palpate evaluate ensemble.json unseen --at 10,30 --json
   palpate evaluate model.palpate monday.mcap
-  palpate evaluate model.palpate unseen --noise 5ms
-  palpate evaluate model.palpate unseen --timer 1ms --missed 2% --speed-bias 5%
+  palpate evaluate model.palpate unseen --real timer=1ms,missed=2%
   palpate evaluate model.palpate unseen --probe probe.toml
-  palpate evaluate model.palpate unseen --confusion 20
   palpate evaluate model.palpate unseen --prior fork=0.3,spoon=0.3
-  palpate evaluate model.palpate unseen --only bowl,fork,spoon
-  palpate evaluate model.palpate unseen --strangers others
-  palpate capture builtin -o approaches --approaches --touches 5000 --seed 2
-  palpate evaluate model.palpate approaches --error-rate 0.02
-  palpate evaluate planned.palpate approaches --active
-  palpate evaluate model.palpate approaches --switch
+  palpate evaluate model.palpate unseen --unknown others
+  palpate evaluate planned.palpate unseen --active
   palpate evaluate model.palpate rows.csv --label kind")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
-    /// Directory that `palpate capture` filled, or a robot's log (MCAP); with --label a CSV file of rows
+    /// Touches: a directory, or a robot's log (MCAP); with --label a CSV file of rows
+    #[arg(value_name = "DIR")]
     directory: PathBuf,
     /// Column of the rows' classes, or of the numbers that a regression should give
     #[arg(long, value_name = "COLUMN", conflicts_with_all = ["at", "confusion"])]
     label: Option<String>,
-    /// Touches of objects that the model does not know, a directory as DIR: say as well how many are found out
-    #[arg(long, value_name = "DIR2")]
-    strangers: Option<PathBuf>,
+    /// Touches of objects that the model does not know: also say how many are detected
+    #[arg(long, value_name = "DIR")]
+    unknown: Option<PathBuf>,
     /// Numbers of touches after which to give the accuracy [default: 5,10,20,30,60, as far as the touches go]
-    #[arg(long, value_delimiter = ',', value_name = "TOUCHES,…")]
+    #[arg(long, value_delimiter = ',', value_name = "N,…")]
     at: Option<Vec<usize>>,
-    /// Groups of touches, and sequences, to draw at random for each object
-    #[arg(long, default_value_t = 1000)]
-    groups: usize,
-    /// Stop touching when the posterior passes one less this, such as 0.05 or 5%, which nothing promises [default: the
-    /// model's own thresholds; 1% for an ensemble]
+    /// Sequences of touches to draw; of each object, and as many groups
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences)]
+    sequences: usize,
+    /// The share of wrong names to accept, such as 1%; stops there, which nothing promises [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
-    #[arg(long, value_name = "TOUCHES")]
+    #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
-    /// Say as well how often each object was taken for each, after this many touches
-    #[arg(long, value_name = "TOUCHES")]
+    /// Show the confusion matrix after this many touches
+    #[arg(long, value_name = "N")]
     confusion: Option<usize>,
-    /// Seed of the drawing, and of the noise
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Make every approach where the model's plan says, instead of one drawn at random (see `palpate plan`)
+    /// Follow the model's plan of approaches
     #[arg(long)]
     active: bool,
-    /// Say as well what an object that is exchanged at a random approach comes to, with and without forgetting: restarting
-    /// once recent touches speak by this many nats against the likeliest object
+    /// Also exchange the object at a random approach, with and without forgetting at so many nats [default: 5]
     #[arg(long, value_name = "NATS", num_args = 0..=1, default_missing_value = "5")]
     switch: Option<f32>,
-    /// Print the figures as JSON
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
     expected: ExpectedArguments,
     #[command(flatten)]
-    noise: NoiseArguments,
+    real: RealArguments,
 }
 
 /// Whether which fingers touch is evidence to the model.
@@ -116,10 +84,10 @@ fn counts_patterns(file: &ModelFile) -> bool {
     counted != Counted::Full
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
     if let Some(label) = &arguments.label {
-        return rows(&arguments, &file, label);
+        return rows(&arguments, &file, label, global);
     }
     let mut dataset = super::dataset(&arguments.directory)?;
     let touches = || dataset.touches();
@@ -129,69 +97,42 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let trained_on: Vec<String> = file.trained_on(&dataset).into_iter().map(String::from).collect();
     let probe = arguments.probe.read()?;
     arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
-    let noise = arguments.noise.over(arguments.probe.noise(probe.as_ref(), &dataset, Noise::default())?);
+    let noise = arguments.real.over(arguments.probe.noise(probe.as_ref(), &dataset, Noise::default())?)?;
     // What the touches have in the end.
     let stated = dataset.real().and(&noise);
-    let robots = evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
+    let robots = evaluate::add_noise(&mut dataset, &noise, global.seed())?;
     let progress = Bar::new();
     progress.begin("evaluating", None);
-    let unknown = arguments.strangers.as_deref().map(|directory| -> Result<_> {
+    let unknown = arguments.unknown.as_deref().map(|directory| -> Result<_> {
         let mut dataset = super::checked(Dataset::read_any(directory)?);
-        evaluate::add_noise(&mut dataset, &noise, arguments.seed)?;
+        evaluate::add_noise(&mut dataset, &noise, global.seed())?;
         Ok((directory, dataset))
     });
     let unknown = unknown.transpose()?;
-    let evaluated = file.with(|candidate| {
-        let mut margins = Margins::new(candidate, &dataset)?;
-        let own = match candidate {
-            Candidate::Compiled(model) => expected::own_weights(model),
-            Candidate::Full(ensemble) => vec![1.0; ensemble.objects.len()],
-        };
-        if let Some(weights) = arguments.expected.weights(margins.objects(), &own)? {
-            margins = margins.expecting(weights)?;
-        }
-        let at = numbers_of_touches(&margins, arguments.at.as_deref())?;
-        let settings = Settings {
-            at,
-            at_approaches: numbers_of_approaches(&margins, arguments.at.as_deref()),
-            groups: arguments.groups,
-            error_rate: arguments.error_rate,
-            max_touches: arguments.max_touches,
-            seed: arguments.seed,
-            noise: stated,
-        };
-        let confusion = arguments.confusion.map(|touches| -> Result<_> {
-            Ok(Confusion {
-                touches,
-                touched: margins.tested_names().to_vec(),
-                recognized: margins.objects().to_vec(),
-                counts: margins.confusion(touches, arguments.groups, arguments.seed)?,
-            })
-        });
-        let active = arguments.active.then(|| Active::new(&margins, &dataset)).transpose()?;
-        let evaluation = match &active {
-            Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
-            None => evaluate::evaluate(&margins, &settings)?,
-        };
-        let switch = arguments.switch.map(|nats| margins.switched(&settings.sequences(), nats)).transpose()?;
-        let strangers = unknown.as_ref().map(|(directory, dataset)| {
-            let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
-            let known = (&margins, &evaluation.sequential);
-            evaluate::strangers(known, &unknown, &settings.sequences())
-        });
-        let (confusion, strangers) = (confusion.transpose()?, strangers.transpose()?);
-        let (instances, active) = (dataset.several(), active.map(|active| active.facts()));
-        Ok(Evaluated { evaluation, robots, instances, trained_on, confusion, active, switch, strangers })
-    })?;
+    let wanted = Wanted {
+        at: arguments.at.clone(),
+        groups: arguments.sequences,
+        error_rate: arguments.error_rate,
+        max_touches: arguments.max_touches,
+        seed: global.seed(),
+        noise: stated,
+        confusion: arguments.confusion,
+        active: arguments.active,
+        switch: arguments.switch,
+        unknown: unknown.as_ref().map(|(directory, dataset)| (*directory, dataset)),
+    };
+    let expecting = |objects: &[String], own: &[f64]| arguments.expected.weights(objects, own);
+    let measured = file.with(|candidate| evaluate::measure(candidate, &dataset, &wanted, &expecting))?;
+    let evaluated = Evaluated { robots, trained_on, ..measured };
     drop(progress);
-    if arguments.json {
+    if global.json {
         return output::print_json(&evaluated);
     }
     output::print(&text(&evaluated))
 }
 
 /// Evaluates a model on labeled rows.
-fn rows(arguments: &Arguments, file: &ModelFile, label: &str) -> Result<()> {
+fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -> Result<()> {
     if file.with(|candidate| Ok(candidate.is_of_touches()))? {
         return Err(Error::from(RowsProblem::Touches).in_file(&arguments.model));
     }
@@ -205,7 +146,7 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str) -> Result<()> {
         Some(RowsProblem::Label { .. }) => error.in_file(&arguments.directory),
         _ => error.in_file(&arguments.model),
     })?;
-    if arguments.json {
+    if global.json {
         return output::print_json(&evaluated);
     }
     let RowsEvaluation { rows, classes, regression } = evaluated;
@@ -228,36 +169,4 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str) -> Result<()> {
         );
     }
     output::print(&text)
-}
-
-/// The numbers of touches to give the accuracy after: those asked for, or the usual ones that enough groups can be drawn
-/// of.
-fn numbers_of_touches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Result<Vec<usize>> {
-    let few = |at: usize| margins.distinct_groups(at) < LEAST_GROUPS;
-    let Some(wanted) = wanted else {
-        return Ok(Settings::default().at.into_iter().filter(|&at| !few(at)).collect());
-    };
-    // None at all is said by the evaluation, with the object that has too few touches.
-    match wanted.iter().find(|&&at| at > 0 && at <= margins.fewest_touches() && few(at)) {
-        Some(&at) => {
-            let (groups, touches) = (margins.distinct_groups(at), margins.fewest_touches());
-            let allowed = format!(
-                "another number, or capture more: of {touches} touches only {groups} different groups of {at} can be drawn, \
-                 too few for an accuracy"
-            );
-            Err(Error::setting("at", at, allowed))
-        }
-        None => Ok(wanted.to_vec()),
-    }
-}
-
-/// The numbers of approaches to give the accuracy after: those asked for, or the usual ones, as far as the approaches go.
-fn numbers_of_approaches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Vec<usize> {
-    match wanted {
-        Some(wanted) => wanted.to_vec(),
-        None => {
-            let few = |at: &usize| *at <= margins.fewest_approaches();
-            Settings::default().at_approaches.into_iter().filter(few).collect()
-        }
-    }
 }

@@ -7,7 +7,7 @@ use palpate::error::{Error, Result};
 pub(crate) struct ExpectedArguments {
     #[command(flatten)]
     prior: PriorArguments,
-    /// Only these objects can be there
+    /// Only these objects; others cannot be there
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     only: Vec<String>,
 }
@@ -78,11 +78,6 @@ impl ExpectedArguments {
             |weight: f64| (weight / most * f64::from(1_u32 << 31)).round().max(f64::from(u8::from(weight > 0.0)));
         Ok(Some(weights.into_iter().map(|weight| whole(weight) as u32).collect()))
     }
-}
-
-/// The weights that a model's own priors stand for.
-pub(crate) fn own_weights(model: &palpate_onboard::Model<'_>) -> Vec<f64> {
-    (0..model.object_count()).map(|object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect()
 }
 
 fn position(option: &'static str, name: &str, names: &[String]) -> Result<usize> {

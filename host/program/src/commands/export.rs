@@ -1,3 +1,4 @@
+use super::Global;
 use super::chips::{features, instructions};
 use super::expected::PriorArguments;
 use super::numbers::error_rate;
@@ -18,87 +19,53 @@ use std::path::{Path, PathBuf};
 /// Compile an ensemble to the bytes that the chip reads.
 #[derive(clap::Args)]
 #[command(after_help = "\
-ENSEMBLE is what `palpate train` saved, or a model of another library over features of any kind: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). Its content says which. `palpate verify` compares the model with it, and with the library.
+ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). `palpate verify` compares the model with it. A compiled model is written as source code, with --emit.
 
-Leaves:
-  i16  two bytes per value: verdicts as the full model's
-  i8   one byte per value: half the size, margins within hundredths of a nat
-  f32  four bytes per value, added as the trainer adds them: the same margins
-
-Layouts: without --layout all that fit are tried, and --for decides. `balanced` takes the fastest on a Cortex-M4F of those that have at most three times the bytes of the smallest, `m4f` and `m0+` the same for that processor, `speed` the fastest of all, and `size` the smallest. But none that rounds leaves is taken where another does not.
-
-Shared leaves: where many leaves are equal, as in forests, each stands once in a table, and a leaf is its number there; margins are the same. It is tried with every layout that walks trees.
-
-A compiled model, such as one that was calibrated, is written as source code: -o says beside which file, which becomes a copy of it; --emit what. Nothing else about it can be changed.
-
-Instructions per touch, or per row, are estimated, right to 15 %. `palpate inspect MODEL --chip m0+ --mhz 48` says more.
-
-Whole numbers: --scale says in which units a chip without a float unit measures a feature: --scale width=100 for hundredths. A value is its whole number of units, the nearest one; thresholds become whole numbers, too. Values beyond ±(2^31 - 1) units count as that. --fit-scales chooses the scales that hold the values of rows exactly, or to seven digits, as powers of ten. LightGBM compares f64: whole numbers that f32 does not hold, such as seconds since 1970, need --scale too.
-
-What another library's file does not say: --missing is the number that stood for a missing value in training, and --link what makes a regression's value of its margin, where the file's own link is not the one. Where training stopped early, the trees up to the best iteration are taken; --all-trees takes all.
+Without a layout of its own (compact, complete, grid, wide, patterns), --layout says what it is chosen for: balanced, m4f or m0+ for the fastest of at most three times the smallest, speed, or size.
 
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
-  palpate export ensemble.json -o strict.palpate --error-rate 0.1%
   palpate export ensemble.json -o kitchen.palpate --prior fork=0.3,spoon=0.3
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
-  palpate export lightgbm.txt -o model.palpate --for speed
+  palpate export lightgbm.txt -o model.palpate --layout speed
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
+  palpate export forest.onnx -o model.palpate --scale rows.csv
   palpate export xgboost.json -o model.palpate --missing -999
-  palpate export ensemble.json -o model.palpate --emit c  # also model.h
-  palpate export sure.palpate -o sure.palpate --emit c    # sure.h alone
-  palpate export lightgbm.txt -o model.palpate --emit json
-                                                  # also model.json, for XGBoost")]
+  palpate export sure.palpate -o sure.palpate --emit c     # sure.h alone
+  palpate export lightgbm.txt -o model.palpate --emit json # model.json too")]
 pub(crate) struct Arguments {
-    /// Ensemble that `palpate train` or another library saved; or a compiled model, to be written as source code
+    /// An ensemble that `palpate train` or another library saved, or a compiled model to be written as source code
     ensemble: PathBuf,
-    /// Where to write the model
-    #[arg(short, long, value_name = "FILE")]
+    /// Where to write; the model
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// The classes' names, in the order of the labels, or a file with one per line [default: the file's own, or 0, 1, …]
-    #[arg(long, value_name = "A,B,…|FILE")]
+    #[arg(long, value_name = "NAME,…|FILE")]
     names: Option<String>,
     /// What leaves are stored as [default: i16; i8 for touches of more than 50 objects]
     #[arg(long, value_parser = leaf, value_name = "i8|i16|f32")]
     leaf: Option<Leaf>,
-    /// How trees are laid out; auto lets --for decide
-    #[arg(long, value_parser = layout, default_value = "auto", value_name = "auto|compact|complete|grid|wide|patterns")]
+    /// How trees are laid out, or what the layout is chosen for
+    #[arg(long, value_parser = layout, default_value = "balanced", value_name = "LAYOUT|GOAL")]
     layout: LayoutChoice,
-    /// What the layout is chosen for
-    #[arg(
-        long = "for",
-        value_parser = goal,
-        default_value = "balanced",
-        value_name = "balanced|speed|size|m4f|m0+",
-        conflicts_with = "layout"
-    )]
-    goal: Goal,
-    /// Whether equal leaves stand once, in a table that a leaf is a number of: `auto` where that is smaller, and better
-    /// for what --for says
+    /// Store equal leaves once, in a table; auto where that is smaller, and better for what --layout says
     #[arg(long, value_parser = sharing, default_value = "auto", value_name = "auto|yes|no")]
     shared_leaves: Sharing,
-    /// Compare whole numbers: how many units of a feature make up 1
-    #[arg(long, value_name = "FEATURE=UNITS,…", value_delimiter = ',', value_parser = scale)]
-    scale: Vec<(String, f32)>,
-    /// Compare whole numbers, in the units that the values of these rows need (CSV)
-    #[arg(long, value_name = "ROWS.csv")]
-    fit_scales: Option<PathBuf>,
-    /// The error rate, such as 0.05 or 5%, at which recognizers stop unless told otherwise
+    /// Compare whole numbers; how many units of a feature make up 1, or the units that a CSV file of rows needs
+    #[arg(long, value_name = "FEATURE=UNITS,…|ROWS.csv", value_delimiter = ',', value_parser = scale)]
+    scale: Vec<Scale>,
+    /// The share of wrong names to accept, such as 1%; recognizers stop at it unless told otherwise
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
-    /// The touches after which they give up
-    #[arg(long, default_value_t = 200, value_name = "N")]
+    /// Give up after this many touches
+    #[arg(long, default_value = "200", value_name = "N")]
     max_touches: u32,
-    /// Write beside it, too: an array in FILE.h with palpate.h to read it, or in FILE.rs; the trees in FILE.json, as
-    /// XGBoost's JSON
+    /// Write beside it: an array in FILE.h with palpate.h to read it, or in FILE.rs, or the trees as XGBoost's JSON
     #[arg(long, value_name = "c|rust|json,…", value_delimiter = ',', value_parser = emitted)]
     emit: Vec<Emitted>,
-    /// Print what was exported as JSON
-    #[arg(long)]
-    json: bool,
-    /// What makes a regression's value of its margin [default: as the file says]
-    #[arg(long, value_parser = link, value_name = "identity|logistic|exponential|square|softplus")]
+    /// The function from a regression's margin to its value: identity, logistic, exponential, square or softplus [default: the file's]
+    #[arg(long, value_parser = link, value_name = "LINK")]
     link: Option<Link>,
     #[command(flatten)]
     unstated: UnstatedArguments,
@@ -106,8 +73,37 @@ pub(crate) struct Arguments {
     prior: PriorArguments,
 }
 
+/// A layout, or what it is chosen for.
+#[derive(Clone, Copy)]
+enum LayoutChoice {
+    Layout(Layout),
+    For(Goal),
+}
+
+impl LayoutChoice {
+    fn layout(self) -> Option<Layout> {
+        match self {
+            Self::Layout(layout) => Some(layout),
+            Self::For(_) => None,
+        }
+    }
+
+    fn goal(self) -> Goal {
+        match self {
+            Self::Layout(_) => Settings::default().goal,
+            Self::For(goal) => goal,
+        }
+    }
+}
+
+/// How a feature is measured in whole numbers.
 #[derive(Clone)]
-struct LayoutChoice(Option<Layout>);
+enum Scale {
+    /// So many units of this feature make up 1.
+    Units(String, f32),
+    /// As the values of these rows need.
+    Rows(PathBuf),
+}
 
 /// Whether leaves are shared; `None` leaves it open.
 #[derive(Clone)]
@@ -182,14 +178,11 @@ struct Sources {
     sources: Vec<PathBuf>,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if is_compiled(&arguments.ensemble) {
-        return emit_compiled(&arguments);
+        return emit_compiled(&arguments, global);
     }
-    output::refuse_input(
-        &arguments.output,
-        [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten(),
-    )?;
+    output::refuse_input(&arguments.output, arguments.inputs())?;
     let emitted = places(&arguments)?;
     let names = arguments.names.as_deref().map(names).transpose()?;
     let mut ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
@@ -201,8 +194,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     let settings = Settings {
         leaf: arguments.leaf.unwrap_or(usual.leaf),
-        layout: arguments.layout.0,
-        goal: arguments.goal,
+        layout: arguments.layout.layout(),
+        goal: arguments.layout.goal(),
         shared_leaves: arguments.shared_leaves.0,
         error_rate: arguments.error_rate,
         max_touches: arguments.max_touches,
@@ -245,10 +238,25 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         sources: emitted.iter().filter(|(kind, _)| *kind != Emitted::Ensemble).map(|(_, path)| path.clone()).collect(),
         ensemble: emitted.into_iter().find(|(kind, _)| *kind == Emitted::Ensemble).map(|(_, path)| path),
     };
-    if arguments.json {
+    if global.json {
         return output::print_json_about(&arguments.output, &exported);
     }
     output::print_about(&arguments.output, &text(&arguments.output, &exported))
+}
+
+impl Arguments {
+    /// The files that are read, none of which may be written.
+    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.ensemble).chain(self.rows())
+    }
+
+    /// The rows that scales are fitted to.
+    fn rows(&self) -> Option<&PathBuf> {
+        self.scale.iter().find_map(|scale| match scale {
+            Scale::Rows(path) => Some(path),
+            Scale::Units(..) => None,
+        })
+    }
 }
 
 /// Whether a file is a compiled model, by its first bytes. Where it cannot be read, whoever reads it as an ensemble says so.
@@ -260,7 +268,7 @@ fn is_compiled(path: &Path) -> bool {
 }
 
 /// Writes a compiled model as source code.
-fn emit_compiled(arguments: &Arguments) -> Result<()> {
+fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
     let model = &arguments.ensemble;
     let compiled = CompiledModel::read(model)?;
     let refuse = |name: &'static str, value: &str| {
@@ -270,11 +278,9 @@ fn emit_compiled(arguments: &Arguments) -> Result<()> {
     for (name, is_given) in [
         ("names", arguments.names.is_some()),
         ("leaf", arguments.leaf.is_some()),
-        ("layout", arguments.layout.0.is_some()),
-        ("for", arguments.goal != usual.goal),
+        ("layout", arguments.layout.layout().is_some() || arguments.layout.goal() != usual.goal),
         ("shared_leaves", arguments.shared_leaves.0.is_some()),
         ("scale", !arguments.scale.is_empty()),
-        ("fit_scales", arguments.fit_scales.is_some()),
         ("error_rate", arguments.error_rate != usual.error_rate),
         ("max_touches", arguments.max_touches != usual.max_touches),
         ("prior", arguments.prior.of(&compiled.names())?.is_some()),
@@ -305,7 +311,7 @@ fn emit_compiled(arguments: &Arguments) -> Result<()> {
         leaf: compiled.model().leaf_type().name(),
         sources: emitted.into_iter().map(|(_, path)| path).collect(),
     };
-    if arguments.json {
+    if global.json {
         return output::print_json_about(&arguments.output, &written);
     }
     let mut text = format!("{}: {} bytes, as it was\n", arguments.output.display(), written.bytes);
@@ -333,7 +339,7 @@ fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
                 ),
             ));
         }
-        output::refuse_input(&path, [Some(&arguments.ensemble), arguments.fit_scales.as_ref()].into_iter().flatten())?;
+        output::refuse_input(&path, arguments.inputs())?;
         places.push((emitted, path));
     }
     Ok(places)
@@ -453,25 +459,30 @@ fn link(name: &str) -> Result<Link, String> {
 
 /// The scale of each feature, if whole numbers are asked for, and the rows that they were fitted to.
 fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>>, Option<Rows>)> {
-    if arguments.scale.is_empty() && arguments.fit_scales.is_none() {
+    if arguments.scale.is_empty() {
         return Ok((None, None));
     }
     let names = ensemble.inputs.names();
-    let rows = arguments.fit_scales.as_deref().map(|path| super::verify::read_rows(path, &names, None)).transpose()?;
+    let files = arguments.scale.iter().filter(|scale| matches!(scale, Scale::Rows(_))).count();
+    if files > 1 {
+        return Err(Error::setting("scale", format!("{files} files of rows"), "one file of rows"));
+    }
+    let path = arguments.rows();
+    let rows = path.map(|path| super::verify::read_rows(path, &names, None)).transpose()?;
     let mut scales = rows.as_ref().map_or_else(|| vec![1.0; names.len()], |rows| scales::fit(ensemble, rows));
-    for (name, scale) in &arguments.scale {
+    let mut named = Vec::new();
+    for scale in &arguments.scale {
+        let Scale::Units(name, scale) = scale else { continue };
         let Some(index) = names.iter().position(|own| own == name) else {
             return Err(Error::setting("scale", format!("{name}={scale}"), format!("a feature: {}", names.join(", "))));
         };
         scales[index] = *scale;
+        named.push(index);
     }
     // A feature that nothing was said about is taken as it is, which only whole thresholds can be.
-    for (index, name) in names.iter().enumerate() {
-        let is_named = arguments.scale.iter().any(|(own, _)| own == name);
-        if let Some(threshold) =
-            scales::fraction(ensemble, index).filter(|_| arguments.fit_scales.is_none() && !is_named)
-        {
-            let allowed = format!("a scale for {name} too, which has the threshold {threshold}, or --fit-scales");
+    for (index, name) in names.iter().enumerate().filter(|(index, _)| path.is_none() && !named.contains(index)) {
+        if let Some(threshold) = scales::fraction(ensemble, index) {
+            let allowed = format!("a scale for {name} too, which has the threshold {threshold}, or a file of rows");
             return Err(Error::setting("scale", "incomplete", allowed));
         }
     }
@@ -571,13 +582,18 @@ fn leaf(name: &str) -> Result<Leaf, String> {
 }
 
 fn layout(name: &str) -> Result<LayoutChoice, String> {
-    if name == "auto" {
-        return Ok(LayoutChoice(None));
+    if let Some(layout) = Layout::ALL.iter().copied().find(|layout| layout.name() == name) {
+        return Ok(LayoutChoice::Layout(layout));
     }
-    let layout = Layout::ALL.iter().copied().find(|layout| layout.name() == name);
-    layout
-        .map(|layout| LayoutChoice(Some(layout)))
-        .ok_or_else(|| "use one of auto, compact, complete, grid, wide, patterns".to_owned())
+    let goal = match name {
+        "balanced" => Ok(Goal::Balanced(compile::Core::M4F)),
+        "speed" => Ok(Goal::Speed),
+        "size" => Ok(Goal::Size),
+        chip => super::chips::core(chip).map(Goal::Balanced),
+    };
+    goal.map(LayoutChoice::For).map_err(|_| {
+        "use a layout (compact, complete, grid, wide, patterns), or a goal (balanced, speed, size, m4f, m0+)".to_owned()
+    })
 }
 
 fn sharing(name: &str) -> Result<Sharing, String> {
@@ -589,21 +605,14 @@ fn sharing(name: &str) -> Result<Sharing, String> {
     }
 }
 
-fn goal(name: &str) -> Result<Goal, String> {
-    match name {
-        "balanced" => Ok(Goal::Balanced(compile::Core::M4F)),
-        "speed" => Ok(Goal::Speed),
-        "size" => Ok(Goal::Size),
-        chip => super::chips::core(chip)
-            .map(Goal::Balanced)
-            .map_err(|_| "use one of balanced, speed, size, m4f, m0+".to_owned()),
-    }
-}
-
-fn scale(text: &str) -> Result<(String, f32), String> {
-    let (name, scale) = text.rsplit_once('=').ok_or("give FEATURE=UNITS, such as width=100")?;
+fn scale(text: &str) -> Result<Scale, String> {
+    let Some((name, scale)) = text.rsplit_once('=') else {
+        let is_file = text.ends_with(".csv") || Path::new(text).is_file();
+        let wanted = || "give FEATURE=UNITS, such as width=100, or a file of rows".to_owned();
+        return is_file.then(|| Scale::Rows(text.into())).ok_or_else(wanted);
+    };
     match scale.parse::<f32>() {
-        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok((name.to_owned(), scale)),
+        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok(Scale::Units(name.to_owned(), scale)),
         _ => Err("give a positive number of units, such as width=100".into()),
     }
 }

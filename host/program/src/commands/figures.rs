@@ -1,46 +1,11 @@
 //! The figures of an evaluation as JSON and as text.
 
 use super::percent;
-use palpate::evaluate::{ActiveFacts, Approaches, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched};
+use palpate::evaluate::{
+    ActiveFacts, Approaches, Confusion, Evaluated, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched,
+};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-
-/// An evaluation, and what was asked for beside it.
-#[derive(serde::Serialize)]
-pub(super) struct Evaluated {
-    #[serde(flatten)]
-    pub(super) evaluation: Evaluation,
-    /// Robots that made the touches in turn, each with its own bias.
-    pub(super) robots: usize,
-    /// How many instances or recordings the objects have that have several: each group is of touches of one.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub(super) instances: BTreeMap<String, usize>,
-    /// Objects whose touches are those that the model was trained on.
-    pub(super) trained_on: Vec<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) confusion: Option<Confusion>,
-    /// What the plan proposed approaches from, where it did.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) active: Option<ActiveFacts>,
-    /// Sequences in which the object is exchanged.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) switch: Option<Switched>,
-    /// What is said to objects that the model does not know.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) strangers: Option<Strangers>,
-}
-
-/// How often each object was taken for each.
-#[derive(serde::Serialize)]
-pub(super) struct Confusion {
-    pub(super) touches: usize,
-    /// Rows.
-    pub(super) touched: Vec<String>,
-    /// Columns.
-    pub(super) recognized: Vec<String>,
-    /// Groups.
-    pub(super) counts: Vec<Vec<usize>>,
-}
 
 /// What `palpate evaluate` prints: tables, then sentences about what was asked for beside them.
 pub(super) fn text(evaluated: &Evaluated) -> String {

@@ -3,6 +3,7 @@
 use super::numbers::count;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
+use super::{Global, remark};
 use palpate::error::FitProblem;
 use palpate::fit::{Estimate, Fit, Settings, between, fit};
 use palpate::output;
@@ -13,48 +14,39 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-RECORDED is a data set that your probe made: DIR/<object>.txt, one line per approach, of objects whose meshes you have. MESHES are these objects, matched by their names. The probe that explains the recorded touches best is written as probe.toml: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
+RECORDED is a data set that your probe made, of objects whose meshes you have, matched by their names. The probe that explains the recorded touches best is written: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
 
-A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, tell offsets and noise better than any object: one line per press, in a file for --plate.
-
-Recordings that look wrong are named, and nothing is written: another object than the name says, two objects in one file, a probe that was moved on the way.
+A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets and noise better than any object: one line per press, in a file for --plate. Recordings that look wrong are named, and nothing is written.
 
 Examples:
   palpate probe fit recorded meshes/ -o probe.toml
   palpate probe fit recorded meshes/ -o probe.toml --plate plate.txt
-  palpate probe fit recorded meshes/ -o fitted.toml --probe probe.toml --true-size --unit mm
-                                                  a probe with other measures
-  palpate capture meshes/ -o data --probe probe.toml --approaches")]
+  palpate probe fit recorded meshes/ -o fitted.toml --probe probe.toml \\
+      --true-size mm")]
 pub(super) struct FitArguments {
     /// The recorded touches: a directory with a file for each object
     #[arg(value_name = "RECORDED")]
     recorded: PathBuf,
-    /// The objects: `builtin` or a built-in object's name, a mesh, or a directory of meshes
-    #[arg(value_name = "MESHES", required = true)]
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
+    #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
-    /// Where to write the probe, such as probe.toml
-    #[arg(short, long, value_name = "FILE")]
+    /// Where to write; the probe, such as probe.toml
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Presses on a flat plate, half a turn of the probe after each, one line per press
     #[arg(long, value_name = "FILE")]
     plate: Option<PathBuf>,
-    /// Write the probe although recordings look wrong
+    /// Write all the same; although recordings look wrong
     #[arg(long)]
     force: bool,
-    /// Simulated approaches to each object
+    /// Approaches to each object; simulated
     #[arg(long, value_name = "N", value_parser = count, default_value_t = Settings::default().approaches)]
     approaches: u64,
-    /// Seed of the simulated approaches
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Print what was found as JSON
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     size: SizeArguments,
 }
 
-pub(super) fn run(arguments: &FitArguments) -> Result<()> {
+pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     let inputs = super::files_of(&arguments.recorded).into_iter().chain(arguments.plate.clone());
     output::refuse_input(&arguments.output, inputs)?;
     let recorded = super::checked(palpate::touches::Dataset::read_any(&arguments.recorded)?);
@@ -63,15 +55,15 @@ pub(super) fn run(arguments: &FitArguments) -> Result<()> {
         refuse_unstated(&arguments.size)?;
     }
     let origin = arguments.size.origin(base)?;
-    let objects = arguments.size.objects(&arguments.sources, arguments.seed)?;
+    let objects = arguments.size.objects(&arguments.sources, global.seed())?;
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
-    let settings = Settings { origin, approaches: arguments.approaches, seed: arguments.seed };
+    let settings = Settings { origin, approaches: arguments.approaches, seed: global.seed() };
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
     let suspects: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
     if arguments.force || suspects.is_empty() {
         output::write_bytes(&arguments.output, found.toml().as_bytes())?;
     }
-    if arguments.json {
+    if global.json {
         output::print_json_about(&arguments.output, &found)?;
     } else {
         output::print_about(&arguments.output, &table(&found))?;
@@ -80,9 +72,9 @@ pub(super) fn run(arguments: &FitArguments) -> Result<()> {
         return Err(Error::from(FitProblem::Suspects { suspects }).in_file(&arguments.recorded));
     }
     for suspect in suspects {
-        eprintln!("palpate: warning: {suspect}.");
+        remark(&format!("palpate: warning: {suspect}."));
     }
-    match arguments.json {
+    match global.json {
         true => Ok(()),
         false => output::print_about(&arguments.output, &format!("Wrote {}\n", arguments.output.display())),
     }

@@ -2,7 +2,6 @@
 
 mod calibrate;
 mod capture;
-mod cast;
 mod chips;
 mod completions;
 mod data;
@@ -14,37 +13,36 @@ mod figures;
 mod fit;
 mod inspect;
 mod link;
-mod noise;
 mod numbers;
-mod objects;
 mod parity;
 mod plan;
 mod play;
 mod probe;
 mod progress;
+mod real;
 mod recognize;
 mod recognize_rows;
-mod record;
+mod renamed;
 mod report;
 mod run;
 mod shell;
-mod stated;
 mod strangers;
 mod teach;
 mod train;
+mod trees;
 mod tune;
 mod unstated;
 mod verify;
 mod view;
-mod watch;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{Setting, TouchesProblem};
+use palpate::error::{CaptureProblem, Setting, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing, Log, Warning};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Declares the enum that clap parses and the dispatch, from one list.
 macro_rules! commands {
@@ -55,9 +53,9 @@ macro_rules! commands {
         }
 
         impl Command {
-            fn run(self) -> Result<()> {
+            fn run(self, global: &Global) -> Result<()> {
                 match self {
-                    $(Self::$name(arguments) => $module::run(arguments),)*
+                    $(Self::$name(arguments) => $module::run(arguments, global),)*
                 }
             }
         }
@@ -67,47 +65,36 @@ macro_rules! commands {
 commands! {
     /// Do all of it: capture, train, export, recognize, report
     Run => run,
-    /// Write the ten built-in objects as OBJ files
-    Objects => objects,
-    /// Make a page that shows an object and some touches, to look at in a browser
-    View => view,
-    /// Make a page on which objects can be touched, with the recognizer inside
-    Play => play,
     /// Touch objects with the virtual probe
     Capture => capture,
-    /// Move spheres against a mesh as a file says, to compare the simulator with another engine
-    Cast => cast,
-    /// Look after data sets of touches: record, check, compare
-    Data => data,
     /// Train an ensemble on captured touches
     Train => train,
     /// Compile an ensemble to the bytes that the chip reads
     Export => export,
-    /// Say what is in a compiled model
-    Inspect => inspect,
-    /// Recognize objects from a stream of touches
-    Recognize => recognize,
-    /// Add a plan of approaches to a model: where to touch next
-    Plan => plan,
+    /// Set thresholds that keep a promised error rate, or plan approaches
+    Calibrate => calibrate,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
-    /// Set a model's thresholds so that it keeps a promised error rate
-    Calibrate => calibrate,
     /// Find the best model that fits a chip
     Tune => tune,
-    /// Find out which probe to build for your objects, and what is crooked about the one you have
-    Probe => design,
-    /// Compare a compiled model with its ensemble
-    Parity => parity,
-    /// Compare a model over rows of features with the file that it was exported from
+    /// Compare a compiled model with what it was exported from
     Verify => verify,
+    /// Recognize objects from a stream of touches
+    Recognize => recognize,
+    /// Say what is in a compiled model, and what it costs on a chip
+    Inspect => inspect,
     /// Remake the whole evaluation: every figure, the limit, speed against error
     Report => report,
-    /// Recognize on a chip at the end of a line
+    /// Recognize on a chip at the end of a line, or watch it
     Link => link,
-    /// Watch a chip while it recognizes
-    Watch => watch,
+    /// Make a page that shows an object and touches, or on which to touch objects
+    View => view,
+    /// Check, compare and record data sets of touches; write built-in objects
+    Data => data,
+    /// Find the probe to build for your objects, and how yours differs from the ideal
+    Probe => design,
     /// Print a script that completes this program's commands and options in a shell
+    #[command(hide = true)]
     Completions => completions,
 }
 
@@ -120,17 +107,112 @@ commands! {
     max_term_width = 120,
     arg_required_else_help = true,
     subcommand_required = true,
-    after_help = "\
-Examples:
-  palpate run                 capture, train and recognize built-in objects
-  palpate run meshes/ -o out  the same for your own meshes
-  palpate help capture        what a command does, with examples
-
-What the words of the output mean: docs/reference/words.md"
+    help_template = "{about-with-newline}\n{usage-heading} {usage}\n{after-help}"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    global: Global,
+}
+
+/// Options that every command takes.
+#[derive(clap::Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Global options")]
+pub(crate) struct Global {
+    /// Print the result as JSON
+    #[arg(long, global = true)]
+    json: bool,
+    /// Threads; the results are the same for any number [default: all]
+    #[arg(long, global = true, value_name = "N", value_parser = threads)]
+    threads: Option<usize>,
+    /// Seed of all that is random [default: 1]
+    #[arg(long, global = true, value_name = "N", value_parser = numbers::count)]
+    seed: Option<u64>,
+    /// Print neither progress nor remarks, only results and errors
+    #[arg(long, global = true)]
+    quiet: bool,
+}
+
+impl Global {
+    /// The seed, or 1.
+    fn seed(&self) -> u64 {
+        self.seed.unwrap_or(1)
+    }
+
+    /// Makes the options count that concern the whole process.
+    fn apply(&self) -> Result<()> {
+        QUIET.store(self.quiet, Ordering::Relaxed);
+        // More are of no use, and cost memory.
+        let Some(asked) = self.threads.map(|asked| asked.min(MOST_THREADS)) else { return Ok(()) };
+        let built = rayon::ThreadPoolBuilder::new().num_threads(asked).build_global();
+        built.map_err(|error| CaptureProblem::Threads { asked, started: 0, message: error.to_string() }.into())
+    }
+}
+
+/// The most threads that are started.
+const MOST_THREADS: usize = 256;
+
+fn threads(text: &str) -> Result<usize, String> {
+    match numbers::count(text)? {
+        0 => Err("give 1 or more".to_owned()),
+        count => usize::try_from(count).map_err(|_| "give fewer".to_owned()),
+    }
+}
+
+/// Whether `--quiet` is given.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Whether neither progress nor remarks are printed.
+fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// Prints a remark to stderr, unless `--quiet` is given.
+fn remark(text: &str) {
+    if !is_quiet() {
+        eprintln!("{text}");
+    }
+}
+
+/// The commands as the program's help lists them.
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Everything at once", &["run", "report"]),
+    ("Step by step", &["capture", "train", "export", "calibrate", "evaluate", "tune", "recognize"]),
+    ("A real probe", &["probe design", "probe fit", "data record", "data check", "link"]),
+    ("Models from elsewhere", &["export", "verify"]),
+    ("Look", &["inspect", "view", "data objects"]),
+];
+
+/// The command of this path, such as `data check`.
+fn at<'c>(cli: &'c clap::Command, path: &str) -> Option<&'c clap::Command> {
+    path.split(' ').try_fold(cli, |command, name| command.find_subcommand(name))
+}
+
+/// The commands in their groups, the global options and examples.
+fn overview(cli: &clap::Command) -> String {
+    let mut text = String::new();
+    for (title, paths) in GROUPS {
+        text += &format!("\n{title}:\n");
+        for path in paths {
+            let about = at(cli, path).and_then(clap::Command::get_about).map(ToString::to_string).unwrap_or_default();
+            text += &format!("  {path:14}{about}\n");
+        }
+    }
+    text + "
+Global options:
+  --json         Print the result as JSON
+  --threads <N>  Threads; the results are the same for any number
+  --seed <N>     Seed of all that is random
+  --quiet        Print neither progress nor remarks, only results and errors
+  --help         Print help; `palpate help capture`, with examples
+  --version      Print the version
+
+Examples:
+  palpate run                 capture, train and recognize built-in objects
+  palpate run meshes/ -o out  the same for your own meshes
+
+Words of the output: docs/reference/words.md; all options: docs/reference/options.md"
 }
 
 impl Command {
@@ -148,10 +230,18 @@ impl Command {
 
 /// The program's commands and arguments.
 fn cli() -> clap::Command {
-    Cli::command().mut_subcommands(|command| match command.get_after_help().map(|text| unwrapped(&text.to_string())) {
+    let cli = Cli::command();
+    let overview = overview(&cli);
+    with_unwrapped_help(cli).after_help(overview)
+}
+
+/// A command whose help below the options is wrapped to the terminal's width, and that of the commands below it.
+fn with_unwrapped_help(command: clap::Command) -> clap::Command {
+    let command = command.mut_subcommands(with_unwrapped_help);
+    match command.get_after_help().map(|text| unwrapped(&text.to_string())) {
         Some(text) => command.after_help(text),
         None => command,
-    })
+    }
 }
 
 /// Joins the lines of each paragraph, so that they can be wrapped to the terminal's width. Indented lines stay as they are.
@@ -171,10 +261,17 @@ fn unwrapped(text: &str) -> String {
 
 /// Runs the command that the arguments name, prints its error if it has one, and returns the exit code.
 pub fn main() -> ExitCode {
-    let matches = cli().try_get_matches().unwrap_or_else(|error| without_trailing(error).exit());
+    let matches = cli().try_get_matches().unwrap_or_else(|error| {
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        if let Some(text) = renamed::said(&words, &error) {
+            eprintln!("palpate: {text}");
+            std::process::exit(2);
+        }
+        without_trailing(error).exit()
+    });
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let hint = cli.command.hint();
-    match cli.command.run() {
+    match cli.global.apply().and_then(|()| cli.command.run(&cli.global)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if !matches!(error, Error::Closed) {
@@ -204,7 +301,7 @@ fn message(error: &Error, command: &str) -> String {
     let (Error::At { place, problem }, Some(Setting { name, value, .. })) = (error, error.problem()) else {
         return error.to_string();
     };
-    let option = name.replace('_', "-");
+    let option = option_of(name).replace('_', "-");
     let cli = cli();
     // The command's own options, and those of the commands below it.
     let named = cli.find_subcommand(command).into_iter();
@@ -215,6 +312,15 @@ fn message(error: &Error, command: &str) -> String {
         return format!("{place}--{option} is {value}. {}", problem.fix());
     }
     error.to_string()
+}
+
+/// The option of a setting that the library calls otherwise.
+fn option_of(setting: &str) -> &str {
+    match setting {
+        "groups" => "sequences",
+        "rolls" => "plan",
+        other => other,
+    }
 }
 
 /// A share in percent, as it was meant: without the last bits.
@@ -236,8 +342,8 @@ fn checked(dataset: Dataset) -> Dataset {
 /// Says to stderr what looks wrong, or what was skipped.
 fn say(warning: &Warning) {
     match warning {
-        Warning::SkippedChannels { .. } => eprintln!("palpate: {warning}"),
-        _ => eprintln!("palpate: warning: {warning}"),
+        Warning::SkippedChannels { .. } => remark(&format!("palpate: {warning}")),
+        _ => remark(&format!("palpate: warning: {warning}")),
     }
 }
 
@@ -248,9 +354,9 @@ const MANY: usize = 30;
 /// for other objects.
 fn warn_of_full(touches: usize, is_any_partial: bool) {
     if touches >= MANY && !is_any_partial {
-        eprintln!(
-            "palpate: warning: all {touches} touches are full, and to this model it is evidence which fingers touch: if others were left out, its verdicts are wrong. Keep every approach (palpate capture --approaches), or train for full touches (palpate train --touches full)."
-        );
+        remark(&format!(
+            "palpate: warning: all {touches} touches are full, and to this model it is evidence which fingers touch: if others were left out, its verdicts are wrong. Keep every approach (palpate capture --approaches N), or train for full touches (palpate train --evidence full)."
+        ));
     }
 }
 
@@ -272,10 +378,93 @@ fn files_of(directory: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::{BTreeMap, BTreeSet};
 
     #[test]
     fn every_commands_arguments_are_consistent() {
         cli().debug_assert();
+    }
+
+    /// Every command that help lists, with its path: those that do something, not those that only hold others.
+    fn listed() -> Vec<(String, clap::Command)> {
+        fn below(command: &clap::Command, path: &str, found: &mut Vec<(String, clap::Command)>) {
+            for own in command.get_subcommands().filter(|own| !own.is_hide_set() && own.get_name() != "help") {
+                let path = format!("{path} {}", own.get_name()).trim_start().to_owned();
+                if own.has_subcommands() { below(own, &path, found) } else { found.push((path, own.clone())) }
+            }
+        }
+        let mut cli = cli();
+        cli.build();
+        let mut found = Vec::new();
+        below(&cli, "", &mut found);
+        found
+    }
+
+    /// The options of a command that its help shows, without `--help`.
+    fn options(command: &clap::Command) -> impl Iterator<Item = &clap::Arg> {
+        command.get_arguments().filter(|own| own.get_long().is_some_and(|name| name != "help") && !own.is_hide_set())
+    }
+
+    #[test]
+    fn the_program_has_at_most_18_commands_and_190_options() {
+        let listed = listed();
+        let global: BTreeSet<&str> = listed
+            .iter()
+            .flat_map(|(_, own)| options(own))
+            .filter(|own| own.is_global_set())
+            .filter_map(|own| own.get_long())
+            .collect();
+        let own = |command| options(command).filter(|own| !own.is_global_set()).count();
+        let each: Vec<String> = listed.iter().map(|(path, command)| format!("{path} {}", own(command))).collect();
+        let total = global.len() + listed.iter().map(|(_, command)| own(command)).sum::<usize>();
+        println!("{} commands, {total} options, {} of them global: {}", listed.len(), global.len(), each.join(", "));
+        assert!(listed.len() <= 18, "{}", listed.len());
+        assert!(total <= 190, "{total}");
+        assert_eq!(global, BTreeSet::from(["json", "quiet", "seed", "threads"]));
+    }
+
+    #[test]
+    fn no_help_is_longer_than_60_lines_at_80_and_at_120_columns() {
+        for (path, command) in listed() {
+            for columns in [80, 120] {
+                let help = command.clone().term_width(columns).max_term_width(columns).render_long_help().to_string();
+                let lines = help.lines().count();
+                println!("{path} at {columns}: {lines}");
+                assert!(lines <= 60, "{path} at {columns} columns has {lines} lines\n{help}");
+            }
+        }
+    }
+
+    /// What an option means: its name for values, its kind, and its help up to the first semicolon or bracket.
+    fn meaning(option: &clap::Arg) -> String {
+        let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+        let first = help.split(['[', ';']).next().unwrap_or_default().trim().to_owned();
+        let names: Vec<&str> =
+            option.get_value_names().unwrap_or_default().iter().map(clap::builder::Str::as_str).collect();
+        format!("{} {:?} {:?}: {first}", names.join(" "), option.get_action(), option.get_num_args())
+    }
+
+    #[test]
+    fn an_option_means_the_same_in_every_command() {
+        let mut meanings: BTreeMap<String, BTreeMap<String, Vec<String>>> = BTreeMap::new();
+        for (path, command) in listed() {
+            for option in options(&command) {
+                let name = option.get_long().unwrap_or_default().to_owned();
+                meanings.entry(name).or_default().entry(meaning(option)).or_default().push(path.clone());
+            }
+        }
+        let several: Vec<String> =
+            meanings.iter().filter(|(_, own)| own.len() > 1).map(|(name, own)| format!("--{name}: {own:#?}")).collect();
+        assert!(several.is_empty(), "{}", several.join("\n"));
+    }
+
+    #[test]
+    fn the_groups_of_help_name_every_command_that_is_listed() {
+        let shown: BTreeSet<String> =
+            GROUPS.iter().flat_map(|(_, paths)| paths.iter().map(ToString::to_string)).collect();
+        assert_eq!(shown, listed().into_iter().map(|(path, _)| path).collect());
+        let overview = overview(&Cli::command());
+        assert!(overview.lines().all(|line| line.chars().count() <= 80), "{overview}");
     }
 
     #[test]
@@ -300,8 +489,8 @@ mod tests {
         let error = Error::setting("max_touches", 0, "1 to 1000");
         assert_eq!(message(&error, "recognize"), "--max-touches is 0. Use 1 to 1000.");
         assert_eq!(error.exit_code(), 2);
-        let error = Error::setting("spacing", 9, "less");
-        assert_eq!(message(&error, "probe"), "--spacing is 9. Use less.");
+        let error = Error::setting("sequences", 9, "less");
+        assert_eq!(message(&error, "probe"), "--sequences is 9. Use less.");
         let error = Error::setting("max_touches", 0, "1 to 1000");
         // No option of this name, and no command: the setting's own name.
         assert_eq!(message(&error, "view"), "max_touches is 0. Use 1 to 1000.");

@@ -8,6 +8,11 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
     })
 }
 
+/// A number of sequences, as [`count`].
+pub(crate) fn sequences(text: &str) -> Result<usize, String> {
+    count(text).map(|count| usize::try_from(count).unwrap_or(usize::MAX))
+}
+
 /// The whole number that `1e6`, `1_000_000`, `1,000,000`, `20k` or `2.0` stand for.
 fn whole(text: &str) -> Option<u64> {
     let text = text.trim().to_lowercase().replace(['_', ',', '\'', ' '], "");

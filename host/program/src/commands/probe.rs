@@ -1,5 +1,6 @@
 //! Options for the probe and the sizes of objects.
 
+use super::remark;
 use palpate::ensemble::StatedProbe;
 use palpate::error::ProbeProblem;
 use palpate::mesh::{BACKGROUND, Object, builtin, source};
@@ -8,25 +9,35 @@ use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
 use palpate::{Error, Result};
 use palpate_shared::format::Length;
+use std::fmt;
 use std::path::PathBuf;
 
-/// The probe file.
+/// The probe.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct ProbeArguments {
-    /// The probe, as a TOML file: unit, radius, spacing, speed, and if you like tilt, timer and what a real one adds; such as probe.toml
-    #[arg(long, value_name = "FILE")]
-    probe: Option<PathBuf>,
+    /// The probe; published, or a file that states its unit, radius, spacing, speed, tilt and what a real one adds
+    #[arg(long, value_name = "published|FILE", default_value = PUBLISHED, hide_default_value = true)]
+    probe: PathBuf,
 }
 
+/// The name of the probe that needs no file.
+const PUBLISHED: &str = "published";
+
 impl ProbeArguments {
+    /// The probe file; none for the published probe.
+    fn path(&self) -> Option<&PathBuf> {
+        Some(&self.probe).filter(|path| path.as_os_str() != PUBLISHED)
+    }
+
     /// What the file states, if one is given.
     pub(crate) fn read(&self) -> Result<Option<ProbeFile>> {
-        self.probe.as_ref().map(ProbeFile::read).transpose()
+        self.path().map(ProbeFile::read).transpose()
     }
 
     /// The option as words of a command line, to repeat it.
     pub(crate) fn words(&self) -> Vec<String> {
-        let words = self.probe.iter().flat_map(|path| ["--probe".to_owned(), path.to_string_lossy().into_owned()]);
+        let words =
+            self.path().into_iter().flat_map(|path| ["--probe".to_owned(), path.to_string_lossy().into_owned()]);
         words.collect()
     }
 
@@ -38,7 +49,7 @@ impl ProbeArguments {
         let own = StatedProbe::of(dataset);
         let Some(file) = file else { return Ok(own) };
         let given = StatedProbe { probe: file.probe, unit: file.unit, ..StatedProbe::default() };
-        let name = self.probe.as_ref().map_or_else(String::new, |path| path.display().to_string());
+        let name = self.path().map_or_else(String::new, |path| path.display().to_string());
         if let Some(own) = own {
             StatedProbe::compare([&name, "the data set"], [given.trained(), own.trained()])?;
         }
@@ -57,7 +68,7 @@ impl ProbeArguments {
             None if there.is_none() => Ok(usual),
             Some(real) if there.is_none() => Ok(real),
             Some(real) if real != there => Err(ProbeProblem::Differs {
-                first: self.probe.as_ref().map_or_else(String::new, |path| path.display().to_string()),
+                first: self.path().map_or_else(String::new, |path| path.display().to_string()),
                 second: "the data set".into(),
                 differences: format!("[real]: {real}; and {there}"),
             }
@@ -79,13 +90,10 @@ pub(crate) struct SizeArguments {
 /// Whether objects keep their true sizes, and whether they have instances.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct UnitArguments {
-    /// Touch objects at their true size, with a probe in millimeters; built-in objects, glTF and COLLADA state their unit, for others say --unit
-    #[arg(long)]
-    true_size: bool,
-    /// The unit of the meshes that do not state one: mm, cm, m or in; for one object, whatever its file states, NAME=cm; may be given several times
-    #[arg(long, value_name = "[NAME=]mm|cm|m|in", value_parser = mesh_unit, requires = "true_size")]
-    unit: Vec<(Option<String>, f64)>,
-    /// Objects with several meshes: of a directory inside a directory each mesh is an instance; with a number N, each built-in object has N varied instances
+    /// Touch objects at their true size, with a probe in mm; the unit of meshes that state none, or `stated`
+    #[arg(long, value_name = "[NAME=]UNIT,…", value_parser = mesh_unit, value_delimiter = ',')]
+    true_size: Vec<MeshUnit>,
+    /// Several meshes per object; each subdirectory is an object, or with N each built-in object is varied N times
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "0", value_parser = instances)]
     instances: Option<usize>,
 }
@@ -146,15 +154,16 @@ impl UnitArguments {
     }
 
     fn add_units(&self, objects: &mut [Object]) -> Result<()> {
-        for (name, millimeters) in &self.unit {
-            match name {
-                None => {
+        for unit in &self.true_size {
+            match unit {
+                MeshUnit::Stated => {}
+                MeshUnit::Unstated(millimeters) => {
                     objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(Some(*millimeters)))
                 }
-                Some(name) => {
+                MeshUnit::Of(name, millimeters) => {
                     let known = || objects.iter().map(|object| object.name.clone()).collect::<Vec<_>>().join(", ");
                     let Some(place) = objects.iter().position(|object| object.name == *name) else {
-                        return Err(Error::setting("unit", name, format!("the name of an object: {}", known())));
+                        return Err(Error::setting("true_size", name, format!("the name of an object: {}", known())));
                     };
                     objects[place].millimeters = Some(*millimeters);
                 }
@@ -165,17 +174,15 @@ impl UnitArguments {
 
     /// Whether objects are touched at their true size.
     pub(crate) fn is_true_size(&self) -> bool {
-        self.true_size
+        !self.true_size.is_empty()
     }
 
     /// The options as words of a command line, to repeat them.
     pub(crate) fn words(&self) -> Vec<String> {
         let mut words = Vec::new();
-        words.extend(self.true_size.then(|| "--true-size".to_owned()));
-        for (name, millimeters) in &self.unit {
-            let unit = UNITS.into_iter().find(|(_, own)| own == millimeters).map_or("mm", |(unit, _)| unit);
-            let name = name.as_ref().map_or_else(String::new, |name| format!("{name}="));
-            words.extend(["--unit".to_owned(), format!("{name}{unit}")]);
+        if self.is_true_size() {
+            let units: Vec<String> = self.true_size.iter().map(ToString::to_string).collect();
+            words.extend(["--true-size".to_owned(), units.join(",")]);
         }
         if let Some(count) = self.instances {
             words.push("--instances".to_owned());
@@ -201,15 +208,15 @@ impl SizeArguments {
     /// # Errors
     /// If the file cannot be used, or is in another unit than objects are touched in.
     pub(crate) fn origin(&self, base: Origin) -> Result<Origin> {
-        let unit = if self.units.true_size { Length::Millimeter } else { base.unit };
+        let unit = if self.units.is_true_size() { Length::Millimeter } else { base.unit };
         let Some(file) = self.probe.read()? else { return Ok(Origin { unit, ..base }) };
         let problem = |message: &str| {
-            let path = self.probe.probe.clone().unwrap_or_default();
+            let path = self.probe.path().cloned().unwrap_or_default();
             Err(Error::from(ProbeProblem::BadFile { message: message.into() }).in_file(path))
         };
         match (unit, file.unit) {
             (Length::Tenth, Length::Millimeter) => {
-                problem("its unit is mm, which needs objects at their true size (--true-size)")
+                problem("its unit is mm, which needs objects at their true size (--true-size UNIT)")
             }
             (Length::Millimeter, Length::Tenth) => problem(
                 "its unit is a tenth of the object's longest side, where objects have their true size (unit = \"mm\")",
@@ -220,7 +227,7 @@ impl SizeArguments {
 
     /// Whether objects are touched at their true size with a probe that was not stated: the published one is in units.
     pub(crate) fn lacks_probe(&self) -> bool {
-        self.units.true_size && self.probe.probe.is_none()
+        self.units.is_true_size() && self.probe.path().is_none()
     }
 
     /// The options as words of a command line, to repeat them.
@@ -244,20 +251,48 @@ pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
 /// Tells on stderr how objects were found and read, where that may surprise.
 fn tell(objects: &[Object]) {
     for object in objects {
-        object.notes.iter().for_each(|note| eprintln!("{}: {note}", object.name));
+        object.notes.iter().for_each(|note| remark(&format!("{}: {note}", object.name)));
     }
 }
 
 /// Units of meshes, and how many millimeters they are.
 const UNITS: [(&str, f64); 4] = [("mm", 1.0), ("cm", 10.0), ("m", 1_000.0), ("in", 25.4)];
 
-fn mesh_unit(text: &str) -> Result<(Option<String>, f64), String> {
+/// What a true size is measured in.
+#[derive(Clone, Debug, PartialEq)]
+enum MeshUnit {
+    /// What each mesh states itself.
+    Stated,
+    /// Of meshes that state none, in millimeters.
+    Unstated(f64),
+    /// Of the object of this name, whatever its mesh states, in millimeters.
+    Of(String, f64),
+}
+
+impl fmt::Display for MeshUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit =
+            |millimeters: &f64| UNITS.into_iter().find(|(_, own)| own == millimeters).map_or("mm", |(unit, _)| unit);
+        match self {
+            Self::Stated => f.write_str("stated"),
+            Self::Unstated(millimeters) => f.write_str(unit(millimeters)),
+            Self::Of(name, millimeters) => write!(f, "{name}={}", unit(millimeters)),
+        }
+    }
+}
+
+fn mesh_unit(text: &str) -> Result<MeshUnit, String> {
     let (name, unit) = match text.rsplit_once('=') {
         Some((name, unit)) => (Some(name.to_owned()), unit),
         None => (None, text),
     };
-    let found = UNITS.into_iter().find(|(name, _)| *name == unit);
-    found.map(|(_, millimeters)| (name, millimeters)).ok_or_else(|| "use mm, cm, m or in, or NAME=cm".to_owned())
+    let found = UNITS.into_iter().find(|(name, _)| *name == unit).map(|(_, millimeters)| millimeters);
+    match (name, found) {
+        (None, None) if text == "stated" => Ok(MeshUnit::Stated),
+        (None, Some(millimeters)) => Ok(MeshUnit::Unstated(millimeters)),
+        (Some(name), Some(millimeters)) => Ok(MeshUnit::Of(name, millimeters)),
+        _ => Err("use mm, cm, m or in for meshes that state no unit, NAME=cm for one object, or stated".to_owned()),
+    }
 }
 
 fn instances(text: &str) -> Result<usize, String> {

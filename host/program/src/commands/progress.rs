@@ -1,4 +1,4 @@
-//! Progress on stderr, where it is a terminal.
+//! Progress on stderr, where it is a terminal and `--quiet` is not given.
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use palpate::progress::Progress;
@@ -23,6 +23,9 @@ impl Bar {
 
 impl Progress for Bar {
     fn begin(&self, stage: &str, total: Option<u64>) {
+        if super::is_quiet() {
+            return;
+        }
         let bar = match total {
             Some(total) => {
                 let bar = ProgressBar::new(total);

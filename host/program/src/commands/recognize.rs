@@ -1,4 +1,5 @@
-use super::expected::{self, ExpectedArguments};
+use super::Global;
+use super::expected::ExpectedArguments;
 use super::numbers::error_rate;
 use palpate::Result;
 use palpate::chip::Entry;
@@ -17,27 +18,19 @@ use std::path::{Path, PathBuf};
 /// Recognize objects from a stream of touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and the probe's direction and alignment (six numbers) if the model needs them. Each line out is the verdict so far: undecided; recognized; unknown where the touches fit no object of the model, which only a model with a test of fit says (`palpate calibrate --strangers`); or gave-up once the limit of touches is reached. After a verdict, and after an empty line, the next touch is the first of another object.
+Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and six numbers of the probe's direction and alignment if the model needs them. Each line out is the verdict so far: undecided, recognized, unknown or gave-up. After a verdict, and after an empty line, the next touch is the first of another object. FILE may be a robot's log (MCAP) as well.
 
-FILE may be a robot's log as well (MCAP, see docs/reference/mcap.md): its touches are taken in the order of their log times, and where the object that they name changes, the next touch is the first of another object.
-
-With --mcap touches and verdicts are written as a log, with the posterior of every object after every touch, once all touches are recognized. Foxglove shows it: plot /verdict.posteriors.fork. Touches that are not from a log are logged a second apart.
-
-With --features each line in is a row of features for a model that was exported from another library's: CSV with the features' names in the header, or as many columns as features, empty cells for missing values. Each line out is the class of that row and its posterior, or with --add-up the verdict of all rows since the last one. A regression gives the value that its library predicts, after the inverse link; with --json also the margin before it.
+With --features each line in is a row of features for a model of another library: CSV with the features' names in the header; out is the class of each row, or a regression's value.
 
 Examples:
   palpate recognize model.palpate data/fork.txt
   probe | palpate recognize model.palpate
-  palpate recognize model.palpate - --json < data/fork.txt
   palpate recognize model.palpate data/fork.txt --error-rate 5% --max-touches 30
   palpate recognize model.palpate data/fork.txt --only fork,spoon,bowl
   palpate recognize model.palpate data/fork.txt --prior fork=0.3,spoon=0.3
   probe | palpate recognize planned.palpate --active
-  palpate recognize model.palpate monday.mcap
-  palpate recognize model.palpate data/fork.txt --mcap verdicts.mcap
-  palpate recognize model.palpate rows.csv --features --json
-
-The posterior is that of the model's temperature, if it was calibrated. What it promises holds for its own priors and all of its objects; `palpate evaluate` with --prior or --only says what becomes of it.")]
+  palpate recognize model.palpate monday.mcap --mcap verdicts.mcap
+  palpate recognize model.palpate rows.csv --features --json")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
@@ -50,21 +43,18 @@ pub(crate) struct Arguments {
     /// Add up the evidence of rows until there is a verdict, as that of touches
     #[arg(long, requires = "features")]
     add_up: bool,
-    /// Stop when the posterior passes one less this, such as 0.05 or 5%, instead of at the model's own thresholds; nothing is promised then
+    /// The share of wrong names to accept, such as 1%; stops there, which nothing promises [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
-    /// Give up after this many touches instead of the model's limit
+    /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
-    /// Say after each touch where to touch next; the model needs a plan (see `palpate plan`)
+    /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
     active: bool,
-    /// Write touches and verdicts as a log, which Foxglove shows
+    /// Write touches, verdicts and posteriors as a log, which Foxglove shows
     #[arg(long, value_name = "FILE", conflicts_with = "features")]
     mcap: Option<PathBuf>,
-    /// Print one JSON object per line
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     expected: ExpectedArguments,
 }
@@ -101,7 +91,7 @@ impl Line<'_> {
     }
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
     let model = compiled.model();
     let own = Stopping::from_model(&model);
@@ -115,7 +105,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     };
     let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
     if arguments.features {
-        return super::recognize_rows::run(recognizer, &arguments.file, arguments.add_up, arguments.json)
+        return super::recognize_rows::run(recognizer, &arguments.file, arguments.add_up, global.json)
             .map_err(|error| error.in_file(&arguments.model));
     }
     if model.descriptor().is_none() {
@@ -124,9 +114,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     if arguments.active && model.plan().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
-    let weights = arguments.expected.weights(&compiled.names(), &expected::own_weights(&model))?;
+    let weights = arguments.expected.weights(&compiled.names(), &palpate::evaluate::own_weights(&model))?;
     let longest = compile::longest_time(&model);
-    let (active, json) = (arguments.active, arguments.json);
+    let (active, json) = (arguments.active, global.json);
     let log = arguments.mcap.as_deref().map(|log| log_to(log, &arguments, &compiled.names())).transpose()?;
     let mut stream =
         Stream { recognizer, model: &model, weights, longest, active, json, log, touches: 0, is_any_partial: false };

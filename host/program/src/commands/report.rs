@@ -1,7 +1,7 @@
-use super::noise::NoiseArguments;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
-use super::shell;
+use super::real::RealArguments;
+use super::{Global, shell};
 use palpate::Result;
 use palpate::output::{print, print_json, refuse_stdout};
 use palpate::probe::noise::Noise;
@@ -12,25 +12,22 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate report                    the built-in objects, in about ten minutes
-  palpate report --quick -o quick   fewer touches, in a minute or two
-  palpate report meshes/ -o report  your own meshes
-  palpate report meshes/ --true-size --unit mm --probe probe.toml
-                                    objects as large as they are, and your probe
-  palpate report --noise 0..10ms    with our robust model trained for this noise
+  palpate report                       the built-in objects
+  palpate report --quick -o quick      fewer touches, in a minute or two
+  palpate report meshes/ -o report     your own meshes
+  palpate report meshes/ --true-size mm --probe probe.toml
+                                       objects as large as they are, your probe
+  palpate report --real noise=0..10ms  our robust model trained for this noise
   palpate report meshes/ --recorded recorded --probe probe.toml
-                                    is the simulation of your probe right?
-  palpate report --resume           continue an interrupted report")]
+                                       is the simulation of your probe right?
+  palpate report --resume              continue an interrupted report")]
 pub(crate) struct Arguments {
-    /// Where objects come from: `builtin` or a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or a directory of meshes
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
     #[arg(default_value = "builtin", value_name = "SOURCE")]
     sources: Vec<String>,
-    /// Where the page, its figures and tables go
-    #[arg(short, long, default_value = "report", value_name = "DIR")]
+    /// Where to write; a directory for the page, its figures and tables
+    #[arg(short, long, default_value = "report", value_name = "PATH")]
     output: PathBuf,
-    /// Seed of everything random
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
     /// Fewer folds, levels and touches; the same figures
     #[arg(long)]
     quick: bool,
@@ -40,35 +37,33 @@ pub(crate) struct Arguments {
     /// Recorded touches of the objects, to compare simulated ones with: by the probe of --probe, as it really is
     #[arg(long, value_name = "DIR")]
     recorded: Option<PathBuf>,
-    /// Continue an interrupted report of the same program with the same settings and objects
+    /// Continue what was interrupted, with the same program, settings and objects
     #[arg(long)]
     resume: bool,
-    /// Replace results of another report or run in the same directory
+    /// Write all the same; replaces results of another report or run
     #[arg(long)]
     force: bool,
-    /// Print the summary as JSON
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
-    noise: NoiseArguments,
+    real: RealArguments,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { sources, output, seed, quick, growth, recorded, resume, force, json, size, noise } = arguments;
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { sources, output, quick, growth, recorded, resume, force, size, real: given } = arguments;
+    let seed = global.seed();
     refuse_stdout(&output)?;
     let compared = recorded.iter().flat_map(|path| ["--recorded".to_owned(), path.to_string_lossy().into_owned()]);
     let compared: Vec<String> = compared.collect();
-    let command = command(&sources, seed, quick, growth, &[compared, size.words(), noise.words()].concat());
+    let command = command(&sources, seed, quick, growth, &[compared, size.words(), given.words()].concat());
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
     let growth = settings.growth || growth;
     refuse_unstated(&size)?;
     let capture = size.origin(Origin::default())?;
     let real = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
     let noise = match real {
-        Some(real) => noise.over(real),
-        None if noise.is_given() => noise.over(Noise::default()),
+        Some(real) => given.over(real)?,
+        None if given.is_given() => given.over(Noise::default())?,
         None => settings.noise,
     };
     noise.check()?;
@@ -77,7 +72,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     let objects = || size.objects(&settings.sources, seed);
     let existing = Existing { resume, replace: force };
     let written = palpate_report::report_on(&objects, &settings, &output, existing, &Bar::new())?;
-    if json {
+    if global.json {
         return print_json(&written.summary);
     }
     let times = written.stages.iter().map(|(name, seconds)| format!("  {name:<18}{seconds:8.1} s\n"));
@@ -101,8 +96,14 @@ mod tests {
     fn the_command_of_a_report_makes_it_again() {
         assert_eq!(command(&["builtin".into()], 1, false, false, &[]), "palpate report builtin --seed 1");
         assert_eq!(
-            command(&["my meshes".into(), "cup.obj".into()], 2, true, true, &["--noise".into(), "0ms..5ms".into()]),
-            "palpate report 'my meshes' cup.obj --seed 2 --quick --growth --noise 0ms..5ms"
+            command(
+                &["my meshes".into(), "cup.obj".into()],
+                2,
+                true,
+                true,
+                &["--real".into(), "noise=0ms..5ms".into()]
+            ),
+            "palpate report 'my meshes' cup.obj --seed 2 --quick --growth --real noise=0ms..5ms"
         );
     }
 }

@@ -1,7 +1,7 @@
-use super::noise::NoiseArguments;
 use super::probe::SizeArguments;
 use super::progress::Bar;
-use super::shell;
+use super::real::RealArguments;
+use super::{Global, shell};
 use crate::run;
 use palpate::Result;
 use palpate::output;
@@ -12,55 +12,46 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate run                  ten built-in objects; results in out/
-  palpate run meshes/ -o mine  your own meshes
-  palpate run --touches 2000   a quick look
-  palpate run --noise 0..5ms --timer 1ms
-                               trained for a real switch, and tested with one
-  palpate run meshes/ --true-size --unit mm --probe probe.toml
-                               objects as large as they are, and your probe
+  palpate run                      ten built-in objects; results in out/
+  palpate run meshes/ -o mine      your own meshes
+  palpate run --touches 2000       a quick look
+  palpate run --real noise=0..5ms,timer=1ms
+                                   trained for a real switch, and tested with one
+  palpate run meshes/ --true-size mm --probe probe.toml
+                                   objects as large as they are, and your probe
   palpate run --json | jq .ours.accuracy
 
-Ours is trained for a usual switch, polled every millisecond (--noise 0..5ms --timer 1ms), unless the options or the probe file say otherwise; all methods are tested with the same noise. --noise 0ms --timer 0ms adds none.
+Three methods are trained and compared: the published one, on the times of full touches; ours on full touches; and ours on every approach with a contact, which is the model to use: model.palpate. Models promise an error rate of 1 %.
 
-Three methods are trained and compared: the published one, on the times of full touches; ours on full touches; and ours on every approach with at least one contact, which is the model to use.
-
-The models promise an error rate of 1 %: their thresholds are found on touches that are captured for that and nothing else (see `palpate help calibrate`).
-
-Written into the output directory: data/ (full touches), approaches/ (approaches), paper.json, full.json and ensemble.json (the full models), paper.palpate, full.palpate and model.palpate (the compiled ones), summary.json, report.html, and play.html, on which the objects can be touched (see `palpate help play`).")]
+Touches are disturbed as by a usual switch that is polled every millisecond, unless --real or the probe file says otherwise; --real none adds nothing. docs/reference/options.md lists the files that are written.")]
 pub(crate) struct Arguments {
-    /// What to touch: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
-    /// Directory for the results
-    #[arg(short, long, value_name = "DIR", default_value = "out")]
-    out: PathBuf,
-    /// Touches of each object, a tenth of them to test on
-    #[arg(long, value_name = "N", default_value_t = 21_000, value_parser = touches)]
+    /// Where to write; a directory for the results
+    #[arg(short, long, value_name = "PATH", default_value = "out")]
+    output: PathBuf,
+    /// Touches of each object; a tenth of them to test on
+    #[arg(long, value_name = "N", default_value = "21000", value_parser = touches)]
     touches: u64,
-    /// Approaches to each object, all of them kept, a tenth of them to test on [default: three per touch]
+    /// Approaches to each object; all of them kept, a tenth to test on [default: three per touch]
     #[arg(long, value_name = "N", value_parser = touches)]
     approaches: Option<u64>,
-    /// Seed of all that is random
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Replace results of another run in the same directory
+    /// Write all the same; replaces results of another run
     #[arg(long)]
     force: bool,
-    /// Print the summary as JSON
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
-    noise: NoiseArguments,
+    real: RealArguments,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    output::refuse_stdout(&arguments.out)?;
-    let Arguments { sources, out, touches, approaches, seed, force, json, size, noise } = arguments;
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    output::refuse_stdout(&arguments.output)?;
+    let Arguments { sources, output: out, touches, approaches, force, size, real } = arguments;
+    let (seed, json) = (global.seed(), global.json);
     let approaches = approaches.unwrap_or_else(|| touches.saturating_mul(3));
-    let file = size.probe.read()?;
+    let stated = size.probe.read()?.map(|file| file.real);
     let origin = size.origin(Origin { touches, seed, ..Origin::default() })?;
     super::probe::refuse_unstated(&size)?;
     let objects = size.objects(&sources, seed)?;
@@ -83,9 +74,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
                 .chain(sources.iter().map(String::as_str))
                 .chain(["-o", &out.to_string_lossy(), "--touches", &touches.to_string()])
                 .chain(["--approaches", &approaches.to_string(), "--seed", &seed.to_string()])
-                .chain(size.words().iter().chain(&noise.words()).map(String::as_str)),
+                .chain(size.words().iter().chain(&real.words()).map(String::as_str)),
         ),
-        noise: noise.over(file.map(|file| file.real).filter(|real| !real.is_none()).unwrap_or_else(Noise::switch)),
+        noise: real.over(stated.filter(|real| !real.is_none()).unwrap_or_else(Noise::switch))?,
         sources: sources.clone(),
         // As many as 21,000 touches are worth it for; enough to promise anything at least.
         sequences: usize::try_from(touches / 2).unwrap_or(usize::MAX).clamp(300, run::Settings::default().sequences),

@@ -10,9 +10,7 @@ use std::path::{Path, PathBuf};
 /// Recorded touches, and what they are taught to.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TeachArguments {
-    /// Recorded touches of objects of which there is no mesh: a directory, a file of touches called like its object,
-    /// or a robot's log (MCAP); may be given several times. Their values are added to the trees of the simulated objects; without DIRECTORY the
-    /// ensemble is trained on them alone
+    /// Recorded touches of objects without a mesh: a directory, a file called like its object, or a log (MCAP); repeatable
     #[arg(long, value_name = "RECORDED")]
     pub(crate) teach: Vec<PathBuf>,
     /// Teach the recorded objects to this ensemble, trained on the objects of DIRECTORY, instead of training another one
@@ -21,13 +19,10 @@ pub(crate) struct TeachArguments {
         value_name = "ENSEMBLE",
         requires = "teach",
         requires = "directory",
-        conflicts_with_all = [
-            "preset", "descriptor", "touches", "leaves", "rounds", "depth", "eta", "min_child_weight", "bins", "trainer",
-            "probe", "noise", "timer", "debounce", "missed", "bent", "speed_error", "speed_bias", "pose_noise", "pose_bias",
-        ]
+        conflicts_with_all = ["preset", "descriptor", "evidence", "trees", "probe", "real"]
     )]
     pub(crate) extend: Option<PathBuf>,
-    /// Write a page that shows how well the recorded objects are recognized, and what more approaches would come to
+    /// Write a page that shows how well the recorded objects are recognized, and the gain from more approaches
     #[arg(long, value_name = "FILE", requires = "teach")]
     pub(crate) page: Option<PathBuf>,
 }

@@ -1,9 +1,11 @@
-use super::noise::NoiseArguments;
+use super::Global;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
+use super::real::RealArguments;
 use super::teach::TeachArguments;
+use super::trees::Trees;
 use palpate::ensemble::Ensemble;
-use palpate::ensemble::train::{self, Engine, Settings, Small};
+use palpate::ensemble::train::{self, Settings};
 use palpate::evaluate::{self, CostOfNoise};
 use palpate::mesh::BACKGROUND;
 use palpate::output;
@@ -14,129 +16,63 @@ use palpate::{Error, Result};
 use palpate_onboard::Refused;
 use palpate_shared::format::Counted;
 use palpate_shared::{Descriptor, Touch};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Presets:
-  compact  small and accurate: leaves hold a value per object; uses curvature
-  paper    the published method: one tree per object and round, on contact times
-
-A data set of approaches also holds touches with one or two contacts, and approaches that touched nothing. Partial touches say which fingers touched and, where two did, how long one came after the other; a robot that uses them needs a fraction of the approaches. An approach that touched nothing is evidence only with --touches all: what it says depends on where the robot aims.
-
-The ensemble states the probe that the data set was captured with; models exported from it do as well. With --probe, \
-the data set must have been captured with the probe of the file, and what the file says under [real] is added to the \
-touches, unless they were captured with it and have it already.
-
-With --teach, objects are learned from recorded touches, which are not disturbed further. The trees are those of the simulated objects, or of the ensemble that --extend names; every leaf gets a value more. How much the touches are smoothed is found by cross-validation, and so is a constant that is added with every touch, so that the object is missed as often as others are taken for it. What is printed comes from recorded touches that were held out; of the simulated ones, trees have seen all.
+Presets: compact is small and accurate (leaves hold a value per object; curvature), paper the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, different_leaves, threshold_cost, trainer; docs/reference/options.md explains them, --teach and --evidence.
 
 Examples:
   palpate train data -o ensemble.json
   palpate train data -o paper.json --preset paper
-  palpate train data -o small.json --rounds 20 --depth 5
-  palpate capture builtin -o approaches --approaches --touches 60000
-  palpate train approaches -o contacts.json
-  palpate train approaches -o all.json --touches all
-  palpate capture background -o shapes --approaches --touches 60000
+  palpate train data -o small.json --trees rounds=20,depth=5
+  palpate train data -o table.json --trees bins=64/16
+  palpate train data -o tiny.json --trees different_leaves=128,leaf_bits=8
+  palpate train data -o robust.json --real noise=0..10ms,timer=1ms
+  palpate train approaches -o all.json --evidence all
   palpate train approaches -o wary.json --background shapes
-  palpate train data -o table.json --bins 64,16  for a small, very fast table
-  palpate train data -o tiny.json --different-leaves 128 --leaf-bits 8
-  palpate train data -o robust.json --noise 0..10ms --timer 1ms
-  palpate train data -o real.json --probe probe.toml
-  palpate train approaches -o taught.json --teach pot.txt
   palpate train approaches -o taught.json --teach pot.txt --page pot.html
-  palpate train approaches -o more.json --extend taught.json --teach real
-  palpate train --teach real -o own.json  no simulation at all
-  palpate train data -o turned.json --descriptor oriented --pose-noise 5deg")]
+  palpate train --teach recorded -o own.json")]
 pub(crate) struct Arguments {
-    /// Directory that `palpate capture` filled
+    /// Touches to train on: a directory that `palpate capture` filled
     #[arg(required_unless_present = "teach")]
     directory: Option<PathBuf>,
     #[command(flatten)]
     teach: TeachArguments,
-    /// Where to save the ensemble
-    #[arg(short, long, value_name = "FILE")]
+    /// Where to write; the ensemble
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Touches of many other shapes: trains a column more, for what the model does not know, which is never named
-    #[arg(long, value_name = "DIR2")]
+    /// Touches of many other shapes; they train a column for what the model does not know
+    #[arg(long, value_name = "DIR")]
     background: Option<PathBuf>,
-    /// Where the settings below start from
-    #[arg(long, value_enum, default_value = "compact")]
+    /// Where the settings start from
+    #[arg(long, value_parser = preset, default_value = "compact", value_name = "compact|paper")]
     preset: Preset,
     /// Which features a touch is turned into [default: the preset's]
     #[arg(long, value_parser = descriptor, value_name = "times|curvature|gravity|oriented")]
     descriptor: Option<Descriptor>,
-    /// Which touches are trained on, and so evidence: full ones, those with at least one contact, or every approach, also those that touched nothing [default: contacts where the data set holds approaches, else full; full for the paper's preset]
-    #[arg(long, value_enum)]
-    touches: Option<Touches>,
-    /// What a leaf holds: a value for each object, or one value (and each object has its own trees) [default: the preset's]
-    #[arg(long, value_enum)]
-    leaves: Option<Leaves>,
-    /// Boosting rounds [default: the preset's; compact 30, paper 100]
-    #[arg(long)]
-    rounds: Option<usize>,
-    /// The most splits between root and leaf [default: the preset's; 6]
-    #[arg(long)]
-    depth: Option<usize>,
-    /// The share of each tree that is added [default: the preset's; 0.3]
-    #[arg(long)]
-    eta: Option<f64>,
-    /// The least sum of second derivatives in a leaf [default: the preset's; compact 30, paper 1]
-    #[arg(long, value_name = "WEIGHT")]
-    min_child_weight: Option<f64>,
-    /// The most bins of a feature's histogram, for all features or for each [default: the preset's; 256]
-    #[arg(long, value_delimiter = ',', value_name = "BINS[,BINS…]")]
-    bins: Vec<usize>,
-    /// Round leaves to multiples of a power of two that fit this many bits, so that a compiled model with leaves of that width is exact; 0 leaves them as they are [default: the preset's; compact 16, paper 0]
-    #[arg(long, value_name = "BITS")]
-    leaf_bits: Option<u32>,
-    /// Grow trees for little flash: the leaves of all trees share at most this many lists of values, and thresholds cost. Up to 256 a leaf takes one byte of the exported model; with --leaf-bits 8 models with i8 leaves are exact
-    #[arg(long, value_name = "COUNT")]
-    different_leaves: Option<usize>,
-    /// With --different-leaves: what a threshold that no tree had before has to save, as loss of a touch in nats [default: 2e-5]
-    #[arg(long, value_name = "NATS", requires = "different_leaves")]
-    threshold_cost: Option<f64>,
+    /// Which approaches are evidence; those with three contacts, with at least one, or all [default: as the data set has]
+    #[arg(long, value_parser = evidence, value_name = "full|contacts|all")]
+    evidence: Option<Counted>,
+    /// How trees are grown, such as rounds=30,depth=6,eta=0.3 [default: the preset's]
+    #[arg(long, value_name = "KEY=VALUE,…")]
+    trees: Option<Trees>,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
-    noise: NoiseArguments,
-    /// Seed of the noise
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Threads; the ensemble is the same for any number [default: all]
-    #[arg(long)]
-    threads: Option<usize>,
-    /// The trainer: palpate, or xgboost (version 1.6.2, only with --leaves one), which needs the cargo feature of that name
-    #[arg(long, value_parser = trainer, value_name = "palpate|xgboost", default_value = "palpate")]
-    trainer: Engine,
-    /// Print what was trained as JSON
-    #[arg(long)]
-    json: bool,
+    real: RealArguments,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
+#[derive(Clone, Copy)]
 enum Preset {
     Compact,
     Paper,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Touches {
-    Full,
-    Contacts,
-    All,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Leaves {
-    Each,
-    One,
-}
-
 #[derive(serde::Serialize)]
-struct Trained {
+struct Trained<'m> {
     descriptor: &'static str,
     objects: usize,
     /// Touches of the data set.
@@ -152,7 +88,7 @@ struct Trained {
     cost_of_noise: Option<CostOfNoise>,
     /// What was learned from recorded touches.
     #[serde(skip_serializing_if = "Option::is_none")]
-    taught: Option<Taught>,
+    taught: Option<&'m Taught>,
 }
 
 /// The noise whose cost is given, in microseconds: what a good switch and a timer add.
@@ -168,73 +104,84 @@ struct Made {
     settings: Settings,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let read = arguments.directory.iter().flat_map(|directory| super::files_of(directory));
     let read: Vec<PathBuf> = read.chain(arguments.teach.files()).collect();
     output::refuse_input(&arguments.output, &read)?;
     arguments.teach.page.iter().try_for_each(|page| output::refuse_input(page, &read))?;
     let start = Instant::now();
     let recorded = arguments.teach.read()?;
-    let Made { ensemble, dataset, taught, is_clean, settings } = match (&arguments.directory, recorded) {
-        (Some(directory), recorded) => simulated(&arguments, directory, recorded.as_ref())?,
-        (None, recorded) => alone(&arguments, recorded.unwrap_or_default())?,
+    let made = match (&arguments.directory, recorded) {
+        (Some(directory), recorded) => simulated(&arguments, global, directory, recorded.as_ref())?,
+        (None, recorded) => alone(&arguments, global, recorded.unwrap_or_default())?,
     };
     let seconds = start.elapsed().as_secs_f64();
-    ensemble.save(&arguments.output)?;
-    arguments.teach.write_page(taught.as_ref())?;
-    let evidence = ensemble.trained_touches();
-    let is_used = |touch: &&Touch| Refused::check(&evidence, touch).is_ok();
-    let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
-    let trees = ensemble.trees.len();
-    // A binary tree has one leaf more than splits.
-    let splits = (nodes - trees) / 2;
-    let trained = Trained {
-        descriptor: ensemble.descriptor().map_or("", Descriptor::name),
-        objects: ensemble.known_count(),
-        touches: dataset.len(),
-        used: dataset.touches().filter(is_used).count(),
-        counted: evidence.counted.name(),
-        trees,
-        splits,
-        leaves: nodes - splits,
-        seconds,
-        taught,
-        cost_of_noise: match is_clean {
-            true => evaluate::cost_of_noise(&dataset, &settings, &Noise::gaussian(SWITCH))?,
-            false => None,
-        },
-    };
-    if arguments.json {
-        return output::print_json_about(&arguments.output, &trained);
+    made.ensemble.save(&arguments.output)?;
+    arguments.teach.write_page(made.taught.as_ref())?;
+    let trained = Trained::new(&made, seconds)?;
+    match global.json {
+        true => output::print_json_about(&arguments.output, &trained),
+        false => output::print_about(&arguments.output, &text(&arguments.output, &trained, &made)),
     }
+}
+
+impl<'m> Trained<'m> {
+    fn new(made: &'m Made, seconds: f64) -> Result<Self> {
+        let Made { ensemble, dataset, taught, is_clean, settings } = made;
+        let evidence = ensemble.trained_touches();
+        let is_used = |touch: &&Touch| Refused::check(&evidence, touch).is_ok();
+        let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
+        let trees = ensemble.trees.len();
+        // A binary tree has one leaf more than splits.
+        let splits = (nodes - trees) / 2;
+        Ok(Self {
+            descriptor: ensemble.descriptor().map_or("", Descriptor::name),
+            objects: ensemble.known_count(),
+            touches: dataset.len(),
+            used: dataset.touches().filter(is_used).count(),
+            counted: evidence.counted.name(),
+            trees,
+            splits,
+            leaves: nodes - splits,
+            seconds,
+            taught: taught.as_ref(),
+            cost_of_noise: match is_clean {
+                true => evaluate::cost_of_noise(dataset, settings, &Noise::gaussian(SWITCH))?,
+                false => None,
+            },
+        })
+    }
+}
+
+/// What was trained, as text.
+fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
     let text = format!(
         "{}: {} trees, {} splits on {} of {} of {} {} of {} objects ({}), trained in {:.1} s\n",
-        arguments.output.display(),
+        output.display(),
         trained.trees,
         trained.splits,
         trained.descriptor,
         trained.used,
         trained.touches,
-        if dataset.holds_approaches() { "approaches" } else { "touches" },
-        dataset.objects.len(),
-        match evidence.counted {
+        if made.dataset.holds_approaches() { "approaches" } else { "touches" },
+        made.dataset.objects.len(),
+        match made.ensemble.trained_touches().counted {
             Counted::Full => "full touches",
             Counted::Contacts => "those with a contact",
             Counted::All => "all of them",
         },
         trained.seconds
     );
-    let text = text + &cost(&trained, is_clean) + &trained.taught.as_ref().map_or_else(String::new, super::teach::text);
-    output::print_about(&arguments.output, &text)
+    text + &cost(trained, made.is_clean) + &trained.taught.map_or_else(String::new, super::teach::text)
 }
 
 /// Trains on simulated touches, or takes the ensemble that was, and teaches it the recorded ones, if there are any.
-fn simulated(arguments: &Arguments, directory: &PathBuf, recorded: Option<&Dataset>) -> Result<Made> {
+fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, recorded: Option<&Dataset>) -> Result<Made> {
     let dataset = super::dataset(directory)?;
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let mut settings = Settings { probe, ..arguments.settings() };
-    settings.noise = arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, settings.noise)?);
+    let mut settings = Settings { probe, ..arguments.settings(global) };
+    settings.noise = arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, settings.noise)?)?;
     let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
     let in_directory = |error: Error| match error.exit_code() {
         1 => error.in_file(directory),
@@ -263,10 +210,10 @@ fn simulated(arguments: &Arguments, directory: &PathBuf, recorded: Option<&Datas
 }
 
 /// Trains on recorded touches alone.
-fn alone(arguments: &Arguments, recorded: Dataset) -> Result<Made> {
-    if arguments.noise.is_given() {
+fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Made> {
+    if arguments.real.is_given() {
         return Err(Error::setting(
-            "noise",
+            "real",
             "given",
             "it with simulated touches: recorded ones have noise of their own",
         ));
@@ -277,7 +224,7 @@ fn alone(arguments: &Arguments, recorded: Dataset) -> Result<Made> {
     }
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &recorded)?;
-    let settings = Settings { probe, noise: Noise::default(), ..arguments.settings() };
+    let settings = Settings { probe, noise: Noise::default(), ..arguments.settings(global) };
     let (ensemble, taught) = teach::alone(&recorded, &settings, &teaching(&settings), &Bar::new())?;
     Ok(Made { ensemble, dataset: recorded, taught: Some(taught), is_clean: false, settings })
 }
@@ -289,12 +236,12 @@ fn teaching(settings: &Settings) -> teach::Settings {
 }
 
 /// What noise would cost, as a line; nothing where the training had noise.
-fn cost(trained: &Trained, is_clean: bool) -> String {
+fn cost(trained: &Trained<'_>, is_clean: bool) -> String {
     let ms = SWITCH / 1e3;
     match trained.cost_of_noise {
         Some(CostOfNoise { touches, clean, noisy }) => format!(
             "{ms} ms of noise on contact times would cost about {:.0} points: {:.0} instead of {:.0} % correct after {touches} \
-             touches. --noise {ms}ms trains for it.\n",
+             touches. --real noise={ms}ms trains for it.\n",
             100.0 * (clean - noisy),
             100.0 * noisy,
             100.0 * clean,
@@ -309,47 +256,34 @@ fn cost(trained: &Trained, is_clean: bool) -> String {
 
 impl Arguments {
     /// All but the noise and the probe.
-    fn settings(&self) -> Settings {
+    fn settings(&self, global: &Global) -> Settings {
         let preset = match self.preset {
             Preset::Compact => Settings::compact(),
             Preset::Paper => Settings::paper(),
         };
-        Settings {
+        let settings = Settings {
             descriptor: self.descriptor.unwrap_or(preset.descriptor),
-            counted: match self.touches {
-                None => preset.counted,
-                Some(Touches::Full) => Some(Counted::Full),
-                Some(Touches::Contacts) => Some(Counted::Contacts),
-                Some(Touches::All) => Some(Counted::All),
-            },
-            multi_output: self.leaves.map_or(preset.multi_output, |leaves| matches!(leaves, Leaves::Each)),
-            rounds: self.rounds.unwrap_or(preset.rounds),
-            depth: self.depth.unwrap_or(preset.depth),
-            eta: self.eta.unwrap_or(preset.eta),
-            min_child_weight: self.min_child_weight.unwrap_or(preset.min_child_weight),
-            bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
-            feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
-            leaf_bits: self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-            small: self.different_leaves.map(|leaves| {
-                let threshold_cost = self.threshold_cost.unwrap_or(Small::default().threshold_cost);
-                Small { leaves, threshold_cost }
-            }),
-            noise: preset.noise,
-            seed: self.seed,
-            threads: self.threads,
+            counted: self.evidence.or(preset.counted),
+            seed: global.seed(),
+            threads: global.threads,
             probe: None,
-            trainer: self.trainer,
-        }
+            ..preset
+        };
+        self.trees.as_ref().map_or_else(|| settings.clone(), |trees| trees.over(settings.clone()))
     }
 }
 
-fn trainer(name: &str) -> Result<Engine, String> {
+fn preset(name: &str) -> Result<Preset, String> {
     match name {
-        "palpate" => Ok(Engine::Palpate),
-        "xgboost" => Ok(Engine::Xgboost),
-        "hessboost" => Err("the trainer is called palpate now; its trees are the same".into()),
-        _ => Err("use palpate or xgboost".into()),
+        "compact" => Ok(Preset::Compact),
+        "paper" => Ok(Preset::Paper),
+        _ => Err("use compact or paper".into()),
     }
+}
+
+pub(super) fn evidence(name: &str) -> Result<Counted, String> {
+    let found = Counted::ALL.iter().copied().find(|counted| counted.name() == name);
+    found.ok_or_else(|| "use one of full, contacts, all".to_owned())
 }
 
 pub(super) fn descriptor(name: &str) -> Result<Descriptor, String> {

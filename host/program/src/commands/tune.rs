@@ -1,8 +1,9 @@
+use super::Global;
 use super::chips::{core, features};
-use super::noise::NoiseArguments;
-use super::numbers::error_rate;
+use super::numbers::{error_rate, sequences};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
+use super::real::RealArguments;
 use palpate::Result;
 use palpate::compile::Core;
 use palpate::output;
@@ -15,21 +16,20 @@ use std::path::PathBuf;
 /// Find the best model that fits a chip.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Trains a family of ensembles, compiles each in several ways, and keeps the model that needs the fewest touches within the limits. It is chosen on touches held out from training, calibrated to the error rate on others, and measured on others again.
-
-For small limits it also trains ensembles of few thresholds, whose trees share their leaves (palpate train --different-leaves). More touches make these more accurate and hardly slower to train: capture with --touches 210000.
+Trains a family of ensembles, compiles each in several ways, and keeps the model that needs the fewest touches within the limits. It is chosen on touches held out from training, calibrated to the error rate on others, and measured on others again. For small limits it also trains ensembles of few thresholds, whose trees share their leaves; more touches make these more accurate: capture with --touches 210000.
 
 Examples:
   palpate tune data --max-bytes 16K -o model.palpate
   palpate tune data --max-bytes 16K --max-instructions 600 -o fast.palpate
   palpate tune data --max-instructions 2000 --chip m0+ -o m0.palpate
-  palpate tune data --noise 0..10ms --timer 1ms -o robust.palpate
+  palpate tune data --real noise=0..10ms,timer=1ms -o robust.palpate
   palpate tune data --json")]
 pub(crate) struct Arguments {
-    /// Directory that `palpate capture` filled
+    /// Touches: a directory that `palpate capture` filled
+    #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Where to write the best model that fits
-    #[arg(short, long, value_name = "FILE")]
+    /// Where to write; the best model that fits
+    #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
     /// Where to save its ensemble
     #[arg(long, value_name = "FILE")]
@@ -38,33 +38,27 @@ pub(crate) struct Arguments {
     #[arg(long, value_parser = bytes, value_name = "BYTES")]
     max_bytes: Option<usize>,
     /// The most instructions per touch
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "N")]
     max_instructions: Option<u64>,
-    /// The processor that the limit of instructions is for
+    /// The processor; instructions are counted for it
     #[arg(long, value_parser = core, default_value = "m4f", value_name = "m0+|m4f")]
     chip: Core,
     /// Which features a touch is turned into
-    #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "NAME")]
+    #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "times|curvature|gravity|oriented")]
     descriptor: Descriptor,
-    /// The error rate that the model promises, such as 0.05 or 5%
+    /// The share of wrong names to accept, such as 1%; the model promises it
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
-    /// Groups of touches, and sequences, to draw at random for each object
-    #[arg(long, default_value_t = 1000)]
-    groups: usize,
-    /// Seed of the split and of the drawing
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Print all models of the family, and the choice, as JSON
-    #[arg(long)]
-    json: bool,
+    /// Sequences of touches to draw; of each object, and as many groups
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences)]
+    sequences: usize,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
-    noise: NoiseArguments,
+    real: RealArguments,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     for path in [&arguments.output, &arguments.ensemble].into_iter().flatten() {
         output::refuse_input(path, super::files_of(&arguments.directory))?;
     }
@@ -78,10 +72,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
             max_instructions: arguments.max_instructions,
             core: arguments.chip,
             probe: arguments.probe.of_dataset(file.as_ref(), &dataset)?,
-            noise: arguments.noise.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?),
+            noise: arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?,
             error_rate: arguments.error_rate,
-            groups: arguments.groups,
-            seed: arguments.seed,
+            groups: arguments.sequences,
+            seed: global.seed(),
         },
         &Bar::new(),
     )?;
@@ -92,7 +86,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
         output::write_bytes(path, &tuned.model)?;
     }
     let written = arguments.output.clone().unwrap_or_default();
-    if arguments.json {
+    if global.json {
         return output::print_json_about(&written, &tuned);
     }
     let mut text = table(&tuned);

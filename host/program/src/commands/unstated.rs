@@ -4,8 +4,7 @@ use palpate::ensemble::import::Options;
 
 #[derive(clap::Args)]
 pub(super) struct UnstatedArguments {
-    /// The number that stood for a missing value in training, such as 0 or -999 (XGBoost's `missing=`, which no file
-    /// holds); NaN always does
+    /// The number that stood for a missing value in training (XGBoost's `missing=`), such as 0; NaN always does
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     missing: Option<f32>,
     /// Take all trees where training stopped early, not those up to the best iteration

@@ -1,3 +1,4 @@
+use super::Global;
 use super::progress::Bar;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
@@ -9,55 +10,60 @@ use palpate::output;
 use palpate::rows::{Rows, read_margins};
 use std::path::PathBuf;
 
-/// Compare a model over rows with the file that it was exported from.
+/// Compare a compiled model with what it was exported from.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Every row goes through the model and through the file's own trees. So do rows that are made at every split: its feature at the threshold, one step to each side of it, and missing; and rows with features that are missing, infinite or subnormal.
+Of a model of touches, every touch of DATA, a directory, goes through model and ensemble: margins, and the best object. Then random sequences of touches, each of one object, go through both until there is a verdict.
 
-ROWS is a CSV file: a header with the features' names, one row per line, empty cells for missing values. Columns are matched by name, or by position if their names are others and their number is right.
+Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output.
 
-With --library-margins the model is also compared with the library's own raw scores of the rows: no header, one row per line, one column per output, or one column for a binary model (the score of its second class). In Python, for XGBoost: np.savetxt(\"margins.csv\", booster.predict(rows, output_margin=True), delimiter=\",\").
-
-Classes are those of the largest margin, and ties go as the library has them.
-
-The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the rounding that the model states does not explain it.
+The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the stated rounding does not explain it.
 
 Examples:
-  palpate verify model.palpate xgboost.json rows.csv
+  palpate verify model.palpate ensemble.json data
   palpate verify model.palpate lightgbm.txt rows.csv --json
   palpate verify model.palpate m.json rows.csv --library-margins margins.csv")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
-    model: PathBuf,
-    /// File that it was exported from
-    ensemble: PathBuf,
-    /// Rows of features
-    #[arg(value_name = "ROWS.csv")]
-    rows: PathBuf,
+    pub(super) model: PathBuf,
+    /// The file that it was exported from
+    pub(super) ensemble: PathBuf,
+    /// Touches (a directory), or rows of features (a CSV file)
+    #[arg(value_name = "DATA")]
+    pub(super) data: PathBuf,
+    /// Sequences of touches to draw; of all objects together
+    #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
+    pub(super) sequences: usize,
     /// The library's own raw scores of the rows
     #[arg(long, value_name = "MARGINS.csv")]
     library_margins: Option<PathBuf>,
     #[command(flatten)]
     unstated: UnstatedArguments,
-    /// Print the result as JSON
-    #[arg(long)]
-    json: bool,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
     let ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(None))?;
     if ensemble.descriptor().is_some() {
-        return Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches));
+        return match (&arguments.library_margins, arguments.data.is_file()) {
+            (Some(margins), _) => {
+                Err(Error::setting("library_margins", margins.display(), "it with a model of another library"))
+            }
+            // A log is a data set, too.
+            (None, true) if !palpate::touches::is_log(&arguments.data) => {
+                Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches))
+            }
+            (None, _) => super::parity::run(&arguments, &ensemble, &compiled, global),
+        };
     }
-    let rows = read_rows(&arguments.rows, &ensemble.inputs.names(), None)?;
+    let rows = read_rows(&arguments.data, &ensemble.inputs.names(), None)?;
     let library = arguments.library_margins.as_deref().map(read_margins).transpose()?;
     let place = |error: Error| match (&arguments.library_margins, error.problem()) {
         (Some(path), Some(problem)) if RowsProblem::is_about_margins(problem) => error.in_file(path),
         _ => error.in_file(&arguments.model),
     };
     let verified = verify(&compiled.model(), &ensemble, &rows, library.as_deref(), &Bar::new()).map_err(place)?;
-    if arguments.json {
+    if global.json {
         output::print_json(&verified)?;
     } else {
         output::print(&text(&verified))?;
@@ -69,10 +75,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
 pub(super) fn read_rows(path: &std::path::Path, features: &[&str], label: Option<&str>) -> Result<Rows> {
     let rows = Rows::read(path, features, label)?;
     if rows.by_position {
-        eprintln!(
+        super::remark(&format!(
             "palpate: note: {}: columns are taken by their position, since the header does not name all features",
             path.display()
-        );
+        ));
     }
     Ok(rows)
 }

@@ -1,81 +1,108 @@
+//! `palpate view`: a page that shows an object, or on which objects are touched.
+
+use super::Global;
+use super::play;
 use super::probe::{SizeArguments, refuse_unstated};
+use super::real::RealArguments;
 use glam::DVec3;
-use palpate::Result;
 use palpate::error::CaptureProblem;
 use palpate::mesh::facts::Facts;
 use palpate::output;
-use palpate::probe::approach::Probe;
 use palpate::touches::Origin;
+use palpate::{Error, Result};
 use palpate_report::view;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Examples:
-  palpate view bowl -o bowl.html                  a built-in object
-  palpate view cup.stl -o cup.html                is your own mesh right?
-  palpate view fork -o fork.html --touches 60     more touches
-  palpate view cup.obj -o cup.html --radius 0.05  with thinner fingers
-  palpate view cup.obj -o cup.html --true-size --unit mm --probe probe.toml
-                                                  as large as it is
+Pages work in any browser, without a network. The inside of a surface is orange: a mesh that shows orange from outside is inside out, or has holes.
 
-The page works in any browser, without a network. The inside of the surface is orange: a mesh that shows orange from
-outside is inside out, or has holes.")]
+With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute.
+
+Examples:
+  palpate view bowl -o bowl.html                a built-in object
+  palpate view cup.stl -o cup.html              is your own mesh right?
+  palpate view fork -o fork.html --touches 60   more touches
+  palpate view cup.obj -o cup.html --true-size mm --probe probe.toml
+                                                as large as it is, your probe
+  palpate view --play -o play.html              ten objects, four models
+  palpate view --play meshes/ -o play.html      your own meshes
+  palpate view --play --model models/household.palpate -o play.html")]
 pub(crate) struct Arguments {
-    /// A mesh (OBJ, STL, PLY, glTF, GLB or COLLADA), or the name of a built-in object if there is no such file
-    #[arg(value_name = "OBJECT")]
-    object: String,
-    /// The page to write
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
-    /// How many touches with all three fingers to show
-    #[arg(long, value_name = "N", default_value_t = view::Settings::default().touches)]
-    touches: usize,
-    /// How many approaches to show in which a finger missed
-    #[arg(long, value_name = "N", default_value_t = view::Settings::default().misses)]
+    /// An object: a built-in object's name, or a mesh (OBJ, STL, PLY, glTF, GLB, COLLADA); with --play several, or directories
+    #[arg(value_name = "SOURCE", required_unless_present = "play")]
+    pub(super) sources: Vec<String>,
+    /// Where to write; the page
+    #[arg(short, long, value_name = "PATH")]
+    pub(super) output: PathBuf,
+    /// Touches of each object; to show [default: 24], or with --play to train on [default: 10000]
+    #[arg(long, value_name = "N", value_parser = super::numbers::count)]
+    pub(super) touches: Option<u64>,
+    /// Approaches to show in which a finger missed
+    #[arg(long, value_name = "N", default_value = "12", conflicts_with = "play")]
     misses: usize,
-    /// The seed of the approaches
-    #[arg(long, value_name = "N", default_value_t = view::Settings::default().seed)]
-    seed: u64,
-    /// The longest side of the object's bounding box, in units
-    #[arg(long, value_name = "UNITS", default_value_t = view::Settings::default().length, conflicts_with = "true_size")]
-    length: f64,
-    /// The fingers' radius, in units [default: the probe file's; 0.15]
-    #[arg(long, value_name = "UNITS")]
-    radius: Option<f64>,
-    /// The distance between neighboring fingers, in units [default: the probe file's; 1.5]
-    #[arg(long, value_name = "UNITS")]
-    spacing: Option<f64>,
+    /// Make a page on which the objects are touched, with the recognizer inside
+    #[arg(long)]
+    play: bool,
+    /// A compiled model for the page; may be given several times
+    #[arg(long, value_name = "FILE", requires = "play", conflicts_with = "touches")]
+    pub(super) model: Vec<PathBuf>,
+    /// For tests of the page: also write what it has to compute, as this program computes it
+    #[arg(long, value_name = "FILE", requires = "play")]
+    pub(super) trace: Option<PathBuf>,
     #[command(flatten)]
-    size: SizeArguments,
+    pub(super) size: SizeArguments,
+    #[command(flatten)]
+    pub(super) real: RealArguments,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    output::refuse_input(&arguments.output, [&arguments.object])?;
-    let Arguments { touches, misses, seed, length, radius, spacing, size, .. } = &arguments;
-    let origin = size.origin(Origin { length: *length, ..Origin::default() })?;
+/// What is printed of a page.
+#[derive(serde::Serialize)]
+struct Shown<'a> {
+    page: &'a PathBuf,
+    object: &'a str,
+    /// What is wrong with the mesh.
+    complaints: Vec<String>,
+    /// Whether it can be touched as it is.
+    verdict: String,
+}
+
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    if arguments.play {
+        return play::run(arguments, global);
+    }
+    let Arguments { sources, output, touches, misses, size, real, .. } = &arguments;
+    let [source] = &sources[..] else {
+        return Err(Error::setting("play", "not given", "it to see several objects on one page"));
+    };
+    if real.is_given() {
+        return Err(Error::setting("real", "given", "it with --play: touches are shown as the simulator makes them"));
+    }
+    output::refuse_input(output, [source])?;
+    let origin = size.origin(Origin::default())?;
     refuse_unstated(size)?;
-    let object = size.object(&arguments.object)?;
+    let object = size.object(source)?;
     let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
     let length = object.instances().next().and_then(|first| origin.length_of(&object, first)).ok_or_else(unknown)?;
-    let probe = Probe {
-        radius: radius.unwrap_or(origin.probe.radius),
-        spacing: spacing.unwrap_or(origin.probe.spacing),
-        ..origin.probe
-    };
-    let clearance = Origin { probe, ..origin }.clearance([DVec3::ZERO, DVec3::splat(length)]);
+    let probe = origin.probe;
+    let clearance = origin.clearance([DVec3::ZERO, DVec3::splat(length)]);
+    let touches = touches.map_or(view::Settings::default().touches, |touches| touches as usize);
     let page = view::page(
         &object,
-        &view::Settings { touches: *touches, misses: *misses, seed: *seed, length, clearance, probe },
+        &view::Settings { touches, misses: *misses, seed: global.seed(), length, clearance, probe },
     )?;
-    output::write_bytes(&arguments.output, page.as_bytes())?;
-    let mut text = format!("{}: open it in a browser\n", arguments.output.display());
+    output::write_bytes(output, page.as_bytes())?;
     let facts = Facts::of(object.mesh());
     let complaints = facts.complaints(object.millimeters);
+    let verdict = view::verdict(&facts, length, &probe);
+    if global.json {
+        return output::print_json_about(output, &Shown { page: output, object: &object.name, complaints, verdict });
+    }
+    let mut text = format!("{}: open it in a browser\n", output.display());
     match complaints.is_empty() {
         true => text += &format!("{}: nothing is wrong with the mesh\n", object.name),
         false => complaints.iter().for_each(|complaint| text += &format!("{}: {complaint}\n", object.name)),
     }
-    text += &format!("{}: {}\n", object.name, view::verdict(&facts, length, &probe));
-    output::print_about(&arguments.output, &text)
+    text += &format!("{}: {}\n", object.name, verdict);
+    output::print_about(output, &text)
 }

@@ -94,7 +94,7 @@ fn the_summary_as_json_holds_what_the_manifest_holds() {
 #[test]
 fn every_approach_is_kept_when_asked_and_one_that_touches_nothing_is_three_dashes() {
     let directory = meshes();
-    stdout(capture(directory.path(), "out", &["--touches", "400", "--approaches"]).output().unwrap());
+    stdout(capture(directory.path(), "out", &["--approaches", "400"]).output().unwrap());
     let text = std::fs::read_to_string(directory.path().join("out/globe.txt")).unwrap();
     assert_eq!(text.lines().count(), 400);
     assert!(text.lines().any(|line| line == "- - -"));
@@ -120,7 +120,8 @@ fn wrong_input_is_refused_and_nothing_is_left_behind() {
     }
     let error = stderr(run(["capture", "nowhere.obj", "-o", "never"]), 1);
     assert!(error.contains("nowhere.obj: cannot read the mesh"), "{error}");
-    for wrong in [&["--radius", "-1"][..], &["--tilt", "90"], &["--touches", "0"], &["--shard", "3/2"], &["--sed", "1"]]
+    for wrong in
+        [&["--length", "-1"][..], &["--threads", "0"], &["--touches", "0"], &["--shard", "3/2"], &["--sed", "1"]]
     {
         stderr(capture(directory.path(), "out", wrong).output().unwrap(), 2);
         assert!(!directory.path().join("out").exists());
@@ -275,7 +276,9 @@ fn an_object_is_added_with_the_settings_of_the_others() {
         let mesh = directory.path().join("meshes").join(mesh);
         command(["capture"]).arg(mesh).arg("-o").arg(directory.path().join("real")).args(more).output().unwrap()
     };
-    let settings = ["--touches", "30", "--seed", "5", "--spacing", "2", "--pose"];
+    let probe = directory.path().join("probe.toml");
+    std::fs::write(&probe, "radius = 0.15\nspacing = 2\nspeed = 10\n").unwrap();
+    let settings = ["--touches", "30", "--seed", "5", "--probe", probe.to_str().unwrap(), "--pose"];
     stdout(one("globe.obj", &settings));
     stdout(one("apple.obj", &["--add"]));
     stdout(capture(directory.path(), "together", &settings).output().unwrap());
@@ -364,7 +367,7 @@ fn an_edited_line_is_a_warning_and_a_cut_file_an_error() {
     let path = directory.path().join("out/apple.txt");
     let text = std::fs::read_to_string(&path).unwrap();
     let train = || {
-        let mut command = command(["train", "--rounds", "2", "-o"]);
+        let mut command = command(["train", "--trees", "rounds=2", "-o"]);
         command.args([directory.path().join("ensemble.json"), directory.path().join("out")]).output().unwrap()
     };
     let untouched = train();
@@ -384,7 +387,8 @@ fn results_go_through_links_and_to_standard_output_and_never_onto_what_is_read()
     let directory = meshes();
     stdout(capture(directory.path(), "out", &["--touches", "400"]).output().unwrap());
     let at = |name: &str| directory.path().join(name);
-    let train = |output: &Path| command(["train", "--rounds", "2", "-o"]).arg(output).arg(at("out")).output().unwrap();
+    let train =
+        |output: &Path| command(["train", "--trees", "rounds=2", "-o"]).arg(output).arg(at("out")).output().unwrap();
     stdout(train(&at("ensemble.json")));
     let ensemble = std::fs::read(at("ensemble.json")).unwrap();
     // Through a link, and to standard output, where nothing else may stand.
@@ -398,9 +402,10 @@ fn results_go_through_links_and_to_standard_output_and_never_onto_what_is_read()
         assert!(String::from_utf8_lossy(&output.stderr).contains("trees"), "the summary goes to stderr");
     }
     // Onto what is read.
-    for (output, arguments) in
-        [(at("out/apple.txt"), ["train", "--rounds", "2"]), (at("out/dataset.json"), ["train", "--rounds", "2"])]
-    {
+    for (output, arguments) in [
+        (at("out/apple.txt"), ["train", "--trees", "rounds=2"]),
+        (at("out/dataset.json"), ["train", "--trees", "rounds=2"]),
+    ] {
         let before = std::fs::read(&output).unwrap();
         let error = stderr(command(arguments).arg("-o").arg(&output).arg(at("out")).output().unwrap(), 2);
         assert!(error.contains("Use another file than what is read"), "{error}");

@@ -79,7 +79,7 @@ fn link_loads_a_model_and_says_what_is_on_the_chip() {
 fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
     let place = Place::new();
     let (model, data, journal) = (place.text("model.palpate"), place.text("data"), place.text("journal.jsonl"));
-    let arguments = ["--load", &model, "--parity", &data, "--touches", "40", "--sequence", "5"];
+    let arguments = ["--load", &model, "--parity", &data, "--stop-after", "40", "--per-object", "5"];
     let mut command = command(["link", &chip()]);
     let summary = json(command.args(arguments).args(["--journal", &journal, "--json"]).output().unwrap());
     assert_eq!(
@@ -93,7 +93,7 @@ fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
     let kinds = |kind: &str| entries.iter().filter(|entry| entry["is"] == kind).count();
     assert_eq!((kinds("model"), kinds("object"), kinds("touch"), kinds("link")), (1, 8, 40, 1));
 
-    let watched = stdout(run(["watch", &journal]));
+    let watched = stdout(run(["link", &journal, "--watch"]));
     let lines: Vec<&str> = watched.lines().collect();
     assert_eq!(lines.len(), entries.len(), "{watched}");
     assert!(lines[0].starts_with("model of ") && lines[0].ends_with(": bowl, fork"), "{watched}");
@@ -110,7 +110,7 @@ fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
 fn link_counts_every_touch_once_over_a_bad_line() {
     let place = Place::new();
     let (model, data) = (place.text("model.palpate"), place.text("data"));
-    let arguments = ["--load", &model, "--parity", &data, "--touches", "500", "--bad-line", "0.001,0.001,0.02,0"];
+    let arguments = ["--load", &model, "--parity", &data, "--stop-after", "500", "--bad-line", "0.001,0.001,0.02,0"];
     let summary = json(command(["link", &chip(), "--json"]).args(arguments).output().unwrap());
     assert_eq!((&summary["touches"], &summary["differences"]), (&500.into(), &0.into()));
     assert!(summary["resent"].as_u64().unwrap() > 0, "{summary}");
@@ -152,8 +152,8 @@ fn a_chip_without_a_model_and_a_chip_that_is_gone_say_what_to_do() {
 fn bad_arguments_of_link_and_watch_exit_with_2() {
     let place = Place::new();
     let error = stderr(run(["link", "emulator", "--parity", &place.text("data")]), 2);
-    assert!(error.contains("--load") && error.contains("--model"), "{error}");
-    for arguments in [["link", "http://host:1"], ["watch", "http://host:1"]] {
+    assert!(error.contains("--load") && error.contains("--against"), "{error}");
+    for arguments in [&["link", "http://host:1"][..], &["link", "http://host:1", "--watch"]] {
         let error = stderr(run(arguments), 2);
         assert!(error.contains("`http://host:1` is not a port. Give a serial port"), "{error}");
     }
@@ -164,7 +164,7 @@ fn bad_arguments_of_link_and_watch_exit_with_2() {
 #[test]
 fn watch_shows_a_chip_that_gets_a_data_set() {
     let place = Place::new();
-    let arguments = ["watch", &chip(), &place.text("data"), "--load", &place.text("model.palpate")];
+    let arguments = ["link", &chip(), &place.text("data"), "--watch", "--load", &place.text("model.palpate")];
     let text = stdout(run(arguments));
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[0].starts_with("model of ") && lines[1] == "another object: bowl", "{text}");
@@ -177,7 +177,7 @@ fn watch_names_the_line_of_a_journal_that_is_wrong() {
     let place = Place::new();
     let journal = place.text("journal.jsonl");
     std::fs::write(&journal, "{\"is\":\"object\",\"name\":\"cup\"}\nnonsense\n").unwrap();
-    let output = run(["watch", &journal]);
+    let output = run(["link", &journal, "--watch"]);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "another object: cup\n");
     let error = stderr(output, 1);
     assert!(error.contains("journal.jsonl:2: not an entry of a journal"), "{error}");

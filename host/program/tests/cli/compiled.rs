@@ -113,7 +113,7 @@ fn inspect_tells_what_was_exported() {
 fn parity_of_a_model_with_its_own_ensemble_has_no_difference() {
     let place = Place::new();
     let (ensemble, model, data) = (place.text("ensemble.json"), place.text("model.palpate"), place.text("data"));
-    let parity = json(&["parity", &ensemble, &model, &data, "--sequences", "200", "--json"]);
+    let parity = json(&["verify", &model, &ensemble, &data, "--sequences", "200", "--json"]);
     assert_eq!(
         (&parity["touches"], &parity["best_differs"], &parity["verdict_differs"]),
         (&4.into(), &0.into(), &0.into())
@@ -127,7 +127,7 @@ fn parity_refuses_a_model_of_other_objects() {
     let other = Ensemble { objects: vec!["bowl".into(), "spoon".into()], ..ensemble() };
     other.save(place.path("other.json")).unwrap();
     let (code, message) =
-        refusal(&["parity", &place.text("other.json"), &place.text("model.palpate"), &place.text("data")]);
+        refusal(&["verify", &place.text("model.palpate"), &place.text("other.json"), &place.text("data")]);
     assert_eq!(code, 1);
     assert!(message.contains("model.palpate") && message.contains("not compiled from this ensemble"), "{message}");
 }
@@ -505,7 +505,7 @@ fn full_touches_alone_are_warned_of_where_it_is_evidence_which_fingers_touch() {
     assert_eq!(said(&place.text("model.palpate"), &full), "");
     std::fs::create_dir(place.path("full")).unwrap();
     ["bowl", "fork"].iter().for_each(|name| std::fs::write(place.path(&format!("full/{name}.txt")), &full).unwrap());
-    let finished = palpate(&["evaluate", household, &place.text("full"), "--at", "5", "--groups", "10"]);
+    let finished = palpate(&["evaluate", household, &place.text("full"), "--at", "5", "--sequences", "10"]);
     let said = String::from_utf8(finished.stderr).unwrap();
     assert!(said.contains("all 80 touches are full"), "{said}");
 }

@@ -4,25 +4,13 @@ use crate::{command, globe, json, listing, run, stderr, stdout};
 use std::path::Path;
 
 /// Two built-in objects, and as little work as there is.
-const QUICK: [&str; 17] = [
-    "probe",
-    "design",
-    "bowl",
-    "mouse",
-    "--radius",
-    "0.15",
-    "--tilt",
-    "10",
-    "--aim",
-    "box",
-    "--approaches",
-    "200",
-    "--sequences",
-    "30",
-    "--error-rate",
-    "5%",
-    "-o",
-];
+const QUICK: [&str; 11] =
+    ["probe", "design", "bowl", "mouse", "--approaches", "200", "--sequences", "30", "--error-rate", "5%", "-o"];
+
+/// A search of one probe, but for what `more` says.
+fn search(more: &str) -> String {
+    format!("radius=0.15,tilt=10,aim=box,{more}")
+}
 
 fn design(directory: &Path, more: &[&str]) -> std::process::Output {
     let words: Vec<&str> = QUICK.iter().chain(more).copied().collect();
@@ -33,7 +21,7 @@ fn design(directory: &Path, more: &[&str]) -> std::process::Output {
 fn a_probe_is_designed_for_two_objects_and_written_with_a_page() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    let found = json(design(at, &["one", "--spacing", "0.5..2", "--json"]));
+    let found = json(design(at, &["one", "--search", &search("spacing=0.5..2"), "--json"]));
     assert_eq!(listing(&at.join("one")), ["design.html", "probe.toml"]);
     assert_eq!(found["best"]["reached"], true);
     let spacings: Vec<f64> =
@@ -54,10 +42,11 @@ fn a_probe_is_designed_for_two_objects_and_written_with_a_page() {
 fn the_same_seed_designs_the_same_files_on_any_number_of_threads() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    let words: Vec<&str> = QUICK.iter().copied().chain(["out", "--spacing", "1..1.5"]).collect();
+    let search = search("spacing=1..1.5");
+    let words: Vec<&str> = QUICK.iter().copied().chain(["out", "--search", &search]).collect();
     let mut files = Vec::new();
     for threads in ["1", "3"] {
-        let output = command(&words).current_dir(at).env("RAYON_NUM_THREADS", threads).output().unwrap();
+        let output = command(&words).args(["--threads", threads]).current_dir(at).output().unwrap();
         let table = stdout(output);
         let read = |name: &str| std::fs::read(at.join("out").join(name)).unwrap();
         files.push((table, read("probe.toml"), read("design.html")));
@@ -69,10 +58,18 @@ fn the_same_seed_designs_the_same_files_on_any_number_of_threads() {
 #[test]
 fn a_probe_design_that_cannot_be_says_which_option_is_wrong() {
     let directory = tempfile::tempdir().unwrap();
-    let error = stderr(design(directory.path(), &["out", "--spacing", "2..1"]), 2);
+    let error = stderr(design(directory.path(), &["out", "--search", "spacing=2..1"]), 2);
     assert!(error.contains("0.5..3"), "{error}");
-    let error = stderr(design(directory.path(), &["out", "--speed", "0"]), 2);
-    assert!(error.contains("--speed is 0"), "{error}");
+    let error = stderr(design(directory.path(), &["out", "--search", "speed=0"]), 2);
+    assert!(error.contains("speed is 0"), "{error}");
+    for (search, expected) in
+        [("gap=2", "use spacing=1..2"), ("aim=box+away", "box, middle, mass"), ("tilt=1,tilt=2", "twice")]
+    {
+        let error = stderr(design(directory.path(), &["out", "--search", search]), 2);
+        assert!(error.contains(expected), "{error}");
+    }
+    let error = stderr(design(directory.path(), &["out", "--real", "missed=2%"]), 2);
+    assert!(error.contains("one level of noise on contact times, such as noise=5ms"), "{error}");
     let one = globe(directory.path(), "globe", 8);
     let output = directory.path().join("out");
     let error = stderr(run(["probe", "design", one.to_str().unwrap(), "-o", output.to_str().unwrap()]), 1);
@@ -84,7 +81,7 @@ fn a_probe_design_that_cannot_be_says_which_option_is_wrong() {
 fn a_capture_aims_where_it_is_told_and_its_data_set_says_so() {
     let directory = tempfile::tempdir().unwrap();
     let capture = |name: &str, more: &[&str]| {
-        let words = ["capture", "fork", "bowl", "--touches", "200", "--approaches", "-o", name];
+        let words = ["capture", "fork", "bowl", "--approaches", "200", "-o", name];
         stdout(command(words.iter().chain(more)).current_dir(directory.path()).output().unwrap());
         let read = |file: &str| std::fs::read_to_string(directory.path().join(name).join(file)).unwrap();
         let touched = read("fork.txt").lines().filter(|line| *line != "- - -").count();

@@ -17,7 +17,7 @@ macro_rules! arguments {
 fn recorded(directory: &Path, name: &str, approaches: &str) -> PathBuf {
     let (probe, data) = (directory.join("true.toml"), directory.join(name));
     std::fs::write(&probe, CROOKED).unwrap();
-    let seed = arguments!["--seed", "5", "--approaches", "--touches", approaches];
+    let seed = arguments!["--seed", "5", "--approaches", approaches];
     stdout(run([&arguments!["capture", "bowl", "mouse", "-o", &data, "--probe", &probe][..], &seed].concat()));
     let stated: Value = serde_json::from_slice(&std::fs::read(data.join("dataset.json")).unwrap()).unwrap();
     assert_eq!(stated["settings"]["real"]["speed"], 0.9);
@@ -48,7 +48,7 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
     assert_eq!(std::fs::read_to_string(&probe).unwrap(), text, "the same recordings give the same bytes");
 
     let (touches, ensemble) = (at.join("touches"), at.join("ensemble.json"));
-    let capture = arguments!["capture", "bowl", "mouse", "-o", &touches, "--touches", "2000", "--approaches"];
+    let capture = arguments!["capture", "bowl", "mouse", "-o", &touches, "--approaches", "2000"];
     stdout(run([&capture[..], &arguments!["--probe", &probe]].concat()));
     let stated: Value = serde_json::from_slice(&std::fs::read(touches.join("dataset.json")).unwrap()).unwrap();
     let real = stated["settings"]["real"].clone();
@@ -58,20 +58,20 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
     let mut times = lines.split_whitespace().filter(|time| *time != "-");
     assert!(times.all(|time| time.ends_with("000")), "{}", &lines[..200]);
     // Training with the file adds nothing again; the ensemble states what there is.
-    stdout(run(arguments!["train", &touches, "-o", &ensemble, "--rounds", "3", "--probe", &probe]));
+    stdout(run(arguments!["train", &touches, "-o", &ensemble, "--trees", "rounds=3", "--probe", &probe]));
     let saved: Value = serde_json::from_slice(&std::fs::read(&ensemble).unwrap()).unwrap();
     let noise: Value = serde_json::from_str(saved["learner"]["attributes"]["palpate_noise"].as_str().unwrap()).unwrap();
     assert_eq!(noise, real);
     // Nor does testing.
     let evaluate = |more: &[&std::ffi::OsStr]| {
-        json(run([&arguments!["evaluate", &ensemble, &touches, "--groups", "50", "--json"], more].concat()))["accuracy"]
+        json(run([&arguments!["evaluate", &ensemble, &touches, "--sequences", "50", "--json"], more].concat()))["accuracy"]
             .clone()
     };
     assert_eq!(evaluate(&[]), evaluate(&arguments!["--probe", &probe]));
     let error = stderr(run(arguments!["evaluate", &ensemble, &touches, "--probe", &at.join("true.toml")]), 1);
     assert!(error.contains("true.toml and the data set state different probes: [real]: "), "{error}");
     // Another probe's touches are not added to a data set.
-    let add = arguments!["capture", "fork", "-o", &touches, "--touches", "2000", "--approaches", "--add", "--probe"];
+    let add = arguments!["capture", "fork", "-o", &touches, "--approaches", "2000", "--add", "--probe"];
     let error = stderr(run([&add[..], &arguments![&at.join("true.toml")]].concat()), 1);
     assert!(error.contains("real is "), "{error}");
 }
@@ -103,21 +103,21 @@ fn recorded_touches_are_compared_with_simulated_ones() {
     let at = directory.path();
     let data = recorded(at, "recorded", "300");
     let (clean, right) = (at.join("clean"), at.join("right"));
-    let capture = arguments!["capture", "bowl", "mouse", "--approaches", "--touches", "3000", "-o"];
+    let capture = arguments!["capture", "bowl", "mouse", "--approaches", "3000", "-o"];
     stdout(run([&capture[..], &arguments![&clean]].concat()));
     stdout(run([&capture[..], &arguments![&right, "--probe", &at.join("true.toml")]].concat()));
     let compare = |simulated: &Path| {
-        let words = arguments!["data", "compare", &data, simulated, "--groups", "100", "--json"];
+        let words = arguments!["data", "check", &data, simulated, "--sequences", "100", "--json"];
         json(run(words))
     };
     let [wrong, right_one] = [&clean, &right].map(|simulated| compare(simulated));
     let told = |of: &Value| of["told_apart"]["value"].as_f64().unwrap();
     assert!(told(&right_one) < 0.56 && told(&wrong) > told(&right_one) + 0.02, "{wrong} {right_one}");
     assert!(right_one["told_apart"]["low"].as_f64().unwrap() < 0.53, "{right_one}");
-    let text = stdout(run(arguments!["data", "compare", &data, &right, "--groups", "100"]));
+    let text = stdout(run(arguments!["data", "check", &data, &right, "--sequences", "100"]));
     assert!(text.contains("50 % is guessing") && text.contains("on recorded"), "{text}");
     let full = at.join("full");
     stdout(run(arguments!["capture", "bowl", "mouse", "--touches", "300", "-o", &full]));
-    let error = stderr(run(arguments!["data", "compare", &data, &full]), 1);
+    let error = stderr(run(arguments!["data", "check", &data, &full]), 1);
     assert!(error.contains("full touches only") && error.contains("--approaches"), "{error}");
 }

@@ -124,7 +124,7 @@ fn a_damaged_mesh_of_any_format_is_refused_with_its_place_and_a_cure() {
         }
         let casts = directory.path().join("casts.csv");
         std::fs::write(&casts, "a,0,0,9,0,0,-1\n").unwrap();
-        assert!(stderr(command(["cast"]).args([&path, &casts]).output().unwrap(), 1).contains(expected));
+        assert!(stderr(command(["data", "cast"]).args([&path, &casts]).output().unwrap(), 1).contains(expected));
     }
     assert!(!out.exists());
 }

@@ -2,12 +2,13 @@
 
 use crate::{command, run, stderr, stdout};
 
-/// The program's commands, as its help lists them.
+/// The program's commands, as its help lists them in groups: what stands before two blanks.
 fn commands() -> Vec<String> {
     let help = help(&["--help"], 100);
-    let list = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    let names = list.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
-    names.map(|line| line.split_whitespace().next().unwrap().to_owned()).filter(|name| name != "help").collect()
+    let list = help.lines().take_while(|line| *line != "Global options:").filter(|line| line.starts_with("  "));
+    let names: std::collections::BTreeSet<String> =
+        list.map(|line| line.trim_start().split("  ").next().unwrap().to_owned()).collect();
+    names.into_iter().collect()
 }
 
 fn help(arguments: &[&str], columns: usize) -> String {
@@ -19,7 +20,7 @@ fn lists(help: &str) -> (Vec<&str>, Vec<&str>) {
     let mut inside = false;
     help.lines().partition(|line| {
         let is_heading = line.ends_with(':') && !line.starts_with(' ');
-        let is_claps_own = ["Arguments:", "Options:", "Commands:"].contains(line);
+        let is_claps_own = ["Arguments:", "Options:", "Commands:", "Global options:"].contains(line);
         inside = is_heading && !is_claps_own || inside && !line.is_empty();
         inside
     })
@@ -64,7 +65,7 @@ fn every_commands_help_wraps_well_at_80_and_at_120_columns() {
     let mut faults = Vec::new();
     for command in commands.iter().map(String::as_str).chain([""]) {
         for flag in ["--help", "-h"] {
-            let arguments: Vec<&str> = [command, flag].into_iter().filter(|word| !word.is_empty()).collect();
+            let arguments: Vec<&str> = command.split(' ').chain([flag]).filter(|word| !word.is_empty()).collect();
             let unwrapped = help(&arguments, 1_000);
             for width in [80, 120] {
                 let help = help(&arguments, width);
@@ -99,11 +100,56 @@ fn completions_know_every_command_in_every_shell() {
     let commands = commands();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let script = stdout(run(["completions", shell]));
-        for command in &commands {
-            assert!(script.contains(command.as_str()), "{shell}: {command}");
+        for command in commands.iter().flat_map(|path| path.split(' ')) {
+            assert!(script.contains(command), "{shell}: {command}");
         }
         assert!(script.contains("bad-line"), "{shell}");
     }
     let error = stderr(run(["completions", "tcsh"]), 2);
     assert!(error.contains("bash"), "{error}");
+}
+
+#[test]
+fn help_lists_commands_in_groups_of_what_one_wants_to_do() {
+    for arguments in [&["help"][..], &["--help"]] {
+        let text = help(arguments, 80);
+        let places = ["Everything at once:", "Step by step:", "A real probe:", "Models from elsewhere:", "Look:"]
+            .map(|title| text.find(title).unwrap_or_else(|| panic!("{title}\n{text}")));
+        assert!(places.is_sorted(), "{text}");
+        assert!(text.lines().count() <= 60, "{text}");
+    }
+}
+
+#[test]
+fn old_names_end_with_2_and_the_new_name() {
+    for (arguments, expected) in [
+        (&["objects", "-o", "meshes"][..], "palpate data objects"),
+        (&["help", "plan"], "plan"),
+        (&["parity", "e.json", "m.palpate", "data"], "palpate verify MODEL ENSEMBLE DIR"),
+        (&["data", "compare", "a", "b"], "palpate data check RECORDED SIMULATED"),
+        (&["run", "--noise", "5ms"], "--real noise="),
+        (&["train", "data", "-o", "e.json", "--touches", "all"], "--evidence"),
+        (&["capture", "bowl", "-o", "data", "--approaches", "--touches", "100"], "--approaches 60000"),
+        (&["--json", "evaluate", "m", "d", "--strangers", "others"], "--unknown DIR"),
+    ] {
+        let error = stderr(run(arguments), 2);
+        assert!(error.contains(expected), "{arguments:?}: {error}");
+    }
+}
+
+#[test]
+fn quiet_prints_no_remark_and_still_results_and_errors() {
+    let directory = tempfile::tempdir().unwrap();
+    let lines = (0..40).map(|i| format!("0 0.00{} 0.0{}\n", i % 7, 10 + i % 50)).collect::<String>();
+    std::fs::create_dir(directory.path().join("data")).unwrap();
+    for name in ["bowl.txt", "cup.txt"] {
+        std::fs::write(directory.path().join("data").join(name), &lines).unwrap();
+    }
+    let here = |arguments: &[&str]| command(arguments).current_dir(&directory).output().unwrap();
+    stdout(here(&["--quiet", "train", "data", "-o", "e.json", "--trees", "rounds=2"]));
+    stdout(here(&["export", "e.json", "-o", "m.palpate"]));
+    let error = stderr(here(&["--quiet", "evaluate", "m.palpate", "nowhere"]), 1);
+    assert!(error.contains("nowhere"), "{error}");
+    let quiet = here(&["evaluate", "m.palpate", "data", "--quiet"]);
+    assert!(quiet.stderr.is_empty() && !stdout(quiet).is_empty());
 }

@@ -138,7 +138,7 @@ fn a_log_is_a_data_set_to_evaluate_and_to_train_on_and_so_is_a_directory_with_lo
         assert_eq!(stdout(run(["evaluate", &model, logs, "--json"])), expected);
     }
     let trained = |data: &str, name: &str| {
-        stdout(run(["train", data, "-o", &place.text(name), "--rounds", "3", "--depth", "2"]));
+        stdout(run(["train", data, "-o", &place.text(name), "--trees", "rounds=3,depth=2"]));
         Dataset::read(Path::new(data)).unwrap()
     };
     let touches = |dataset: Dataset| -> Vec<_> {
@@ -147,7 +147,7 @@ fn a_log_is_a_data_set_to_evaluate_and_to_train_on_and_so_is_a_directory_with_lo
     assert_eq!(touches(trained(&data, "a.json")), touches(trained(&monday, "b.json")));
     assert!(std::fs::read(place.path("a.json")).unwrap() == std::fs::read(place.path("b.json")).unwrap());
     // And taught, as recorded touches are.
-    stdout(run(["train", "--teach", &monday, "-o", &place.text("taught.json"), "--rounds", "3", "--depth", "2"]));
+    stdout(run(["train", "--teach", &monday, "-o", &place.text("taught.json"), "--trees", "rounds=3,depth=2"]));
     // What is read is not written.
     assert!(stderr(run(["train", &monday, "-o", &monday]), 2).contains("another file than what is read"));
     assert!(is_log(&place.path("monday.mcap")));

@@ -53,12 +53,12 @@ fn set_up() -> tempfile::TempDir {
 fn an_ensemble_and_its_compiled_model_evaluate_side_by_side() {
     let directory = set_up();
     let at = directory.path();
-    let trained = succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "5", "--json"]);
+    let trained = succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=5", "--json"]);
     let trained: Value = serde_json::from_str(&trained).unwrap();
     assert_eq!((&trained["trees"], &trained["touches"]), (&5.into(), &800.into()));
     succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
     let figures = ["ensemble.json", "model.palpate"].map(|model| -> Value {
-        let json = succeeds(at, &["evaluate", model, "data", "--at", "5,20", "--groups", "100", "--json"]);
+        let json = succeeds(at, &["evaluate", model, "data", "--at", "5,20", "--sequences", "100", "--json"]);
         serde_json::from_str(&json).unwrap()
     });
     for figures in &figures {
@@ -66,7 +66,8 @@ fn an_ensemble_and_its_compiled_model_evaluate_side_by_side() {
         assert!(figures["per_object"]["fork"]["5"].is_number());
         assert!(figures["sequential"]["mean_touches"].as_f64() >= Some(1.0));
     }
-    let noisy = ["evaluate", "model.palpate", "data", "--at", "5,20", "--groups", "100", "--json", "--noise", "200ms"];
+    let noisy =
+        ["evaluate", "model.palpate", "data", "--at", "5,20", "--sequences", "100", "--json", "--real", "noise=200ms"];
     let noisy: Value = serde_json::from_str(&succeeds(at, &noisy)).unwrap();
     assert!(noisy["accuracy"]["20"].as_f64() < figures[1]["accuracy"]["20"].as_f64());
     let table = succeeds(at, &["evaluate", "model.palpate", "data"]);
@@ -77,8 +78,8 @@ fn an_ensemble_and_its_compiled_model_evaluate_side_by_side() {
 fn noise_of_every_kind_is_added_to_the_touches_that_are_evaluated() {
     let directory = set_up();
     let at = directory.path();
-    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "5"]);
-    let evaluate = ["evaluate", "ensemble.json", "data", "--at", "10", "--groups", "100", "--json"];
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=5"]);
+    let evaluate = ["evaluate", "ensemble.json", "data", "--at", "10", "--sequences", "100", "--json"];
     let accuracy = |more: &[&str]| -> (f64, u64) {
         let figures: Value = serde_json::from_str(&succeeds(at, &[&evaluate[..], more].concat())).unwrap();
         (figures["accuracy"]["10"].as_f64().unwrap(), figures["robots"].as_u64().unwrap())
@@ -86,36 +87,36 @@ fn noise_of_every_kind_is_added_to_the_touches_that_are_evaluated() {
     let (clean, robots) = accuracy(&[]);
     assert_eq!(robots, 1);
     for more in [
-        &["--noise", "0..400ms"][..],
-        &["--timer", "200ms"],
-        &["--debounce", "400ms"],
-        &["--bent", "2:150ms"],
-        &["--speed-error", "90%"],
+        &["--real", "noise=0..400ms"][..],
+        &["--real", "timer=200ms"],
+        &["--real", "debounce=400ms"],
+        &["--real", "bent=0ms/150ms/0ms"],
+        &["--real", "speed_error=90%"],
     ] {
         assert!(accuracy(more).0 < clean, "{more:?}: {clean}");
     }
-    fails(at, &[&evaluate[..], &["--missed", "200%"]].concat(), 2, "--missed is 2. Use a share from 0 to 1.");
-    fails(at, &[&evaluate[..], &["--bent", "9:1ms"]].concat(), 2, "such as 1:3ms");
-    fails(at, &[&evaluate[..], &["--noise", "5"]].concat(), 2, "such as 0..10ms");
+    fails(at, &[&evaluate[..], &["--real", "missed=200%"]].concat(), 2, "missed is \"200%\"; use a share from 0 to 1");
+    fails(at, &[&evaluate[..], &["--real", "bent=9:1ms"]].concat(), 2, "bent is \"9:1ms\"; use a duration");
+    fails(at, &[&evaluate[..], &["--real", "noise=5"]].concat(), 2, "such as 0..10ms");
 }
 
 #[test]
 fn training_says_what_a_millisecond_of_noise_would_cost() {
     let directory = set_up();
     let at = directory.path();
-    let text = succeeds(at, &["train", "data", "-o", "clean.json", "--rounds", "5"]);
-    assert!(text.contains("1 ms of noise on contact times would cost") && text.contains("--noise 1ms"), "{text}");
-    let json = succeeds(at, &["train", "data", "-o", "clean.json", "--rounds", "5", "--json"]);
+    let text = succeeds(at, &["train", "data", "-o", "clean.json", "--trees", "rounds=5"]);
+    assert!(text.contains("1 ms of noise on contact times would cost") && text.contains("--real noise=1ms"), "{text}");
+    let json = succeeds(at, &["train", "data", "-o", "clean.json", "--trees", "rounds=5", "--json"]);
     let json: Value = serde_json::from_str(&json).unwrap();
     assert!(json["cost_of_noise"]["clean"].as_f64() > Some(0.5) && json["cost_of_noise"]["touches"] == 10, "{json}");
-    let text = succeeds(at, &["train", "data", "-o", "robust.json", "--rounds", "5", "--noise", "0..10ms"]);
+    let text = succeeds(at, &["train", "data", "-o", "robust.json", "--trees", "rounds=5", "--real", "noise=0..10ms"]);
     assert!(!text.contains("would cost"), "{text}");
     for object in ["bowl", "fork"] {
         let path = at.join(format!("data/{object}.txt"));
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.lines().take(99).map(|line| format!("{line}\n")).collect::<String>()).unwrap();
     }
-    let text = succeeds(at, &["train", "data", "-o", "small.json", "--rounds", "5"]);
+    let text = succeeds(at, &["train", "data", "-o", "small.json", "--trees", "rounds=5"]);
     assert!(text.contains("was not measured: an object has fewer than 100 touches"), "{text}");
 }
 
@@ -124,7 +125,7 @@ fn an_ensemble_states_the_noise_that_it_was_trained_with() {
     let directory = set_up();
     let at = directory.path();
     let attribute = |more: &[&str]| -> Value {
-        succeeds(at, &[&["train", "data", "-o", "ensemble.json", "--rounds", "3"], more].concat());
+        succeeds(at, &[&["train", "data", "-o", "ensemble.json", "--trees", "rounds=3"], more].concat());
         let json: Value = serde_json::from_slice(&std::fs::read(at.join("ensemble.json")).unwrap()).unwrap();
         match json["learner"]["attributes"]["palpate_noise"].as_str() {
             Some(text) => serde_json::from_str(text).unwrap(),
@@ -132,7 +133,7 @@ fn an_ensemble_states_the_noise_that_it_was_trained_with() {
         }
     };
     assert_eq!(attribute(&[]), Value::Null);
-    let noise = attribute(&["--noise", "0..10ms", "--timer", "1ms"]);
+    let noise = attribute(&["--real", "noise=0..10ms,timer=1ms"]);
     assert_eq!((&noise["deviation"]["largest"], &noise["timer"]), (&10_000.0.into(), &1_000.0.into()));
     // The model that it is compiled to is read again.
     succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
@@ -143,7 +144,7 @@ fn training_twice_writes_the_same_bytes_whatever_the_threads() {
     let directory = set_up();
     let read = |name| std::fs::read(directory.path().join(name)).unwrap();
     for (name, threads) in [("one.json", "1"), ("three.json", "3")] {
-        succeeds(directory.path(), &["train", "data", "-o", name, "--noise", "5ms", "--threads", threads]);
+        succeeds(directory.path(), &["train", "data", "-o", name, "--real", "noise=5ms", "--threads", threads]);
     }
     assert_eq!(read("one.json"), read("three.json"));
 }
@@ -152,32 +153,41 @@ fn training_twice_writes_the_same_bytes_whatever_the_threads() {
 fn trees_of_few_different_leaves_make_a_smaller_model_that_is_exact() {
     let directory = set_up();
     let at = directory.path();
-    let export = |options: &[&str]| -> Value {
-        succeeds(
-            at,
-            &[&["train", "data", "-o", "ensemble.json", "--rounds", "10", "--leaf-bits", "8"], options].concat(),
-        );
-        let export = ["export", "ensemble.json", "-o", "model.palpate", "--leaf", "i8", "--for", "size", "--json"];
+    let export = |more: &str| -> Value {
+        let trees = format!("rounds=10,leaf_bits=8{more}");
+        succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", &trees]);
+        let export = ["export", "ensemble.json", "-o", "model.palpate", "--leaf", "i8", "--layout", "size", "--json"];
         serde_json::from_str(&succeeds(at, &export)).unwrap()
     };
-    let usual = export(&[]);
-    let small = export(&["--different-leaves", "16"]);
-    let dear = export(&["--different-leaves", "16", "--threshold-cost", "0.01"]);
+    let usual = export("");
+    let small = export(",different_leaves=16");
+    let dear = export(",different_leaves=16,threshold_cost=0.01");
     let number = |exported: &Value, key: &str| exported[key].as_f64().unwrap();
     assert!(number(&small, "shared_leaves") <= 16.0 && number(&small, "margin_error") == 0.0, "{small:#}");
     let bytes = [&usual, &small, &dear].map(|exported| number(exported, "bytes"));
     assert!(bytes[0] > bytes[1] && bytes[1] > bytes[2], "{bytes:?}");
-    fails(at, &["train", "data", "-o", "x.json", "--different-leaves", "0"], 2, "--different-leaves");
-    fails(at, &["train", "data", "-o", "x.json", "--threshold-cost", "1"], 2, "--different-leaves");
-    let one = ["train", "data", "-o", "x.json", "--different-leaves", "8", "--leaves", "one"];
-    fails(at, &one, 2, "--leaves");
+    fails(at, &["train", "data", "-o", "x.json", "--trees", "different_leaves=0"], 2, "different_leaves is 0");
+    fails(at, &["train", "data", "-o", "x.json", "--trees", "threshold_cost=1"], 2, "use it with different_leaves");
+    let one = ["train", "data", "-o", "x.json", "--trees", "different_leaves=8,leaves=one"];
+    fails(at, &one, 2, "leaves");
 }
 
 #[test]
 fn tuning_writes_a_model_within_the_limit() {
     let directory = set_up();
-    let tune =
-        ["tune", "data", "--max-bytes", "2K", "--groups", "20", "-o", "tuned.palpate", "--noise", "1ms", "--json"];
+    let tune = [
+        "tune",
+        "data",
+        "--max-bytes",
+        "2K",
+        "--sequences",
+        "20",
+        "-o",
+        "tuned.palpate",
+        "--real",
+        "noise=1ms",
+        "--json",
+    ];
     let tuned: Value = serde_json::from_str(&succeeds(directory.path(), &tune)).unwrap();
     let chosen = usize::try_from(tuned["chosen"].as_u64().unwrap()).unwrap();
     let bytes = std::fs::metadata(directory.path().join("tuned.palpate")).unwrap().len();
@@ -186,7 +196,7 @@ fn tuning_writes_a_model_within_the_limit() {
     assert!(tuned["calibration"].is_null(), "{tuned:#}");
     let stated = tuned["rows"][chosen]["bytes"].as_u64().unwrap();
     assert!((bytes..=2048).contains(&stated), "{stated} for {bytes}");
-    succeeds(directory.path(), &["evaluate", "tuned.palpate", "data", "--groups", "20"]);
+    succeeds(directory.path(), &["evaluate", "tuned.palpate", "data", "--sequences", "20"]);
 }
 
 #[test]
@@ -207,11 +217,11 @@ fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
     fails(at, &train("missing", &[]), 1, "missing");
     fails(at, &train("data", &["--descriptor", "gravity"]), 1, "with their pose");
     fails(at, &train("data", &["--descriptor", "shape"]), 2, "curvature");
-    fails(at, &train("data", &["--rounds", "0"]), 2, "--rounds");
-    fails(at, &train("data", &["--noise", "5"]), 2, "unit");
-    fails(at, &train("data", &["--bins", "9,9,9"]), 2, "--bins");
+    fails(at, &train("data", &["--trees", "rounds=0"]), 2, "rounds is 0");
+    fails(at, &train("data", &["--real", "noise=5"]), 2, "unit");
+    fails(at, &train("data", &["--trees", "bins=9/9/9"]), 2, "bins is ");
     fails(at, &train("data", &["--no-such-option"]), 2, "--no-such-option");
-    fails(at, &["tune", "data", "--max-bytes", "9", "--groups", "5", "-o", "ensemble.json"], 1, "the smallest has");
+    fails(at, &["tune", "data", "--max-bytes", "9", "--sequences", "5", "-o", "ensemble.json"], 1, "the smallest has");
     fails(at, &["tune", "data", "--max-bytes", "many"], 2, "16K");
     assert_eq!(std::fs::read(at.join("ensemble.json")).unwrap(), b"older");
     assert_eq!(std::fs::read_dir(at).unwrap().count(), 5, "something was left behind");
@@ -221,7 +231,7 @@ fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
 fn what_cannot_be_evaluated_is_refused() {
     let directory = set_up();
     let at = directory.path();
-    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3"]);
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=3"]);
     succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
     let text = std::fs::read_to_string(at.join("ensemble.json")).unwrap();
     std::fs::write(at.join("times.json"), text.replace("\"curvature\"", "\"times\"")).unwrap();
@@ -237,7 +247,7 @@ fn what_cannot_be_evaluated_is_refused() {
     fails(at, &["evaluate", "model.palpate", "others"], 1, "does not know the object spoon");
     fails(at, &["evaluate", "model.palpate", "data", "--at", "401"], 2, "bowl has only 400");
     fails(at, &["evaluate", "model.palpate", "data", "--error-rate", "0.7"], 2, "--error-rate");
-    fails(at, &["evaluate", "model.palpate", "data", "--groups", "0"], 2, "--groups");
+    fails(at, &["evaluate", "model.palpate", "data", "--sequences", "0"], 2, "--sequences");
 }
 
 fn json(directory: &Path, arguments: &[&str]) -> Value {
@@ -248,11 +258,12 @@ fn json(directory: &Path, arguments: &[&str]) -> Value {
 fn the_probe_of_the_capture_stands_in_every_model_made_of_it() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    let capture = ["capture", "builtin", "-o", "data", "--touches", "60", "--spacing", "2", "--speed", "20"];
+    std::fs::write(at.join("probe.toml"), "radius = 0.15\nspacing = 2\nspeed = 20\n").unwrap();
+    let capture = ["capture", "builtin", "-o", "data", "--touches", "60", "--probe", "probe.toml"];
     succeeds(at, &capture);
-    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "2"]);
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=2"]);
     succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
-    succeeds(at, &["tune", "data", "-o", "tuned.palpate", "--groups", "5", "--ensemble", "tuned.json"]);
+    succeeds(at, &["tune", "data", "-o", "tuned.palpate", "--sequences", "5", "--ensemble", "tuned.json"]);
     succeeds(at, &["export", "tuned.json", "-o", "again.palpate"]);
     for model in ["model.palpate", "tuned.palpate", "again.palpate"] {
         let probe = &json(at, &["inspect", model, "--json"])["probe"];
@@ -288,14 +299,14 @@ fn objects_that_no_model_can_hold_are_refused_before_training_and_nothing_is_wri
 fn evaluating_on_the_training_touches_says_so() {
     let directory = set_up();
     let at = directory.path();
-    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3", "--noise", "1ms"]);
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=3", "--real", "noise=1ms"]);
     let evaluate = |data, more: &[&str]| {
-        let arguments = [&["evaluate", "ensemble.json", data, "--groups", "50"], more].concat();
+        let arguments = [&["evaluate", "ensemble.json", data, "--sequences", "50"], more].concat();
         succeeds(at, &arguments)
     };
     let said = "The model was trained on these touches of bowl, fork";
     assert!(evaluate("data", &[]).contains(said));
-    assert!(evaluate("data", &["--noise", "5ms"]).contains(said));
+    assert!(evaluate("data", &["--real", "noise=5ms"]).contains(said));
     let figures: Value = serde_json::from_str(&evaluate("data", &["--json"])).unwrap();
     assert_eq!(figures["trained_on"], serde_json::json!(["bowl", "fork"]));
     // The same touches from the other end: other touches.
@@ -318,12 +329,12 @@ fn a_compiled_model_knows_the_capture_that_it_was_trained_on_and_no_promise_is_m
     capture("data", "60", &[]);
     capture("more", "90", &["--pose"]);
     capture("unseen", "90", &["--seed", "2"]);
-    succeeds(at, &["capture", "fork", "mouse", "-o", "fewer", "--touches", "70", "--approaches"]);
-    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "2"]);
+    succeeds(at, &["capture", "fork", "mouse", "-o", "fewer", "--approaches", "70"]);
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=2"]);
     succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
     for model in ["ensemble.json", "model.palpate"] {
         let trained_on = |data| {
-            let figures = json(at, &["evaluate", model, data, "--groups", "20", "--json"]);
+            let figures = json(at, &["evaluate", model, data, "--sequences", "20", "--json"]);
             figures["trained_on"].to_string()
         };
         assert_eq!(trained_on("data"), r#"["bowl","fork","mouse"]"#, "{model}");
@@ -346,14 +357,14 @@ fn a_compiled_model_knows_the_capture_that_it_was_trained_on_and_no_promise_is_m
 fn no_accuracy_rests_on_the_one_group_that_a_small_test_set_has() {
     let directory = set_up();
     let at = directory.path();
-    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3"]);
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=3"]);
     std::fs::create_dir(at.join("few")).unwrap();
     for name in ["bowl.txt", "fork.txt"] {
         let text = std::fs::read_to_string(at.join("data").join(name)).unwrap();
         let lines: Vec<&str> = text.lines().take(30).collect();
         std::fs::write(at.join("few").join(name), lines.join("\n")).unwrap();
     }
-    let figures = json(at, &["evaluate", "ensemble.json", "few", "--groups", "50", "--json"]);
+    let figures = json(at, &["evaluate", "ensemble.json", "few", "--sequences", "50", "--json"]);
     let mut given: Vec<&String> = figures["accuracy"].as_object().unwrap().keys().collect();
     given.sort();
     assert_eq!(given, ["10", "20", "5"]);
@@ -365,8 +376,9 @@ fn no_accuracy_rests_on_the_one_group_that_a_small_test_set_has() {
 fn evaluate_shows_undecided_sequences_and_the_confusion_of_objects() {
     let directory = set_up();
     let at = directory.path();
-    succeeds(at, &["train", "data", "-o", "ensemble.json", "--rounds", "3"]);
-    let evaluate = ["evaluate", "ensemble.json", "data", "--groups", "100", "--max-touches", "1", "--confusion", "5"];
+    succeeds(at, &["train", "data", "-o", "ensemble.json", "--trees", "rounds=3"]);
+    let evaluate =
+        ["evaluate", "ensemble.json", "data", "--sequences", "100", "--max-touches", "1", "--confusion", "5"];
     let table = succeeds(at, &evaluate);
     assert!(table.lines().next().unwrap().ends_with("undecided"), "{table}");
     assert!(table.contains("Taken for, after 5 touches"), "{table}");
@@ -384,7 +396,7 @@ fn evaluate_shows_undecided_sequences_and_the_confusion_of_objects() {
 fn tune_names_the_file_it_wrote_and_the_features_that_the_chip_needs() {
     let directory = set_up();
     let at = directory.path();
-    let tune = ["tune", "data", "--max-instructions", "2000", "--chip", "m0+", "--groups", "20"];
+    let tune = ["tune", "data", "--max-instructions", "2000", "--chip", "m0+", "--sequences", "20"];
     let written = succeeds(at, &[&tune[..], &["-o", "tuned.palpate"]].concat());
     assert!(written.contains("Wrote the model: tuned.palpate"), "{written}");
     let inspected = json(at, &["inspect", "tuned.palpate", "--json"]);
@@ -416,7 +428,7 @@ fn uncalibrated() -> tempfile::TempDir {
     many(&at.join("train"), 2_000, 0);
     many(&at.join("fresh"), 20_000, 1_000_000);
     many(&at.join("unseen"), 4_000, 2_000_000);
-    succeeds(at, &["train", "train", "-o", "ensemble.json", "--rounds", "10"]);
+    succeeds(at, &["train", "train", "-o", "ensemble.json", "--trees", "rounds=10"]);
     succeeds(at, &["export", "ensemble.json", "-o", "model.palpate"]);
     directory
 }
@@ -455,10 +467,10 @@ fn a_calibrated_model_promises_and_evaluate_shows_whether_it_keeps_it() {
     assert_eq!(replaced["sequential"]["promised"], Value::Null);
     assert!(replaced.get("promise").is_none());
     // Other noise makes the promise void; how far it is broken is said.
-    let noisy = json(&["evaluate", "calibrated.palpate", "unseen", "--json", "--noise", "50ms"]);
+    let noisy = json(&["evaluate", "calibrated.palpate", "unseen", "--json", "--real", "noise=50ms"]);
     assert!(noisy["promise"]["void"][0].as_str().unwrap().contains("noise of 50 ms"));
     assert!(noisy["promise"]["exceeded_by"].as_f64().unwrap() > 0.0);
-    let text = succeeds(at, &["evaluate", "calibrated.palpate", "unseen", "--noise", "50ms"]);
+    let text = succeeds(at, &["evaluate", "calibrated.palpate", "unseen", "--real", "noise=50ms"]);
     assert!(text.contains("the promise is broken by ") && text.contains("void: promised with no noise"), "{text}");
 }
 

@@ -29,7 +29,7 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
     approaches(&at.join("unseen"), 4_000, 2_000_000, false);
     approaches(&at.join("full"), 4_000, 3_000_000, true);
     let run = |arguments: &[&str]| stdout(command(arguments).current_dir(at).output().unwrap());
-    run(&["train", "train", "-o", "e.json", "--rounds", "10"]);
+    run(&["train", "train", "-o", "e.json", "--trees", "rounds=10"]);
     run(&["export", "e.json", "-o", "m.palpate"]);
     run(&["calibrate", "m.palpate", "fresh", "-o", "c.palpate", "--error-rate", "5%"]);
     let json = |data: &str, more: &[&str]| -> Value {
@@ -46,7 +46,7 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
     assert_eq!(void[0], "promised for every approach, tested on full touches only", "{void:?}");
     assert!(["kept", "unclear", "broken"].contains(&other["promise"]["finding"].as_str().unwrap()));
     // Of which noise is the worst: what differs is said, and that it broke.
-    let noisy = json("unseen", &["--noise", "60ms"]);
+    let noisy = json("unseen", &["--real", "noise=60ms"]);
     assert_eq!(noisy["promise"]["finding"], "broken", "{}", noisy["promise"]);
     // One of the objects is never touched.
     std::fs::create_dir(at.join("two")).unwrap();
@@ -70,7 +70,7 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
     // A model without a test for strangers says that it has none, instead of a table of noughts.
     std::fs::create_dir(at.join("others")).unwrap();
     std::fs::copy(at.join("full/cup.txt"), at.join("others/vase.txt")).unwrap();
-    let strangers = run(&["evaluate", "c.palpate", "unseen", "--strangers", "others"]);
+    let strangers = run(&["evaluate", "c.palpate", "unseen", "--unknown", "others"]);
     assert!(strangers.contains("has no test") && !strangers.contains("found out by"), "{strangers}");
 }
 
@@ -88,7 +88,7 @@ fn messages_name_the_option_that_is_wrong_and_what_to_write() {
         assert!(error.contains("--error-rate") && error.contains("for 2 percent write 2%"), "{error}");
     }
     globe(at, "cup", 6);
-    let error = fails(&["capture", "cup.obj", "-o", "data", "--true-size", "--unit", "mm"], 2);
+    let error = fails(&["capture", "cup.obj", "-o", "data", "--true-size", "mm"], 2);
     assert!(error.contains("unit = \"mm\", radius = 1.5, spacing = 15, speed = 100"), "{error}");
     let error = fails(&["report", "--touches", "5"], 2);
     assert!(error.contains("unexpected argument '--touches'") && !error.contains("-- --touches"), "{error}");
@@ -101,10 +101,10 @@ fn every_approach_is_not_summed_up_as_a_touch_and_a_mesh_gets_a_verdict() {
     globe(at, "cup", 6);
     globe(at, "jug", 8);
     let run = |arguments: &[&str]| stdout(command(arguments).current_dir(at).output().unwrap());
-    let said = run(&["capture", "cup.obj", "jug.obj", "-o", "data", "--approaches", "--touches", "300"]);
+    let said = run(&["capture", "cup.obj", "jug.obj", "-o", "data", "--approaches", "300"]);
     assert!(!said.contains("share") && said.contains("Every approach was kept"), "{said}");
     assert!(run(&["view", "cup.obj", "-o", "cup.html"]).contains("cup: usable"));
-    run(&["train", "data", "-o", "e.json", "--rounds", "3"]);
+    run(&["train", "data", "-o", "e.json", "--trees", "rounds=3"]);
     run(&["export", "e.json", "-o", "m.palpate"]);
     std::fs::write(at.join("rows.csv"), "a,b,c\n1,2,3\n").unwrap();
     let verified = command(["verify", "m.palpate", "e.json", "rows.csv"]).current_dir(at).output().unwrap();

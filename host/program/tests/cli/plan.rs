@@ -3,7 +3,7 @@
 use crate::{command, json, run, stderr, stdout};
 use palpate::mesh::{Mesh, obj};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Three shapes, touched; a model that knows the pose, and the same with a plan.
 struct Place {
@@ -23,7 +23,7 @@ impl Place {
             std::fs::write(place.path("meshes").join(format!("{name}.obj")), text).unwrap();
         }
         for (data, seed) in [("train", "1"), ("fresh", "2"), ("unseen", "3")] {
-            place.capture(data, &["--approaches", "--pose", "--touches", "1500", "--seed", seed]);
+            place.capture(data, &["--approaches", "1500", "--pose", "--seed", seed]);
         }
         place.ok(&[
             "train",
@@ -32,13 +32,13 @@ impl Place {
             "ensemble.json",
             "--descriptor",
             "oriented",
-            "--touches",
+            "--evidence",
             "all",
-            "--rounds",
-            "8",
+            "--trees",
+            "rounds=8",
         ]);
         place.ok(&["export", "ensemble.json", "-o", "model.palpate"]);
-        place.ok(&["plan", "model.palpate", "fresh", "-o", "planned.palpate", "--rolls", "1"]);
+        place.ok(&["calibrate", "model.palpate", "fresh", "-o", "planned.palpate", "--plan", "1"]);
         place
     }
 
@@ -70,7 +70,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
     let length = |name: &str| std::fs::metadata(place.path(name)).unwrap().len();
     // 26 directions, three pairs, four bytes before them, eight before the section, and zeros.
     assert_eq!(length("planned.palpate"), length("model.palpate") + 4 + 26 * 3 + 8 + 2);
-    let planned = place.json(&["plan", "model.palpate", "fresh", "-o", "again.palpate", "--rolls", "1", "--json"]);
+    let planned = place.json(&["calibrate", "model.palpate", "fresh", "-o", "again.palpate", "--plan", "1", "--json"]);
     assert_eq!((&planned["poses"], &planned["plan_bytes"]), (&26.into(), &82.into()));
     assert_eq!(
         std::fs::read(place.path("again.palpate")).unwrap(),
@@ -80,7 +80,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
     assert_eq!((&inspected["plan"]["rolls"], &inspected["plan"]["left_out"]), (&1.into(), &0.into()));
     assert!(place.json(&["inspect", "model.palpate", "--json"])["plan"].is_null());
 
-    let evaluate = ["evaluate", "planned.palpate", "unseen", "--at", "2,5", "--groups", "300", "--json"];
+    let evaluate = ["evaluate", "planned.palpate", "unseen", "--at", "2,5", "--sequences", "300", "--json"];
     let random = place.json(&evaluate);
     let active = place.json(&[&evaluate[..], &["--active"]].concat());
     let fields = |figures: &Value| figures.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
@@ -97,7 +97,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
     // Every approach counts as evidence to this model, up to late contacts.
     let touches = active["sequential"]["mean_touches"].as_f64().unwrap();
     assert!((touches - mean(&active)).abs() < 0.1 * touches, "{touches}");
-    let text = place.ok(&["evaluate", "planned.palpate", "unseen", "--groups", "100", "--active"]);
+    let text = place.ok(&["evaluate", "planned.palpate", "unseen", "--sequences", "100", "--active"]);
     assert!(text.contains("Each approach is in the pose that the plan proposed, of 26"), "{text}");
 
     let followed = place.ok(&["recognize", "planned.palpate", "unseen/cigar.txt", "--active"]);
@@ -110,7 +110,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
 #[test]
 fn an_evaluation_under_a_plan_is_the_same_on_any_number_of_threads() {
     let place = Place::new();
-    let evaluate = ["evaluate", "planned.palpate", "unseen", "--groups", "50", "--active", "--switch", "--json"];
+    let evaluate = ["evaluate", "planned.palpate", "unseen", "--sequences", "50", "--active", "--switch", "--json"];
     let on = |threads: &str| {
         let mut command = command(evaluate);
         stdout(command.current_dir(place.directory.path()).env("RAYON_NUM_THREADS", threads).output().unwrap())
@@ -122,30 +122,34 @@ fn an_evaluation_under_a_plan_is_the_same_on_any_number_of_threads() {
 fn what_cannot_be_planned_or_followed_is_refused_with_what_to_do() {
     let place = Place::new();
     let plan = |model: &'static str, data: &'static str, rolls: &'static str| {
-        ["plan", model, data, "-o", "out.palpate", "--rolls", rolls]
+        ["calibrate", model, data, "-o", "out.palpate", "--plan", rolls]
     };
-    place.fails(&plan("model.palpate", "fresh", "3"), 2, "--rolls is 3. Use 1, 2 or 4");
+    place.fails(&plan("model.palpate", "fresh", "3"), 2, "--plan is 3. Use 1, 2 or 4");
     place.fails(&plan("model.palpate", "fresh", "4"), 1, "are in one of the poses");
     place.fails(&plan("ensemble.json", "fresh", "1"), 1, "not a Palpate model");
     place.capture("full", &["--pose", "--touches", "100"]);
-    place.fails(&plan("model.palpate", "full", "1"), 1, "--approaches --pose");
-    place.capture("blind", &["--approaches", "--touches", "500"]);
+    place.fails(&plan("model.palpate", "full", "1"), 1, "--approaches N --pose");
+    place.capture("blind", &["--approaches", "500"]);
     place.fails(&plan("model.palpate", "blind", "1"), 1, "pose");
     assert!(!place.path("out.palpate").exists());
-    place.fails(&["evaluate", "model.palpate", "unseen", "--active"], 1, "palpate plan MODEL DIR -o OUT");
+    place.fails(&["evaluate", "model.palpate", "unseen", "--active"], 1, "palpate calibrate MODEL DIR -o OUT --plan 4");
     place.fails(&["evaluate", "ensemble.json", "unseen", "--active"], 1, "has no plan");
-    place.fails(&["recognize", "model.palpate", "unseen/disc.txt", "--active"], 1, "palpate plan MODEL DIR -o OUT");
-    place.fails(&["evaluate", "planned.palpate", "full", "--active"], 1, "--approaches --pose");
+    place.fails(
+        &["recognize", "model.palpate", "unseen/disc.txt", "--active"],
+        1,
+        "palpate calibrate MODEL DIR -o OUT --plan 4",
+    );
+    place.fails(&["evaluate", "planned.palpate", "full", "--active"], 1, "--approaches N --pose");
     place.fails(&["evaluate", "ensemble.json", "unseen", "--switch"], 1, "Export the ensemble first");
     place.fails(&["evaluate", "model.palpate", "unseen", "--switch", "0"], 2, "--switch is 0");
     // Nothing is written over what is read.
-    place.fails(&["plan", "model.palpate", "fresh", "-o", "model.palpate", "--rolls", "1"], 2, "model.palpate");
+    place.fails(&["calibrate", "model.palpate", "fresh", "-o", "model.palpate", "--plan", "1"], 2, "model.palpate");
 }
 
 #[test]
 fn a_promise_is_calibrated_under_the_plan_and_kept_under_it() {
     let place = Place::new();
-    place.capture("more", &["--approaches", "--pose", "--touches", "30000", "--seed", "4"]);
+    place.capture("more", &["--approaches", "30000", "--pose", "--seed", "4"]);
     let calibrate =
         ["calibrate", "planned.palpate", "more", "-o", "calibrated.palpate", "--error-rate", "5%", "--json"];
     let random = place.json(&calibrate);
@@ -154,13 +158,14 @@ fn a_promise_is_calibrated_under_the_plan_and_kept_under_it() {
     // A few poses are proposed again and again, and used up long before the others.
     assert!(sequences(&active) > 60 && sequences(&active) < sequences(&random), "{active:#} {random:#}");
     assert!(active["error"].as_f64().unwrap() <= 0.05, "{active:#}");
-    let evaluated = place.json(&["evaluate", "calibrated.palpate", "unseen", "--active", "--groups", "2000", "--json"]);
+    let evaluated =
+        place.json(&["evaluate", "calibrated.palpate", "unseen", "--active", "--sequences", "2000", "--json"]);
     let sequential = &evaluated["approaches"]["sequential"];
     assert_eq!(sequential["promised"], 0.05);
     assert!(sequential["error"].as_f64().unwrap() < 0.06, "{sequential:#}");
     assert_eq!(evaluated["promise"]["void"], serde_json::json!([]));
     // At random it is another promise.
-    let passive = place.json(&["evaluate", "calibrated.palpate", "unseen", "--groups", "200", "--json"]);
+    let passive = place.json(&["evaluate", "calibrated.palpate", "unseen", "--sequences", "200", "--json"]);
     let void = passive["promise"]["void"].to_string();
     assert!(void.contains("as the plan proposes") && void.contains("at random"), "{void}");
     place.fails(&["calibrate", "model.palpate", "more", "-o", "x.palpate", "--active"], 1, "has no plan");
@@ -169,7 +174,7 @@ fn a_promise_is_calibrated_under_the_plan_and_kept_under_it() {
 #[test]
 fn forgetting_finds_an_exchanged_object_sooner() {
     let place = Place::new();
-    let figures = place.json(&["evaluate", "model.palpate", "unseen", "--groups", "500", "--switch", "3", "--json"]);
+    let figures = place.json(&["evaluate", "model.palpate", "unseen", "--sequences", "500", "--switch", "3", "--json"]);
     let of = |rule: &str, case: &str, figure: &str| figures["switch"][rule][case][figure].as_f64().unwrap();
     assert_eq!(figures["switch"]["nats"], 3.0);
     let after = |rule| of(rule, "switched", "mean_approaches");
@@ -185,8 +190,7 @@ fn forgetting_finds_an_exchanged_object_sooner() {
 }
 
 #[test]
-fn plan_says_what_it_does() {
-    let help = stdout(run(["help", "plan"]));
-    assert!(help.contains("--rolls") && help.contains("palpate evaluate planned.palpate unseen --active"), "{help}");
-    assert!(Path::new(env!("CARGO_BIN_EXE_palpate")).exists());
+fn a_plan_takes_no_option_of_a_promise() {
+    let error = stderr(run(["calibrate", "m.palpate", "d", "-o", "x", "--plan", "4", "--error-rate", "1%"]), 2);
+    assert!(error.contains("--plan") && error.contains("cannot be used with"), "{error}");
 }

@@ -13,7 +13,7 @@ fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_t
     let trace = directory.path().join("pages/trace.txt");
     let mesh = globe(directory.path(), "my globe", 8);
     let play = || {
-        let mut command = command(["play", "mouse"]);
+        let mut command = command(["view", "--play", "mouse"]);
         command.arg(&mesh).arg("--model").arg(household()).arg("-o").arg(&page).arg("--trace").arg(&trace);
         let said = stdout(command.output().unwrap());
         assert!(said.contains("play.html"), "{said}");
@@ -34,7 +34,7 @@ fn a_page_without_a_model_trains_four_and_says_what_each_is_expected_to_cost() {
     let directory = tempfile::tempdir().unwrap();
     let page = directory.path().join("play.html");
     let meshes = [("round", 8), ("rough", 5)].map(|(name, rings)| globe(directory.path(), name, rings));
-    stdout(command(["play", "--touches", "300", "-o"]).arg(&page).args(meshes).output().unwrap());
+    stdout(command(["view", "--play", "--touches", "300", "-o"]).arg(&page).args(meshes).output().unwrap());
     let text = std::fs::read_to_string(&page).unwrap();
     for name in
         ["times, full touches", "curvature, full touches", "curvature, every contact", "oriented, every approach"]
@@ -49,16 +49,16 @@ fn what_cannot_be_played_with_writes_no_page() {
     let directory = tempfile::tempdir().unwrap();
     let page = directory.path().join("play.html");
     let with = |arguments: &[&str], code| {
-        let mut command = command(["play", "-o"]);
+        let mut command = command(["view", "--play", "-o"]);
         stderr(command.arg(&page).args(arguments).output().unwrap(), code)
     };
     let bad = directory.path().join("bad.palpate");
     std::fs::write(&bad, b"no model").unwrap();
     let error = with(&["bowl", "--model", bad.to_str().unwrap()], 1);
     assert!(error.contains("bad.palpate"), "{error}");
-    let error = with(&["bowl", "--true-size", "--model", household().to_str().unwrap()], 2);
+    let error = with(&["bowl", "--true-size", "stated", "--model", household().to_str().unwrap()], 2);
     assert!(error.contains("probe"), "{error}");
-    let error = with(&["bowl", "--noise", "much"], 2);
+    let error = with(&["bowl", "--real", "noise=much"], 2);
     assert!(error.contains("5ms"), "{error}");
     assert!(!page.exists());
 }

@@ -36,10 +36,10 @@ macro_rules! arguments {
 fn objects_keep_their_true_sizes_and_the_manifest_says_so() {
     let (directory, meshes, probe) = set_up();
     let data = directory.path().join("data");
-    let capture = arguments!["capture", &meshes, "-o", &data, "--touches", "200", "--true-size", "--probe", &probe];
-    let error = stderr(run(capture), 1);
-    assert!(error.contains("globe: the unit of its mesh is not known") && error.contains("See --unit"), "{error}");
-    stdout(run([&capture[..], &arguments!["--unit", "mm", "--unit", "lump=cm"]].concat()));
+    let capture = arguments!["capture", &meshes, "-o", &data, "--touches", "200", "--probe", &probe, "--true-size"];
+    let error = stderr(run([&capture[..], &arguments!["stated"]].concat()), 1);
+    assert!(error.contains("globe: the unit of its mesh is not known") && error.contains("See --true-size"), "{error}");
+    stdout(run([&capture[..], &arguments!["mm,lump=cm"]].concat()));
     let stated = listing(&data);
     assert_eq!(stated["settings"]["unit"], "mm");
     assert_eq!(stated["settings"]["probe"]["spacing"], 0.3);
@@ -54,10 +54,10 @@ fn objects_keep_their_true_sizes_and_the_manifest_says_so() {
     };
     assert!(longest("globe.txt") < 1.2 && longest("globe.txt") > 0.1, "{}", longest("globe.txt"));
     // Another unit of the mesh is another size.
-    let resumed = stderr(run([&capture[..], &arguments!["--unit", "in", "--resume"]].concat()), 1);
+    let resumed = stderr(run([&capture[..], &arguments!["in", "--resume"]].concat()), 1);
     assert!(resumed.contains("a unit of globe's mesh is 1 mm there and 25.4 mm here"), "{resumed}");
-    let error = stderr(run([&capture[..], &arguments!["--unit", "plate=mm"]].concat()), 2);
-    assert!(error.contains("--unit is plate"), "{error}");
+    let error = stderr(run([&capture[..], &arguments!["plate=mm"]].concat()), 2);
+    assert!(error.contains("--true-size is plate"), "{error}");
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn a_probe_in_another_unit_than_the_objects_is_refused() {
     let error = stderr(run([&capture[..], &arguments!["--probe", &probe]].concat()), 1);
     assert!(error.contains("probe.toml: ") && error.contains("--true-size"), "{error}");
     let tenths = write(directory.path(), "tenths.toml", &MILLIMETERS.replace("mm", "unit"));
-    let true_size = arguments!["--true-size", "--unit", "mm"];
+    let true_size = arguments!["--true-size", "mm"];
     let error = stderr(run([&capture[..], &true_size, &arguments!["--probe", &tenths]].concat()), 1);
     assert!(error.contains("tenths.toml: ") && error.contains("unit = \"mm\""), "{error}");
     let error = stderr(run([&capture[..], &true_size].concat()), 2);
@@ -79,10 +79,9 @@ fn a_probe_in_another_unit_than_the_objects_is_refused() {
     let error = stderr(run([&capture[..], &arguments!["--probe", &broken]].concat()), 1);
     assert!(error.contains("broken.toml:5: not a usable probe file: ") && error.contains("weight"), "{error}");
     assert!(!data.exists());
-    // Radius, spacing and speed in millimeters are a probe as well.
-    let stated = arguments!["--radius", "0.1", "--spacing", "0.3", "--speed", "2"];
-    stdout(run([&capture[..], &true_size, &stated].concat()));
-    assert_eq!(listing(&data)["settings"]["unit"], "mm");
+    // The published probe is the one without a file.
+    stdout(run([&capture[..], &arguments!["--probe", "published"]].concat()));
+    assert_eq!(listing(&data)["settings"]["probe"]["radius"], 0.15);
 }
 
 #[test]
@@ -98,11 +97,11 @@ fn two_probes_that_meet_have_to_be_the_same() {
     capture(&thick_data, &thick);
     capture(&data, &published);
     assert_eq!(listing(&thick_data)["settings"]["probe"]["radius"], 0.3);
-    let train = arguments!["train", &data, "-o", &ensemble, "--rounds", "3", "--probe"];
+    let train = arguments!["train", &data, "-o", &ensemble, "--trees", "rounds=3", "--probe"];
     let error = stderr(run([&train[..], &arguments![&thick]].concat()), 1);
     assert!(error.contains("thick.toml and the data set state different probes: radius 0.3 and 0.15"), "{error}");
     stdout(run([&train[..], &arguments![&published]].concat()));
-    let evaluate = |data: &Path| run(arguments!["evaluate", &ensemble, data, "--groups", "50"]);
+    let evaluate = |data: &Path| run(arguments!["evaluate", &ensemble, data, "--sequences", "50"]);
     stdout(evaluate(&data));
     let error = stderr(evaluate(&thick_data), 1);
     assert!(error.contains("the model and the data set state different probes: radius 0.15 and 0.3"), "{error}");
@@ -110,7 +109,7 @@ fn two_probes_that_meet_have_to_be_the_same() {
     std::fs::remove_file(thick_data.join("dataset.json")).unwrap();
     stdout(evaluate(&thick_data));
     // It is then the file that says for which probe the ensemble is, and what the real one adds.
-    let train = arguments!["train", &thick_data, "-o", &ensemble, "--rounds", "3", "--probe", &thick];
+    let train = arguments!["train", &thick_data, "-o", &ensemble, "--trees", "rounds=3", "--probe", &thick];
     stdout(run(train));
     let saved: Value = serde_json::from_slice(&std::fs::read(&ensemble).unwrap()).unwrap();
     let attribute =
@@ -133,7 +132,7 @@ fn run_tune_and_view_take_the_probe_file() {
     let (directory, meshes, probe) = set_up();
     let at = directory.path();
     let (out, page, data) = (at.join("out"), at.join("globe.html"), at.join("out/data"));
-    let size = arguments!["--true-size", "--unit", "mm", "--probe", &probe];
+    let size = arguments!["--true-size", "mm", "--probe", &probe];
     stdout(run([&arguments!["run", &meshes, "-o", &out, "--touches", "300"][..], &size].concat()));
     assert_eq!(listing(&data)["settings"]["unit"], "mm");
     let saved = std::fs::read_to_string(out.join("ensemble.json")).unwrap();
@@ -143,7 +142,7 @@ fn run_tune_and_view_take_the_probe_file() {
     let published = write(at, "published.toml", "radius = 0.15\nspacing = 1.5\nspeed = 10\n");
     let error = stderr(run(arguments!["tune", &data, "--probe", &published]), 1);
     assert!(error.contains("state different probes: unit \"unit\" and \"mm\""), "{error}");
-    let error = stderr(run(arguments!["run", &meshes, "-o", &out, "--true-size", "--unit", "mm"]), 2);
+    let error = stderr(run(arguments!["run", &meshes, "-o", &out, "--true-size", "mm"]), 2);
     assert!(error.contains("--probe is not given"), "{error}");
 }
 
@@ -161,10 +160,10 @@ fn a_directory_of_meshes_is_one_object_with_instances() {
     assert_eq!(summary["objects"].as_array().unwrap().len(), 2);
     assert_eq!(listing(&data)["objects"][1]["instances"], serde_json::json!(["a", "b", "c"]));
     let (ensemble, evaluated) = (at.join("ensemble.json"), at.join("unseen"));
-    stdout(run(arguments!["train", &data, "-o", &ensemble, "--rounds", "3"]));
+    stdout(run(arguments!["train", &data, "-o", &ensemble, "--trees", "rounds=3"]));
     let unseen = arguments!["capture", &meshes, "-o", &evaluated, "--touches", "300", "--seed", "2", "--instances"];
     stdout(run(unseen));
-    let figures = json(run(arguments!["evaluate", &ensemble, &evaluated, "--groups", "50", "--json"]));
+    let figures = json(run(arguments!["evaluate", &ensemble, &evaluated, "--sequences", "50", "--json"]));
     assert_eq!(figures["touches"], 600);
     // Other instances are other touches.
     std::fs::remove_file(meshes.join("globe/c.obj")).unwrap();

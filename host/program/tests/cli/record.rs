@@ -78,7 +78,7 @@ fn a_recording_trains_and_is_recognized_like_any_other_data_set() {
     let [data, ensemble] = [&data, &ensemble].map(|path| path.to_str().unwrap());
     let model = place.path().join("model.palpate");
     let model = model.to_str().unwrap();
-    stdout(run(["train", data, "-o", ensemble, "--rounds", "3", "--depth", "2"]));
+    stdout(run(["train", data, "-o", ensemble, "--trees", "rounds=3,depth=2"]));
     let said = stdout(run(["evaluate", ensemble, data]));
     assert!(said.contains("\nall     100.0 % 100.0 %"), "{said}");
     stdout(run(["export", ensemble, "-o", model]));
@@ -234,7 +234,8 @@ fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
         serve(&mut stream, &mut end, &[event(8), fault, event(9), event(10)]);
         wait(&mut stream);
     });
-    let arguments = ["link", &port, "--record", data.to_str().unwrap(), "--object", "bowl", "--touches", "7", "--json"];
+    let arguments =
+        ["data", "record", &port, "-o", data.to_str().unwrap(), "--object", "bowl", "--stop-after", "7", "--json"];
     let output = run(arguments);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let summary = json(output);
@@ -268,7 +269,7 @@ fn each_touch_is_printed_and_a_second_recording_of_the_object_is_added() {
             wait(&mut stream);
         });
         let directory = data.to_str().unwrap();
-        let text = stdout(run(["link", &port, "--record", directory, "--object", "bowl", "--touches", "2"]));
+        let text = stdout(run(["data", "record", &port, "-o", directory, "--object", "bowl", "--stop-after", "2"]));
         chip.join().unwrap();
         let [first, second, all] = [1, 2, 2].map(|number| number + 2 * round);
         let expected = format!(
@@ -300,7 +301,7 @@ fn a_touch_that_the_chip_tells_again_from_before_the_recording_is_said_and_not_r
         wait(&mut stream);
     });
     let directory = data.to_str().unwrap();
-    let output = run(["link", &port, "--record", directory, "--object", "bowl", "--touches", "1"]);
+    let output = run(["data", "record", &port, "-o", directory, "--object", "bowl", "--stop-after", "1"]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     chip.join().unwrap();
     assert!(said.contains("warning: a touch from before this recording was told again, and not recorded"), "{said}");
@@ -322,7 +323,7 @@ fn with_the_pose_wanted_touches_without_one_are_said_and_not_recorded() {
         wait(&mut stream);
     });
     let directory = data.to_str().unwrap();
-    let arguments = ["link", &port, "--record", directory, "--object", "bowl", "--touches", "1", "--pose"];
+    let arguments = ["data", "record", &port, "-o", directory, "--object", "bowl", "--stop-after", "1", "--pose"];
     let output = run(arguments);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let text = stdout(output);
@@ -337,10 +338,8 @@ fn with_the_pose_wanted_touches_without_one_are_said_and_not_recorded() {
 #[test]
 fn bad_arguments_of_recordings_exit_with_2() {
     for (arguments, part) in [
-        (&["link", "emulator", "--record", "recorded"][..], "--object"),
-        (&["link", "emulator", "--object", "bowl"], "--record"),
-        (&["link", "emulator", "--pose"], "--record"),
-        (&["link", "emulator", "touches", "--record", "recorded", "--object", "bowl"], "cannot be used with"),
+        (&["data", "record", "emulator", "-o", "recorded"][..], "--object"),
+        (&["link", "emulator", "--record", "recorded"], "palpate data record PORT -o DIR --object NAME"),
         (&["data", "record", "x.txt", "--object", "bowl"], "--output"),
         (&["data"], "Usage: palpate data"),
     ] {

@@ -272,7 +272,7 @@ fn what_cannot_be_taken_over_is_refused_by_name_with_the_way_round() {
 fn the_layout_is_chosen_for_what_is_asked_and_all_candidates_are_named() {
     let (_directory, path) = place();
     let export = |goal: &str| {
-        json(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m"), "--for", goal, "--json"]))
+        json(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m"), "--layout", goal, "--json"]))
     };
     let (size, speed, balanced) = (export("size"), export("speed"), export("balanced"));
     let candidates = size["candidates"].as_array().unwrap();
@@ -308,7 +308,7 @@ fn whole_numbers_in_the_users_units_split_as_the_values_do_and_say_what_they_cha
     assert_eq!(inspected["feature_names"][1], serde_json::json!({"name": "height", "scale": 1000.0}));
     let parts = inspected["bytes_by_part"].as_object().unwrap().values();
     assert_eq!(inspected["bytes"], parts.map(|bytes| bytes.as_u64().unwrap()).sum::<u64>());
-    let fitted = json(run(["export", &model, "-o", &path("m"), "--fit-scales", &rows, "--json"]));
+    let fitted = json(run(["export", &model, "-o", &path("m"), "--scale", &rows, "--json"]));
     assert!(fitted["scales"].as_array().unwrap().iter().any(|effect| effect["scale"].as_f64() > Some(1.0)), "{fitted}");
     json(run(["verify", &path("m"), &model, &rows, "--json"]));
     // A feature with fractions, of which nothing was said, and one that there is not; units beyond 32 bits.
@@ -436,7 +436,7 @@ fn what_a_file_does_not_say_is_said_at_export_and_can_be_stated() {
     assert!(text.contains("stay different in f32") && text.contains("--scale height=UNITS"), "{text}");
     // One line for what whole numbers hold exactly.
     let rows = data("lightgbm-4.7-seconds.rows.csv");
-    let text = export("lightgbm-4.7-seconds.txt", &["--fit-scales", &rows]);
+    let text = export("lightgbm-4.7-seconds.txt", &["--scale", &rows]);
     assert!(text.contains("Whole units hold every value of these rows") && text.contains("height × 1"), "{text}");
     let text = stdout(run(["inspect", &path("m")]));
     assert!(text.contains("(per row, estimated)") && text.contains("200 rows") && !text.contains("touch"), "{text}");

@@ -47,7 +47,7 @@ fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
     touches(&at.join("unseen"), &KNOWN, 4_000, 3);
     touches(&at.join("others"), &[("kettle", 550_000)], 4_000, 3);
     let trained =
-        succeeds(at, &["train", "data", "-o", "e.json", "--rounds", "10", "--background", "shapes", "--json"]);
+        succeeds(at, &["train", "data", "-o", "e.json", "--trees", "rounds=10", "--background", "shapes", "--json"]);
     let trained: Value = serde_json::from_str(&trained).unwrap();
     assert_eq!(trained["objects"], 2, "a background is no object");
     succeeds(at, &["export", "e.json", "-o", "m.palpate"]);
@@ -57,7 +57,7 @@ fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
     assert_eq!(calibrated["strangers"]["held"], "certain");
     assert!(calibrated["strangers"]["false_alarms"].as_f64().unwrap() <= 0.02, "{calibrated}");
 
-    let arguments = ["evaluate", "c.palpate", "unseen", "--strangers", "others", "--json"];
+    let arguments = ["evaluate", "c.palpate", "unseen", "--unknown", "others", "--json"];
     let figures: Value = serde_json::from_str(&succeeds(at, &arguments)).unwrap();
     let strangers = &figures["strangers"];
     let number = |value: &Value| value.as_f64().unwrap();
@@ -84,8 +84,8 @@ fn a_known_object_is_no_stranger_and_says_so() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
     touches(&at.join("data"), &KNOWN, 400, 1);
-    succeeds(at, &["train", "data", "-o", "e.json", "--rounds", "3"]);
-    let message = stderr(palpate(at, &["evaluate", "e.json", "data", "--strangers", "data"]), 1);
+    succeeds(at, &["train", "data", "-o", "e.json", "--trees", "rounds=3"]);
+    let message = stderr(palpate(at, &["evaluate", "e.json", "data", "--unknown", "data"]), 1);
     assert!(message.contains("data: the model knows the object bowl"), "{message}");
     succeeds(at, &["export", "e.json", "-o", "m.palpate"]);
     let arguments = ["calibrate", "m.palpate", "data", "-o", "c.palpate", "--strangers", "maybe"];

@@ -70,7 +70,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
 }
 
-const QUICK: [&str; 4] = ["--rounds", "6", "--depth", "4"];
+const QUICK: [&str; 2] = ["--trees", "rounds=6,depth=4"];
 
 #[test]
 fn a_recorded_object_is_taught_exported_and_recognized() {
@@ -100,7 +100,8 @@ fn a_recorded_object_is_taught_exported_and_recognized() {
     for part in ["Errors against approaches", "palpate train data --extend t.json", "<svg", "cup"] {
         assert!(page.contains(part), "{part}");
     }
-    let figures = json(&succeeds(at, &["evaluate", "t.palpate", "unseen", "--at", "20", "--groups", "300", "--json"]));
+    let figures =
+        json(&succeeds(at, &["evaluate", "t.palpate", "unseen", "--at", "20", "--sequences", "300", "--json"]));
     for object in ["bowl", "fork", "pot"] {
         assert!(figures["per_object"][object]["20"].as_f64() > Some(0.8), "{object}: {}", figures["per_object"]);
     }
@@ -149,7 +150,7 @@ fn several_recordings_are_taught_at_once_and_alone() {
     assert!(trained["taught"]["objects"][0]["recognized"].as_f64() > Some(0.8), "{trained}");
     let one = ["train", "--teach", "pot.txt", "-o", "t.json"];
     fails(at, &one, 1, "there is only one object to train on");
-    let noisy = [&alone[..5], &["-o", "t.json", "--noise", "5ms"]].concat();
+    let noisy = [&alone[..5], &["-o", "t.json", "--real", "noise=5ms"]].concat();
     fails(at, &noisy, 2, "recorded ones have noise of their own");
     fails(at, &["train", "data", "--teach", "pot.txt", "--teach", "unseen", "-o", "t.json"], 1, "pot was given twice");
 }
@@ -158,7 +159,7 @@ fn several_recordings_are_taught_at_once_and_alone() {
 fn what_does_not_go_together_is_named() {
     let place = set_up("");
     let at = place.path();
-    let teach = |recorded: &'static str| ["train", "data", "--teach", recorded, "-o", "t.json", "--rounds", "2"];
+    let teach = |recorded: &'static str| ["train", "data", "--teach", recorded, "-o", "t.json", "--trees", "rounds=2"];
     touches(&at.join("few/pot.txt"), 500_000, 12, 5, "");
     fails(at, &teach("few"), 1, "only 12 recorded touches of pot are evidence");
     touches(&at.join("clash/bowl.txt"), 500_000, 100, 5, "");
@@ -171,14 +172,14 @@ fn what_does_not_go_together_is_named() {
     // Every line has all three contacts: not every approach was recorded.
     std::fs::write(at.join("full.txt"), "0 0.1 0.2\n0 0.2 0.3\n".repeat(50)).unwrap();
     fails(at, &teach("full.txt"), 1, "only full touches were recorded");
-    let full = ["train", "data", "--teach", "full.txt", "-o", "full.json", "--rounds", "2", "--touches", "full"];
+    let full = ["train", "data", "--teach", "full.txt", "-o", "full.json", "--trees", "rounds=2", "--evidence", "full"];
     succeeds(at, &full);
     let paper = [&teach("pot.txt")[..], &["--preset", "paper"]].concat();
     fails(at, &paper, 1, "a leaf of the ensemble holds one value");
     fails(at, &["train", "-o", "t.json"], 2, "<DIRECTORY>");
     fails(at, &["train", "data", "--extend", "e.json", "-o", "t.json"], 2, "--teach");
-    let both = ["train", "data", "--extend", "e.json", "--teach", "pot.txt", "-o", "t.json", "--rounds", "2"];
-    fails(at, &both, 2, "--rounds");
+    let both = ["train", "data", "--extend", "e.json", "--teach", "pot.txt", "-o", "t.json", "--trees", "rounds=2"];
+    fails(at, &both, 2, "--trees");
     // A recording is never written over.
     fails(at, &["train", "data", "--teach", "pot.txt", "-o", "pot.txt"], 2, "another file than what is read");
 }
@@ -189,18 +190,18 @@ fn a_recording_with_another_probe_or_without_poses_is_refused() {
     let at = place.path();
     touches(&at.join("plain/cup.txt"), 500_000, 100, 5, "");
     let oriented = |recorded: &'static str| {
-        ["train", "data", "--teach", recorded, "-o", "t.json", "--descriptor", "oriented", "--rounds", "2"]
+        ["train", "data", "--teach", recorded, "-o", "t.json", "--descriptor", "oriented", "--trees", "rounds=2"]
     };
     fails(at, &oriented("plain"), 1, "touches of cup have no pose");
     stdout(palpate(at, &[&oriented("pot.txt")[..4], &["-o", "posed.json", "--descriptor", "oriented"]].concat()));
     // Poses that the model does not need are no obstacle.
-    succeeds(at, &["train", "data", "--teach", "pot.txt", "-o", "blind.json", "--rounds", "2"]);
+    succeeds(at, &["train", "data", "--teach", "pot.txt", "-o", "blind.json", "--trees", "rounds=2"]);
     for (directory, spacing) in [("narrow", "1.5"), ("wide", "2")] {
         let probe = format!("radius = 0.15\nspacing = {spacing}\nspeed = 10.0\n");
         std::fs::write(at.join("probe.toml"), probe).unwrap();
         let objects = if directory == "narrow" { ["bowl", "fork"] } else { ["spoon", "mouse"] };
-        let how = ["-o", directory, "--approaches", "--touches", "300", "--probe", "probe.toml"];
+        let how = ["-o", directory, "--approaches", "300", "--probe", "probe.toml"];
         succeeds(at, &[&["capture"][..], &objects, &how].concat());
     }
-    fails(at, &["train", "narrow", "--teach", "wide", "-o", "t.json", "--rounds", "2"], 1, "spacing");
+    fails(at, &["train", "narrow", "--teach", "wide", "-o", "t.json", "--trees", "rounds=2"], 1, "spacing");
 }

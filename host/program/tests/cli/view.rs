@@ -32,9 +32,9 @@ fn wrong_arguments_write_no_page() {
     let directory = tempfile::tempdir().unwrap();
     let page = directory.path().join("page.html");
     for (wrong, expected) in [
-        (["--radius", "0"], "radius is 0. Use a number greater than 0."),
-        (["--length", "nan"], "length is NaN."),
-        (["--spacing", "-1"], "-1"),
+        (["--misses", "-1"], "-1"),
+        (["--real", "noise=5ms"], "--real is given. Use it with --play"),
+        (["--length", "9"], "--probe FILE with smaller or larger fingers"),
         (["--touches", "many"], "many"),
     ] {
         let error = stderr(command(["view", "bowl", "-o"]).arg(&page).args(wrong).output().unwrap(), 2);

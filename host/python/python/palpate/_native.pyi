@@ -445,7 +445,7 @@ def evaluate(model: Model | Ensemble, data: DataSet, *, at: SupportsGetItem[int,
 def parity(ensemble: Ensemble, model: Model, data: DataSet, *, sequences: SupportsIndex = 10000, seed: SupportsIndex = 1, progress: Progress | None = None) -> str:
     """
     Compares a compiled model with its ensemble on every touch of a data set and on random sequences, and returns what
-    `palpate parity --json` prints.
+    `palpate verify --json` prints.
     """
 
 def sources(meshes: SupportsGetItem[int, str | PathLike[str]]) -> list[tuple[str, str]]:

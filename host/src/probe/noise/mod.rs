@@ -15,9 +15,12 @@
 //! # Ok::<_, palpate::error::ProbeProblem>(())
 //! ```
 
+mod partial;
 pub mod quantity;
 #[cfg(test)]
 mod tests;
+
+pub use partial::{BadNoise, PartialNoise};
 
 use crate::error::{Error, ProbeProblem, Result};
 use crate::probe::approach::{FINGERS, to_q15};

@@ -302,7 +302,7 @@ impl Findings {
         let partial = touches.iter().filter(|touch| !touch.is_full()).count();
         if partial > 0 && origin.is_some_and(|origin| !origin.approaches) {
             let what = format!("{} miss a contact, but the data set is said to hold full touches only", of(partial));
-            self.wrong(path, what, "Remove those lines, or capture with --approaches.");
+            self.wrong(path, what, "Remove those lines, or capture with --approaches N.");
         }
         if touches.iter().all(|touch| touch.times().iter().all(|time| time.micros().is_none())) {
             self.wrong(path, "no touch has a contact", "Check that the probe reaches the object.");

@@ -136,7 +136,7 @@ impl Problem for RowsProblem {
             Self::Class { .. } => {
                 "Export with `--leaf f32`, and check that the margins are the library's raw scores of these rows."
             }
-            Self::Touches => "Use `palpate parity` and `palpate evaluate` for models of touches.",
+            Self::Touches => "Use `palpate verify` and `palpate evaluate` for models of touches.",
             Self::OtherModel { .. } => {
                 "Give the file that the model was exported from, and --all-trees if it was exported with that."
             }

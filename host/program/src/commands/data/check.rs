@@ -1,34 +1,51 @@
-//! `palpate data check`.
+//! `palpate data check` of one data set.
 
+use crate::commands::Global;
+use crate::commands::numbers::sequences;
+use crate::commands::train::descriptor;
 use palpate::Result;
 use palpate::error::{Error, Place, TouchesProblem};
+use palpate::evaluate::recorded::Settings;
 use palpate::output;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
+use palpate_shared::Descriptor;
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Every line that cannot be read is named, and what reads well but would train badly: a file that was appended to itself, one object under two names, poses that some touches have and others do not, times that are no seconds, a capture that is not complete. The exit code is 1 if training would be wrong; what may be meant is a note.
+Of one data set, every line that cannot be read is named, and what reads well but would train badly: a file that was appended to itself, one object under two names, times that are no seconds, a capture that is not complete. The exit code is 1 if training would be wrong; what may be meant is a note.
+
+Of two, a classifier is trained to tell recorded from simulated touches of an object, and tested on others: 50 % is guessing, so the simulation is right as far as the touches show. Every feature is compared as well, and the accuracy of a model that is trained on simulated touches.
 
 Examples:
-  palpate data check touches
-  palpate data check recorded --json
-  palpate data check monday.mcap
-  palpate data check touches && palpate train touches -o ensemble.json")]
-pub(crate) struct Arguments {
+  palpate data check recorded
+  palpate data check monday.mcap --json
+  palpate capture meshes/ -o simulated --approaches 20000 --probe probe.toml
+  palpate data check recorded simulated
+  palpate data check recorded simulated --descriptor oriented")]
+pub(super) struct Arguments {
     /// A directory with a file of touches for each object, or a robot's log (MCAP)
     #[arg(value_name = "DIR")]
-    directory: PathBuf,
-    /// Print findings and summary as JSON
-    #[arg(long)]
-    json: bool,
+    pub(super) directory: PathBuf,
+    /// Simulated touches of the same objects, to compare the recorded ones in DIR with
+    #[arg(value_name = "SIMULATED")]
+    simulated: Option<PathBuf>,
+    /// Which features a touch is turned into; where two data sets are compared
+    #[arg(long, value_parser = descriptor, value_name = "times|curvature|gravity|oriented", default_value = "curvature", requires = "simulated")]
+    pub(super) descriptor: Descriptor,
+    /// Sequences of touches to draw; of each object, where two data sets are compared
+    #[arg(long, value_name = "N", value_parser = sequences, default_value_t = Settings::default().groups, requires = "simulated")]
+    pub(super) sequences: usize,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+    if let Some(simulated) = &arguments.simulated {
+        return super::compare::run(arguments, simulated, global);
+    }
     let check = Check::of(&arguments.directory)?;
-    match arguments.json {
+    match global.json {
         true => output::print_json(&check)?,
         false => output::print(&text(&check))?,
     }

@@ -1,67 +1,37 @@
-//! `palpate data compare`.
+//! `palpate data check` of two data sets.
 
-use super::super::progress::Bar;
-use super::super::{dataset, train};
+use super::check::Arguments;
+use crate::commands::progress::Bar;
+use crate::commands::{Global, checked, dataset, remark};
 use palpate::Result;
 use palpate::evaluate::recorded::{Comparison, Cost, Settings, Share, compare};
 use palpate::output;
 use palpate::touches::{Captured, Dataset};
-use palpate_shared::Descriptor;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::Path;
 
-#[derive(clap::Args)]
-#[command(after_help = "\
-RECORDED is a data set that a real probe made, SIMULATED one of `palpate capture`, with --approaches if every approach was recorded. Objects are matched by their names.
-
-A classifier is trained to tell recorded from simulated touches of an object, and tested on others: 50 % is guessing, so the simulation is right as far as the touches tell. Every feature is compared as well, and accuracy: a model trained on the simulated touches is tested on simulated and on recorded ones.
-
-Examples:
-  palpate capture meshes/ -o simulated --approaches --probe probe.toml
-  palpate data compare recorded simulated
-  palpate data compare recorded simulated --descriptor oriented --json")]
-pub(super) struct CompareArguments {
-    /// The recorded touches
-    #[arg(value_name = "RECORDED")]
-    recorded: PathBuf,
-    /// The simulated touches
-    #[arg(value_name = "SIMULATED")]
-    simulated: PathBuf,
-    /// Which features touches are compared by, such as oriented where the pose was recorded
-    #[arg(long, value_parser = train::descriptor, value_name = "times|curvature|gravity|oriented", default_value = "curvature")]
-    descriptor: Descriptor,
-    /// Groups of approaches to draw for each object
-    #[arg(long, value_name = "N", default_value_t = Settings::default().groups)]
-    groups: usize,
-    /// Seed of the folds and of the drawing
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Print the comparison as JSON
-    #[arg(long)]
-    json: bool,
-}
-
-pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
-    let recorded = super::super::checked(Dataset::read_any(&arguments.recorded)?);
-    let simulated = dataset(&arguments.simulated)?;
+/// Says how far recorded touches are from simulated ones, and what that costs.
+pub(super) fn run(arguments: &Arguments, simulated: &Path, global: &Global) -> Result<()> {
+    let recorded = checked(Dataset::read_any(&arguments.directory)?);
+    let simulated = dataset(simulated)?;
     if let Some((recorded, simulated)) = Captured::of(&recorded).zip(Captured::of(&simulated)) {
         let objects = recorded.shared(&simulated).join(", ");
         if !objects.is_empty() {
-            eprintln!(
+            remark(&format!(
                 "palpate: warning: both data sets hold the same simulated touches of {objects}: nothing is compared with \
                  them. Give RECORDED touches, or capture with another seed."
-            );
+            ));
         }
     }
     let settings = Settings {
         descriptor: arguments.descriptor,
-        groups: arguments.groups,
-        seed: arguments.seed,
+        groups: arguments.sequences,
+        seed: global.seed(),
         ..Settings::default()
     };
     let compared = compare(&recorded, &simulated, &settings, &Bar::new())
-        .map_err(|error| if error.exit_code() == 1 { error.in_file(&arguments.recorded) } else { error })?;
-    if arguments.json { output::print_json(&compared) } else { output::print(&text(&compared)) }
+        .map_err(|error| if error.exit_code() == 1 { error.in_file(&arguments.directory) } else { error })?;
+    if global.json { output::print_json(&compared) } else { output::print(&text(&compared)) }
 }
 
 /// A share in percent with its interval.

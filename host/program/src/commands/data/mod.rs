@@ -1,9 +1,12 @@
-//! `palpate data`: what is done with data sets of touches.
+//! `palpate data`: data sets of touches, and built-in objects.
 
+mod cast;
 mod check;
 mod compare;
+mod objects;
 mod record;
 
+use super::Global;
 use palpate::Result;
 
 #[derive(clap::Args)]
@@ -15,18 +18,22 @@ pub(crate) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Say what is wrong with a data set, line by line, and what it holds
+    /// Say what is wrong with a data set, or how far it is from simulated touches
     Check(check::Arguments),
-    /// Add the touches of a real probe to a data set, from a file of lines
+    /// Add touches of a real probe to a data set: from lines, a log, or a chip
     Record(record::Arguments),
-    /// Say how far recorded touches are from simulated ones, and what that costs
-    Compare(compare::CompareArguments),
+    /// Write the ten built-in objects as OBJ files
+    Objects(objects::Arguments),
+    /// Move spheres against a mesh as a file says, to compare the simulator with another engine
+    #[command(hide = true)]
+    Cast(cast::Arguments),
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     match arguments.command {
-        Command::Check(arguments) => check::run(&arguments),
-        Command::Record(arguments) => record::run(&arguments),
-        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments, global),
+        Command::Record(arguments) => record::run(&arguments, global),
+        Command::Objects(arguments) => objects::run(&arguments, global),
+        Command::Cast(arguments) => cast::run(&arguments, global),
     }
 }

@@ -1,6 +1,8 @@
 //! `palpate data record`.
 
-use crate::commands::record::{RecordArguments, summary};
+use crate::commands::link::LineOptions;
+use crate::commands::link::record::{RecordArguments, from_chip, summary};
+use crate::commands::{Global, remark};
 use palpate::touches::{Log, begins_log, text};
 use palpate::{Error, Result, output};
 use std::fs::File;
@@ -10,62 +12,74 @@ use std::time::SystemTime;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and if you like \
-the probe's direction and alignment (six numbers). Lines like these come from any robot that can print. Lines `- - -` for \
-approaches that missed are welcome: they say how often each object is missed.
+A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and if you like the probe's direction and alignment (six numbers). Lines `- - -` for approaches that missed are welcome: a chip cannot report those. SOURCE may also be a robot's log (MCAP), of which the touches of NAME are taken, or a chip, whose touches are added as soon as it reports them, until Ctrl-C; if the cable is pulled, this waits for it.
 
-FILE may be a robot's log as well (MCAP, see docs/reference/mcap.md): its touches of NAME are taken, or all of them if its messages \
-name no object.
-
-DIR gets NAME.txt and dataset.json, which says when, from where and with which probe the touches were recorded. All \
-lines are added, or none if one of them is wrong. Touches of an object that is there already are added to it.
+The directory gets NAME.txt and dataset.json. All lines are added, or none if one of them is wrong. Touches of an object that is there already are added to it.
 
 Examples:
   palpate data record monday.txt -o recorded --object bowl
   palpate data record monday.txt -o recorded --object bowl --probe probe.toml
   palpate data record monday.mcap -o recorded --object bowl
-  robot --print | palpate data record - -o recorded --object bowl --pose")]
+  robot --print | palpate data record - -o recorded --object bowl --pose
+  palpate data record /dev/ttyACM0 -o recorded --object bowl")]
 pub(crate) struct Arguments {
-    /// A file of lines or a log in MCAP, or - for standard input
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
-    /// The data set's directory, such as recorded; created if it is missing
-    #[arg(short, long, value_name = "DIR")]
+    /// A file of lines, a log (MCAP), - for standard input, or a chip: a serial port, tcp://HOST:PORT, or emulator
+    #[arg(value_name = "SOURCE")]
+    source: String,
+    /// Where to write; the data set's directory, such as recorded
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// The name of the object that was touched, such as bowl
     #[arg(long, value_name = "NAME")]
     object: String,
     #[command(flatten)]
     record: RecordArguments,
-    /// Print the summary as JSON
-    #[arg(long)]
-    json: bool,
+    /// Stop after this many touches in all [default: all that there are]
+    #[arg(long, value_name = "N")]
+    stop_after: Option<u64>,
+    #[command(flatten)]
+    line: LineOptions,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let Arguments { file, output: directory, object, record, json } = arguments;
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+    let Arguments { source, output: directory, object, record, .. } = arguments;
     output::refuse_stdout(directory)?;
-    let (source, lines): (_, Box<dyn Read>) = match file.as_os_str() == "-" {
-        true => ("standard input".into(), Box::new(std::io::stdin())),
+    if is_chip(source) {
+        let port = source.parse()?;
+        let recording = record.open(directory, object, source, SystemTime::now())?;
+        let from = (&arguments.line, &port, global.seed());
+        return from_chip(from, recording, directory, arguments.stop_after, global.json);
+    }
+    let (source, lines): (_, Box<dyn Read>) = match source == "-" {
+        true => ("standard input", Box::new(std::io::stdin())),
         false => {
-            let opened = File::open(file).map_err(|error| Error::io(file, "read the touches", error))?;
-            (file.display().to_string(), Box::new(opened))
+            let opened = File::open(source).map_err(|error| Error::io(source, "read the touches", error))?;
+            (source.as_str(), Box::new(opened))
         }
     };
-    let touches = read(BufReader::new(lines), Path::new(&source), object)?;
-    let mut recording = record.open(directory, object, &source, SystemTime::now())?;
-    recording.add_all(&touches).map_err(|error| error.in_file(&source))?;
+    let mut touches = read(BufReader::new(lines), Path::new(source), object)?;
+    touches.truncate(arguments.stop_after.map_or(usize::MAX, |most| usize::try_from(most).unwrap_or(usize::MAX)));
+    let mut recording = record.open(directory, object, source, SystemTime::now())?;
+    recording.add_all(&touches).map_err(|error| error.in_file(source))?;
     let mut counts = [0; 4];
     for touch in &touches {
         counts[touch.times().iter().filter(|time| !time.is_missing()).count()] += 1;
     }
-    if *json {
+    if global.json {
         let all = recording.all_touches();
         return output::print_json(&serde_json::json!({
             "object": object, "touches": touches.len(), "all_touches": all, "contacts": counts,
         }));
     }
     output::print(&summary(&recording, directory, counts))
+}
+
+/// Whether a source is a chip rather than a file of touches.
+fn is_chip(source: &str) -> bool {
+    let is_com = source.strip_prefix("COM").is_some_and(|number| number.parse::<u16>().is_ok());
+    let is_port =
+        ["tcp://", "/dev/tty", "/dev/cu.", "/dev/serial/", "/dev/pts/"].iter().any(|begin| source.starts_with(begin));
+    source == "emulator" && !Path::new(source).is_file() || is_com || is_port
 }
 
 /// The touches in a file of lines; those of the object in a log.
@@ -76,7 +90,7 @@ fn read(mut lines: impl BufRead, source: &Path, object: &str) -> Result<Vec<palp
         log.skipped().iter().for_each(crate::commands::say);
         let (touches, others) = log.of_object(object)?;
         if others > 0 {
-            eprintln!("palpate: {}: skipped {others} touches of other objects", source.display());
+            remark(&format!("palpate: {}: skipped {others} touches of other objects", source.display()));
         }
         return Ok(touches);
     }

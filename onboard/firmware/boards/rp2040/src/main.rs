@@ -3,7 +3,7 @@
 //! | pin | what |
 //! |---|---|
 //! | GP2, GP3, GP4 | the three switches in their order along the row, each to ground |
-//! | GP0, GP1 | UART to the host, 115,200 baud: `palpate watch /dev/ttyUSB0` |
+//! | GP0, GP1 | UART to the host, 115,200 baud: `palpate link /dev/ttyUSB0 --watch` |
 //! | GP25 | the Pico's LED: lit from a recognition to the next touch |
 //!
 //! The host may load another model (`palpate link /dev/ttyUSB0 --load model.palpate`), which is kept in flash, as is what

@@ -1,67 +1,80 @@
 //! What a compiled model states about itself: its features, its training, what it promises.
 
-use palpate::calibrate;
-use palpate::compile;
-use palpate::evaluate;
-use palpate::probe;
-use palpate::rows::{Encoder, feature_names};
+use crate::rows::{Encoder, feature_names};
+use crate::{calibrate, compile, evaluate, probe};
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::ContactPattern;
 use palpate_shared::format::{Length, MisfitTerms, TrainedNoise, TrainedProbe};
 use std::collections::BTreeMap;
 
-#[derive(serde::Serialize)]
-pub(super) struct Feature {
-    pub(super) name: String,
-    pub(super) scale: Option<f32>,
+/// A feature of a model over rows.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Feature {
+    /// The name.
+    pub name: String,
+    /// How many units make up 1; null where f32 values are compared.
+    pub scale: Option<f32>,
 }
 
-#[derive(serde::Serialize)]
-pub(super) struct Defaults {
-    pub(super) error_rate: f64,
-    pub(super) max_touches: u32,
+/// When recognizers stop.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Defaults {
+    /// The error rate at which recognizers stop.
+    pub error_rate: f64,
+    /// The touches after which they give up.
+    pub max_touches: u32,
 }
 
-#[derive(serde::Serialize)]
-pub(super) struct Promised {
-    pub(super) error_rate: f64,
+/// A promise, and what it rests on.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Promised {
+    /// The promised share of wrong names.
+    pub error_rate: f64,
     /// "average", "name" or "object".
-    pub(super) per: &'static str,
-    pub(super) confidence: f64,
+    pub per: &'static str,
+    /// The probability that the promise is kept.
+    pub confidence: f64,
     /// "touches" or "approaches".
-    pub(super) counted: &'static str,
+    pub counted: &'static str,
     /// Whether each approach was in the pose that the plan proposed.
-    pub(super) active: bool,
-    pub(super) sequences: u32,
-    /// Names given in these sequences, and wrong ones of them.
-    pub(super) given: u32,
-    pub(super) wrong: u32,
-    pub(super) undecided: f64,
+    pub active: bool,
+    /// The sequences that it rests on.
+    pub sequences: u32,
+    /// Names given in these sequences.
+    pub given: u32,
+    /// Wrong ones of them.
+    pub wrong: u32,
+    /// The share of sequences that ended without a name.
+    pub undecided: f64,
     /// Touches, or approaches, of a sequence on average.
-    pub(super) mean: f64,
-    pub(super) max_touches: u32,
+    pub mean: f64,
+    /// The touches after which they give up.
+    pub max_touches: u32,
     /// What was added to the touches.
-    pub(super) noise: probe::noise::Noise,
+    pub noise: probe::noise::Noise,
     /// Nats by which an object has to be ahead of all others for its name to be given.
-    pub(super) margins: BTreeMap<String, f64>,
+    pub margins: BTreeMap<String, f64>,
     /// What the error rate is at most by theory, with any priors.
-    pub(super) by_theory: f64,
+    pub by_theory: f64,
 }
 
-#[derive(serde::Serialize)]
-pub(super) struct Tested {
+/// A test of whether touches fit any object that a model knows.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Tested {
     /// How long names are held back: "likely" or "certain".
-    pub(super) held: &'static str,
+    pub held: &'static str,
     /// The promised share of known objects' sequences that end as unknown.
-    pub(super) promised: f64,
-    pub(super) confidence: f64,
-    pub(super) sequences: u32,
+    pub promised: f64,
+    /// The probability that the promise is kept.
+    pub confidence: f64,
+    /// The sequences that it rests on.
+    pub sequences: u32,
     /// Touches before which nothing is tested, and no name is given.
-    pub(super) first_touches: u32,
+    pub first_touches: u32,
     /// Touches before which no name is given.
-    pub(super) least_touches: u32,
+    pub least_touches: u32,
     /// The misfit above which an object is unknown, after many touches, in nats.
-    pub(super) threshold: f64,
+    pub threshold: f64,
 }
 
 pub(super) fn tested(terms: &MisfitTerms) -> Tested {
@@ -76,68 +89,62 @@ pub(super) fn tested(terms: &MisfitTerms) -> Tested {
     }
 }
 
-#[derive(serde::Serialize)]
-pub(super) struct Probe {
+/// A probe.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Probe {
     /// Radius of a finger; null if the model does not state its probe.
-    pub(super) radius: Option<f32>,
-    pub(super) spacing: f32,
-    pub(super) speed: f32,
+    pub radius: Option<f32>,
+    /// The distance between neighboring fingers.
+    pub spacing: f32,
+    /// The speed, per second.
+    pub speed: f32,
     /// What lengths are measured in: "unit", a tenth of the object's longest side, or "mm".
-    pub(super) unit: &'static str,
+    pub unit: &'static str,
     /// Whether the model states its probe; otherwise the published one is assumed.
-    pub(super) stated: bool,
+    pub stated: bool,
 }
 
-#[derive(serde::Serialize)]
-pub(super) struct Touches {
+/// The touches that are evidence.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Touches {
     /// "full", "contacts" or "all".
-    pub(super) counted: &'static str,
-    pub(super) patterns: Vec<&'static str>,
-    pub(super) needs_pose: bool,
+    pub counted: &'static str,
+    /// The contact patterns that are evidence.
+    pub patterns: Vec<&'static str>,
+    /// Whether touches need the probe's direction and alignment.
+    pub needs_pose: bool,
     /// The largest time between the first and the last contact in microseconds; null if the model does not state it.
-    pub(super) largest_spread: Option<u32>,
+    pub largest_spread: Option<u32>,
 }
 
-#[derive(serde::Serialize)]
-pub(super) struct Noise {
+/// The noise in a training.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Noise {
     /// Standard deviations of contact times in microseconds.
-    pub(super) least: u32,
-    pub(super) largest: u32,
+    pub least: u32,
+    /// The largest standard deviation.
+    pub largest: u32,
     /// The timer's resolution in microseconds; 0 for none.
-    pub(super) timer: u32,
+    pub timer: u32,
     /// Standard deviation of the pose in degrees; 0 for none.
-    pub(super) pose_degrees: f64,
+    pub pose_degrees: f64,
 }
 
 /// The prediction of a model over rows.
-#[derive(serde::Serialize)]
-pub(super) struct Predicts {
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Predicts {
     /// "class" or "value".
-    pub(super) what: &'static str,
+    pub what: &'static str,
     /// What makes a value of a margin.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) link: Option<&'static str>,
+    pub link: Option<&'static str>,
     /// What a margin of the model is multiplied by to be the library's.
-    pub(super) scale: f32,
+    pub scale: f32,
     /// Whether the last of several largest margins names the class.
-    pub(super) last_of_ties: bool,
+    pub last_of_ties: bool,
     /// The least and the largest of the features that stand for a missing value: whole numbers, or keys of f32 values.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) missing: Option<[i32; 2]>,
-}
-
-impl Predicts {
-    pub(super) fn text(&self) -> String {
-        let what = match self.link {
-            None if self.last_of_ties => "the class with the largest margin, of several the last",
-            None => "the class with the largest margin, of several the first",
-            Some(link) => super::export::formula(link),
-        };
-        match self.missing {
-            Some([low, high]) => format!("{what}; features from {low} to {high} are missing"),
-            None => what.into(),
-        }
-    }
+    pub missing: Option<[i32; 2]>,
 }
 
 pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
@@ -237,12 +244,12 @@ pub(super) fn pattern(model: &Model<'_>) -> Option<BTreeMap<&'static str, f64>> 
 }
 
 /// The touches that a model was trained on.
-#[derive(serde::Serialize)]
-pub(super) struct TrainedOn {
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct TrainedOn {
     /// 16 bits of a checksum of the capture's seed and settings, in hexadecimal digits; null if no capture is known.
-    pub(super) capture: Option<String>,
+    pub capture: Option<String>,
     /// The first sample of each object, and the one after the last.
-    pub(super) samples: [u32; 2],
+    pub samples: [u32; 2],
 }
 
 pub(super) fn trained_on(model: &Model<'_>) -> Option<TrainedOn> {
@@ -252,13 +259,14 @@ pub(super) fn trained_on(model: &Model<'_>) -> Option<TrainedOn> {
 }
 
 /// The plan of approaches.
-#[derive(serde::Serialize)]
-pub(super) struct PlanOf {
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct PlanOf {
     /// Rolls of the row of fingers for each of 26 directions.
-    pub(super) rolls: u8,
-    pub(super) poses: u16,
+    pub rolls: u8,
+    /// All poses.
+    pub poses: u16,
     /// Poses in which nothing is ever touched.
-    pub(super) left_out: usize,
+    pub left_out: usize,
 }
 
 pub(super) fn plan(model: &Model<'_>) -> Option<PlanOf> {

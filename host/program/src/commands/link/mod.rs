@@ -1,5 +1,11 @@
-use super::progress::Bar;
-use super::record::LinkArguments;
+//! `palpate link`, and what it has in common with `palpate data record`.
+
+pub(super) mod record;
+mod screen;
+mod watch;
+
+use crate::commands::progress::Bar;
+use crate::commands::{self, Global};
 use clap::ArgGroup;
 use palpate::chip::{
     ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Transport, Update, probability,
@@ -17,61 +23,99 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Options of `link` and `watch`: how the chip is reached, and which touches it gets.
+/// How a chip is reached.
 #[derive(clap::Args)]
-pub(crate) struct ChipOptions {
-    /// Load this model into the chip first; it is checked there before it is used
-    #[arg(long, value_name = "FILE")]
-    load: Option<PathBuf>,
-    /// Touches of one object before the next object begins
-    #[arg(long, value_name = "N", default_value_t = 60)]
-    sequence: usize,
-    /// Touches in all, from a data set or to record [default: all that it holds; until Ctrl-C]
-    #[arg(long, value_name = "N")]
-    touches: Option<u64>,
-    /// Ask the chip after each touch for the approach that helps most; its model needs a plan (see `palpate plan`)
-    #[arg(long)]
-    pub(super) active: bool,
+pub(crate) struct LineOptions {
     /// Speed of a serial port, in bits per second
-    #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
+    #[arg(long, value_name = "BAUD", default_value = "115200")]
     baud: u32,
     /// Image that the emulator runs [default: onboard/firmware/target/thumbv7em-none-eabihf/release/uart]
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// Make the line bad: the probabilities that a byte is lost, that a byte is changed and that a frame comes twice, and
-    /// the longest delay in milliseconds
+    /// Make the line bad: probabilities that a byte is lost and changed, that a frame comes twice; longest delay in ms
     #[arg(long, value_name = "LOST,CHANGED,DOUBLED,MS")]
     bad_line: Option<Faults>,
-    /// Seed of the bad line
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
 }
 
-impl ChipOptions {
-    /// Opens the line.
-    fn transport(&self, port: &Port) -> Result<Transport> {
+impl LineOptions {
+    /// Opens the line; its faults are drawn from `seed`.
+    pub(crate) fn transport(&self, port: &Port, seed: u64) -> Result<Transport> {
         let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
         let transport = port.open(self.baud, &emulator)?;
         Ok(match self.bad_line {
-            Some(faults) => transport.with_faults(faults, self.seed),
+            Some(faults) => transport.with_faults(faults, seed),
             None => transport,
         })
     }
 
+    /// Opens a session.
+    pub(crate) fn open(&self, port: &Port, seed: u64) -> Result<Connection> {
+        let settings = match self.bad_line {
+            // A bad line fails often: retry sooner, and more often.
+            Some(_) => HostSettings { retry: 50_000, attempts: 200 },
+            None => HostSettings::default(),
+        };
+        Connection::open(self.transport(port, seed)?, settings)
+    }
+}
+
+#[derive(clap::Args)]
+#[command(group(ArgGroup::new("expected").args(["against", "load"])), after_help = "\
+The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station. A touch is one line of three contact times in seconds (- for a missing contact), as in a data set; an empty line begins another object. `palpate data record` records what the chip's own fingers touch.
+
+Examples:
+  palpate link /dev/ttyACM0                           what is on the chip?
+  palpate link /dev/ttyACM0 --load model.palpate      load a model into it
+  palpate link /dev/ttyACM0 touches/                  recognize a data set
+  echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
+  palpate link /dev/ttyACM0 - --active                where to touch next
+  palpate link /dev/ttyACM0 --watch                   watch its own fingers
+  palpate link journal.jsonl --watch                  watch another link
+  palpate link emulator --load model.palpate --parity touches/ \\
+      --stop-after 10000 --bad-line 0.001,0.001,0.01,5")]
+pub(crate) struct Arguments {
+    /// A serial port, tcp://HOST:PORT, or emulator; with --watch also a journal that another link writes
+    port: String,
+    /// Touches to recognize: a data set's directory, a file of lines, a robot's log (MCAP), or - for standard input
+    source: Option<PathBuf>,
+    /// Load this model into the chip first; it is checked there before it is used
+    #[arg(long, value_name = "FILE")]
+    load: Option<PathBuf>,
+    /// Watch the chip on a screen while it recognizes; plain lines where the output is no terminal
+    #[arg(long, conflicts_with_all = ["parity", "journal", "against"])]
+    watch: bool,
+    /// Recognize a data set's touches, and compare every verdict, posterior and evidence with the host's recognizer
+    #[arg(long, value_name = "DIR", conflicts_with = "source", requires = "expected")]
+    parity: Option<PathBuf>,
+    /// The model to compare with, if it is on the chip already
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
+    /// Touches of one object before the next object of a data set begins
+    #[arg(long, value_name = "N", default_value = "60")]
+    per_object: usize,
+    /// Stop after this many touches in all [default: all that there are]
+    #[arg(long, value_name = "N")]
+    stop_after: Option<u64>,
+    /// Follow the model's plan of approaches; asks the chip after each touch for the next one
+    #[arg(long)]
+    active: bool,
+    /// Write what happens to a file, which `palpate link FILE --watch` follows
+    #[arg(long, value_name = "FILE")]
+    journal: Option<PathBuf>,
+    #[command(flatten)]
+    line: LineOptions,
+}
+
+impl Arguments {
     /// Opens a session, and loads the model if there is one to load.
-    pub(crate) fn open(&self, port: &Port) -> Result<(Connection, Option<CompiledModel>)> {
+    fn open(&self, port: &Port, seed: u64) -> Result<(Connection, Option<CompiledModel>)> {
         let model = self.load.as_deref().map(CompiledModel::read).transpose()?;
         if let Some(path) = self.load.as_deref()
             && model.as_ref().is_some_and(|model| model.model().descriptor().is_none())
         {
             return Err(Error::at(Place::file(path), ChipProblem::Rows));
         }
-        let settings = match self.bad_line {
-            // A bad line fails often: retry sooner, and more often.
-            Some(_) => HostSettings { retry: 50_000, attempts: 200 },
-            None => HostSettings::default(),
-        };
-        let mut connection = Connection::open(self.transport(port)?, settings)?;
+        let mut connection = self.line.open(port, seed)?;
         if let Some(file) = &model {
             connection.load(file.bytes(), &Bar::new())?;
         }
@@ -79,18 +123,18 @@ impl ChipOptions {
     }
 
     /// The touches in `source`: a data set's directory, a file of lines, a log, or `-` for standard input.
-    pub(crate) fn steps(&self, source: &Path) -> Result<Steps> {
+    fn steps(&self, source: &Path) -> Result<Steps> {
         if source.as_os_str() == "-" {
             return Ok(Steps::lines(Box::new(BufReader::new(std::io::stdin())), Path::new("standard input")));
         }
         if source.is_dir() {
-            let dataset = super::dataset(source)?;
-            let count = self.touches.unwrap_or(dataset.len() as u64);
-            return Ok(Steps::sequences(dataset, self.sequence, count));
+            let dataset = commands::dataset(source)?;
+            let count = self.stop_after.unwrap_or(dataset.len() as u64);
+            return Ok(Steps::sequences(dataset, self.per_object, count));
         }
         if is_log(source) {
             let log = Log::read(source)?;
-            log.skipped().iter().for_each(super::say);
+            log.skipped().iter().for_each(commands::say);
             return Ok(Steps::logged(&log));
         }
         let file = std::fs::File::open(source).map_err(|e| Error::io(source, "read the touches", e))?;
@@ -98,81 +142,30 @@ impl ChipOptions {
     }
 }
 
-#[derive(clap::Args)]
-#[command(group(ArgGroup::new("expected").args(["model", "load"])), after_help = "\
-Examples:
-  palpate link /dev/ttyACM0                           what is on the chip?
-  palpate link /dev/ttyACM0 --load model.palpate      load a model into it
-  palpate link /dev/ttyACM0 touches/                  recognize a data set
-  echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
-  palpate link /dev/ttyACM0 - --active                where to touch next
-  palpate link /dev/ttyACM0 --record recorded --object bowl
-                                                      keep its touches
-  palpate link emulator --load model.palpate --parity touches/ --touches 10000
-  palpate link emulator --load model.palpate --parity touches/ \\
-      --bad-line 0.001,0.001,0.01,5
-
-The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station.
-
-A touch is one line of three contact times in seconds (- for a missing contact), as in a data set. An empty line begins \
-another object. Every touch is counted exactly once, however bad the line.
-
-With --record, what the chip's own fingers touch goes to DIR/NAME.txt, each touch as soon as the chip reports it, and \
-dataset.json says when, with which probe and by which firmware. A model on the chip is not needed. If the cable is \
-pulled, this waits for it; recording the same object again adds to it. See docs/guide/real-probe.md.
-
-An approach that touches nothing closes no switch, so the chip cannot report it and it is not recorded. To train on misses \
-(palpate train --touches all) or to compare contact patterns with those of a simulation, the robot has to say when an \
-approach ended without a contact: add lines `- - -` for these with `palpate data record`.")]
-pub(crate) struct Arguments {
-    /// A serial port, tcp://HOST:PORT, or emulator
-    port: Port,
-    /// Touches to recognize: a data set's directory, a file of lines, a robot's log (MCAP), or - for standard input
-    source: Option<PathBuf>,
-    /// Recognize a data set's touches, and compare every verdict, posterior and evidence with the host's recognizer
-    #[arg(long, value_name = "DIR", conflicts_with = "source", requires = "expected")]
-    parity: Option<PathBuf>,
-    /// The model to compare with, if it is on the chip already
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// Write what happens to a file that `palpate watch` can follow
-    #[arg(long, value_name = "FILE")]
-    journal: Option<PathBuf>,
-    /// Print the summary as JSON
-    #[arg(long)]
-    json: bool,
-    #[command(flatten)]
-    record: LinkArguments,
-    #[command(flatten)]
-    chip: ChipOptions,
-}
-
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    if let Some(recording) = arguments.record.open(&arguments.port.to_string())? {
-        let (port, chip) = (&arguments.port, &arguments.chip);
-        let (connection, _) = chip.open(port)?;
-        let reopen = || chip.transport(port);
-        return arguments.record.run(connection, reopen, recording, chip.touches, arguments.json);
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    if arguments.watch {
+        return watch::run(&arguments, global);
     }
-    let named = arguments.model.as_deref().map(CompiledModel::read).transpose()?;
+    let port: Port = arguments.port.parse()?;
+    let named = arguments.against.as_deref().map(CompiledModel::read).transpose()?;
     let steps = match arguments.parity.as_ref().or(arguments.source.as_ref()) {
-        Some(source) => Some(arguments.chip.steps(source)?),
+        Some(source) => Some(arguments.steps(source)?),
         None => None,
     };
-    let (mut connection, loaded) = arguments.chip.open(&arguments.port)?;
+    let (mut connection, loaded) = arguments.open(&port, global.seed())?;
     let chip = connection.model()?;
     if steps.is_some() && chip.info.descriptor().is_none() {
         return Err(ChipProblem::Rows.into());
     }
-    let mut printer = Printer::new(&chip, arguments.json, arguments.journal.as_deref())?;
-    let Some(steps) = steps else { return printer.model(&arguments.port) };
+    let mut printer = Printer::new(&chip, global.json, arguments.journal.as_deref())?;
+    let Some(steps) = steps else { return printer.model(&port) };
 
     let compiled = named.or(loaded);
     let model = compiled.as_ref().map(CompiledModel::model);
     let progress = Bar::new();
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
-    let summary = stream(&mut connection, steps, &chip, model.as_ref(), arguments.chip.active, |_, update| {
+    let summary = stream(&mut connection, steps, &chip, model.as_ref(), arguments.active, |_, update| {
         if matches!(update, Update::Touch { .. } | Update::Refused { .. }) {
             progress.advance(1);
         }

@@ -1,6 +1,6 @@
-//! `palpate objects`.
+//! `palpate data objects`.
 
-use clap::builder::PossibleValuesParser;
+use crate::commands::Global;
 use palpate::Result;
 use palpate::mesh::Object;
 use palpate::mesh::builtin;
@@ -13,18 +13,18 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate objects -o meshes                    ten files: meshes/bowl.obj, ...
-  palpate objects -o meshes --only fork        one of them
-  palpate objects -o meshes --picture all.png  and a picture of them
-  palpate objects -o meshes --varied 7         other proportions, from seed 7
+  palpate data objects -o meshes                    ten files: meshes/bowl.obj, ...
+  palpate data objects -o meshes --only fork        one of them
+  palpate data objects -o meshes --picture all.png  and a picture of them
+  palpate data objects -o meshes --varied 7         other proportions, from seed 7
 
 The meshes are closed, in centimeters, with z up. The same command always writes the same bytes.")]
-pub(crate) struct Arguments {
-    /// The directory to write NAME.obj into; created if it is missing
-    #[arg(short, long, value_name = "DIR")]
+pub(super) struct Arguments {
+    /// Where to write; a directory for NAME.obj of each object
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Only this object; may be given several times
-    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(builtin::names()))]
+    /// Only these objects; others are not written
+    #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = built_in)]
     only: Vec<String>,
     /// Vary the proportions by up to about a fifth, with this seed
     #[arg(long, value_name = "SEED")]
@@ -32,9 +32,6 @@ pub(crate) struct Arguments {
     /// Also draw a contact sheet of the objects into this PNG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Print what was written as JSON
-    #[arg(long)]
-    json: bool,
 }
 
 /// What was written for one object.
@@ -46,16 +43,16 @@ struct Written {
     triangles: usize,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
     let chosen = |name: &&str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
     let names: Vec<&str> = builtin::names().into_iter().filter(chosen).collect();
     let made = builtin::make(&names, arguments.varied)?;
-    let written = made.iter().map(|object| write(object, &arguments)).collect::<Result<Vec<_>>>()?;
+    let written = made.iter().map(|object| write(object, arguments)).collect::<Result<Vec<_>>>()?;
     if let Some(picture) = &arguments.picture {
         output::write_bytes(picture, &render::sheet(&made, 1200))?;
     }
-    if arguments.json {
+    if global.json {
         return output::print_json(&written);
     }
     let mut text = String::new();
@@ -73,4 +70,12 @@ fn write(object: &Object, arguments: &Arguments) -> Result<Written> {
     output::write_whole(&file, |out| obj::write(object.mesh(), out))?;
     let (vertices, triangles) = (object.mesh().vertices.len(), object.mesh().triangles.len());
     Ok(Written { name: object.name.clone(), file, vertices, triangles })
+}
+
+fn built_in(name: &str) -> Result<String, String> {
+    let names = builtin::names();
+    match names.contains(&name) {
+        true => Ok(name.into()),
+        false => Err(format!("use one of {}", names.join(", "))),
+    }
 }

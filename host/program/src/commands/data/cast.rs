@@ -1,3 +1,6 @@
+//! `palpate data cast`: for those who compare the simulator with another engine.
+
+use crate::commands::Global;
 use glam::DVec3;
 use palpate::Error;
 use palpate::Result;
@@ -15,18 +18,18 @@ that another engine found, or `miss`. The output has the same lines with our tim
 direction, which is not renormalized; all numbers are rounded to the nearest f32.
 
 Examples:
-  palpate cast cup.obj casts.csv              print the lines
-  palpate cast cup.obj casts.csv -o ours.csv  write them, compare the times
-  palpate cast cup.obj casts.csv --as-is      the mesh is in units of the probe")]
-pub(crate) struct Arguments {
+  palpate data cast cup.obj casts.csv              print the lines
+  palpate data cast cup.obj casts.csv -o ours.csv  write them, compare the times
+  palpate data cast cup.obj casts.csv --as-is      a mesh in units of the probe")]
+pub(super) struct Arguments {
     /// The mesh: OBJ, STL, PLY, glTF, GLB or COLLADA
     #[arg(value_name = "MESH")]
     mesh: PathBuf,
     /// The casts
     #[arg(value_name = "CASTS.csv")]
     casts: PathBuf,
-    /// Where to write the lines [default: standard output]
-    #[arg(short, long, value_name = "OUT.csv")]
+    /// Where to write; the lines [default: standard output]
+    #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
     /// The longest side of the bounding box that the mesh is scaled to, centered at the origin
     #[arg(long, value_name = "UNITS", default_value_t = 10.0)]
@@ -37,12 +40,9 @@ pub(crate) struct Arguments {
     /// The sphere's radius, in units
     #[arg(long, value_name = "UNITS", default_value_t = 0.15)]
     radius: f32,
-    /// Print how the times agree as JSON (with --output)
-    #[arg(long, requires = "output")]
-    json: bool,
 }
 
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     for (name, value) in [("length", arguments.length), ("radius", f64::from(arguments.radius))] {
         if !(value.is_finite() && value > 0.0) {
             return Err(Error::setting(name, value, "a number greater than 0"));
@@ -61,15 +61,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<()> {
     }
     let times = cast::times(&scene, &lines, f64::from(arguments.radius));
     let text = cast::annotate(&lines, &times);
-    let Some(path) = arguments.output else { return output::print(&text) };
-    output::refuse_input(&path, [&arguments.mesh, &arguments.casts])?;
-    output::write_bytes(&path, text.as_bytes())?;
+    let Some(path) = &arguments.output else {
+        return match global.json {
+            true => Err(Error::setting("json", "given", "it with --output: it says how the times agree")),
+            false => output::print(&text),
+        };
+    };
+    output::refuse_input(path, [&arguments.mesh, &arguments.casts])?;
+    output::write_bytes(path, text.as_bytes())?;
     let agreement = cast::agreement(&lines, &times);
-    if arguments.json {
-        output::print_json_about(&path, &agreement)
-    } else {
-        output::print_about(&path, &table(&agreement))
-    }
+    if global.json { output::print_json_about(path, &agreement) } else { output::print_about(path, &table(&agreement)) }
 }
 
 fn table(sets: &[Agreement]) -> String {

@@ -1,59 +1,32 @@
-mod screen;
+//! `palpate link --watch`.
 
-use super::link::ChipOptions;
+use super::Arguments;
+use super::screen::Screen;
+use crate::commands::Global;
 use palpate::Result;
 use palpate::chip::watch::{Follow, Status};
 use palpate::chip::{ChipModel, Connection, Entry, Port, Received, Update, probability, stream};
 use palpate::output::print;
 use palpate_shared::link::Event;
-use screen::Screen;
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  palpate watch /dev/ttyACM0              a chip with its own fingers
-  palpate watch emulator touches/ --load model.palpate
-                                          an emulated chip and a data set
-  palpate watch journal.jsonl             what palpate link --journal writes
-
-q, Esc or Ctrl-C quit. When the output is not a terminal, plain lines are printed instead.")]
-pub(crate) struct Arguments {
-    /// A serial port, tcp://HOST:PORT, emulator, or a journal that `palpate link --journal` writes
-    #[arg(value_parser = source)]
-    source: Source,
-    /// Touches to recognize: a data set's directory, a file of lines, or - for standard input
-    data: Option<PathBuf>,
-    #[command(flatten)]
-    chip: ChipOptions,
-}
-
-#[derive(Clone)]
-enum Source {
-    Chip(Port),
-    Journal(PathBuf),
-}
-
-fn source(text: &str) -> Result<Source> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+    let path = Path::new(&arguments.port);
     // A serial port is a file, too, but none with lines to follow.
-    if Path::new(text).is_file() { Ok(Source::Journal(text.into())) } else { text.parse().map(Source::Chip) }
-}
-
-pub(crate) fn run(arguments: Arguments) -> Result<()> {
-    match &arguments.source {
-        Source::Journal(path) => follow(path),
-        Source::Chip(port) => watch(&arguments, port),
+    if path.is_file() {
+        return follow(path, global.json);
     }
+    watch(arguments, &arguments.port.parse()?, global)
 }
 
-fn watch(arguments: &Arguments, port: &Port) -> Result<()> {
-    let steps = arguments.data.as_deref().map(|source| arguments.chip.steps(source)).transpose()?;
-    let (mut connection, loaded) = arguments.chip.open(port)?;
+fn watch(arguments: &Arguments, port: &Port, global: &Global) -> Result<()> {
+    let steps = arguments.source.as_deref().map(|source| arguments.steps(source)).transpose()?;
+    let (mut connection, loaded) = arguments.open(port, global.seed())?;
     let chip = connection.model()?;
-    let mut display = Display::open(port.to_string())?;
+    let mut display = Display::open(port.to_string(), global.json)?;
     display.take(Entry::Model {
         objects: chip.names.clone(),
         length: chip.info.length,
@@ -74,7 +47,7 @@ fn watch(arguments: &Arguments, port: &Port) -> Result<()> {
     match steps {
         Some(steps) => {
             let model = loaded.as_ref().map(|file| file.model());
-            stream(&mut connection, steps, &chip, model.as_ref(), arguments.chip.active, &mut each)?;
+            stream(&mut connection, steps, &chip, model.as_ref(), arguments.active, &mut each)?;
         }
         None => loop {
             let update = match connection.hear(Duration::from_millis(50))? {
@@ -82,8 +55,8 @@ fn watch(arguments: &Arguments, port: &Port) -> Result<()> {
                 Some(Received::Earlier(event)) => Update::Event(event, 0),
                 _ => Update::Idle,
             };
-            let asks = arguments.chip.active
-                && matches!(&update, Update::Event(Event::Touch { .. } | Event::Refused { .. }, _));
+            let asks =
+                arguments.active && matches!(&update, Update::Event(Event::Touch { .. } | Event::Refused { .. }, _));
             if each(&mut connection, update)?.is_break() {
                 return Ok(());
             }
@@ -103,9 +76,9 @@ fn watch(arguments: &Arguments, port: &Port) -> Result<()> {
 }
 
 /// Shows a journal, and on a screen also what is appended to it meanwhile.
-fn follow(path: &Path) -> Result<()> {
+fn follow(path: &Path, json: bool) -> Result<()> {
     let mut journal = Follow::open(path)?;
-    let mut display = Display::open(path.display().to_string())?;
+    let mut display = Display::open(path.display().to_string(), json)?;
     loop {
         while let Some(entry) = journal.next_entry()? {
             display.take(entry)?;
@@ -121,22 +94,26 @@ fn follow(path: &Path) -> Result<()> {
     }
 }
 
-/// A screen, or plain lines.
+/// A screen, or plain lines, or JSON lines.
 struct Display {
+    json: bool,
     status: Status,
     screen: Option<Screen>,
     has_quit: bool,
 }
 
 impl Display {
-    fn open(source: String) -> Result<Self> {
-        let screen = std::io::stdout().is_terminal().then(Screen::open).transpose()?;
-        Ok(Self { status: Status::new(source), screen, has_quit: false })
+    fn open(source: String, json: bool) -> Result<Self> {
+        let screen = (!json && std::io::stdout().is_terminal()).then(Screen::open).transpose()?;
+        Ok(Self { json, status: Status::new(source), screen, has_quit: false })
     }
 
     fn take(&mut self, entry: Entry) -> Result<()> {
         self.status.take(&entry);
-        if self.screen.is_none() {
+        if self.json {
+            // Numbers and strings are always JSON.
+            print(&format!("{}\n", serde_json::to_string(&entry).unwrap_or_default()))?;
+        } else if self.screen.is_none() {
             print(&format!("{entry}\n"))?;
         }
         Ok(())

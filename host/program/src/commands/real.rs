@@ -1,0 +1,108 @@
+//! The option for what a real sensor, timer and robot add to touches.
+
+use palpate::Result;
+use palpate::probe::file::ProbeFile;
+use palpate::probe::noise::{Noise, PartialNoise};
+use std::path::{Path, PathBuf};
+
+/// What disturbs touches.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct RealArguments {
+    /// Disturb touches as real ones are: noise=0..5ms,timer=1ms,missed=2% and so on, none, or a probe file's [real]
+    #[arg(long, value_parser = real, value_name = "KEY=VALUE,…|FILE")]
+    real: Option<Real>,
+}
+
+#[derive(Clone, Debug)]
+struct Real {
+    /// As it was written, to repeat it.
+    text: String,
+    given: Given,
+}
+
+#[derive(Clone, Debug)]
+enum Given {
+    Settings(PartialNoise),
+    File(PathBuf),
+}
+
+impl RealArguments {
+    /// What the option says; `base` without it, and where it leaves settings open.
+    ///
+    /// # Errors
+    /// If its probe file cannot be read.
+    pub(crate) fn over(&self, base: Noise) -> Result<Noise> {
+        match self.real.as_ref().map(|real| &real.given) {
+            None => Ok(base),
+            Some(Given::Settings(settings)) => Ok(settings.over(base)),
+            Some(Given::File(path)) => Ok(ProbeFile::read(path)?.real),
+        }
+    }
+
+    /// Whether the option was given.
+    pub(crate) fn is_given(&self) -> bool {
+        self.real.is_some()
+    }
+
+    /// The option as words of a command line, to repeat it.
+    pub(crate) fn words(&self) -> Vec<String> {
+        self.real.iter().flat_map(|real| ["--real".to_owned(), real.text.clone()]).collect()
+    }
+}
+
+/// A probe file by its name, or settings; what is wrong with them, with what to write.
+fn real(text: &str) -> Result<Real, String> {
+    let path = Path::new(text);
+    let is_file = path.extension().is_some_and(|extension| extension == "toml") || path.is_file();
+    let given = match is_file {
+        true => Given::File(path.into()),
+        false => Given::Settings(text.parse().map_err(|problem: palpate::probe::noise::BadNoise| problem.to_string())?),
+    };
+    Ok(Real { text: text.into(), given })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Program {
+        #[command(flatten)]
+        real: RealArguments,
+    }
+
+    fn parsed(words: &[&str]) -> RealArguments {
+        Program::try_parse_from([&["program"], words].concat()).unwrap_or_else(|error| panic!("{error}")).real
+    }
+
+    #[test]
+    fn settings_stand_for_noise_and_are_repeated_as_words() {
+        let given = parsed(&["--real", "noise=0..10ms,missed=2%"]);
+        let noise = given.over(Noise::switch()).unwrap();
+        assert_eq!((noise.deviation.largest, noise.timer, noise.missed), (10_000.0, 1_000.0, [0.02; 3]));
+        assert_eq!(given.words(), ["--real", "noise=0..10ms,missed=2%"]);
+        assert!(given.is_given() && !parsed(&[]).is_given() && parsed(&["--real", "none"]).is_given());
+        assert_eq!(parsed(&[]).over(Noise::switch()).unwrap(), Noise::switch());
+        assert!(parsed(&["--real", "none"]).over(Noise::switch()).unwrap().is_none());
+    }
+
+    #[test]
+    fn a_probe_file_says_all_of_it() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("probe.toml");
+        std::fs::write(&path, "radius = 1\nspacing = 2\nspeed = 3\n[real]\nmissed = \"2%\"\n").unwrap();
+        let given = parsed(&["--real", path.to_str().unwrap()]);
+        assert_eq!(given.over(Noise::switch()).unwrap(), Noise { missed: [0.02; 3], ..Noise::default() });
+        std::fs::remove_file(&path).unwrap();
+        assert!(given.over(Noise::switch()).unwrap_err().to_string().contains("probe.toml"));
+    }
+
+    #[test]
+    fn what_is_no_noise_is_refused_with_an_example() {
+        for text in ["5ms", "noise=5", "missed=few", "pose_noise=5", ""] {
+            let error = Program::try_parse_from(["program", "--real", text]).err().unwrap().to_string();
+            assert!(error.contains("such as") || error.contains("value is required"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! What is in a compiled model, and what it costs on a chip.
+
+mod stated;
+
+pub use stated::{Defaults, Feature, Noise, PlanOf, Predicts, Probe, Promised, Tested, Touches, TrainedOn};
+
+use super::instructions::Chip;
+use crate::compile::{self, Core, Instructions, Memory};
+use crate::error::Result;
+use crate::evaluate;
+use palpate_onboard::{Model, Stopping};
+use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
+use palpate_shared::{Pose, Q15_ONE, Touch};
+use stated::{evidence, features, noise, pattern, plan, predicts, priors, probe, promised, tested, trained_on};
+use std::collections::BTreeMap;
+
+/// What a compiled model is and states.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Inspected<'a> {
+    /// The format's version.
+    pub version: u16,
+    /// The version of the program that wrote it.
+    pub tool_version: &'a str,
+    /// 16 hexadecimal digits that identify the ensemble.
+    pub ensemble: String,
+    /// The name of its descriptor.
+    pub descriptor: &'static str,
+    /// How many features there are.
+    pub features: usize,
+    /// Of a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature_names: Option<Vec<Feature>>,
+    /// The objects' names.
+    pub objects: Vec<&'a str>,
+    /// Of a model over rows: what it predicts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub predicts: Option<Predicts>,
+    /// The layout's name.
+    pub layout: &'static str,
+    /// The type of leaves.
+    pub leaf: &'static str,
+    /// How many different leaves there are, if equal ones stand once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shared_leaves: Option<usize>,
+    /// Trees.
+    pub trees: u32,
+    /// Splits.
+    pub splits: u32,
+    /// Leaves.
+    pub leaves: u32,
+    /// All bytes.
+    pub bytes: usize,
+    /// The bytes of each part.
+    pub bytes_by_part: BTreeMap<&'static str, usize>,
+    /// 8 hexadecimal digits.
+    pub checksum: String,
+    /// The unit of margins, in nats.
+    pub unit: f32,
+    /// The largest rounding error of a margin, in nats.
+    pub margin_error: f32,
+    /// When recognizers stop unless told otherwise.
+    pub stopping: Defaults,
+    /// What the model promises; null if it was not calibrated.
+    pub promise: Option<Promised>,
+    /// Whether it has a column for what it does not know.
+    pub background: bool,
+    /// Its test of whether touches fit any object that it knows; null without one.
+    pub strangers: Option<Tested>,
+    /// What evidence is divided by before it is shown as a posterior.
+    pub temperature: f64,
+    /// The logarithm of each object's prior, the largest 0; null if all are equal.
+    pub priors: Option<BTreeMap<&'a str, f64>>,
+    /// The probe that it was trained for.
+    pub probe: Probe,
+    /// The touches that are evidence.
+    pub touches: Touches,
+    /// The noise in the training; null if the model does not state it.
+    pub noise: Option<Noise>,
+    /// Share of each contact pattern among the approaches of the training; null if the model does not state it.
+    pub pattern: Option<BTreeMap<&'static str, f64>>,
+    /// The touches that it was trained on; null if the model does not state it.
+    pub trained_on: Option<TrainedOn>,
+    /// The plan of approaches; null if the model has none.
+    pub plan: Option<PlanOf>,
+    /// Per touch, estimated.
+    pub instructions: Instructions,
+    /// The cost on a chip, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chip: Option<OnChip>,
+}
+
+/// The cost of a model on a chip.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct OnChip {
+    /// The processor.
+    pub core: Core,
+    /// Flash, memory and stack.
+    #[serde(flatten)]
+    pub memory: Memory,
+    /// "measured" or "estimated".
+    pub how: &'static str,
+    /// From contact times to margins.
+    pub margin_instructions: Option<u64>,
+    /// From contact times to the verdict.
+    pub verdict_instructions: Option<u64>,
+    /// The clock.
+    pub mhz: Option<f64>,
+    /// From contact times to the verdict, at one instruction per cycle.
+    pub microseconds: Option<f64>,
+}
+
+/// Instructions of a verdict beyond the margins, where nothing is measured: between 500 and 1,400.
+const VERDICT: u64 = 1_000;
+
+/// What a model is and states; its cost on a chip is left out.
+pub fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
+    let header = model.header();
+    let stopping = Stopping::from_model(model);
+    Inspected {
+        version: header.version(),
+        tool_version: model.tool_version(),
+        ensemble: format!("{:016x}", header.ensemble()),
+        descriptor: model.descriptor().map_or("none (rows of features)", palpate_shared::Descriptor::name),
+        features: model.feature_count(),
+        feature_names: model.descriptor().is_none().then(|| features(model)),
+        objects: (0..model.known_count()).map(|object| model.object_name(object)).collect(),
+        predicts: predicts(model),
+        layout: model.layout().name(),
+        leaf: model.leaf_type().name(),
+        shared_leaves: compile::different_leaves(model),
+        trees: header.trees(),
+        splits: header.splits(),
+        leaves: header.leaves(),
+        bytes: model.bytes().len(),
+        bytes_by_part: parts(model),
+        checksum: format!("{:08x}", model.checksum()),
+        unit: model.unit(),
+        margin_error: model.margin_error(),
+        stopping: Defaults {
+            error_rate: evaluate::significant(stopping.error_rate()),
+            max_touches: stopping.max_touches(),
+        },
+        promise: promised(model),
+        background: model.background().is_some(),
+        strangers: model.strangers().and_then(|strangers| strangers.test).map(|test| tested(&test.terms)),
+        temperature: model.temperature().value(),
+        priors: priors(model),
+        probe: probe(model),
+        touches: evidence(model),
+        noise: noise(model),
+        pattern: pattern(model),
+        trained_on: trained_on(model),
+        plan: plan(model),
+        instructions: Instructions::of_model(model),
+        chip: None,
+    }
+}
+
+fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
+    let header = model.header();
+    let objects = model.object_count();
+    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
+    BTreeMap::from([
+        ("header", HEADER_LENGTH),
+        ("text", length(header.text_length())),
+        ("optional_sections", length(header.optional_length())),
+        ("base_margins", 4 * objects),
+        ("priors", 4 * objects),
+        ("axes", 4 * usize::from(header.axes())),
+        ("thresholds", length(header.cuts_length())),
+        ("groups", 8 * usize::from(header.groups())),
+        ("splits", length(header.nodes_length())),
+        ("leaves", length(header.leaves_length())),
+        ("checksum", CHECKSUM_LENGTH),
+    ])
+}
+
+/// The cost of a model on a processor, at a clock in MHz if one is given: measured where QEMU and the firmware's image are
+/// there, else estimated.
+///
+/// # Errors
+/// As [`Chip::measure`].
+pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip> {
+    let emulated = match core {
+        Core::M4F => Chip::M4F,
+        Core::M0Plus => Chip::M0Plus,
+    };
+    // The image makes touches of what it is given; a model over rows of features cannot be measured with it.
+    let measured = match model.descriptor() {
+        Some(_) if emulated.is_there() => Some(emulated.measure(model.bytes(), &spread_touches(model))?),
+        _ => None,
+    };
+    let (how, margins, verdict) = match measured {
+        Some(cost) => ("measured", Some(cost.margins), Some(cost.push)),
+        None => {
+            let margins = Instructions::of_model(model).on(core);
+            ("estimated", margins, margins.map(|margins| margins + VERDICT))
+        }
+    };
+    Ok(OnChip {
+        core,
+        memory: Memory::of_model(model, core),
+        how,
+        margin_instructions: margins,
+        verdict_instructions: verdict,
+        mhz,
+        microseconds: mhz.zip(verdict).map(|(mhz, verdict)| verdict as f64 / mhz),
+    })
+}
+
+/// Touches that spread evenly over what the model's probe can give, the same every time.
+fn spread_touches(model: &Model<'_>) -> Vec<Touch> {
+    // Most contacts come within a twentieth of the longest time.
+    let range = compile::longest_time(model) * 1e6 / 20.0;
+    let spread = |index: u32, step: f64| ((f64::from(index) * step).fract() * range) as u32;
+    let touch = |index| {
+        let pose = Pose { direction: [0, 0, -Q15_ONE], alignment: [Q15_ONE, 0, 0] };
+        let times = [spread(index, 0.618_034), spread(index, 0.754_878), spread(index, 0.569_840)];
+        Touch::from_micros(times).with_pose(pose)
+    };
+    (0..64).map(touch).collect()
+}
