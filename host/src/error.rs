@@ -1,5 +1,4 @@
-//! What can go wrong, said so that the user knows where and what to do next. Each room has its own problems; one error holds
-//! any of them, and the place.
+//! Errors, with the place and a remedy. Each room has its own problems; one error holds any of them, and the place.
 
 pub use crate::calibrate::{CalibrateProblem, Supplied};
 pub use crate::capture::CaptureProblem;

@@ -201,7 +201,7 @@ impl Ensemble {
 /// method); whatever else is given replaces a part of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
 /// `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
 /// approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
-/// `background` is a data set of many other shapes, which stand for all that the model does not know.
+/// `background` is a data set of many other shapes, which stand for everything that the model does not know.
 /// `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
 /// to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
 ///

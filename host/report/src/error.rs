@@ -2,7 +2,7 @@
 
 use palpate::error::Problem;
 
-/// What can be wrong with the report and the main job.
+/// Problems with the report and the main job.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportProblem {

@@ -151,11 +151,12 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
         id: "published".into(),
         title: "Accuracy, recall and touches".into(),
         caption: format!(
-            "The paper is the publication of the method that is compared with ours: 1000 trees on the three contact times of \
-             full touches (see `docs/reference/words.md`). The paper's meshes are not ours: it used ten ShapeNet models that cannot be had here, so its numbers \
-             cannot be compared with the others directly; the columns beside them share their objects and touches. ± is \
-             one standard deviation over {} folds. At ten touches ours is right {} points more often than the paper's \
-             method{interval}. Touches until sure and the limit are measured on the large capture.",
+            "The paper is the publication of the method that is compared with ours: 1000 trees on the three contact \
+             times of full touches (see `docs/reference/words.md`). The paper's meshes are not ours: it used ten \
+             ShapeNet models that are not available here, so its numbers cannot be compared with the others directly; \
+             the columns beside them share their objects and touches. ± is one standard deviation over {} folds. At \
+             ten touches our accuracy is {} points above that of the paper's method{interval}. Touches until sure and \
+             the limit are measured on the large capture.",
             context.settings.folds_used,
             points(mean)
         ),

@@ -2,7 +2,7 @@
 
 use crate::error::Problem;
 
-/// What can be wrong with calibrating.
+/// Problems with calibrating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrateProblem {

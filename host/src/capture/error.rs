@@ -12,9 +12,9 @@ pub enum CaptureProblem {
     Object {
         /// The object.
         name: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         detail: String,
-        /// What to do about it, as a sentence.
+        /// Remedy, as a sentence.
         fix: String,
     },
     /// The true size of an object is needed and not known.

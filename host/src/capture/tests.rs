@@ -190,7 +190,7 @@ fn wrong_settings_are_wrong_arguments() {
     }
 }
 
-/// What a capture of these objects into the directory is refused for.
+/// Reason why a capture of these objects into the directory is refused.
 fn refusal(objects: &[Object], settings: &Settings, directory: &Path) -> CaptureProblem {
     let before = read_files(directory);
     let error = capture(objects, settings, directory, &()).unwrap_err();
@@ -313,7 +313,7 @@ fn an_unfinished_capture_repeated_without_resuming_is_refused() {
 
 #[test]
 fn a_kill_while_old_touches_are_deleted_leaves_no_complete_listing() {
-    // The first file that is to be deleted cannot be: it stands for the moment of the kill.
+    // The first file to delete cannot be deleted: it stands for the moment of the kill.
     let directory = tempfile::tempdir().unwrap();
     capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
     let obstacle = directory.path().join("globe.txt");

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 pub struct TouchOrigin {
     /// The probe that made them, where the data set states it.
     pub probe: Option<StatedProbe>,
-    /// What was added to them in training; none also where that is not known.
+    /// Noise added to them in training; none also where that is not known.
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
@@ -30,12 +30,12 @@ impl TouchOrigin {
     const TOUCHES: &str = "palpate_touches";
     const CAPTURED: &str = "palpate_captured";
 
-    /// What touches say about themselves, and the probe that they were made with.
+    /// Statements of touches about themselves, and the probe that they were made with.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
         Self { probe, touches: fingerprints(dataset), captured: Captured::of(dataset), noise: None }
     }
 
-    /// What `origin` states.
+    /// Statements of `origin`.
     ///
     /// # Errors
     /// [`EnsembleProblem::Attribute`] for an attribute that is not what this crate writes.
@@ -85,7 +85,7 @@ impl TouchOrigin {
         origin
     }
 
-    /// What a compiled model of these objects states.
+    /// Statements of a compiled model of these objects.
     pub fn stated(&self, objects: &[String]) -> compile::Stated {
         // Where nothing is known, the published probe.
         let probe = self.probe.map_or_else(Probe::default, |stated| stated.probe);
@@ -208,7 +208,7 @@ pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -
     let Some(stated) = model.trained_capture() else { return Vec::new() };
     let captured = Captured::of(dataset);
     let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(&stated));
-    // A capture of another seed has other touches; what is not captured is told by its first touches.
+    // A capture of another seed has other touches; what is not captured is identified by its first touches.
     let fingerprints = if captured.is_none() || stated.settings == 0 { fingerprints(dataset) } else { BTreeMap::new() };
     let same = |name: &&str| {
         let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));

@@ -1,8 +1,8 @@
-//! What can be wrong with fitting a probe to recordings.
+//! Problems with fitting a probe to recordings.
 
 use crate::error::Problem;
 
-/// What can be wrong with fitting a probe to recordings.
+/// Problems with fitting a probe to recordings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitProblem {

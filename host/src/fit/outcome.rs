@@ -56,7 +56,7 @@ impl fmt::Display for Warning {
 pub struct Fit {
     /// The probe as it should be.
     pub probe: Probe,
-    /// What its lengths are measured in.
+    /// Unit of its lengths.
     #[serde(with = "crate::probe::unit")]
     pub unit: Length,
     /// Its speed over the nominal one.

@@ -2,7 +2,7 @@
 
 use crate::error::Problem;
 
-/// What can be wrong with scenes, probes and casts.
+/// Problems with scenes, probes and casts.
 ///
 /// What is wrong with a scene's mesh is a [`MeshProblem`](super::MeshProblem), what is wrong with a probe's measures a
 /// [`Setting`](crate::error::Setting).
@@ -30,7 +30,7 @@ pub enum ProbeProblem {
     BadQuantity {
         /// The text.
         text: String,
-        /// What to write, with an example.
+        /// Text to write, with an example.
         example: &'static str,
     },
     /// A line of a file of casts has too few or too many fields.

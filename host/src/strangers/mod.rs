@@ -93,7 +93,7 @@ impl Default for Settings {
 pub struct Calibrated {
     /// The model's bytes.
     pub bytes: Vec<u8>,
-    /// What is the same for all objects.
+    /// Terms that are the same for all objects.
     pub terms: MisfitTerms,
     /// Of the sequences that the threshold was tested on, those that ended as unknown.
     pub alarms: usize,

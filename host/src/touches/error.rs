@@ -377,7 +377,7 @@ impl Problem for TouchesProblem {
                 "Name the schema of the touches palpate.Touch, or in ROS 2 palpate_msgs/msg/Touch: docs/reference/mcap.md."
             }
             Self::Message { .. } | Self::BadMessage { .. } => {
-                "Correct what logged it: docs/reference/mcap.md says what belongs in a message."
+                "Correct the program that logged it: docs/reference/mcap.md says what belongs in a message."
             }
             Self::NamelessTouch => "Name the object in every message, or in none.",
             Self::NotInLog { .. } => "Give one of these names, or the log of the other object.",
@@ -407,7 +407,7 @@ impl Problem for TouchesProblem {
             Self::NoFormat => "Name it after the object, with the extension .txt or .parquet.",
             Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
-            Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
+            Self::WouldTrainWrong { .. } => "Correct the faults listed above, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }
         .into()

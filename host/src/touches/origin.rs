@@ -19,8 +19,8 @@ pub struct Origin {
     pub touches: u64,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// What the probe's lengths are measured in: units, with every object scaled to `length`, or millimeters, with objects
-    /// at their true size. Before version 0.3.0, always units.
+    /// Unit of the probe's lengths: units, with every object scaled to `length`, or millimeters, with objects at their
+    /// true size. Before version 0.3.0, always units.
     #[serde(default = "unit::tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning at true size.

@@ -1,8 +1,8 @@
-//! What can be wrong with searching for a model.
+//! Problems with searching for a model.
 
 use crate::error::Problem;
 
-/// What can be wrong with searching for a model.
+/// Problems with searching for a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TuneProblem {
@@ -22,7 +22,7 @@ pub enum TuneProblem {
     /// There is nothing to distinguish.
     #[error("a probe is searched for {objects} object(s), which leaves nothing to distinguish")]
     FewObjects {
-        /// How many objects there are.
+        /// Number of objects.
         objects: usize,
     },
 }

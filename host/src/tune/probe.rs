@@ -214,7 +214,7 @@ pub struct Design {
     pub by_spacing: Vec<Trial>,
     /// All probes tried in the rounds before, the best of each round first.
     pub rounds: Vec<Vec<Trial>>,
-    /// What lengths are measured in.
+    /// Unit of lengths.
     #[serde(with = "crate::probe::unit")]
     pub unit: Length,
     /// The error rate that was asked for.

@@ -193,7 +193,7 @@ fn a_message_that_is_no_touch_is_named_with_file_byte_number_topic_and_what_is_w
             r#"{"times": [0, 1, 1], "pose": {"direction": [1, 0, 0], "alignment": [1, 1, 0]}}"#,
             "the alignment has length 1.414",
         ),
-        (r#"{"times": [0, 1, 1], "object": "../../bowl"}"#, "no file can be called after the object"),
+        (r#"{"times": [0, 1, 1], "object": "../../bowl"}"#, "no file can be named after the object"),
     ] {
         let log = touches(&[good, good, text]);
         let found = error(&log);
@@ -201,7 +201,9 @@ fn a_message_that_is_no_touch_is_named_with_file_byte_number_topic_and_what_is_w
         let begin = format!("robot.mcap: byte {place}: message 3 on /touch: ");
         assert!(found.starts_with(&begin) && found.contains(what), "{text}: {found}");
         assert!(
-            found.ends_with("Correct what logged it: docs/reference/mcap.md says what belongs in a message."),
+            found.ends_with(
+                "Correct the program that logged it: docs/reference/mcap.md says what belongs in a message."
+            ),
             "{found}"
         );
     }
@@ -365,7 +367,7 @@ fn a_directory_holds_logs_beside_text_and_the_content_says_which_is_which() {
     assert_eq!(dataset.warnings.len(), 2);
     let check = Check::of(directory.path()).unwrap();
     assert_eq!(check.summary.objects.len(), 5);
-    assert!(check.findings.iter().any(|finding| finding.what.contains("mug: every touch stands in it twice")));
+    assert!(check.findings.iter().any(|finding| finding.what.contains("mug: it holds every touch at least twice")));
     // A log is a data set by itself.
     assert!(is_log(&python("ros2.mcap")) && is_log(&path("spoon.txt")) && !is_log(&path("cup.txt")));
     assert!(!is_log(directory.path()) && !is_log(&path("nowhere")));

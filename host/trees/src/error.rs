@@ -1,4 +1,4 @@
-//! What can go wrong, said so that the user knows where and what to do next.
+//! Errors, with the place and a remedy.
 
 pub use crate::compile::CompileProblem;
 pub use crate::ensemble::{EnsembleProblem, NameProblem, TreeProblem};
@@ -58,7 +58,7 @@ impl fmt::Display for Place {
 /// Something that is wrong with what was given. Each room has an enum of its own, with a variant for whatever a caller may
 /// act on. Its `Display` says what is wrong, without a full stop.
 pub trait Problem: std::error::Error + Any + Send + Sync {
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     fn fix(&self) -> String;
 
     /// The exit code of a program that ends with it: 1 for bad input, 2 for bad arguments.
@@ -73,9 +73,9 @@ pub trait Problem: std::error::Error + Any + Send + Sync {
 pub struct Setting {
     /// The setting's name: the field in its `Settings`.
     pub name: &'static str,
-    /// What it was set to.
+    /// Value that was given.
     pub value: String,
-    /// What it may be: "1 to 10000".
+    /// Values allowed: "1 to 10000".
     pub allowed: String,
 }
 
@@ -97,11 +97,11 @@ pub enum Error {
     Io {
         /// The file or directory.
         path: PathBuf,
-        /// What was tried, as an infinitive: "read the mesh".
+        /// Action that failed, as an infinitive: "read the mesh".
         action: &'static str,
-        /// What the operating system said.
+        /// The operating system's message.
         source: std::io::Error,
-        /// What to do, as a sentence.
+        /// Remedy, as a sentence.
         fix: String,
     },
     /// Something is wrong with what was given.
@@ -109,7 +109,7 @@ pub enum Error {
     At {
         /// Where.
         place: Place,
-        /// What.
+        /// The problem.
         problem: Box<dyn Problem>,
     },
     /// The caller cancelled the work through its [`Progress`](crate::progress::Progress).
@@ -138,7 +138,7 @@ impl Error {
         Setting { name, value: value.to_string(), allowed: allowed.into() }.into()
     }
 
-    /// What is wrong, if it is a problem of this kind: `error.problem::<Setting>()`.
+    /// The problem, if it is of this kind: `error.problem::<Setting>()`.
     pub fn problem<P: Problem>(&self) -> Option<&P> {
         match self {
             Self::At { problem, .. } => (problem.as_ref() as &dyn Any).downcast_ref(),

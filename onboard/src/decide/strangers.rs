@@ -61,7 +61,8 @@ impl Model<'_> {
     }
 }
 
-/// How badly the touches fit the leader, in 2^-16 nats. `None` for an object without a record, which no valid model has.
+/// Misfit of the touches with the leader, in 2^-16 nats. `None` for an object without a record, which no valid model
+/// has.
 fn misfit(test: &MisfitTest<'_>, model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Option<i64> {
     let object = test.object(leader)?;
     // Of an object that cannot be there nothing is known: as if it had its mean.
@@ -106,7 +107,7 @@ fn held(number: i64) -> i32 {
     i32::try_from(number.clamp(-MOST, MOST)).unwrap_or(i32::MAX)
 }
 
-/// How much higher the limits are after this number of touches, in 2^-16 nats.
+/// Amount by which the limits are higher after this number of touches, in 2^-16 nats.
 fn early(terms: &MisfitTerms, touches: u32) -> i64 {
     let left = exp2_negative(u64::from(touches) * u64::from(terms.halving)) >> 24;
     // Below 2^31 · 2^32.

@@ -25,7 +25,7 @@ pub struct Strangers<'a> {
 /// The numbers of a test that are the same for all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MisfitTerms {
-    /// How long names are held back.
+    /// Rule for holding names back.
     pub held: Held,
     /// Rivals of each object: 1 to [`MisfitTest::MOST_RIVALS`].
     pub rivals: u8,
@@ -52,7 +52,7 @@ pub struct MisfitTerms {
 /// A test of fit, read in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MisfitTest<'a> {
-    /// What is the same for all objects.
+    /// Terms that are the same for all objects.
     pub terms: MisfitTerms,
     /// One after the other, one for each object but the background, and what has grown after them.
     records: &'a [u8],

@@ -47,7 +47,7 @@ fn main() {
     }
 }
 
-/// What is trained: both presets, on full touches and on every contact.
+/// Models trained: both presets, on full touches and on every contact.
 fn presets() -> Vec<(&'static str, Settings)> {
     let each = Settings { leaf_bits: None, counted: Some(Counted::Full), ..Settings::compact() };
     let one = Settings { rounds: 20, ..Settings::paper() };
@@ -157,7 +157,7 @@ fn hessboost(dataset: &Dataset, settings: &Settings) -> Vec<Tree> {
     trees.collect()
 }
 
-/// Whether all numbers are the same, zeros' signs included.
+/// True if all numbers are the same, zeros' signs included.
 fn same(ours: &[Tree], theirs: &[Tree]) -> bool {
     let zeros = |trees: &[Tree]| -> Vec<u32> {
         let leaves = trees.iter().flat_map(|tree| &tree.nodes).filter_map(Node::leaf);

@@ -2,7 +2,7 @@
 
 use palpate::error::Problem;
 
-/// What can be wrong with drawing.
+/// Problems with drawing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageProblem {

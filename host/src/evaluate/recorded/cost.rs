@@ -14,7 +14,7 @@ const AT: [usize; 5] = [5, 10, 20, 30, 60];
 /// Approaches whose accuracy on simulated touches is asked for on recorded ones.
 const COST_AT: usize = 20;
 
-/// What it costs a model that recorded touches are not as simulated.
+/// Cost to a model of the difference between recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Objects that the model knows; all of the simulated ones.
@@ -23,30 +23,30 @@ pub struct Cost {
     pub simulated: BTreeMap<usize, Share>,
     /// The same on recorded touches of the same objects.
     pub recorded: BTreeMap<usize, Share>,
-    /// How many approaches the accuracy on simulated touches is of.
+    /// Number of approaches behind the accuracy on simulated touches.
     pub after: usize,
     /// After how many approaches the model is right as often on recorded touches; none if it never is.
     pub needed: Option<f64>,
 }
 
 impl Cost {
-    /// What it costs, in a sentence.
+    /// Cost, in a sentence.
     pub fn sentence(&self) -> String {
         let Self { after, needed, .. } = self;
         match needed {
             Some(needed) if needed - *after as f64 > 0.5 => format!(
-                "To be right as often as on simulated touches after {after} approaches takes {needed:.0} on recorded ones: {:.0} more.",
+                "The accuracy on simulated touches after {after} approaches takes {needed:.0} approaches on recorded ones: {:.0} more.",
                 (needed - *after as f64).max(1.0)
             ),
-            Some(_) => format!("It is right as often on recorded touches: after {after} approaches nothing is lost."),
+            Some(_) => format!("Its accuracy is as high on recorded touches: no loss after {after} approaches."),
             None => {
-                format!("On recorded touches it is never right as often as on simulated ones after {after} approaches.")
+                format!("On recorded touches it never reaches its accuracy on simulated ones after {after} approaches.")
             }
         }
     }
 }
 
-/// What a model that is trained on simulated touches makes of recorded ones; none for fewer than two recorded objects.
+/// Accuracy on recorded touches of a model that is trained on simulated ones; none for fewer than two recorded objects.
 pub(super) fn cost(
     recorded: &Dataset,
     simulated: &Dataset,

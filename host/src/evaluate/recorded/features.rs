@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Kolmogorov's distribution at 95 %.
 const KOLMOGOROV: f64 = 1.358;
 
-/// How a feature of recorded and simulated touches compares.
+/// Comparison of a feature of recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureComparison {
     /// The feature's name.
@@ -16,7 +16,7 @@ pub struct FeatureComparison {
     pub simulated: [f64; 5],
     /// The largest difference between the shares of touches below a value: 0 to 1.
     pub apart: f64,
-    /// What [`FeatureComparison::apart`] would be by chance in one of 20 comparisons.
+    /// Value that [`FeatureComparison::apart`] would exceed by chance in one of 20 comparisons.
     pub by_chance: f64,
 }
 

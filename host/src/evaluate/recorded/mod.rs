@@ -219,7 +219,8 @@ fn first(object: &ObjectTouches, count: usize) -> ObjectTouches {
     object.select(chosen)
 }
 
-/// How often trees tell touches of two samples apart that they were not trained on; the two samples weigh equally.
+/// Accuracy of trees that distinguish touches of two samples, on touches that they were not trained on; the two samples
+/// weigh equally.
 fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, settings: &Settings) -> Result<Estimate> {
     let samples = [("recorded", recorded), ("simulated", simulated)].map(|(name, object)| object.clone().renamed(name));
     let both = Dataset::new(samples.into());

@@ -153,7 +153,7 @@ fn rows_of_another_object_than_the_file_is_called_after_are_refused() {
     writer.close().unwrap();
     let error = read(&path).unwrap_err().to_string();
     assert!(error.contains("fork.parquet: row 2001: a touch of \"mouse\" in the file of \"fork\""), "{error}");
-    assert!(error.ends_with("Give each object a file that is called like it."), "{error}");
+    assert!(error.ends_with("Give each object a file with its name."), "{error}");
 }
 
 /// A file of one touch, `fork.parquet`, with another column of objects.

@@ -100,7 +100,7 @@ pub struct Settings {
     pub stated: Stated,
 }
 
-/// What a model over touches states of the touches that it was trained on; it changes no margin.
+/// Statements of a model over touches about the touches that it was trained on; it changes no margin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stated {
     /// Distance between neighboring fingers, in the probe's unit.
@@ -109,7 +109,7 @@ pub struct Stated {
     pub speed: f32,
     /// The probe, where it is known.
     pub probe: Option<TrainedProbe>,
-    /// What was added to the touches in training.
+    /// Noise added to the touches in training.
     pub noise: Option<TrainedNoise>,
     /// The capture that made the touches: the content of the section [`Tag::Capture`](palpate_shared::format::Tag::Capture).
     pub capture: Option<Vec<u8>>,

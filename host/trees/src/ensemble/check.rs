@@ -117,7 +117,7 @@ fn check_features(names: &[String], ensemble: &Ensemble) -> Result<(), EnsembleP
     Ok(())
 }
 
-/// Whether these names can be an ensemble's objects.
+/// Returns an error unless these names can be an ensemble's objects.
 pub fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
     if !(2..=MAX_OBJECTS).contains(&names.len()) {
         return Err(EnsembleProblem::ObjectCount { count: names.len() });

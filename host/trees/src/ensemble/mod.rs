@@ -26,16 +26,16 @@ use std::borrow::Cow;
 /// Boosted trees over features of touches or of rows, with one margin for each object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ensemble {
-    /// What the features are.
+    /// The features.
     pub inputs: Inputs,
     /// The names of the objects (classes), or of the one output of a regression; a margin's position is its object's
     /// position here.
     pub objects: Vec<String>,
-    /// What every margin starts from, one for each object.
+    /// Starting value of every margin, one for each object.
     pub base_margins: Vec<f32>,
     /// The trees, in the order in which their leaves are added.
     pub trees: Vec<Tree>,
-    /// What is known about the touches that it was trained on; changes no margin.
+    /// Facts about the touches that it was trained on; changes no margin.
     pub origin: Origin,
 }
 
@@ -44,11 +44,11 @@ pub struct Ensemble {
 pub struct Tree {
     /// Splits and leaves.
     pub nodes: Vec<Node>,
-    /// Which margins the tree adds to.
+    /// Margins that the tree adds to.
     pub output: Output,
 }
 
-/// Which margins a tree adds to.
+/// Margins that a tree adds to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
     /// A leaf has one value, for the object with this index.
@@ -73,7 +73,7 @@ pub enum Node {
         /// Index of the right child.
         right: usize,
     },
-    /// What the tree adds: one value, or one for each object, as the tree's [`Output`] says.
+    /// Values that the tree adds: one value, or one for each object, as the tree's [`Output`] says.
     Leaf(Vec<f32>),
 }
 
@@ -145,7 +145,7 @@ impl Ensemble {
         features.iter().map(known).collect()
     }
 
-    /// How margins become a class or a value.
+    /// Rule that turns margins into a class or a value.
     pub fn prediction(&self) -> Prediction {
         self.origin.imported.as_ref().map(|imported| imported.prediction).unwrap_or_default()
     }
@@ -174,7 +174,7 @@ impl Ensemble {
         self.inputs.descriptor()
     }
 
-    /// How many objects can be named: all but the background.
+    /// Number of objects that can be named: all but the background.
     pub fn known_count(&self) -> usize {
         self.objects.len() - usize::from(self.origin.background && !self.objects.is_empty())
     }

@@ -1,4 +1,4 @@
-//! What is known of where an ensemble is from.
+//! Origin of an ensemble, as far as it is known.
 
 use super::nodes::Threshold;
 use palpate_shared::format::{Counted, PatternShares, Prediction, TrainedTouches};
@@ -6,13 +6,13 @@ use palpate_shared::{ContactPattern, Patterns};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What an ensemble states of its training. Empty for ensembles from elsewhere.
+/// Statements of an ensemble about its training. Empty for ensembles from elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origin {
-    /// Which touches it was trained on, and so which ones are evidence; of no meaning over rows.
+    /// Kind of touches it was trained on, and so which ones are evidence; of no meaning over rows.
     pub trained: Option<Trained>,
-    /// The last object is a background: many other shapes, which stand for all that the ensemble does not know. It is a
-    /// rival of the others, and never named.
+    /// The last object is a background: many other shapes, which stand for everything that the ensemble does not know.
+    /// It is a rival of the others, and never named.
     pub background: bool,
     /// The file of another library that it was read from, if it was.
     pub imported: Option<Imported>,
@@ -21,7 +21,7 @@ pub struct Origin {
     pub attributes: BTreeMap<String, String>,
 }
 
-/// What is known about an ensemble that another library trained.
+/// Facts about an ensemble that another library trained.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Imported {
     /// The library and the kind of file, such as "LightGBM text".
@@ -29,10 +29,10 @@ pub struct Imported {
     /// The farthest that a margin can be from the library's own, since leaves and sums are f32 here and f64 there; 0
     /// where the library adds the same f32 values in the same order.
     pub rounding: f64,
-    /// What a user should know about it, each a sentence.
+    /// Notes for the user, each a sentence.
     pub notes: Vec<String>,
-    /// How margins become a class or a value, as the library's `predict` does it. Its scale makes the library's margins of
-    /// what the trees add up to.
+    /// Rule that turns margins into a class or a value, as the library's `predict` does it. Its scale makes the
+    /// library's margins of what the trees add up to.
     pub prediction: Prediction,
     /// The least and the largest of the numbers that stand for a missing value, beside NaN.
     pub sentinel: Option<[f32; 2]>,
@@ -53,7 +53,7 @@ pub struct Trained {
 }
 
 impl Trained {
-    /// What the chip's model states of [`Trained::shares`].
+    /// Statement of the chip's model about [`Trained::shares`].
     pub fn pattern_shares(&self) -> Option<PatternShares> {
         // `as` saturates.
         self.shares.map(|shares| PatternShares(shares.map(|share| (share * 65_535.0).round() as u16)))

@@ -156,6 +156,6 @@ pub struct ClassDiffers {
     pub row: usize,
     /// The model's class and the library's.
     pub classes: [String; 2],
-    /// How far apart their margins are by the library.
+    /// Distance between their margins in the library.
     pub gap: f64,
 }

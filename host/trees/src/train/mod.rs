@@ -72,7 +72,7 @@ pub enum Failure {
     Parameter {
         /// The parameter's name.
         name: &'static str,
-        /// What it may be.
+        /// Values allowed.
         allowed: &'static str,
     },
     /// A feature that is too large or not a number, a class that there is not, or a weight that is not above 0.
@@ -80,7 +80,7 @@ pub enum Failure {
     Row {
         /// The row, counted from 0.
         row: usize,
-        /// What is wrong with it.
+        /// Description of the fault.
         what: &'static str,
     },
     /// No threads could be had.

@@ -16,7 +16,7 @@ pub enum Candidate<'m> {
 }
 
 impl Candidate<'_> {
-    /// Whether the model is over touches; otherwise it is over rows of features.
+    /// True if the model is over touches; otherwise it is over rows of features.
     pub fn is_of_touches(&self) -> bool {
         self.descriptor().is_some()
     }
@@ -37,7 +37,7 @@ impl Candidate<'_> {
         }
     }
 
-    /// How many objects can be named: all but a background.
+    /// Number of objects that can be named: all but a background.
     pub fn known_count(&self) -> usize {
         match self {
             Self::Full(ensemble) => ensemble.known_count(),

@@ -84,7 +84,7 @@ impl Verified {
     }
 }
 
-/// What comparing rows comes to.
+/// Result of comparing rows.
 #[derive(Clone, Default)]
 struct Difference {
     margin_error: f64,

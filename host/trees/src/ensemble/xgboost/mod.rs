@@ -101,7 +101,7 @@ fn without_literals(bytes: &[u8]) -> Cow<'_, [u8]> {
 }
 
 impl Ensemble {
-    /// What XGBoost itself has just trained on `descriptor`'s features of `objects`.
+    /// Ensemble of a model that XGBoost itself has just trained on `descriptor`'s features of `objects`.
     ///
     /// # Errors
     /// [`EnsembleProblem`] for what [`load`](Self::load) refuses.
