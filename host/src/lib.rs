@@ -82,7 +82,7 @@
 //! | feature | default | what it adds |
 //! |---|---|---|
 //! | none | | simulator, compiler, evaluator |
-//! | `train` | yes | `ensemble::train`, `fit`, `strangers`, `teach` and `tune`; the trainer is hessboost |
+//! | `train` | yes | `ensemble::train`, `fit`, `strangers`, `teach` and `tune` |
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |

@@ -108,9 +108,9 @@ pub(crate) struct Arguments {
     /// Threads; the ensemble is the same for any number [default: all]
     #[arg(long)]
     threads: Option<usize>,
-    /// The library that trains; xgboost (version 1.6.2, only with --leaves one) needs the cargo feature of that name
-    #[arg(long, value_enum, default_value = "hessboost")]
-    trainer: Trainer,
+    /// The trainer: palpate, or xgboost (version 1.6.2, only with --leaves one), which needs the cargo feature of that name
+    #[arg(long, value_parser = trainer, value_name = "palpate|xgboost", default_value = "palpate")]
+    trainer: Engine,
     /// Print what was trained as JSON
     #[arg(long)]
     json: bool,
@@ -133,12 +133,6 @@ enum Touches {
 enum Leaves {
     Each,
     One,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Trainer {
-    Hessboost,
-    Xgboost,
 }
 
 #[derive(serde::Serialize)]
@@ -344,11 +338,17 @@ impl Arguments {
             seed: self.seed,
             threads: self.threads,
             probe: None,
-            trainer: match self.trainer {
-                Trainer::Hessboost => Engine::Hessboost,
-                Trainer::Xgboost => Engine::Xgboost,
-            },
+            trainer: self.trainer,
         }
+    }
+}
+
+fn trainer(name: &str) -> Result<Engine, String> {
+    match name {
+        "palpate" => Ok(Engine::Palpate),
+        "xgboost" => Ok(Engine::Xgboost),
+        "hessboost" => Err("the trainer is called palpate now; its trees are the same".into()),
+        _ => Err("use palpate or xgboost".into()),
     }
 }
 

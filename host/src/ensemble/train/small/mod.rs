@@ -53,7 +53,7 @@ impl Small {
         if !settings.multi_output {
             return Err(Error::setting("leaves", "one", "each: few different leaves hold a value for each object"));
         }
-        if settings.trainer != Engine::Hessboost {
+        if settings.trainer != Engine::Palpate {
             return Err(Error::setting(
                 "trainer",
                 "xgboost",
@@ -75,7 +75,7 @@ pub(crate) fn train_each(
 ) -> Result<Vec<Ensemble>> {
     super::check(dataset, settings.descriptor)?;
     let settings = &settings.resolved(dataset);
-    super::parameters(settings, dataset.objects.len())?;
+    super::parameters(settings)?;
     stops.iter().try_for_each(|&(_, leaves)| Small { leaves, threshold_cost }.check(settings))?;
     let evidence = Evidence::new(dataset, settings)?;
     let origin = origin(dataset, settings, &evidence);
