@@ -201,7 +201,7 @@ const C_ROWS: [(&str, &str); 5] = [
         "-DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0",
     ),
     ("touches, all layouts and leaves", "-DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0"),
-    ("… and a test of fit", "-DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0"),
+    ("… and a misfit test", "-DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0"),
     ("everything: also posteriors, snapshots, names", "-DEVERYTHING -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0"),
 ];
 

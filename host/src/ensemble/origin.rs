@@ -1,13 +1,13 @@
 //! Where the touches that an ensemble was trained on came from.
 
 use super::{Origin, Trained};
-use crate::compile::{self, CompiledModel};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
 use crate::probe::approach::Probe;
 use crate::probe::noise::Noise;
 use crate::probe::unit::{self, tenth};
 use crate::touches::{self, Captured, Dataset, short};
 use palpate_shared::format::{Length, TrainedProbe};
+use palpate_trees::compile::{self, CompiledModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

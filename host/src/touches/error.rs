@@ -312,6 +312,12 @@ pub enum TouchesProblem {
         /// The text.
         name: String,
     },
+    /// A directory that touches are to be saved in holds others, or a listing.
+    #[error("holds {}, and touches are not saved over others", shown(files))]
+    HoldsFiles {
+        /// The files' names.
+        files: Vec<String>,
+    },
     /// A file whose name does not say what it holds.
     #[error("not a file of touches by its name")]
     NoFormat,
@@ -404,6 +410,7 @@ impl Problem for TouchesProblem {
             Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
             Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
+            Self::HoldsFiles { .. } => "Give another directory, or move the files away.",
             Self::NoFormat => "Name it after the object, with the extension .txt or .parquet.",
             Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
@@ -412,6 +419,12 @@ impl Problem for TouchesProblem {
         }
         .into()
     }
+}
+
+/// Names, the first ten of them.
+fn shown(names: &[String]) -> String {
+    let first = names[..names.len().min(10)].join(", ");
+    if names.len() > 10 { format!("{first} and {} more", names.len() - 10) } else { first }
 }
 
 fn channels_or_none(channels: &[String]) -> String {

@@ -1,7 +1,7 @@
 //! A data set in memory, to the disk.
 
 use super::{Dataset, Entry, Format, Listing, ObjectTouches, Source, checksum, files, write_touch};
-use crate::error::{CaptureProblem, Error, Place, Result, TouchesProblem};
+use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use std::path::Path;
 
@@ -18,7 +18,7 @@ impl Dataset {
     /// not, such as for a part of a capture.
     ///
     /// # Errors
-    /// [`CaptureProblem::HoldsFiles`] if the directory holds touches; [`TouchesProblem::Unsaid`] if an object has several
+    /// [`TouchesProblem::HoldsFiles`] if the directory holds touches; [`TouchesProblem::Unsaid`] if an object has several
     /// instances or logs, and there would be no `dataset.json` to say so; when a file cannot be written.
     pub fn write(&self, directory: &Path, format: Format, approaches: Option<&[u64]>) -> Result<()> {
         if !format.is_built_in() {
@@ -31,7 +31,7 @@ impl Dataset {
             names.push(Listing::FILE.into());
         }
         if !names.is_empty() {
-            return Err(Error::at(Place::file(directory), CaptureProblem::HoldsFiles { files: names }));
+            return Err(Error::at(Place::file(directory), TouchesProblem::HoldsFiles { files: names }));
         }
         let origin = self.origin.clone().map(|origin| super::Origin { format, ..origin });
         let of_several = |object: &&ObjectTouches| object.sources().len() > 1;
@@ -251,8 +251,8 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         std::fs::write(directory.path().join("spoon.txt"), "0 0 0\n").unwrap();
         let error = dataset(None).write(directory.path(), Format::Text, None).unwrap_err();
-        let holds = CaptureProblem::HoldsFiles { files: vec!["spoon.txt".into()] };
-        assert_eq!(error.problem::<CaptureProblem>(), Some(&holds));
+        let holds = TouchesProblem::HoldsFiles { files: vec!["spoon.txt".into()] };
+        assert_eq!(error.problem::<TouchesProblem>(), Some(&holds));
         assert!(!directory.path().join("cup.txt").exists());
     }
 }
