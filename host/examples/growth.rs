@@ -1,4 +1,5 @@
-//! What more objects cost, and what helps: models of 20 to 256 objects, trained in different ways on the same approaches.
+//! Cost of more objects, and its remedies: models of 20 to 256 objects, trained in different ways on the same
+//! approaches.
 //!
 //! ```text
 //! cargo run --release -p palpate --example growth -- 100 4000 30x6 30x6:i8 8x6:eta=0.5:i8 30x6:stages=10
@@ -110,14 +111,14 @@ fn compare(ways: &[String], data: &Dataset, test: &Dataset) -> Result<(), Failed
 /// The ensemble that was trained last, how, and the seconds that it took: the next way may be the same training.
 type Before = Option<(train::Settings, Ensemble, f64)>;
 
-/// How a model is made.
+/// One way of making a model.
 struct Way {
     settings: train::Settings,
     compile: compile::Settings,
     stages: Option<usize>,
 }
 
-/// What a model costs, and what it is worth.
+/// Cost and accuracy of a model.
 struct Measured {
     bytes: usize,
     instructions: u64,
@@ -303,7 +304,8 @@ impl Way {
     }
 }
 
-/// How often the best was right after each number of approaches; approaches; whether it was wrong; whether undecided.
+/// Share of groups whose best object was right after each number of approaches; mean approaches; share of wrong
+/// verdicts; share undecided.
 type Outcome = ([f64; 3], f64, f64, f64);
 
 /// Tells the second stage a touch, unless it has ended.

@@ -5,6 +5,8 @@ pub use crate::calibrate::{CalibrateProblem, Supplied};
 pub use crate::capture::CaptureProblem;
 pub use crate::chip::ChipProblem;
 pub use crate::evaluate::EvaluateProblem;
+#[cfg(feature = "train")]
+pub use crate::fit::FitProblem;
 pub use crate::mesh::MeshProblem;
 pub use crate::probe::ProbeProblem;
 #[cfg(feature = "train")]

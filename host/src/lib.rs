@@ -61,6 +61,7 @@
 //! | [`probe`] | the simulator: scene, approach, first contact | [`probe::scene::Scene`] |
 //! | [`touches`] | touches in memory and on disk; noise; splits | [`touches::Dataset`] |
 //! | [`capture`] | touches objects, many times | [`capture::capture`](fn@capture::capture) |
+//! | `fit` | finds the probe that recorded touches came from | `fit::fit` |
 //! | [`ensemble`] | the full model: trees in `f32`, files of XGBoost, LightGBM, CatBoost and ONNX, training | [`ensemble::Ensemble`] |
 //! | [`rows`] | rows of features, for models that other libraries trained | [`rows::Rows`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
@@ -71,7 +72,6 @@
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate view --play` | [`play::Game`] |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
-//! | `page`, `report`, `run` | what the program draws and shows, and its main job | `run::run` |
 //!
 //! [`shared`] (touches, descriptors, the model format) and [`onboard`] (models, recognizers) are the crates that run on
 //! the chip; the host uses the same code. [`progress::Progress`] follows and cancels long calls. Errors are
@@ -82,7 +82,7 @@
 //! | feature | default | what it adds |
 //! |---|---|---|
 //! | none | | simulator, compiler, evaluator |
-//! | `train` | yes | `ensemble::train`, `teach` and `tune`; the trainer is hessboost |
+//! | `train` | yes | `ensemble::train`, `fit`, `strangers`, `teach` and `tune` |
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |
@@ -96,14 +96,15 @@
 
 pub mod error;
 pub mod random;
-#[cfg(all(test, feature = "train"))]
-mod repetitions;
 
 pub mod mesh;
 pub mod probe;
 pub mod touches;
 
 pub mod capture;
+#[cfg(feature = "train")]
+pub mod fit;
+
 pub mod ensemble;
 
 pub mod compile;
@@ -123,8 +124,8 @@ pub mod play;
 
 pub mod chip;
 
-#[cfg(all(test, feature = "objects", feature = "train"))]
-mod several_meshes;
+#[cfg(all(test, feature = "train"))]
+mod tests;
 
 pub use error::{Error, Result};
 pub use glam;

@@ -5,17 +5,17 @@
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-/// What random numbers are for. Each purpose has its own streams, so that drawing more for one changes no other, and
+/// Purposes of random numbers. Each purpose has its own streams, so that drawing more for one changes no other, and
 /// what is drawn for two of them at the same seed is independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// Which touches train and which test.
+    /// Division of touches into training and test.
     Folds,
     /// Gaussian noise on contact times.
     Noise,
-    /// What else a sensor and a robot add to a touch.
+    /// Other errors that a sensor and a robot add to a touch.
     Sensor,
-    /// What a robot adds to all of its touches.
+    /// Errors that a robot adds to all of its touches.
     Robot,
     /// Groups and sequences of touches that an evaluation draws.
     Groups,
@@ -35,11 +35,11 @@ pub enum Purpose {
     Switch,
     /// The order in which touches are used to calibrate a test of fit.
     Fit,
-    /// What a real probe adds to the touches of a capture.
+    /// Noise that a real probe adds to the touches of a capture.
     Capture,
     /// Touches as a fitted probe would make them.
     Fitted,
-    /// Which recorded touches are held out together, and groups of them.
+    /// Recorded touches that are held out together, and groups of them.
     Teach,
     /// Made-up touches for tests.
     #[cfg(test)]
@@ -47,8 +47,8 @@ pub enum Purpose {
 }
 
 impl Purpose {
-    /// What the purpose adds to the name: a control character, which no object's name begins with. Nothing for folds,
-    /// which version 0.1.0 drew without a purpose: a data set is still divided as it was.
+    /// Byte that the purpose adds to the name: a control character, which no object's name begins with. Nothing for
+    /// folds, which version 0.1.0 drew without a purpose: a data set is still divided as it was.
     fn mark(self) -> Option<u8> {
         match self {
             Self::Folds => None,

@@ -1,4 +1,4 @@
-//! What holds for contact times whatever the object: properties, tried on random approaches.
+//! Properties of contact times that hold for any object, tried on random approaches.
 
 use glam::{DQuat, DVec3};
 use palpate::mesh::Mesh;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The radius of the reference casts, the nearest f32.
 const RADIUS: f32 = 0.15;
 
-/// What a set may be off by. Far casts start up to 100,000 units away, where the start itself has no more digits.
+/// Largest allowed error of a set. Far casts start up to 100,000 units away, where the start itself has no more digits.
 fn tolerance(set: &str) -> f64 {
     if set == "far" { 1e-6 } else { 1e-9 }
 }

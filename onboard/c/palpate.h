@@ -110,7 +110,7 @@
 /* Bytes that are enough for a snapshot. */
 #define PALPATE_SNAPSHOT_LENGTH(objects) (21 + 10 * (objects))
 
-/* Why bytes are no model, or a model is not used. The place of what is wrong is in `wrong` of the model. */
+/* Reasons why bytes are no model, or a model is not used. The place of the fault is in `wrong` of the model. */
 typedef enum {
     PALPATE_OK = 0,
     PALPATE_LENGTH,          /* fewer bytes than the model has, or more */
@@ -125,7 +125,7 @@ typedef enum {
     PALPATE_TOO_MANY_OBJECTS /* more than PALPATE_MAX_OBJECTS (place 14) */
 } palpate_error;
 
-/* Why a touch or a row is no evidence. It was not counted, and nothing has changed. */
+/* Reasons why a touch or a row is no evidence. The input was not counted, and nothing has changed. */
 typedef enum {
     PALPATE_COUNTED = 0,
     PALPATE_REFUSED_PATTERN, /* the model was not trained on touches with these contacts */
@@ -135,7 +135,7 @@ typedef enum {
     PALPATE_NEEDS_TOUCHES    /* the model is over touches */
 } palpate_answer;
 
-/* What is known. */
+/* Verdicts. */
 typedef enum {
     PALPATE_UNDECIDED = 0,
     PALPATE_RECOGNIZED, /* an object, until the reset */
@@ -143,7 +143,7 @@ typedef enum {
     PALPATE_GAVE_UP     /* the limit of touches was reached, until the reset */
 } palpate_verdict;
 
-/* What became of a snapshot. */
+/* Results of restoring a snapshot. */
 typedef enum { PALPATE_RESTORED = 0, PALPATE_DAMAGED, PALPATE_OTHER_MODEL } palpate_restored;
 
 /* An approach: when each finger touched, in microseconds on any common clock, or PALPATE_MISSING; and the probe's pose if
@@ -177,7 +177,7 @@ typedef struct {
     uint8_t needs_pose;
 } palpate_model;
 
-/* What is known of the object that is touched. */
+/* State of recognition of the object that is touched. */
 typedef struct {
     const palpate_model *model;
     uint64_t odds;        /* threshold: what the others may weigh, in Q56; of objects without one of their own */
@@ -193,7 +193,7 @@ typedef struct {
 /* Parts of a model. */
 enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPATE_GROUPS_, PALPATE_SPLITS_, PALPATE_LEAVES_, PALPATE_END_ };
 
-/* Whether a model has this layout, or type of leaf: without a question where only one is built in. */
+/* True if a model has this layout, or type of leaf: a constant where only one is built in. */
 #define PALPATE_IS_LAYOUT_(model, bit, code) \
     (PALPATE_LAYOUTS == (bit) || ((PALPATE_LAYOUTS & (bit)) != 0 && (model)->layout_ == (code)))
 #define PALPATE_IS_LEAF_(model, bit, code) \
@@ -203,7 +203,7 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 #define PALPATE_IS_GRID_(model) PALPATE_IS_LAYOUT_(model, PALPATE_GRID, 2)
 #define PALPATE_IS_WIDE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_WIDE, 3)
 #define PALPATE_IS_PATTERNS_(model) PALPATE_IS_LAYOUT_(model, PALPATE_PATTERNS, 4)
-/* Whether leaves are numbers of a table. */
+/* True if leaves are indices into a table. */
 #define PALPATE_IS_SHARED_(model) (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && (model)->table_ != NULL)
 #define PALPATE_IS_I8_(model) PALPATE_IS_LEAF_(model, PALPATE_I8, 0)
 #define PALPATE_IS_I16_(model) PALPATE_IS_LEAF_(model, PALPATE_I16, 1)
@@ -409,7 +409,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 }
                 model->table_ = content + 4;
             } else if (last == 13) {
-                /* What is predicted: a link, a rule for ties, a scale that is positive and finite. */
+                /* The prediction: a link, a rule for ties, a scale that is positive and finite. */
                 if (length < 8 || PALPATE_BYTE(content) > 4 || PALPATE_BYTE(content + 1) > 1 ||
                     palpate_u32_(content + 4) - 1 >= 0x7f7fffffu) {
                     return PALPATE_FIELD;
@@ -801,7 +801,7 @@ static inline uint8_t palpate_pattern_(const uint32_t *times)
     return code - 1u < 2 ? PALPATE_AS_(uint8_t, 3 - code) : code;
 }
 
-/* Why a model over touches does not count one, or PALPATE_COUNTED. */
+/* Reason why a model over touches does not count one, or PALPATE_COUNTED. */
 static inline palpate_answer palpate_accepts_(const palpate_model *model, const palpate_touch *touch, const uint32_t *times)
 {
     uint_fast8_t i;
@@ -854,7 +854,7 @@ static inline void palpate_features_(const palpate_model *model, const palpate_t
     if (descriptor >= 4) {
         *features++ = palpate_clamp_(pair);
     }
-    /* What there is of the pose, from x or from z on. */
+    /* The known part of the pose, from x or from z on. */
     if ((0x6cu >> descriptor & 1) != 0) {
         const uint8_t first = (0x24u >> descriptor & 1) != 0 ? 2 : 0;
         int flip = 0;
@@ -881,7 +881,7 @@ static inline void palpate_features_(const palpate_model *model, const palpate_t
 
 /* ---- Margins ---- */
 
-/* How many of an axis's `count` thresholds of `width` bytes are at or below `value`. */
+/* Number of an axis's `count` thresholds of `width` bytes that are at or below `value`. */
 PALPATE_APART_ uint8_t palpate_rank_(const uint8_t *cuts, uint_fast8_t width, uint_fast8_t count, int32_t value)
 {
     uint_fast16_t rank = 0, step = count < 16 ? 8 : 128;
@@ -1242,7 +1242,7 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
     return PALPATE_AS_(uint64_t, power) << 25 >> whole;
 }
 
-/* How many bits an object is behind the leader, in Q32; the most there are where its weight is 0 at any temperature. */
+/* Bits by which an object is behind the leader, in Q32; the largest number where its weight is 0 at any temperature. */
 static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint_fast16_t leader, uint_fast16_t object)
 {
     const uint8_t *bytes = recognizer->model->bytes;
@@ -1354,7 +1354,7 @@ static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fa
     return palpate_subtract_(sum, palpate_prior_(recognizer->model, object));
 }
 
-/* How badly the touches that the evidence is the sum of fit the leader, in 2^-16 nats, by the model's test. */
+/* Misfit of the touches that the evidence is the sum of with the leader, in 2^-16 nats, by the model's test. */
 static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const uint8_t *test = recognizer->model->strangers_;
@@ -1398,7 +1398,7 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
 }
 
 /* Whether the leader may be named by the model's test of fit: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
-static inline palpate_verdict palpate_fit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
+static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const palpate_model *model = recognizer->model;
     const uint8_t *test = model->strangers_;
@@ -1445,7 +1445,7 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     recognizer->touches += recognizer->touches != UINT32_MAX;
     best = palpate_best(recognizer);
     if (PALPATE_STRANGERS) {
-        verdict = palpate_fit_(recognizer, best);
+        verdict = palpate_by_misfit_(recognizer, best);
     }
     if (recognizer->by_object != 0 && model->odds_ != NULL) {
         left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;
@@ -1669,7 +1669,7 @@ static inline float palpate_ln_1p_(float e)
     return 2.0f * s * sum;
 }
 
-/* What the library predicts for a margin, by the model's inverse link. Error, relative to the result: at most 5e-7. */
+/* The library's prediction for a margin, by the model's inverse link. Error, relative to the result: at most 5e-7. */
 PALPATE_API float palpate_inverse_link(const palpate_model *model, float margin)
 {
     const uint8_t *prediction = palpate_prediction_(model);

@@ -13,7 +13,7 @@ fn main() -> io::Result<()> {
     models(&out.join("bench"))
 }
 
-/// What `palpate-tests`' `bench_models` writes.
+/// Files that `palpate-tests`' `bench_models` writes.
 const BENCH: [&str; 17] = [
     "one-i16.palpate",
     "one-compact.palpate",

@@ -47,7 +47,7 @@
 //! | `station` | [`station`], with both of these |
 //! | `compact`, `complete`, `grid`, `wide` | layouts of trees that can be read |
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
-//! | `shared-leaves` | trees whose equal leaves stand once |
+//! | `shared-leaves` | trees whose equal leaves are stored once |
 //! | `sentinel` | models over rows in which a number stands for a missing value |
 //! | `defmt` | touches, verdicts, refusals and faults can be logged; the only one that is off by default |
 //!
@@ -65,6 +65,7 @@ mod bytes;
 mod decide;
 #[cfg(feature = "effector")]
 pub mod effector;
+mod exponential;
 mod layouts;
 mod model;
 #[cfg(feature = "station")]
@@ -72,11 +73,11 @@ pub mod station;
 
 pub use bytes::{Aligned, ModelError};
 pub use decide::{
-    CapacityError, Fit, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
-    exp2_negative,
+    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
+pub use exponential::exp2_negative;
 #[cfg(feature = "rows")]
 pub use layouts::batch::Batch;
 pub use model::{Model, Refused, inverse_link};

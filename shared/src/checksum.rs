@@ -3,7 +3,7 @@
 /// The reflected polynomial.
 const POLYNOMIAL: u32 = 0xedb8_8320;
 
-/// What four bits do to the checksum: a small table, for a quarter of the time that single bits take.
+/// Effect of four bits on the checksum: a small table, for a quarter of the time that single bits take.
 static TABLE: [u32; 16] = table();
 
 const fn table() -> [u32; 16] {

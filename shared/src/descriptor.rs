@@ -1,4 +1,4 @@
-//! Which features a touch is turned into.
+//! Descriptors: the features that a touch is turned into.
 //!
 //! A touch and its mirror image (fingers counted from the other end) are the same touch, so every descriptor but the
 //! paper's own [`Descriptor::Times`] gives the same features for both.
@@ -15,7 +15,7 @@ pub const MISSING_FEATURE: i32 = i32::MIN;
 /// trainers that work in f32 see what the chip sees.
 pub const FEATURE_LIMIT: i32 = (1 << 24) - 1;
 
-/// Which features a touch is turned into. Times in microseconds, direction cosines in Q15.
+/// Features that a touch is turned into. Times in microseconds, direction cosines in Q15.
 ///
 /// The first four were made for full touches; of a partial touch they know the slope of both outer fingers at most. The
 /// `Contacts` forms are for touches with any contacts: they begin with the contact pattern, and a pair of neighboring
@@ -24,7 +24,8 @@ pub const FEATURE_LIMIT: i32 = (1 << 24) - 1;
 pub enum Descriptor {
     /// `t1, t2, t3`: the published method's own; the baseline.
     Times,
-    /// `κ = t1 − 2·t2 + t3` and the slope `|t3 − t1|`: all that three times say about a surface under an unknown pose.
+    /// `κ = t1 − 2·t2 + t3` and the slope `|t3 − t1|`: everything that three times say about a surface under an unknown
+    /// pose.
     Curvature,
     /// Curvature, and the vertical (z) components of direction and alignment: an object on a table.
     Gravity,
@@ -53,7 +54,7 @@ impl Features {
     }
 }
 
-/// What a descriptor takes from the pose.
+/// The part of the pose that a descriptor uses.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Frame {
     Nothing,
@@ -151,7 +152,7 @@ impl Descriptor {
         }
     }
 
-    /// How many features a touch has.
+    /// Number of features of a touch.
     pub const fn feature_count(self) -> usize {
         self.length() as usize
     }
@@ -168,12 +169,12 @@ impl Descriptor {
         }
     }
 
-    /// Whether the features need the probe's pose; without one those features are missing.
+    /// True if the features need the probe's pose; without one those features are missing.
     pub const fn needs_pose(self) -> bool {
         !matches!(self.frame(), Frame::Nothing)
     }
 
-    /// Whether touches with missing contacts have features of their own: the `Contacts` forms.
+    /// True if touches with missing contacts have features: the `Contacts` forms.
     pub const fn uses_partial_touches(self) -> bool {
         matches!(self, Self::ContactsCurvature | Self::ContactsGravity | Self::ContactsOriented)
     }

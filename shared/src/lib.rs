@@ -1,4 +1,4 @@
-//! What Palpate's host and chip both speak.
+//! The common language of Palpate's host and chip.
 //!
 //! A probe with three fingers moves toward an object; each finger reports when it makes contact. The path of one such
 //! [`Touch`] through this crate:

@@ -1,6 +1,6 @@
-//! Which fingers touched.
+//! Contact patterns: the set of fingers that touched.
 
-/// Which fingers touched, up to mirror image: fingers counted from the other end give the same pattern.
+/// The set of fingers that touched, up to mirror image: fingers counted from the other end give the same pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -98,12 +98,12 @@ impl Patterns {
         Self(self.0 & other.0)
     }
 
-    /// Whether a pattern is in the set.
+    /// True if a pattern is in the set.
     pub const fn contains(self, pattern: ContactPattern) -> bool {
         self.0 >> pattern.code() & 1 == 1
     }
 
-    /// Whether there is no pattern in the set.
+    /// True if there is no pattern in the set.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }

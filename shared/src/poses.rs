@@ -47,7 +47,7 @@ impl Poses {
         self.rolls
     }
 
-    /// How many poses there are: 26, 52 or 104.
+    /// Number of poses: 26, 52 or 104.
     pub const fn count(self) -> u16 {
         DIRECTIONS * self.rolls as u16
     }
@@ -157,7 +157,7 @@ fn root_q10(square: i32) -> i64 {
     }
 }
 
-/// What is within 16 bits.
+/// Narrows a number to 16 bits; one beyond them becomes `Q15_ONE`.
 fn narrow(number: i32) -> i16 {
     i16::try_from(number).unwrap_or(Q15_ONE)
 }

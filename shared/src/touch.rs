@@ -1,4 +1,4 @@
-//! What one approach of the probe yields.
+//! The result of one approach of the probe.
 
 use crate::pattern::ContactPattern;
 
@@ -25,7 +25,7 @@ impl ContactTime {
         if self.0 == u32::MAX { None } else { Some(self.0) }
     }
 
-    /// Whether the finger never touched.
+    /// True if the finger never touched.
     pub const fn is_missing(self) -> bool {
         self.0 == u32::MAX
     }
@@ -44,7 +44,7 @@ pub struct Pose {
     pub alignment: [i16; 3],
 }
 
-/// What an approach yields: three contact times, any of which may be missing, and the probe's pose where it is known.
+/// The result of an approach: three contact times, any of which may be missing, and the probe's pose where it is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Touch {
@@ -85,7 +85,7 @@ impl Touch {
         self.pose
     }
 
-    /// Which fingers touched.
+    /// The set of fingers that touched.
     #[inline(never)]
     pub fn pattern(&self) -> ContactPattern {
         let [first, middle, last] = self.times;
@@ -98,12 +98,12 @@ impl Touch {
         self.times.iter().fold(1, |last, time| time.0.wrapping_add(1).max(last)) - 1
     }
 
-    /// Whether all three fingers touched.
+    /// True if all three fingers touched.
     pub fn is_full(&self) -> bool {
         self.times.iter().all(|t| !t.is_missing())
     }
 
-    /// Whether no finger touched.
+    /// True if no finger touched.
     pub fn is_empty(&self) -> bool {
         self.times.iter().all(|t| t.is_missing())
     }

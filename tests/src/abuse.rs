@@ -13,7 +13,7 @@ use palpate_shared::{Descriptor, Patterns};
 /// Bytes that must be refused.
 #[derive(Clone, Debug)]
 pub struct Abuse {
-    /// What was done to a model.
+    /// Description of the damage done to a model.
     pub name: String,
     /// The kind of error, see [`kind`].
     pub kind: &'static str,
@@ -102,7 +102,7 @@ pub fn places(model: &[u8]) -> [usize; 8] {
     })
 }
 
-/// What models state here.
+/// Statements of the models in these tests.
 pub const TRAINED: Trained = Trained {
     probe: Some(TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Millimeter }),
     touches: Some(TrainedTouches {
@@ -165,7 +165,7 @@ pub fn cases() -> Vec<Abuse> {
 
 type Put<'a> = &'a mut dyn FnMut(&str, &'static str, usize, Vec<u8>);
 
-/// What is wrong with all of the bytes.
+/// Damage to the bytes as a whole.
 fn whole(put: Put<'_>) {
     let good = model(Layout::Compact, Leaf::I8, true);
     let length = good.len();
@@ -397,7 +397,7 @@ fn tables(put: Put<'_>) {
     put("tables by pattern of another descriptor", "section", axes, changed(&good, 12, &[Descriptor::Gravity.code()]));
 }
 
-/// What a model predicts, and what stands for a missing value.
+/// Damage to a model's prediction and its missing values.
 fn predictions(put: Put<'_>) {
     let plain = model(Layout::Compact, Leaf::I8, true);
     let [optional, ..] = places(&plain);

@@ -48,7 +48,7 @@ pub enum Step {
 pub struct Desk {
     /// The host's end of the link.
     pub host: HostEnd,
-    /// What it has still to say.
+    /// Steps that it has still to send.
     pub script: VecDeque<Step>,
     /// Bytes on the line.
     pub to_chip: VecDeque<u8>,
@@ -70,7 +70,7 @@ pub struct Desk {
     pub newest: Option<u32>,
     /// The session may end.
     pub may_fail: bool,
-    /// How the session ended.
+    /// Error that ended the session.
     pub failed: Option<LinkError>,
     /// Off once the power is gone: nothing is read or written then.
     pub power: Rc<Cell<bool>>,
@@ -117,14 +117,14 @@ impl Desk {
         }
     }
 
-    /// Whether everything was said and answered.
+    /// True once everything was sent and answered.
     pub fn is_done(&self) -> bool {
         self.open && self.script.is_empty() && self.host.is_idle()
     }
 }
 
 impl Desk {
-    /// What was on the line when the power went is gone; what is in the host is not.
+    /// Returns an error once the power is cut: bytes on the line are lost, those in the host are not.
     fn alive(&mut self) -> Result<(), PowerCut> {
         if self.power.get() {
             return Ok(());
@@ -218,7 +218,7 @@ pub fn load(bytes: &'static [u8], payload: Payload) -> Vec<Step> {
     steps
 }
 
-/// What a recognizer says to these touches.
+/// Outcomes of a recognizer for these touches.
 pub fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
     let model = Model::new(bytes).unwrap();
     let mut recognizer = Recognizer::<OBJECTS>::new(&model, Stopping::from_model(&model)).unwrap();

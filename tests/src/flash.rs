@@ -12,7 +12,7 @@ pub const WORD: usize = 4;
 /// Bytes that are erased at once.
 pub const SECTOR: usize = 1024;
 
-/// What goes wrong in one step; a step is one word written, or one sector erased.
+/// Fault in one step; a step is one word written, or one sector erased.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// The power goes before it.
@@ -47,7 +47,7 @@ impl Fault {
     ];
 }
 
-/// What a read finds once instead of what is there.
+/// Wrong data that a read returns once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Misread {
     /// A bit of each byte is wrong.
@@ -70,7 +70,7 @@ pub struct Cells {
     pub steps: u64,
     /// Faults to come.
     pub faults: Vec<(u64, Fault)>,
-    /// Whether words can be written; if not, they stay as they are, and nothing errs.
+    /// True if words can be written; if not, they stay as they are, and nothing errs.
     pub programs: Rc<Cell<bool>>,
     /// Erases of all sectors, for whoever looks while a driver has the cells.
     pub erased: Rc<Cell<u32>>,

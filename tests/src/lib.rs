@@ -1,4 +1,4 @@
-//! What the tests between the floors share.
+//! Code that the tests between the crates share.
 
 pub mod abuse;
 pub mod desk;

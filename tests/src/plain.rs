@@ -1,7 +1,7 @@
 //! `shared/FORMAT.md` read by the letter: a recognizer that shares no line with the one that chips run. It trusts its
 //! models, and is slow.
 
-/// What is known after a touch.
+/// Decision after a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
     /// Nothing yet.
@@ -54,9 +54,9 @@ pub struct Plain<'a> {
     shared: Option<(usize, &'a [u8])>,
     /// For each object.
     pub evidence: Vec<i64>,
-    /// How many were counted.
+    /// Number of touches counted.
     pub touches: u32,
-    /// What is known.
+    /// The decision.
     pub decision: Decision,
 }
 
@@ -171,7 +171,7 @@ impl<'a> Plain<'a> {
         (self.odds, self.limit) = (odds, limit);
     }
 
-    /// Why a touch is not counted.
+    /// Reason why a touch is not counted.
     pub fn refused(&self, (times, pose): &Approach) -> Option<&'static str> {
         let last = times.iter().flatten().max().copied().unwrap_or(0);
         if self.descriptor == 255 {
@@ -339,7 +339,7 @@ impl<'a> Plain<'a> {
         }
     }
 
-    /// The margins in units that sums come to.
+    /// The margins in units, as sums.
     pub fn margins(&self, sums: &[i32]) -> Vec<i32> {
         let q16 = |&bits: &i32| q16(f32::from_bits(bits as u32));
         if self.leaf == 2 { sums.iter().map(q16).collect() } else { sums.to_vec() }
@@ -375,7 +375,7 @@ impl<'a> Plain<'a> {
         exp2(if sharpness == 1 << 16 { u as u64 } else { ((u.min(1 << 42) * u128::from(sharpness)) >> 16) as u64 })
     }
 
-    /// What all objects but the leader weigh.
+    /// Sum of the weights of all objects but the leader.
     fn rivals(&self, sharpness: u64) -> u128 {
         let leader = self.leader();
         let others = (0..self.objects).filter(|&object| object != leader);

@@ -5,20 +5,20 @@ use palpate_shared::{ContactTime, Descriptor, Pose, Touch};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
-/// What a random ensemble is made like.
+/// Properties of a random ensemble.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
-    /// Which features.
+    /// Its features.
     pub descriptor: Descriptor,
-    /// How many objects.
+    /// Number of objects.
     pub objects: usize,
-    /// How many trees.
+    /// Number of trees.
     pub trees: usize,
     /// Their depth at most.
     pub depth: usize,
     /// One value per leaf for each object, or one for one object.
     pub each: bool,
-    /// How many different thresholds there may be.
+    /// Largest number of different thresholds.
     pub thresholds: usize,
     /// The largest value of a leaf.
     pub leaf: f32,

@@ -8,9 +8,9 @@ use std::fmt::Write;
 /// Commands, and the lines that have to come out.
 #[derive(Default)]
 pub struct Script<'m> {
-    /// What the program reads.
+    /// Commands that the program reads.
     pub commands: Vec<u8>,
-    /// What it has to write.
+    /// Output that the program has to write.
     pub expected: String,
     recognizer: Option<Recognizer<'m, 256>>,
 }
@@ -28,7 +28,7 @@ impl<'m> Script<'m> {
         self.recognizer.is_some()
     }
 
-    /// What is known under the model that is open.
+    /// Recognizer of the model that is open.
     ///
     /// # Panics
     /// If none is.
@@ -194,7 +194,7 @@ const fn refusal(refused: Refused) -> u8 {
     }
 }
 
-/// Whether `FORMAT.md` says where the walk through a model that was opened leads. Slot 0 of a complete tree is not checked,
+/// True if `FORMAT.md` defines where the walk through an opened model leads. Slot 0 of a complete tree is not checked,
 /// nor that the sizes of subtrees agree: what comes of wrong ones is up to the implementation, as long as it ends.
 pub fn is_specified(model: &Model<'_>) -> bool {
     let (bytes, header) = (model.bytes(), model.header());
@@ -230,7 +230,7 @@ pub fn is_specified(model: &Model<'_>) -> bool {
     })
 }
 
-/// Whether subtrees stay within those that they are part of.
+/// True if subtrees stay within those that they are part of.
 fn agrees(left: &impl Fn(usize) -> usize, mut start: usize, end: usize) -> bool {
     while start < end {
         let right = start + 1 + left(start);

@@ -5,8 +5,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    FitTerms, Held, Link, ObjectFit, OddsByObject, Plan, Prediction, Section, Sentinel, Strangers, Tag, Temperature,
-    f32_key, write_section,
+    Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Plan, Prediction, Section, Sentinel, Strangers, Tag,
+    Temperature, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -78,7 +78,7 @@ fn strangers(objects: usize, background: bool, rng: &mut SmallRng) -> Vec<u8> {
     let rivals: u8 = rng.random_range(1..=16);
     let first = rng.random_range(1..4);
     let doubt = rng.random_range(-(1 << 20)..1 << 20);
-    let terms = FitTerms {
+    let terms = MisfitTerms {
         held: Held::Likely,
         rivals,
         first,
@@ -98,7 +98,7 @@ fn strangers(objects: usize, background: bool, rng: &mut SmallRng) -> Vec<u8> {
         let count = usize::from(rivals);
         let numbers: Vec<i16> = (0..2 * count + count * (count + 1) / 2).map(|_| rng.random()).collect();
         let constant = rng.random_range(-100_000..100_000);
-        ObjectFit::write(shifts, constant, &own, numbers.into_iter(), &mut |part| content.extend_from_slice(part));
+        ObjectMisfit::write(shifts, constant, &own, numbers.into_iter(), &mut |part| content.extend_from_slice(part));
     }
     content
 }

@@ -68,7 +68,7 @@ impl Readme {
         }
     }
 
-    /// Whether all numbers held: what is stated, or was changed, is right.
+    /// Fails unless all numbers held: what is stated, or was changed, is right.
     ///
     /// # Panics
     /// If one did not, or the file cannot be written.

@@ -11,7 +11,8 @@ pub fn model() -> Vec<u8> {
     model
 }
 
-/// What exporters wrote before they aligned numbers: no zeros after the text, and thresholds of three bytes and of one.
+/// Models of exporters from before numbers were aligned: no zeros after the text, and thresholds of three bytes and of
+/// one.
 const BYTES: [&str; 7] = [
     "50 4c 50 54 01 00 01 00 b6 00 00 00 01 00 01 01",
     "02 00 02 00 02 00 00 00 03 00 00 00 05 00 00 00",

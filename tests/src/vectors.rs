@@ -62,7 +62,7 @@ pub fn read_touch(words: &str) -> Touch {
     }
 }
 
-/// Why a touch was not counted.
+/// Reason why a touch was not counted.
 pub const fn refusal(refused: Refused) -> &'static str {
     match refused {
         Refused::Pattern(_) => "pattern",

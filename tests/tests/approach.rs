@@ -144,7 +144,7 @@ fn a_plan_that_makes_no_sense_is_refused_when_the_model_is_opened() {
     }
 }
 
-/// What a chip answers, as the desk keeps it.
+/// Answer of a chip, as the desk keeps it.
 fn answered(approach: Result<ApproachMessage, Refusal>) -> String {
     approach.map_or_else(|refusal| format!("Refused({refusal:?})"), |approach| format!("NextApproach({approach:?})"))
 }

@@ -49,7 +49,7 @@ fn sketch(model: Option<&[u8]>, directory: &Path) -> Option<PathBuf> {
     Some(program)
 }
 
-/// What the sketch prints when its switches move like that from `start` on its clock on.
+/// Output of the sketch when its switches make these moves from `start` on, by its clock.
 fn printed(program: &Path, start: u32, end: u32, moves: &Moves) -> String {
     let mut input = format!("{start} {end}\n");
     for (finger, closed, at) in moves {
@@ -86,7 +86,7 @@ fn touches(model: &Model<'_>, start: u32, end: u32, moves: &Moves) -> Vec<Touch>
     touches
 }
 
-/// What the sketch has to print about these touches.
+/// Output that the sketch must print for these touches.
 fn expected(model: &Model<'_>, touches: &[Touch]) -> String {
     let mut recognizer = Recognizer::<16>::new(model, Stopping::from_model(model)).unwrap();
     let mut text = String::new();

@@ -33,7 +33,7 @@ fn here(flags: &[&str], directory: &Path) -> Result<PathBuf, String> {
     compile(&compiler, flags, "host.c", &program).map(|()| program)
 }
 
-/// What the program writes.
+/// Output of the program.
 fn run(program: &mut Command, commands: &[u8]) -> String {
     let mut child = program.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
     let mut input = child.stdin.take().expect("a pipe");
@@ -392,7 +392,7 @@ fn the_empty_image_of_the_peers_harness_hides_no_routine_of_the_compiler() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// What an ATmega2560 writes until the 0 at the end.
+/// Output of an ATmega2560 until the 0 at the end.
 fn run_avr(program: &Path, directory: &Path) -> String {
     let results = directory.join("results");
     std::fs::write(&results, []).unwrap();

@@ -183,7 +183,7 @@ fn approach(rng: &mut ChaCha8Rng) -> Touch {
     Touch::new(times)
 }
 
-/// What is played until the power goes, or all is over, and the touches up to there.
+/// Steps that are played until the power goes, or all is over, and the touches up to there.
 struct Segment {
     bytes: Vec<u8>,
     touches: usize,
@@ -223,14 +223,14 @@ fn segments(touches: &[Touch], rng: &mut ChaCha8Rng) -> Vec<Segment> {
     segments
 }
 
-/// What the chip knows, and how many touches of it.
+/// State of the chip, and the number of touches in it.
 struct Known<'m> {
     recognizer: Recognizer<'m, OBJECTS>,
     counted: usize,
 }
 
 impl Known<'_> {
-    /// What the chip says when it counts a touch. A decision ends an object.
+    /// The chip's report when it counts a touch. A decision ends an object.
     fn push(&mut self, touch: &Touch) -> VerdictMessage {
         let recognizer = &mut self.recognizer;
         let decision = match recognizer.push(touch).unwrap() {

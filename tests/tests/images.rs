@@ -40,7 +40,7 @@ const FEATURES: [(&str, &str); 3] = [
     ("station", "`station`: a `ProbeStation` with both, models and records in flash"),
 ];
 
-/// How far what the README states may be off with another compiler, in percent.
+/// Tolerance, in percent, of the README's figures under another compiler.
 const PERCENT: u64 = 2;
 
 /// Builds an image; it links only if nothing in it can panic, since its panic handler calls what is defined nowhere.
@@ -56,7 +56,7 @@ fn image(name: &str, features: &str) -> Image {
     Image::read(&std::fs::read(path).expect("the image"))
 }
 
-/// What an ELF file says about itself.
+/// Properties of an ELF file.
 struct Image {
     /// Bytes of all sections that are in flash.
     flash: usize,

@@ -10,7 +10,7 @@ use palpate_tests::sections::trained;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
-/// What half of the models state.
+/// Statements that half of the models carry.
 const TRAINED: Trained = Trained {
     probe: None,
     touches: Some(TrainedTouches {

@@ -1,4 +1,5 @@
-//! What a model states about its training is read back, and what a reader does not know is refused or skipped by name.
+//! Statements of a model about its training are read back, and those that a reader does not know are refused or skipped
+//! by name.
 
 use palpate::compile::{Leaf, Settings, compile};
 use palpate_onboard::{Model, ModelError};

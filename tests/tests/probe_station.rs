@@ -27,7 +27,7 @@ struct Bench {
     now: u32,
     edges: VecDeque<Edge>,
     to_chip: VecDeque<u8>,
-    /// What the chip said.
+    /// Bytes that the chip has sent.
     said: Vec<u8>,
     is_unplugged: bool,
     /// Poses, and when they are announced.
@@ -141,7 +141,7 @@ fn deciding() -> ([u32; 3], u32) {
     panic!("no touch decides");
 }
 
-/// What a host has sent and heard.
+/// Everything that a host has sent and heard.
 struct Desk {
     host: HostEnd,
     outcomes: Vec<Outcome>,

@@ -1,5 +1,5 @@
-//! What a model promises is read back, thresholds by object decide on the chip as on the host, and priors and subsets are
-//! exact.
+//! Promises of a model are read back, thresholds by object decide on the chip as on the host, and priors and subsets
+//! are exact.
 
 use palpate::compile::{Leaf, Restated, RestatedSection, Settings, compile, restate};
 use palpate_onboard::{Model, ModelError, NothingExpected, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};

@@ -1,4 +1,4 @@
-//! What a model was not trained for is not counted, and changes nothing.
+//! Touches that a model was not trained for are not counted, and change nothing.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs};
@@ -13,7 +13,7 @@ fn model(descriptor: Descriptor) -> Vec<u8> {
     compile(&random::ensemble(shape, 1), &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap().bytes
 }
 
-/// What a recognizer says to a touch, and that it changed nothing if it refused it.
+/// Result of a recognizer for a touch; checks that it changed nothing if it refused it.
 fn push(bytes: &[u8], touch: &Touch) -> Result<Verdict, Refused> {
     let model = Model::new(bytes).unwrap();
     let mut recognizer = Recognizer::<3>::new(&model, Stopping::from_model(&model)).unwrap();

@@ -1,4 +1,4 @@
-//! What is stated of instructions, stack and bytes is what is measured.
+//! Stated numbers of instructions, stack and bytes equal the measured ones.
 //!
 //! Measured by an emulator and by compilers for chips, so most of it is asked for:
 //! `cargo test -p palpate-tests --test stated -- --ignored --test-threads 1`, which `.ci/firmware` and `.ci/c` do. With
@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 const M4F: &str = "thumbv7em-none-eabihf";
 const M0: &str = "thumbv6m-none-eabi";
-/// How far a number may be off, in percent.
+/// Tolerance of a number, in percent.
 const PERCENT: u64 = 3;
 
 /// Cargo in the firmware's workspace, with the release profile.
@@ -23,7 +23,7 @@ fn cargo(what: &str, image: &str, target: &str) -> Command {
     cargo
 }
 
-/// What an image prints in the emulator, line by line in words.
+/// Output of an image in the emulator, line by line in words.
 fn printed(image: &str, target: &str) -> Vec<Vec<String>> {
     let output = cargo("run", image, target).output().expect("cargo runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -41,8 +41,8 @@ fn numbers(lines: &[Vec<String>], label: &str, index: usize) -> Vec<u64> {
     line[label.len()..].iter().filter_map(number).collect()
 }
 
-/// What the firmware's README states in its table of instructions and stack: its row, the benchmark's label, and which of the lines
-/// with it.
+/// Rows of the table of instructions and stack in the firmware's README: the row, the benchmark's label, and which of
+/// the lines with it.
 const BENCHMARK: [(&str, &str, usize); 8] = [
     ("margins of a touch", "recognizer: margins", 0),
     ("a touch with its verdict", "recognizer: a touch with its verdict", 0),
@@ -98,7 +98,7 @@ fn the_firmwares_readme_states_the_flash_and_ram_of_its_images() {
     readme.finish();
 }
 
-/// What an image takes.
+/// Sizes of an image.
 #[derive(Debug)]
 struct Sizes {
     flash: u64,

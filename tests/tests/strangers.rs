@@ -1,9 +1,9 @@
 //! Tests of fit in models: bytes that make no sense are refused, and those that pass can be walked.
 
 use palpate::compile::{Settings, compile};
-use palpate_onboard::{Fit, Forgetting, Model, Recognizer, Rivals, SNAPSHOT_LENGTH, Stopping, Verdict};
+use palpate_onboard::{Familiarity, Forgetting, Model, Recognizer, Rivals, SNAPSHOT_LENGTH, Stopping, Verdict};
 use palpate_shared::Descriptor;
-use palpate_shared::format::{FitTerms, Held, ObjectFit, Strangers, Tag};
+use palpate_shared::format::{Held, MisfitTerms, ObjectMisfit, Strangers, Tag};
 use palpate_tests::random::{self, Shape};
 
 const OBJECTS: usize = 4;
@@ -14,7 +14,7 @@ fn model() -> Vec<u8> {
     compile(&random::ensemble(shape, 5), &Settings::default()).unwrap().bytes
 }
 
-const TERMS: FitTerms = FitTerms {
+const TERMS: MisfitTerms = MisfitTerms {
     held: Held::Likely,
     rivals: 3,
     first: 1,
@@ -29,13 +29,13 @@ const TERMS: FitTerms = FitTerms {
 };
 
 /// A section in which every number of every record is the same.
-fn section(terms: FitTerms, background: bool, shift: u8, constant: i32, number: i16) -> Vec<u8> {
+fn section(terms: MisfitTerms, background: bool, shift: u8, constant: i32, number: i16) -> Vec<u8> {
     let mut bytes = Strangers::header(background, true).to_vec();
     bytes.extend(terms.to_bytes());
     for object in 0..OBJECTS as u8 - u8::from(background) {
         let rivals: Vec<u8> = (0..OBJECTS as u8).filter(|&rival| rival != object).collect();
         let numbers = (0..12).map(|_| number);
-        ObjectFit::write([shift; 3], constant, &rivals, numbers, &mut |part| bytes.extend_from_slice(part));
+        ObjectMisfit::write([shift; 3], constant, &rivals, numbers, &mut |part| bytes.extend_from_slice(part));
     }
     bytes
 }
@@ -52,7 +52,7 @@ fn nothing_overflows_at_any_numbers_and_any_evidence() {
     for shift in [0, 1, 20, 40] {
         for constant in [i32::MIN, -1, 0, i32::MAX] {
             for number in [i16::MIN, -1, 0, i16::MAX] {
-                let terms = FitTerms { threshold: i32::MAX, doubt: i32::MAX, early: i32::MAX as u32, ..TERMS };
+                let terms = MisfitTerms { threshold: i32::MAX, doubt: i32::MAX, early: i32::MAX as u32, ..TERMS };
                 let bytes = with(&bytes, section(terms, shift == 1, shift, constant, number)).unwrap();
                 let model = Model::new(&bytes).unwrap();
                 for evidence in [[0; 4], [i64::MAX, i64::MIN, 0, -1], [i64::MIN; 4], [i64::MAX, 1 << 40, -(1 << 31), 7]]
@@ -65,7 +65,7 @@ fn nothing_overflows_at_any_numbers_and_any_evidence() {
                 let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
                 for margins in [[i32::MAX, i32::MIN, 0, 1], [i32::MIN; 4], [1, 2, 3, 1 << 30]] {
                     recognizer.push_margins(&margins);
-                    recognizer.fit();
+                    recognizer.familiarity();
                     recognizer.posterior(0);
                 }
             }
@@ -78,7 +78,7 @@ fn a_name_waits_for_enough_touches_and_a_stranger_for_none_after_the_first_look(
     let bytes = model();
     // Nothing fits better or worse than anything else: the misfit is always 0.
     let neutral = |threshold: i32, doubt: i32| {
-        let terms = FitTerms { first: 2, least: 4, threshold, doubt, ..TERMS };
+        let terms = MisfitTerms { first: 2, least: 4, threshold, doubt, ..TERMS };
         with(&bytes, section(terms, false, 0, 0, 0)).unwrap()
     };
     let verdicts = |bytes: &[u8]| {
@@ -94,7 +94,7 @@ fn a_name_waits_for_enough_touches_and_a_stranger_for_none_after_the_first_look(
     let model = neutral(-1, -1);
     let model = Model::new(&model).unwrap();
     let recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
-    assert_eq!(recognizer.fit(), Fit::Fits, "nothing was touched yet");
+    assert_eq!(recognizer.familiarity(), Familiarity::Known, "nothing was touched yet");
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn a_background_with_more_evidence_than_any_object_lets_none_be_named() {
 
 #[test]
 fn verdicts_survive_a_snapshot() {
-    let bytes = with(&model(), section(FitTerms { threshold: -1, doubt: -1, ..TERMS }, false, 0, 0, 0)).unwrap();
+    let bytes = with(&model(), section(MisfitTerms { threshold: -1, doubt: -1, ..TERMS }, false, 0, 0, 0)).unwrap();
     let model = Model::new(&bytes).unwrap();
     let stopping = Stopping::from_model(&model);
     let mut recognizer = Recognizer::<4>::new(&model, stopping).unwrap();
@@ -162,7 +162,7 @@ fn step(model: &Model<'_>) -> i32 {
 fn strict() -> Vec<u8> {
     let bytes = model();
     let step = step(&Model::new(&bytes).unwrap());
-    let terms = FitTerms { first: 2, least: 3, threshold: 2_560, doubt: 2_048, ..TERMS };
+    let terms = MisfitTerms { first: 2, least: 3, threshold: 2_560, doubt: 2_048, ..TERMS };
     let mut section = Strangers::header(false, true).to_vec();
     section.extend(terms.to_bytes());
     for object in 0..OBJECTS as u8 {
@@ -171,7 +171,7 @@ fn strict() -> Vec<u8> {
         let mean = i16::try_from(-(step >> 4)).unwrap();
         let numbers = [mean, mean, mean, 0, 0, 0, 16, 0, 16, 0, 0, 16];
         let put = &mut |part: &[u8]| section.extend_from_slice(part);
-        ObjectFit::write([4, step.ilog2() as u8, 0], 0, &rivals, numbers.into_iter(), put);
+        ObjectMisfit::write([4, step.ilog2() as u8, 0], 0, &rivals, numbers.into_iter(), put);
     }
     with(&bytes, section).unwrap()
 }
@@ -191,7 +191,7 @@ fn an_object_that_is_exchanged_is_named_and_not_unknown_for_the_touches_that_wer
     let mut recognizer = Recognizer::<OBJECTS>::new(&model, stopping).unwrap();
     // Touches that contradict each other do not fit.
     (0..10).for_each(|index| _ = recognizer.push_margins(&speaks_for(index % 2, &model)));
-    assert_eq!(recognizer.fit(), Fit::Stranger);
+    assert_eq!(recognizer.familiarity(), Familiarity::Stranger);
     recognizer.reset();
     let mut forgetting = Forgetting::new(&model, 5.0 * step(&model) as f32 * model.unit());
     for object in [0, 3, 1] {
@@ -200,7 +200,11 @@ fn an_object_that_is_exchanged_is_named_and_not_unknown_for_the_touches_that_wer
             assert_eq!(verdict, Verdict::Undecided, "touch {number} of object {object}");
             // Before the restart touches of both objects are evidence, and after the first touch there is no look.
             if number > 1 && object == 0 || number > 5 {
-                assert_eq!((recognizer.fit(), recognizer.best()), (Fit::Fits, object), "touch {number}");
+                assert_eq!(
+                    (recognizer.familiarity(), recognizer.best()),
+                    (Familiarity::Known, object),
+                    "touch {number}"
+                );
             }
             // A snapshot holds how many touches are forgotten.
             let mut buffer = [0; SNAPSHOT_LENGTH + 10 * OBJECTS];
@@ -208,8 +212,8 @@ fn an_object_that_is_exchanged_is_named_and_not_unknown_for_the_touches_that_wer
             let mut restored = Recognizer::<OBJECTS>::new(&model, stopping).unwrap();
             restored.restore(&snapshot).unwrap();
             assert_eq!(
-                (restored.fit(), restored.touches(), restored.evidence()),
-                (recognizer.fit(), recognizer.touches(), recognizer.evidence())
+                (restored.familiarity(), restored.touches(), restored.evidence()),
+                (recognizer.familiarity(), recognizer.touches(), recognizer.evidence())
             );
             assert_eq!(restored.snapshot(&mut buffer).unwrap(), snapshot);
         }

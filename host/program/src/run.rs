@@ -1,7 +1,5 @@
 //! The main job: capture, train, compile, recognize, report.
 
-#[cfg(test)]
-mod several_meshes;
 mod shown;
 
 pub use shown::text;
@@ -15,9 +13,9 @@ use palpate::evaluate::parity::{self, Parity};
 use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, SequentialSettings};
 use palpate::mesh::Object;
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::progress::{self, Progress};
 use palpate::touches::folds::{self, Split};
-use palpate::touches::noise::Noise;
 use palpate::touches::{Dataset, Listing, ObjectTouches, Origin};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_report::error::ReportProblem;
@@ -52,19 +50,19 @@ const FILES: [&str; 8] =
 /// The page on which the objects can be touched, of [`FILES`].
 const PLAY: &str = "play.html";
 
-/// How to run.
+/// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Where the objects come from; the results state it.
     pub sources: Vec<String>,
-    /// Whether to replace another run's or a report's results.
+    /// True to replace another run's or a report's results.
     pub replace: bool,
-    /// How objects are touched.
+    /// Settings of the capture.
     pub capture: capture::Settings,
-    /// How many approaches of each object are captured besides, each kept whatever it touched: the compact method is
+    /// Number of approaches of each object captured besides, each kept whatever it touched: the compact method is
     /// trained on them, and all methods are tested on them.
     pub approaches: u64,
-    /// What a real sensor adds: ours is trained for it, the paper's method is not, and both are tested with it.
+    /// Noise that a real sensor adds: ours is trained for it, the paper's method is not, and both are tested with it.
     pub noise: Noise,
     /// The share of touches that is kept from training, to test on.
     pub test_share: f64,
@@ -95,18 +93,18 @@ impl Default for Settings {
     }
 }
 
-/// What a run measured; `summary.json`. Shares are between 0 and 1, times in seconds.
+/// Results of a run; `summary.json`. Shares are between 0 and 1, times in seconds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// What it was made from: another run with the same may replace it unasked.
+    /// Settings and objects that it was made from: another run with the same may replace it unasked.
     pub made_from: serde_json::Value,
     /// The program's version.
     pub tool_version: &'static str,
     /// The command that remakes it.
     pub command: String,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// What was added to the touches that ours was trained on, and to all that are tested on.
+    /// Noise added to the touches that ours was trained on, and to all that are tested on.
     pub noise: Noise,
     /// The capture of full touches.
     pub capture: capture::Summary,
@@ -124,17 +122,17 @@ pub struct Summary {
     pub ours: Method,
     /// One sequence of test approaches per object, as the model to use recognizes it.
     pub recognized: Vec<Recognition>,
-    /// What each stage took, in order: captures, then of each method training, compiling, its promise (with the capture
-    /// that it rests on), testing, and the comparison with the full model.
+    /// Time that each stage took, in order: captures, then of each method training, compiling, its promise (with the
+    /// capture that it rests on), testing, and the comparison with the full model.
     pub stages: Vec<Stage>,
     /// The whole run.
     pub seconds: f64,
 }
 
-/// What a stage of a run took.
+/// Time of a stage of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Stage {
-    /// What was done.
+    /// Description of the stage.
     pub name: String,
     /// Wall-clock time.
     pub seconds: f64,
@@ -151,7 +149,7 @@ impl Stages {
         Self { last: Instant::now(), stages: Vec::new() }
     }
 
-    /// What was done since the last stage ended; its time in seconds.
+    /// Ends a stage, which began when the last one ended, and returns its time in seconds.
     fn end(&mut self, name: impl Into<String>) -> f64 {
         let seconds = self.last.elapsed().as_secs_f64();
         self.last = Instant::now();
@@ -160,7 +158,7 @@ impl Stages {
     }
 }
 
-/// How many touches were used for what.
+/// Numbers of touches by use.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Touches {
     /// Trained on.
@@ -178,9 +176,9 @@ pub struct Method {
     pub train_seconds: f64,
     /// Bytes of the compiled model.
     pub model_bytes: usize,
-    /// How the compiled model is laid out.
+    /// Layout of the compiled model.
     pub layout: String,
-    /// What leaves are stored as.
+    /// Type that leaves are stored as.
     pub leaf: String,
     /// Accuracies, and the recognizer that stops by itself.
     #[serde(flatten)]
@@ -192,9 +190,9 @@ pub struct Method {
     pub followed_to: usize,
     /// The compiled model compared with the ensemble, on the test touches.
     pub parity: Parity,
-    /// How its thresholds were found, on touches captured for that; null if they were not.
+    /// Calibration of its thresholds, on touches captured for that; null if there is none.
     pub calibration: Option<Calibrated>,
-    /// Why they were not.
+    /// Reason why there is none.
     pub uncalibrated: Option<String>,
 }
 
@@ -301,7 +299,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     Ok(summary)
 }
 
-/// What the results depend on.
+/// Everything that the results depend on.
 fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Value> {
     Ok(serde_json::json!({
         "job": "run",
@@ -317,7 +315,7 @@ fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Valu
     }))
 }
 
-/// What is the same for all methods: also the approaches that they are tested on besides their own kind of touches.
+/// Parts that all methods share: also the approaches that they are tested on besides their own kind of touches.
 #[derive(Clone, Copy)]
 struct Job<'d> {
     settings: &'d Settings,
@@ -468,6 +466,8 @@ fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Re
 
 #[cfg(test)]
 mod tests {
+    mod several_meshes;
+
     use super::*;
     use palpate::error::Error;
     use palpate::mesh::Mesh;

@@ -20,13 +20,13 @@ use pyo3::types::{PyMapping, PyString};
 use pyo3::{Borrowed, type_hint_identifier};
 use std::path::PathBuf;
 
-/// What is touched: sources that name themselves, or names with what stands for them.
+/// Objects to touch: sources that name themselves, or names with what stands for them.
 pub(crate) enum Meshes {
     Sources(Vec<String>),
     Named(Vec<(String, Given)>),
 }
 
-/// What stands for one object.
+/// Meshes or sources that stand for one object.
 pub(crate) enum Given {
     Source(String),
     Mesh(Mesh),

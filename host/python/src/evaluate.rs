@@ -1,5 +1,5 @@
-//! How often a model is right; how far it is from its ensemble. What is found comes as JSON, which `palpate` turns into
-//! values of its own classes.
+//! Accuracy of a model, and its distance from its ensemble. Results come as JSON, which `palpate` turns into values of
+//! its own classes.
 
 use crate::data::DataSet;
 use crate::ensemble::Ensemble;

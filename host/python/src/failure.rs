@@ -4,12 +4,12 @@ use palpate::error::{Error, Place, Setting};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// What a call fails with.
+/// Failure of a call.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// What the library said.
+    /// An error of the library.
     Library(Error),
-    /// What Python said.
+    /// An exception of Python.
     Python(PyErr),
 }
 

@@ -38,7 +38,7 @@ use std::sync::Arc;
 #[pyo3::pyclass(frozen, module = "palpate._native")]
 pub(crate) struct Model {
     pub(crate) opened: Arc<OpenedModel>,
-    /// What the model compares of a row of features.
+    /// Encoder of a row of features into the values that the model compares.
     pub(crate) encoder: Encoder,
 }
 
@@ -78,7 +78,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Rows<'py> {
 /// With fewer rows than this the lock is kept, and one thread does it all.
 const FEW: usize = 256;
 
-/// How many rows are computed between two looks for signals.
+/// Number of rows computed between two checks for signals.
 const BATCH: usize = 1 << 20;
 
 impl Model {

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use palpate::error::Error;
 use palpate::shared::Descriptor;
-use palpate::touches::noise::{Noise, quantity};
+use palpate::probe::noise::{Noise, quantity};
 
 /// The descriptor with this name.
 pub(crate) fn descriptor_of(name: &str) -> palpate::Result<Descriptor> {

@@ -29,7 +29,7 @@ pub(crate) struct Surface {
 /// With fewer casts than this the lock is kept, and one thread does it all.
 const FEW: usize = 64;
 
-/// How many casts are made between two looks for signals.
+/// Number of casts between two checks for signals.
 const BATCH: usize = 1 << 16;
 
 #[pyo3::pymethods]

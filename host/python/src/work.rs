@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
-/// How often Python is asked for signals, and told how far the work has come.
+/// Time between two checks for Python's signals, and between two reports of progress.
 const TICK: Duration = Duration::from_millis(50);
 
-/// What is called with a stage's name, the steps that are done, and how many there are.
+/// Function called with a stage's name, the number of steps done, and their total.
 pub(crate) struct Callback(Py<PyAny>);
 
 impl<'a, 'py> FromPyObject<'a, 'py> for Callback {
@@ -27,7 +27,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Callback {
     }
 }
 
-/// What the workers say.
+/// Progress reported by the workers.
 #[derive(Default)]
 struct Told {
     stage: Mutex<(String, Option<u64>)>,

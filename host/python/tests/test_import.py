@@ -346,7 +346,7 @@ def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
         (several, "several targets"),
         (folds, "lightgbm's CVBooster has no trees that can be read"),
         (xgboost.XGBModel(n_estimators=2).fit(TRAIN, TRAIN[:, 3] > 0), "xgboost's XGBModel has no trees that can be read"),
-        (object(), "builtins.object is no model"),
+        (object(), "builtins.object is not a model"),
     ]:
         with pytest.raises(palpate.InputError, match=message):
             palpate.compile(model)
@@ -367,7 +367,7 @@ def test_the_number_that_stands_for_a_missing_value_is_the_estimators(missing: f
     # A booster and its file do not hold the number, either: they say so, and take it.
     estimator.save_model(tmp_path / "model.json")
     for source in (estimator.get_booster(), tmp_path / "model.json"):
-        assert "does not say which number stood for a missing value" in palpate.to_ensemble(source).notes[0]
+        assert "does not state the number that stood for a missing value" in palpate.to_ensemble(source).notes[0]
         same = palpate.compile(source, leaf="f32", missing=np.nan if missing is None else missing)
         np.testing.assert_array_equal(same.margins(test), expected)
         if missing is not None:

@@ -95,7 +95,7 @@ def test_a_model_fits_where_there_is_room(ensemble: palpate.Ensemble) -> None:
     for most in (large.size - 1, large.size // 2):
         small = palpate.compile(ensemble, leaf="f32", layout="compact", max_bytes=most)
         assert small.size <= most and small.leaf != "f32"
-    with pytest.raises(palpate.InputError, match="more than the 100 that there is room for"):
+    with pytest.raises(palpate.InputError, match="more than the 100 that fit"):
         palpate.compile(ensemble, max_bytes=100)
     for option, value in [("leaf", "f64"), ("layout", "tree"), ("goal", "best"), ("priors", [1.0]), ("error_rate", 0.9)]:
         with pytest.raises(palpate.SettingError, match=option):

@@ -27,7 +27,7 @@ use std::ops::Range;
 const AT: [usize; 9] = [5, 10, 20, 30, 40, 60, 90, 120, 200];
 /// Those of them that tables show.
 const TABLE_AT: [usize; 3] = [10, 20, 60];
-/// The posterior that a recognizer waits for is one less this.
+/// The posterior that a recognizer waits for is 1 minus this.
 const ERROR_RATE: f64 = 0.01;
 /// The share of misses that a robot avoids which aims better than the simulation.
 const AVOIDED: f64 = 0.7;
@@ -40,7 +40,7 @@ const CONTACTS: usize = 2;
 /// An approach that touched nothing counts as well.
 const ALL: usize = 3;
 
-/// What approaches told.
+/// Results of approaches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ByApproach {
     /// The share of each contact pattern among each object's approaches.
@@ -55,7 +55,7 @@ pub(super) struct ByApproach {
     true_probe: Option<Probe>,
 }
 
-/// What a way to use approaches achieves.
+/// Results of one way to use approaches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Way {
     bytes: usize,
@@ -203,9 +203,9 @@ pub(super) fn section(context: &Context, by_approach: &ByApproach) -> Result<Sec
     section.table(ways_table(context, by_approach));
     section.table(objects_table(context, by_approach));
     section.text(format!(
-        "An approach that touches nothing says something only if the robot aims as the simulation does. The next table \
-         shows what that assumption is worth: a robot that aims better and avoids {} % of the misses makes the model wrong \
-         that counts them; the one that does not count them becomes faster.",
+        "A miss is evidence only if the robot aims as the simulation does. The next table tests that assumption: with \
+         a robot that aims better and avoids {} % of the misses, the model that counts misses makes more errors, and \
+         the one that does not becomes faster.",
         100.0 * AVOIDED
     ));
     section.table(misses_table(context, by_approach));
@@ -241,7 +241,7 @@ fn figure(context: &Context, by_approach: &ByApproach) -> Result<Figure> {
     Ok(Figure {
         id: "approaches-accuracy".into(),
         title: "Accuracy against approaches".into(),
-        caption: "A model that has no evidence yet has recognized nothing.".into(),
+        caption: "Without any evidence, no object counts as recognized.".into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
@@ -299,7 +299,7 @@ fn objects_table(context: &Context, by_approach: &ByApproach) -> Table {
         id: "approaches-objects".into(),
         title: "Contact patterns, and approaches to a verdict".into(),
         caption:
-            "The share of each contact pattern among an object's approaches, and how many approaches each way takes."
+            "The share of each contact pattern among an object's approaches, and the number of approaches for each way."
                 .into(),
         command: context.settings.command.clone(),
         data,

@@ -1,4 +1,4 @@
-//! What was already measured, so that an interrupted report can be resumed.
+//! Cache of what was already measured, so that an interrupted report can be resumed.
 //!
 //! Each stage's result is a file in the report's `.stages` directory, named after the stage and the key of everything
 //! that it depends on: the settings, the objects' meshes, the program (its version and its executable's bytes), and the
@@ -86,7 +86,7 @@ impl Cache {
     }
 }
 
-/// What results depend on besides settings and objects.
+/// Conditions that results depend on besides settings and objects.
 #[derive(Clone, Debug, PartialEq)]
 struct Surroundings {
     /// A checksum of the program's version and bytes.
@@ -117,7 +117,7 @@ impl Surroundings {
     }
 }
 
-/// A checksum of all that results depend on.
+/// A checksum of everything that results depend on.
 fn key(settings: &impl Serialize, objects: &[Object], surroundings: &Surroundings) -> Result<u64> {
     let mut digest = CHECKSUM.digest();
     digest.update(&surroundings.program.to_le_bytes());

@@ -21,12 +21,12 @@ const AT: [usize; 4] = [1, 5, 10, 20];
 const BINS: usize = 10;
 const METHODS: [&str; 3] = ["paper's method", "ours", "ours at its temperature"];
 
-/// How well calibrated the posteriors are.
+/// Calibration of the posteriors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Calibration {
     /// Groups per object.
     pub(super) groups: usize,
-    /// What the evidence of the last method is divided by, fitted on single touches.
+    /// Temperature of the last method, fitted on single touches.
     pub(super) temperature: f64,
     /// For each method, for each number of touches: bins.
     pub(super) bins: Vec<Vec<Vec<ReliabilityBin>>>,
@@ -126,9 +126,10 @@ fn reliability(title: &str, bins: &[ReliabilityBin], color: RGBColor) -> Result<
 pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Section> {
     let mut section = Section::new("calibration", "Calibration");
     section.text(format!(
-        "Is an object with a posterior of 90 % the right one nine times in ten? {} groups per object from the large capture, \
-         in ten bins of the best object's posterior. Dividing the evidence by one temperature ({}, fitted on single \
-         touches) changes no verdict, only the posterior that is shown; `palpate calibrate` puts it into the model.",
+        "Calibration: of the objects with a posterior of 90 %, nine in ten should be right. {} groups per object from \
+         the large capture, in ten bins of the best object's posterior. Dividing the evidence by one temperature ({}, \
+         fitted on single touches) changes no verdict, only the posterior that is shown; `palpate calibrate` stores it \
+         in the model.",
         calibration.groups,
         crate::page::axis::number(calibration.temperature, 2)
     ));
@@ -152,8 +153,9 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
         id: "reliability".into(),
         title: "Reliability diagrams".into(),
         caption:
-            "On the dashed line a posterior is the share right; above it the model is underconfident, below it overconfident. Bars \
-                  are 95 % intervals (Wilson); gray columns show how many of the groups are in each bin."
+            "On the dashed line the posterior equals the accuracy; above it the model is underconfident, below it \
+                  overconfident. Bars are 95 % intervals (Wilson); gray columns show how many of the groups are in \
+                  each bin."
                 .into(),
         command: context.settings.command.clone(),
         panels,
@@ -170,7 +172,7 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
     section.table(Table {
         id: "calibration".into(),
         title: "Expected calibration error".into(),
-        caption: "The mean distance between posterior and share right, over ten bins of equal width.".into(),
+        caption: "The mean distance between posterior and accuracy, over ten bins of equal width.".into(),
         command: context.settings.command.clone(),
         data,
     });

@@ -1,4 +1,4 @@
-//! What the stages of a report share: objects, touches, folds, and the models of the first fold.
+//! Data that the stages of a report share: objects, touches, folds, and the models of the first fold.
 
 use super::cache::Cache;
 use super::settings::Settings;
@@ -154,17 +154,17 @@ impl<'a> Context<'a> {
         Ok(progress::check(self.progress)?)
     }
 
-    /// How the paper's method is trained.
+    /// Training settings of the paper's method.
     pub(super) fn paper(&self) -> train::Settings {
         train::Settings { rounds: self.settings.paper_rounds, seed: self.settings.seed, ..train::Settings::paper() }
     }
 
-    /// How ours is trained.
+    /// Training settings of ours.
     pub(super) fn ours(&self) -> train::Settings {
         train::Settings { seed: self.settings.seed, ..train::Settings::compact() }
     }
 
-    /// How ours is trained for noise.
+    /// Training settings of ours for noise.
     pub(super) fn ours_for_noise(&self) -> train::Settings {
         train::Settings { noise: self.settings.noise, ..self.ours() }
     }
@@ -217,7 +217,7 @@ pub(super) fn compiled(ensemble: &Ensemble) -> Result<compile::Compiled> {
     compile::compile(ensemble, &compile::Settings::default())
 }
 
-/// What the cell holds, made first if it holds nothing.
+/// Returns the contents of the cell, making them first if it is empty.
 pub(super) fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
     if let Some(value) = cell.get() {
         return Ok(value);

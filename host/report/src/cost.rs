@@ -21,13 +21,13 @@ use std::time::Instant;
 /// One compiled model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Member {
-    /// What was trained.
+    /// Name of the trained model.
     pub(super) name: String,
-    /// Whether it is the paper's method.
+    /// True if it is the paper's method.
     pub(super) paper: bool,
-    /// How leaves are stored.
+    /// Type that leaves are stored as.
     pub(super) leaf: String,
-    /// How the trees are laid out.
+    /// Layout of the trees.
     pub(super) layout: String,
     /// Size.
     pub(super) bytes: usize,
@@ -37,7 +37,7 @@ pub(super) struct Member {
     pub(super) instructions: Instructions,
     /// The largest difference to the ensemble's margins over the test touches, in nats.
     pub(super) margin_error: f64,
-    /// What the model states.
+    /// Error that the model states.
     pub(super) stated_error: f64,
     /// Accuracy after ten touches.
     pub(super) at_10: f64,

@@ -22,14 +22,14 @@ pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 /// The longest groups.
 pub(super) const MOST: usize = 120;
 
-/// What one fold showed.
+/// Results of one fold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Fold {
     /// One of each of [`METHODS`].
     pub(super) methods: Vec<MethodFold>,
 }
 
-/// What one fold showed of one method. Accuracies are after 1, 2, … touches, up to [`MOST`] or to as many as still make
+/// Results of one fold for one method. Accuracies are after 1, 2, … touches, up to [`MOST`] or to as many as still make
 /// [enough distinct groups](super::statistics::LEAST_GROUPS).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct MethodFold {
@@ -39,7 +39,7 @@ pub(super) struct MethodFold {
     pub(super) few_of_object: Vec<Vec<f64>>,
     /// Accuracy over many groups.
     pub(super) many: Vec<f64>,
-    /// How often each object (rows) was recognized as each (columns) after ten touches, over many groups.
+    /// Confusion matrix: number of groups of each object (rows) recognized as each (columns) after ten touches.
     pub(super) confusion: Vec<Vec<usize>>,
     /// Seconds of training.
     pub(super) seconds: f64,
@@ -148,7 +148,8 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
         title: "Groups recognized, mean over folds (the paper's figure 8a)".into(),
         caption: format!(
             "Bars are one standard deviation over folds, of {} groups per object. The CSV also has the same over {} \
-             groups per object. – stands where an object's test touches make fewer than {LEAST_GROUPS} distinct groups.",
+             groups per object. A dash (–) means that an object's test touches make fewer than {LEAST_GROUPS} distinct \
+             groups.",
             context.settings.groups, context.settings.many_groups
         ),
         command: context.settings.command.clone(),
@@ -207,7 +208,7 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     }
     Ok(Figure {
         id: "confusion".into(),
-        title: "Which object is recognized as which after ten touches (figure 9)".into(),
+        title: "Confusion matrix after ten touches (figure 9)".into(),
         caption: format!(
             "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
              groups per object and fold. Shares below half a percent are blank.",
@@ -244,7 +245,7 @@ fn recall(context: &Context, folds: &[Fold]) -> Table {
     Table {
         id: "recall".into(),
         title: "Recall and precision after ten touches".into(),
-        caption: "From the matrices above. A click on a heading sorts.".into(),
+        caption: "From the matrices above. Click a heading to sort.".into(),
         command: context.settings.command.clone(),
         data,
     }

@@ -17,12 +17,12 @@ use palpate_shared::format::Length;
 pub fn page(design: &Design, command: &str) -> Result<Page> {
     let mut result = Section::new("result", "The result");
     result.text(assumed(design)).table(compared(design, command)).table(by_aim(design, command));
-    let mut trade = Section::new("spacing", "What another spacing costs");
+    let mut trade = Section::new("spacing", "Cost of another spacing");
     trade.figure(by_spacing(design, command)?);
     let mut tried = Section::new("tried", "What was tried");
     tried.table(rounds(design, command));
     Ok(Page {
-        title: "Which probe to build".into(),
+        title: "The best probe to build".into(),
         summary: format!(
             "{}: {} approaches to {}\u{a0}% errors, compared with {} with {}. {}",
             described(&design.best),
@@ -41,7 +41,7 @@ pub fn page(design: &Design, command: &str) -> Result<Page> {
     })
 }
 
-/// What lengths are measured in.
+/// Unit of lengths.
 pub fn unit(design: &Design) -> &'static str {
     match design.unit {
         Length::Tenth => "units",
@@ -49,7 +49,7 @@ pub fn unit(design: &Design) -> &'static str {
     }
 }
 
-/// What the best probe is compared with.
+/// The probe that the best one is compared with.
 pub fn published(design: &Design) -> &'static str {
     match design.unit {
         Length::Tenth => "The published probe",
@@ -82,13 +82,13 @@ fn approaches(trial: &Trial) -> String {
     }
 }
 
-/// What the figures rest on.
+/// Assumptions behind the figures.
 fn assumed(design: &Design) -> String {
     format!(
         "Every probe touched the objects {} times each in the simulator at {} {} per second, with Gaussian noise of {} \
          ms on every contact time. A model of the descriptor {} was trained on these approaches and tested on as many \
-         others; evidence are {}. The stopping rule was varied until {} % of the verdicts on the test approaches were \
-         wrong.",
+         others; {} count as evidence. The stopping rule was varied until {} % of the verdicts on the test approaches \
+         were wrong.",
         design.best.trained_on,
         design.best.probe.speed,
         unit(design),
@@ -143,7 +143,7 @@ fn compared(design: &Design, command: &str) -> Table {
         id: "best".into(),
         title: "The best probe and the published one".into(),
         caption:
-            "Approaches to a verdict on average, with the standard error of the drawing of sequences; the shares of \
+            "Mean number of approaches to a verdict, with its standard error over the drawn sequences; the shares of \
                   wrong verdicts and of sequences without one; the share of approaches with each contact pattern."
                 .into(),
         command: command.into(),
@@ -159,7 +159,7 @@ fn by_aim(design: &Design, command: &str) -> Table {
     Aim::ALL.into_iter().filter_map(of).for_each(|trial| data.push(row("coarse", trial)));
     Table {
         id: "aims".into(),
-        title: "What it is worth to aim".into(),
+        title: "Benefit of aiming".into(),
         caption:
             "The best probe of the coarse round for each aim: box is anywhere in the bounding box, middle the box of \
                   half its sides, mass a box of a quarter of them about the surface's center of mass. A robot that \
@@ -179,9 +179,9 @@ fn rounds(design: &Design, command: &str) -> Table {
     design.by_spacing.iter().for_each(|trial| data.push(row("last", trial)));
     Table {
         id: "trials".into(),
-        title: "Every probe that was tried".into(),
-        caption: "The coarse round has a quarter of the approaches per object, the finer one half of them: fewer make \
-                  weaker models. Compare within a round."
+        title: "All probes tried".into(),
+        caption: "The coarse round uses a quarter of the approaches per object, the finer one half of them. Fewer \
+                  approaches make weaker models, so compare within a round only."
             .into(),
         command: command.into(),
         data,

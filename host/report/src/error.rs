@@ -1,4 +1,4 @@
-//! What can be wrong with the report and the main job.
+//! Problems with the report and the main job.
 
 use palpate::error::Problem;
 
@@ -12,7 +12,7 @@ pub enum ReportProblem {
     /// The directory holds results that this call did not make.
     #[error("the directory holds results of another run: {found}")]
     OtherResults {
-        /// What shows it: a file's name, or what its summary states.
+        /// Evidence of it: a file's name, or what its summary states.
         found: String,
     },
     /// Densities are estimated over exactly two features.
@@ -20,27 +20,27 @@ pub enum ReportProblem {
     NotTwoFeatures {
         /// The descriptor's name.
         descriptor: String,
-        /// How many features it has.
+        /// Number of features of the model.
         features: usize,
     },
     /// A model that was just compiled does not open.
     #[error("a model that was just compiled does not open: {reason}")]
     Compiled {
-        /// What the reader said.
+        /// The reader's message.
         reason: String,
     },
     /// A model knows more objects than the recognizer has room for.
     #[error("a model of {objects} objects")]
     TooManyObjects {
-        /// How many.
+        /// Number of objects.
         objects: usize,
     },
     /// A result cannot be written as JSON.
     #[error("cannot write the {what} as JSON: {reason}")]
     Json {
-        /// What was to be written.
+        /// Data that were to be written.
         what: &'static str,
-        /// What the JSON library said.
+        /// The JSON library's message.
         reason: String,
     },
 }

@@ -18,10 +18,10 @@ use serde::{Deserialize, Serialize};
 /// Numbers of touches looked at.
 const AT: [usize; 2] = [10, 30];
 
-/// How accurate training on a number of instances of each kind is.
+/// Accuracy of training on a number of instances of each kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Instances {
-    /// How many instances of each kind were trained on.
+    /// Number of instances of each kind that were trained on.
     pub(super) count: usize,
     /// For each of [`AT`], for each test instance: accuracy over all kinds.
     pub(super) unseen: Vec<Vec<f64>>,

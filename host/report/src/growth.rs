@@ -20,7 +20,7 @@ use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// What growth costs.
+/// Cost of growth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Growth {
     /// For each number of objects.
@@ -29,10 +29,10 @@ pub(super) struct Growth {
     pub(super) triangles: Vec<Triangles>,
 }
 
-/// What a number of objects costs.
+/// Cost of a number of objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Objects {
-    /// How many.
+    /// Number of objects.
     pub(super) count: usize,
     /// Seconds of capturing.
     pub(super) capture: f64,
@@ -59,10 +59,10 @@ const AT: [usize; 3] = [20, 60, 200];
 /// Touches after which a recognizer gives up: twice the usual, since many objects take more.
 const MAX_TOUCHES: u32 = 400;
 
-/// What a number of triangles costs.
+/// Cost of a number of triangles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Triangles {
-    /// How many.
+    /// Number of triangles.
     pub(super) count: usize,
     /// Seconds of building the scene and its tree.
     pub(super) build: f64,
@@ -163,9 +163,9 @@ fn triangles_cost(context: &Context, count: usize) -> Result<Triangles> {
 pub(super) fn left_out() -> Section {
     let mut section = Section::new("left-out", "Not measured");
     section.text(
-        "Growth (what more objects and finer meshes cost) and generalization (recognizing objects that were never touched) \
-         are measured on built-in objects and say nothing about these. A report on other objects leaves them out unless \
-         they are asked for.",
+        "Growth (the cost of more objects and finer meshes) and generalization (recognizing objects that were never \
+         touched) are measured on built-in objects and say nothing about the objects of this report. A report on other \
+         objects leaves them out unless they are asked for.",
     );
     section
 }
@@ -287,10 +287,9 @@ fn objects_table(context: &Context, growth: &Growth) -> Table {
     Table {
         id: "growth-objects".into(),
         title: "More objects, in numbers".into(),
-        caption:
-            "Accuracy, after so many approaches, is over all objects: beyond ten, a fork can be mistaken for another \
-                  fork. A recognizer stops at a posterior of 99 %, or gives up after 400 touches."
-                .into(),
+        caption: "Accuracies are over all objects: beyond ten objects, a fork can be mistaken for another fork. A \
+                  recognizer stops at a posterior of 99 %, or gives up after 400 touches."
+            .into(),
         command: context.settings.command.clone(),
         data: objects_data(growth),
     }

@@ -1,4 +1,4 @@
-//! How many instructions per touch a compiled model takes on the chips.
+//! Instructions per touch that a compiled model takes on the chips.
 
 use palpate::chip::instructions::Chip;
 use palpate::compile::{self, Compiled};
@@ -20,7 +20,7 @@ pub(super) struct Instructions {
 pub(super) struct Count {
     /// Instructions per touch.
     pub(super) number: u64,
-    /// Whether an emulated chip counted them; else they are an estimate.
+    /// True if an emulated chip counted them; else they are an estimate.
     pub(super) measured: bool,
 }
 
@@ -41,8 +41,8 @@ impl Instructions {
         Ok(Self::from_measured(compiled.instructions, measured(Chip::M4F)?, measured(Chip::M0Plus)?))
     }
 
-    /// What was measured; where nothing was, the compiler's `estimate`, and where that has none for the M0+, the M4F's
-    /// number times [`M0_RATIO`].
+    /// Returns the measured numbers; where nothing was, the compiler's `estimate`, and where that has none for the M0+,
+    /// the M4F's number times [`M0_RATIO`].
     fn from_measured(estimate: compile::Instructions, m4f: Option<u64>, m0_plus: Option<u64>) -> Self {
         let count = |measured: Option<u64>, estimate: u64| Count {
             number: measured.unwrap_or(estimate),

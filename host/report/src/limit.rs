@@ -22,7 +22,7 @@ const MOST: usize = 60;
 /// Numbers of touches in the table.
 const AT: [usize; 5] = [5, 10, 20, 30, 60];
 
-/// What the large capture showed.
+/// Results of the large capture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Limit {
     /// Full touches captured of each object.
@@ -129,7 +129,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
 }
 
 impl Limit {
-    /// How much less often than the limit a candidate is right after ten touches, and the 95 % interval of the paired
+    /// Difference between the limit's accuracy after ten touches and a candidate's, and the 95 % interval of the paired
     /// difference over groups.
     pub(super) fn gap_at_10(&self, candidate: usize) -> (f64, f64, f64) {
         let (limit, other) = (&self.candidates[self.best].right_at_10, &self.candidates[candidate].right_at_10);
@@ -140,7 +140,7 @@ impl Limit {
         (mean, mean - half, mean + half)
     }
 
-    /// How much doubling the capture changed the limit after ten touches.
+    /// Change of the limit's accuracy after ten touches from doubling the capture.
     pub(super) fn doubling(&self) -> f64 {
         let (whole, half) = if self.best == DENSITY { (DENSITY, DENSITY_HALF) } else { (ENSEMBLE, ENSEMBLE_HALF) };
         self.candidates[whole].curve[9] - self.candidates[half].curve[9]
@@ -151,12 +151,12 @@ impl Limit {
 pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
     let mut section = Section::new("limit", "The limit");
     section.text(format!(
-        "How well could any classifier do? {} full touches of each object were captured separately. On 85 % of them a large \
-         ensemble was trained ({} multi-output trees of depth 7), and the density of each object's touches over the two \
-         features of the curvature descriptor was estimated (a grid of 256 × 256 ranks, smoothed by a Gaussian kernel \
-         {:.1} cells wide, mirrored at the borders, the width chosen on 5 % held out). The limit is the better of the \
-         two (or our own model, if it is better than both), here: {}, on groups from the remaining 10 %. Doubling the \
-         capture changed the estimate by {} points at ten touches.",
+        "This section estimates the best accuracy that any classifier could reach. {} full touches of each object were \
+         captured separately. On 85 % of them a large ensemble was trained ({} multi-output trees of depth 7), and the \
+         density of each object's touches over the two features of the curvature descriptor was estimated (a grid of \
+         256 × 256 ranks, smoothed by a Gaussian kernel {:.1} cells wide, mirrored at the borders, the width chosen on \
+         5 % held out). The limit is the better of the two (or our own model, if it is better than both), here: {}, on \
+         groups from the remaining 10 %. Doubling the capture changed the estimate by {} points at ten touches.",
         limit.captured,
         context.settings.limit_rounds,
         limit.width,

@@ -12,8 +12,8 @@ use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, add_noise};
+use palpate::probe::noise::{self, Noise};
 use palpate::touches::folds::Split;
-use palpate::touches::noise::{self, Noise};
 use palpate::touches::{Dataset, ObjectTouches};
 use plotters::style::RGBColor;
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ pub(super) const METHODS: [&str; 3] = ["paper", "ours", "ours, trained for noise
 const COLORS: [RGBColor; 3] = [color::PAPER, color::OURS, color::GREEN];
 const SHAPES: [Shape; 3] = [Shape::Ring, Shape::Disc, Shape::Triangle];
 
-/// What one fold showed, one entry per method and noise level.
+/// Results of one fold, one entry per method and noise level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Fold {
     /// For each of [`METHODS`], for each level: accuracy after ten touches of each object.
@@ -34,7 +34,7 @@ pub(super) struct Fold {
     pub(super) kinds: Vec<Vec<f64>>,
 }
 
-/// What else a sensor, a timer or a robot does, one at a time and then together.
+/// Other errors of a sensor, a timer or a robot, one at a time and then together.
 fn kinds() -> [Noise; 9] {
     let none = Noise::default();
     let timer = 1_000.0;
@@ -172,8 +172,8 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
         id: "noise-kinds".into(),
         title: "Accuracy after ten touches under other noise".into(),
         caption:
-            "What else a sensor, a timer or a robot does, one at a time and then together. What is off per robot is \
-                  the same for all touches of a group."
+            "Other errors of a sensor, a timer or a robot, one at a time and then together. A robot's own error is the \
+                  same for all touches of a group."
                 .into(),
         command: context.settings.command.clone(),
         data: other_kinds(folds),
@@ -339,7 +339,7 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     }
     Ok(Figure {
         id: "noise-confusion".into(),
-        title: "Which object is recognized as which after ten touches with noise of 5 ms (figure 13)".into(),
+        title: "Confusion matrix after ten touches with noise of 5 ms (figure 13)".into(),
         caption: "Percentage of an object's groups (row) that were recognized as another (column).".into(),
         command: context.settings.command.clone(),
         panels,

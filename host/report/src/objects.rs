@@ -109,7 +109,7 @@ fn densities(context: &Context) -> Result<Figure> {
     }
     Ok(Figure {
         id: "curvature".into(),
-        title: "How each object bends under the probe: densities of the curvature descriptor (figures 5 and 6)".into(),
+        title: "Curvature of each object under the probe: densities of the descriptor (figures 5 and 6)".into(),
         caption: "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's \
                   bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface; to its right the \
                   surface is bent toward the probe, to its left away from it."

@@ -1,4 +1,4 @@
-//! Where to touch next: approaches at random and under a plan; and what an object that is exchanged comes to.
+//! Where to touch next: approaches at random and under a plan; and the effect of exchanging the object.
 
 use super::approaches::approaches;
 use super::context::Context;
@@ -13,13 +13,13 @@ use palpate::error::{EvaluateProblem, Result};
 use palpate::evaluate::{
     self, Active, ApproachSequential, Candidate, Evaluation, Margins, Rule, SequentialSettings, Switched,
 };
-use palpate::touches::noise::Noise;
+use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use serde::{Deserialize, Serialize};
 
-/// Thresholds: the recognizer stops when the posterior passes one less these.
+/// Thresholds: the recognizer stops when the posterior exceeds 1 minus one of these.
 const RATES: [f64; 9] = [0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.01, 0.003];
 /// The errors at which policies are compared.
 const ERRORS: f64 = 0.01;
@@ -29,7 +29,7 @@ const ROLLS: [u8; 3] = [1, 2, 4];
 const FORGETTING: [f32; 4] = [3.0, 5.0, 8.0, 12.0];
 const FORGETTING_RATE: f64 = 0.01;
 
-/// What planning is worth.
+/// Benefit of planning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Plans {
     /// Approaches to each object in each of three captures.
@@ -166,19 +166,19 @@ fn at_rates(context: &Context, bytes: &[u8], test: &Dataset, active: bool) -> Re
 pub(super) fn section(context: &Context, plans: &Plans) -> Result<Section> {
     let mut section = Section::new("plan", "Where to touch next");
     section.text(format!(
-        "A robot that knows how the object is turned can choose where it comes from. The plan says for each direction, and \
-         roll of the row of fingers about it, how well an approach tells each two objects apart; the next approach is the \
-         one that tells the likeliest object best from the others. The model was trained on {} approaches to each object, \
-         misses included, and knows the probe's pose; the plan comes from as many others, and both are tested on a third \
-         lot. Aims are random in every case.",
+        "A robot that knows how the object is turned can choose where it comes from. For each direction, and each roll \
+         of the row of fingers about it, the plan states how well an approach distinguishes each pair of objects; the \
+         next approach is the one that best distinguishes the likeliest object from the others. The model was trained \
+         on {} approaches to each object, misses included, and knows the probe's pose; the plan was made from as many \
+         others, and both are tested on a third set. Aims are random in every case.",
         plans.count
     ));
     section.figure(figure(context, plans)?);
     section.table(policies(context, plans));
     section.table(objects(context, plans));
     section.text(
-        "An object may be exchanged, or slip, while it is being touched. Forgetting restarts the recognizer once recent \
-         touches speak for another object against the likeliest one, by the number of nats in the table.",
+        "An object may be exchanged, or slip, while it is being touched. Forgetting restarts the recognizer once \
+         recent touches favor another object over the likeliest one by the number of nats in the table.",
     );
     section.table(switched(context, plans));
     Ok(section)
@@ -245,8 +245,8 @@ fn policies(context: &Context, plans: &Plans) -> Table {
         id: "plan-policies".into(),
         title: "Approaches at random and planned".into(),
         caption: format!(
-            "At thresholds where {percent} % of the sequences are measured to be wrong or undecided. A policy is missing for \
-             which there were too few approaches in each pose."
+            "At thresholds where {percent} % of the sequences are measured to be wrong or undecided. A policy with too \
+             few approaches in each pose is left out."
         ),
         command: context.settings.command.clone(),
         data,
@@ -264,7 +264,10 @@ fn objects(context: &Context, plans: &Plans) -> Table {
     Table {
         id: "plan-objects".into(),
         title: "Approaches to each object".into(),
-        caption: format!("Where {} % of all sequences are wrong or undecided.", short_number(100.0 * ERRORS)),
+        caption: format!(
+            "At the threshold where {} % of all sequences are wrong or undecided.",
+            short_number(100.0 * ERRORS)
+        ),
         command: context.settings.command.clone(),
         data,
     }

@@ -22,14 +22,14 @@ use serde::{Deserialize, Serialize};
 const RATES: [f64; 6] = [0.1, 0.05, 0.02, 0.01, 0.005, 0.001];
 /// The one whose objects are shown.
 const SHOWN: f64 = 0.01;
-/// How much stricter than the strictest rate's posterior sequences are followed, in nats.
+/// Margin, in nats, by which sequences are followed beyond the posterior of the strictest rate.
 const BEYOND: f64 = 2.5;
 /// Touches after which a sequence ends undecided.
 const MAX_TOUCHES: u32 = 200;
 /// The probability that each promise is kept.
 const CONFIDENCE: f64 = 0.95;
 
-/// What promises showed.
+/// Results of promises.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Promises {
     /// Sequences that thresholds were found on, and others that they were tested on.
@@ -44,7 +44,7 @@ pub(super) struct Promises {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Promised {
     rate: f64,
-    /// Stopping when the posterior passes one less the rate.
+    /// Stopping when the posterior exceeds 1 − rate.
     uncalibrated: Stopped,
     /// Promised on average.
     average: Option<Stopped>,
@@ -55,7 +55,7 @@ struct Promised {
     object: Option<Stopped>,
 }
 
-/// What thresholds came to on sequences that they were not found on.
+/// Results of thresholds on sequences that they were not found on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Stopped {
     /// The threshold in nats; the mean of several.
@@ -68,7 +68,7 @@ struct Stopped {
     undecided: f64,
 }
 
-/// What a promise means for an object.
+/// Meaning of a promise for an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct OfObject {
     name: String,
@@ -76,7 +76,7 @@ struct OfObject {
     promised: [Option<Meaning>; 2],
 }
 
-/// What thresholds come to for an object.
+/// Results of thresholds for an object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Meaning {
     /// Touches until a verdict.
@@ -160,7 +160,7 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64) -> Result<Vec<Sequ
     follow(model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, context.progress)
 }
 
-/// What thresholds come to, all objects together.
+/// Results of thresholds, all objects together.
 fn stopped(sequences: &[Sequence], odds: &Odds) -> Stopped {
     let (mut given, mut wrong, mut touches) = (0.0, 0.0, 0.0);
     for sequence in sequences {
@@ -218,11 +218,12 @@ pub(super) fn section(context: &Context, promises: &Promises) -> Result<Section>
     let [found, tested] = promises.sequences;
     let mut section = Section::new("promises", "Promises");
     section.text(format!(
-        "A promised error rate is the share of the names given that are wrong at most; a sequence that reaches {MAX_TOUCHES} \
-         touches without a name is undecided, neither right nor wrong. Thresholds were found by Learn-then-Test on {found} \
-         sequences of touches captured for that, so that each promise is kept with a probability of 95 %, and measured on \
-         {tested} other sequences. Stopping when the posterior passes one less the rate is wrong less often than it might \
-         be, and takes more touches. The limit is a density estimate from the large capture, with thresholds of its own."
+        "A promised error rate is the largest share of wrong names among those given; a sequence that reaches \
+         {MAX_TOUCHES} touches without a name is undecided, neither right nor wrong. Thresholds were found by \
+         Learn-then-Test on {found} sequences of touches captured for that, so that each promise is kept with a \
+         probability of 95 %, and measured on {tested} other sequences. Stopping when the posterior exceeds 1 − rate \
+         makes fewer errors than allowed, and takes more touches. The limit is a density estimate from the large \
+         capture, with its own thresholds."
     ));
     section.figure(figure(context, promises)?);
     section.table(table(context, promises));
@@ -259,7 +260,7 @@ fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
     Ok(Figure {
         id: "promises-kept".into(),
         title: "Promised and measured error rates".into(),
-        caption: "On the dashed line a promise is used up; above it, it is broken. Bars are 95 % intervals (Wilson)."
+        caption: "On the dashed line the measured error rate equals the promised one; above it, the promise is broken. Bars are 95 % intervals (Wilson)."
             .into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
@@ -304,10 +305,9 @@ fn table(context: &Context, promises: &Promises) -> Table {
     Table {
         id: "promises-table".into(),
         title: "What promises cost".into(),
-        caption:
-            "– stands for a rate that so few sequences cannot promise. A promise per object has one threshold, strict \
-                  enough for the object that is mistaken most often."
-                .into(),
+        caption: "A dash (–) marks a rate that these sequences are too few to promise. A promise per object has one \
+                  threshold, strict enough for the object that is mistaken most often."
+            .into(),
         command: context.settings.command.clone(),
         data,
     }

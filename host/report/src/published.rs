@@ -13,11 +13,11 @@ use serde::Serialize;
 /// The numbers that `summary.json` holds: accuracies as shares of one.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Summary {
-    /// How often the paper's method was right.
+    /// Accuracy of the paper's method.
     pub(super) paper: Method,
-    /// How often ours was.
+    /// Accuracy of ours.
     pub(super) ours: Method,
-    /// How often ours was that is trained for noise; measured on noisy touches only.
+    /// Accuracy of ours, trained for noise; measured on noisy touches only.
     pub(super) ours_for_noise_at_10_with_5_ms: (f64, f64),
     /// The difference of accuracies at ten touches, ours less the paper's, and its 95 % interval, paired over folds.
     pub(super) difference_at_10: (f64, Option<f64>, Option<f64>),
@@ -25,11 +25,11 @@ pub(super) struct Summary {
     pub(super) limit_at_10: f64,
     /// See above.
     pub(super) limit_at_30: f64,
-    /// How far each is behind the limit at ten touches, with its 95 % interval.
+    /// Distance of each from the limit at ten touches, with its 95 % interval.
     pub(super) paper_behind_limit: (f64, f64, f64),
     /// See above.
     pub(super) ours_behind_limit: (f64, f64, f64),
-    /// What doubling the capture changed about the limit.
+    /// Change of the limit from doubling the capture.
     pub(super) limit_doubling: f64,
     /// Full touches of each object that the limit was estimated from.
     pub(super) limit_touches: usize,
@@ -164,7 +164,7 @@ pub(super) fn table(context: &Context, summary: &Summary) -> Table {
     }
 }
 
-/// What the summary says in two sentences.
+/// Summary in two sentences.
 pub(super) fn sentence(summary: &Summary) -> String {
     let percent = |value: f64| crate::page::axis::number(value * 100.0, 1);
     format!(

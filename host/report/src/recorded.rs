@@ -1,4 +1,4 @@
-//! Whether the simulation is right: recorded touches beside simulated ones.
+//! Test of the simulation: recorded touches beside simulated ones.
 
 use super::context::Context;
 use crate::page::axis::Axis;
@@ -8,7 +8,7 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::error::{EvaluateProblem, Result};
-use palpate::evaluate::compare::{self, Comparison, Cost, ObjectComparison, Share};
+use palpate::evaluate::recorded::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::progress;
 use palpate::touches::{Dataset, Origin, checksum, files};
 use std::path::Path;
@@ -33,8 +33,8 @@ pub(super) fn measure(context: &Context) -> Result<Option<Comparison>> {
         return Err(palpate::Error::from(EvaluateProblem::Incomparable { detail }).in_file(directory));
     }
     let groups = if settings.quick { 300 } else { 1_000 };
-    let compared = compare::Settings { groups, seed: settings.seed, ..Default::default() };
-    compare::compare(&recorded, &simulated, &compared, context.progress).map(Some)
+    let compared = recorded::Settings { groups, seed: settings.seed, ..Default::default() };
+    recorded::compare(&recorded, &simulated, &compared, context.progress).map(Some)
 }
 
 /// A checksum of the recorded touches' files: a report that is resumed with others starts again.
@@ -45,12 +45,11 @@ pub(super) fn fingerprint(directory: &Path) -> Result<Vec<u32>> {
 /// The section; none without recorded touches.
 pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Result<Option<Section>> {
     let Some(compared) = compared else { return Ok(None) };
-    let mut section = Section::new("recorded", "Is the simulation right?");
+    let mut section = Section::new("recorded", "Accuracy of the simulation");
     let told = &compared.told_apart;
     section.text(format!(
-        "Recorded touches of {} objects were compared with simulated ones of the same objects{}. A classifier that was \
-         trained to tell the two apart is right {} of the time on touches that it was not trained on; half of the time is \
-         guessing. {}",
+        "Recorded touches of {} objects were compared with simulated ones of the same objects{}. A classifier trained \
+         to distinguish the two is right {} of the time on touches that it was not trained on; 50 % is chance level. {}",
         compared.objects.len(),
         if context.settings.real.is_none() { String::new() } else { format!(", made with {}", context.settings.real) },
         with_interval(told),
@@ -61,7 +60,7 @@ pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Resul
     section.table(words(context, compared));
     if let Some(cost) = &compared.cost {
         section.text(format!(
-            "What it costs: a model of {} objects was trained on simulated touches. {}",
+            "Cost of the difference: a model of {} objects was trained on simulated touches. {}",
             cost.known,
             cost.sentence()
         ));
@@ -80,10 +79,14 @@ fn told_figure(context: &Context, compared: &Comparison) -> Result<Figure> {
     rows.push(("all", &compared.told_apart));
     let high = rows.iter().map(|(_, share)| share.high).fold(0.6, f64::max).min(1.0);
     let low = rows.iter().map(|(_, share)| share.low).fold(0.45, f64::min);
-    let mut chart =
-        Chart::new("", Axis::names(rows.iter().map(|(name, _)| *name)), "told apart", Axis::percent(low, high));
+    let mut chart = Chart::new(
+        "",
+        Axis::names(rows.iter().map(|(name, _)| *name)),
+        "classifier accuracy",
+        Axis::percent(low, high),
+    );
     chart.upright_names = true;
-    let mut data = Records::new(["object", "told apart", "low", "high"]);
+    let mut data = Records::new(["object", "classifier accuracy", "low", "high"]);
     let at = |index: usize| index as f64 + 0.5;
     chart.line("guessing", color::GRAY, Stroke::Dashed, &[(0.0, 0.5), (rows.len() as f64, 0.5)]);
     let spread = rows.iter().enumerate().map(|(index, (_, share))| (at(index), share.low, share.high));
@@ -100,9 +103,10 @@ fn told_figure(context: &Context, compared: &Comparison) -> Result<Figure> {
     }
     Ok(Figure {
         id: "recorded-told-apart".into(),
-        title: "How often recorded and simulated touches are told apart".into(),
+        title: "Accuracy of distinguishing recorded from simulated touches".into(),
         caption:
-            "With intervals of 95 %. Where an interval holds one half, nothing shows that the simulation is not right."
+            "With intervals of 95 %. An interval that contains 50 % shows no difference between recorded and simulated \
+             touches."
                 .into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
@@ -147,8 +151,8 @@ fn features_figure(context: &Context, compared: &Comparison) -> Result<Figure> {
         id: "recorded-features".into(),
         title: "Features of recorded and of simulated touches".into(),
         caption:
-            "Left of each name recorded, right of it simulated touches: the median, the middle half, and all but the \
-                  outer tenth."
+            "Recorded touches are left of each name, simulated ones right of it: the median, the middle half, and all \
+                  but the outer tenth."
                 .into(),
         command: context.settings.command.clone(),
         panels,
@@ -170,7 +174,8 @@ fn is_time(feature: &str) -> bool {
 }
 
 fn words(context: &Context, compared: &Comparison) -> Table {
-    let mut data = Records::new(["object", "recorded", "simulated", "told apart", "features", "contact patterns"]);
+    let mut data =
+        Records::new(["object", "recorded", "simulated", "classifier accuracy", "features", "contact patterns"]);
     for own in &compared.objects {
         let features = own.features.iter().map(|own| format!("{}: {}", own.feature, own.words()));
         let patterns = own
@@ -218,7 +223,7 @@ fn cost_figure(context: &Context, cost: &Cost) -> Result<Figure> {
     Ok(Figure {
         id: "recorded-cost".into(),
         title: "A model trained on simulated touches, on simulated and on recorded ones".into(),
-        caption: "The distance between the curves is what a wrong simulation costs.".into(),
+        caption: "The distance between the curves is the cost of the simulation's errors.".into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,

@@ -33,7 +33,7 @@ pub fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace:
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             match files.iter().map(|file| directory.join(file)).find(|path| path.exists()) {
                 Some(path) if !directory.join(trace).exists() => {
-                    refused(&path, format!("there is no {SUMMARY} that says what it was made from"))
+                    refused(&path, format!("there is no {SUMMARY} that states what it was made from"))
                 }
                 _ => Ok(()),
             }

@@ -7,7 +7,7 @@ use crate::page::document::{Block, Figure, Page, Picture, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 
-/// What a run has to show.
+/// Results of a run, as its page shows them.
 #[derive(Clone, Debug)]
 pub struct RunResults {
     /// The command that remakes it.
@@ -20,7 +20,7 @@ pub struct RunResults {
     pub methods: Vec<RunMethod>,
     /// The table that the run prints: what was measured in the first column, then one column per method.
     pub table: Records,
-    /// What should be known about the table, in sentences; may be empty.
+    /// Notes about the table, in sentences; may be empty.
     pub note: String,
     /// Settings, times and version, as name and value.
     pub facts: Vec<(String, String)>,
@@ -66,8 +66,8 @@ pub fn run_page(results: &RunResults) -> Result<Page> {
     sections.push(section);
     Ok(Page {
         title: "Recognizing objects by touch".into(),
-        summary: "A probe with three fingers touched each object; trees learned what a touch says about the object; a \
-                  compiled model of a few kilobytes added the evidence up, touch by touch."
+        summary: "A probe with three fingers touched each object; trees learned the evidence that a touch gives for \
+                  each object; a compiled model of a few kilobytes added it up, touch by touch."
             .into(),
         sections,
         facts: results.facts.clone(),

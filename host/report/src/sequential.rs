@@ -13,7 +13,7 @@ use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use serde::{Deserialize, Serialize};
 
-/// Thresholds: the recognizer stops when the posterior passes one less these.
+/// Thresholds: the recognizer stops when the posterior exceeds 1 minus one of these.
 const RATES: [f64; 13] = [0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003, 0.002, 0.001];
 /// Touches after which a sequence gives up: enough that hardly any does.
 const MOST: usize = 1_000;
@@ -23,7 +23,7 @@ const DRAWN: f64 = 0.01;
 /// The methods, in the order of [`Sequences::methods`].
 pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 
-/// What sequences showed.
+/// Results of sequences.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Sequences {
     /// Sequences per object.
@@ -54,7 +54,7 @@ pub(super) struct Stopped {
 }
 
 impl Stopped {
-    /// How many times more touches a fixed number needs.
+    /// Number of touches of a fixed-length sequence, divided by ours.
     pub(super) fn ratio(&self) -> Option<f64> {
         self.fixed.map(|fixed| fixed as f64 / self.touches)
     }
@@ -105,9 +105,9 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
 pub(super) fn section(context: &Context, sequences: &Sequences) -> Result<Section> {
     let mut section = Section::new("sequential", "Stopping when sure");
     section.text(format!(
-        "The recognizer stops as soon as the posterior of an object passes one less the threshold. {} sequences of each \
+        "The recognizer stops as soon as the posterior of an object exceeds 1 − threshold. {} sequences of each \
          object's touches, from the large capture that no model was trained on; a sequence of {MOST} touches without a \
-         verdict counts as an error. It is compared with the fixed number of touches that is wrong no more often.",
+         verdict counts as an error. It is compared with the fixed number of touches that makes no more errors.",
         sequences.count
     ));
     section.figure(trade(context, sequences)?);
@@ -204,11 +204,10 @@ fn table(context: &Context, sequences: &Sequences) -> Table {
     Table {
         id: "sequential".into(),
         title: "Thresholds".into(),
-        caption:
-            "Errors come out below the threshold, since evidence overshoots it on the last touch; they include undecided \
-             sequences. ± is one standard error; – stands where no fixed number up to the longest group is wrong as \
-             rarely."
-                .into(),
+        caption: "Error rates are below the threshold, because evidence overshoots it on the last touch; they include \
+             undecided sequences. ± is one standard error; a dash (–) means that no fixed number up to the longest \
+             group makes as few errors."
+            .into(),
         command: context.settings.command.clone(),
         data,
     }

@@ -1,12 +1,12 @@
-//! How much of everything a report measures.
+//! Extent of a report's measurements.
 
 use palpate::mesh::builtin::BACKGROUND_SHAPES;
+use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::touches::noise::Noise;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// What a report is made with. A change of any of these but the command starts it from the beginning.
+/// Settings of a report. A change of any of these but the command starts it from the beginning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Where the objects come from: see [`palpate::mesh::source::objects`].
@@ -17,10 +17,11 @@ pub struct Settings {
     pub seed: u64,
     /// Fewer folds, levels and touches; the same figures.
     pub quick: bool,
-    /// How objects are touched: the probe, and the unit of its lengths. How many touches and from which seed say the
-    /// settings beside it. Growth and generalization use the published probe.
+    /// Origin of the touches: the probe, and the unit of its lengths. The settings beside it state the number of
+    /// touches and the seed. Growth and generalization use the
+    /// published probe.
     pub capture: Origin,
-    /// What a real probe adds to simulated touches where they are compared with recorded ones.
+    /// Noise that a real probe adds to simulated touches where they are compared with recorded ones.
     #[serde(default)]
     pub real: Noise,
     /// A data set of recorded touches of these objects, to compare simulated ones with.
@@ -56,7 +57,7 @@ pub struct Settings {
     pub background_shapes: usize,
     /// Other shapes, which the test of whether touches fit any object learns from.
     pub other_shapes: usize,
-    /// Whether to measure growth and generalization, which use built-in objects no matter what the sources are.
+    /// True to measure growth and generalization, which use built-in objects no matter what the sources are.
     pub growth: bool,
     /// Numbers of objects in the growth figures.
     pub growth_objects: Vec<usize>,

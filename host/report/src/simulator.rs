@@ -19,10 +19,10 @@ use serde::{Deserialize, Serialize};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// What one way of deciding contacts achieved, all objects together.
+/// Results of one way of deciding contacts, all objects together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Engine {
-    /// What it does.
+    /// Description of the way.
     pub(super) name: String,
     /// Casts per second, one thread.
     pub(super) rate: f64,
@@ -194,7 +194,7 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
     section.table(Table {
         id: "simulator".into(),
         title: "The simulator's choices".into(),
-        caption: "The last row is what the others are compared with.".into(),
+        caption: "The last row is the reference for the others.".into(),
         command: context.settings.command.clone(),
         data,
     });

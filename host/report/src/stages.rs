@@ -23,7 +23,7 @@ use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What was written, and how long it took.
+/// Files that were written, and the time that it took.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// All files, the page last.
@@ -36,12 +36,12 @@ pub struct Report {
     pub summary: serde_json::Value,
 }
 
-/// How a report treats what is in its directory.
+/// Rules for the present contents of a report's directory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Existing {
-    /// Whether to take stages that an interrupted report measured with the same settings, objects and program.
+    /// True to take stages that an interrupted report measured with the same settings, objects and program.
     pub resume: bool,
-    /// Whether to replace another report's or run's results.
+    /// True to replace another report's or run's results.
     pub replace: bool,
 }
 
@@ -76,7 +76,7 @@ pub fn report(settings: &Settings, directory: &Path, existing: Existing, progres
 }
 
 /// The same on the objects that `objects` gives, whatever the settings' sources are, such as objects with several
-/// instances or at their true size. They are to be sorted by name.
+/// instances or at their true size. They must be sorted by name.
 ///
 /// # Errors
 /// As [`report`] and `objects`.
@@ -190,10 +190,10 @@ pub fn report_on(
     Ok(Report { files, stages, sentence, summary })
 }
 
-/// What `summary.json` holds.
+/// Contents of `summary.json`.
 #[derive(Serialize)]
 struct Everything<'a> {
-    /// What another report must have been made from to replace this one unasked.
+    /// Settings and objects that another report must have been made from for this one to replace it unasked.
     made_from: &'a serde_json::Value,
     settings: &'a Settings,
     version: &'a str,

@@ -45,10 +45,10 @@ pub(crate) fn paired_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     (mean, mean - half, mean + half)
 }
 
-/// How many distinct groups an accuracy must rest on to be given.
+/// Number of distinct groups that an accuracy must rest on to be given.
 pub const LEAST_GROUPS: usize = 300;
 
-/// How many different groups of `size` can be drawn from `touches` touches, without regard to order; at most
+/// Number of different groups of `size` can be drawn from `touches` touches, without regard to order; at most
 /// [`LEAST_GROUPS`] are counted.
 pub fn distinct_groups(touches: usize, size: usize) -> usize {
     let Some(rest) = touches.checked_sub(size) else { return 0 };

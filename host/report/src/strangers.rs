@@ -24,11 +24,11 @@ const PER_SHAPE: usize = 300;
 /// Touches up to which detection is shown.
 const MOST: usize = 120;
 
-/// How a model can meet strangers, in the order of [`Column::ways`].
+/// Ways in which a model can meet strangers, in the order of [`Column::ways`].
 const WAYS: [(&str, Option<Held>); 3] =
     [("off", None), ("likely", Some(Held::Likely)), ("certain", Some(Held::Certain))];
 
-/// What was measured: without and with a background column; or why nothing was.
+/// Measurements: without and with a background column; or why nothing was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Measured {
     Columns([Column; 2]),
@@ -40,10 +40,10 @@ pub(super) struct Column {
     ways: Vec<Way>,
 }
 
-/// What a way to meet strangers achieves: means over the objects that were left out.
+/// Results of one way to meet strangers: means over the objects that were left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Way {
-    /// The share found out by 1, 2, 3 … touches.
+    /// The share detected by 1, 2, 3 … touches.
     detected: Vec<f64>,
     wrong_name: f64,
     false_alarms: f64,
@@ -51,7 +51,7 @@ struct Way {
     touches: f64,
     wrong: f64,
     undecided: f64,
-    /// For each object left out: its name, the share found out by each of [`DETECTED_BY`], and the share named.
+    /// For each object left out: its name, the share detected by each of [`DETECTED_BY`], and the share named.
     objects: Vec<(String, Vec<f64>, f64)>,
 }
 
@@ -148,11 +148,11 @@ pub(super) fn section(context: &Context, measured: &Measured) -> Result<Section>
     let at = |way: &Way, touches: usize| number(100.0 * way.detected.get(touches - 1).copied().unwrap_or(0.0), 0);
     let [likely, certain] = [&with.ways[1], &with.ways[2]];
     section.text(format!(
-        "Each object is left out of the training in turn, and then touched; a test of fit may say that it is unknown. The \
-         test is calibrated so that at most 2 % of known objects are taken for unknown. Names that are held back until \
-         strangers would have been found out (certain) find out {} % of them by 60 touches and {} % by 120, and {} % get a \
-         name; a known object takes {} touches. Without holding back (likely) {} % get a name, and a known object takes {} \
-         touches.",
+        "Each object is left out of the training in turn, and then touched; a test of fit may declare it unknown. The \
+         test is calibrated to a false alarm rate of at most 2 %: the share of known objects taken for unknown. With \
+         names held back until a stranger would have been detected (certain), {} % of strangers are detected by 60 \
+         touches and {} % by 120, and {} % get a name; a known object takes {} touches. Without holding back (likely), \
+         {} % get a name, and a known object takes {} touches.",
         at(certain, 60),
         at(certain, 120),
         number(100.0 * certain.wrong_name, 0),
@@ -169,9 +169,8 @@ pub(super) fn section(context: &Context, measured: &Measured) -> Result<Section>
 const COLUMNS: [&str; 2] = ["fit", "fit and background"];
 
 fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
-    let mut chart =
-        Chart::new("touches", Axis::linear(0.0, MOST as f64, 6), "found out", Axis::share()).sized(660, 420);
-    let mut data = Records::new(["test", "names", "touches", "found out"]);
+    let mut chart = Chart::new("touches", Axis::linear(0.0, MOST as f64, 6), "detected", Axis::share()).sized(660, 420);
+    let mut data = Records::new(["test", "names", "touches", "detected"]);
     let styles = [
         [("fit, likely", color::PAPER, Shape::Ring), ("fit, certain", color::PURPLE, Shape::Triangle)],
         [("background, likely", color::GREEN, Shape::Square), ("background, certain", color::OURS, Shape::Disc)],
@@ -191,8 +190,8 @@ fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
     }
     Ok(Figure {
         id: "strangers-detected".into(),
-        title: "Strangers found out, against touches".into(),
-        caption: "The mean over the objects that were left out, with false alarms of at most 2 % of known objects."
+        title: "Detection rate of strangers, against touches".into(),
+        caption: "The mean over the objects that were left out, at a false alarm rate of at most 2 % on known objects."
             .into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
@@ -201,7 +200,7 @@ fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
 }
 
 fn ways_table(context: &Context, columns: &[Column; 2]) -> Table {
-    let found = DETECTED_BY.map(|at| format!("found out by {at}"));
+    let found = DETECTED_BY.map(|at| format!("detected by {at}"));
     let more = ["got a name", "false alarms", "touches, known objects", "wrong", "undecided"];
     let names = ["test", "names"].into_iter().map(String::from).chain(found).chain(more.map(String::from));
     let mut data = Records::new(names);
@@ -220,9 +219,9 @@ fn ways_table(context: &Context, columns: &[Column; 2]) -> Table {
     }
     Table {
         id: "strangers-ways".into(),
-        title: "What finding out strangers costs".into(),
-        caption: "Off: no test; with a background, this is a rival of every name also then. 40 trees of depth 5 on \
-                  curvature of full touches."
+        title: "Cost of detecting strangers".into(),
+        caption: "Off: no test; a background, where there is one, still competes with every name. 40 trees of depth 5 \
+                  on curvature of full touches."
             .into(),
         command: context.settings.command.clone(),
         data,
@@ -230,7 +229,7 @@ fn ways_table(context: &Context, columns: &[Column; 2]) -> Table {
 }
 
 fn objects_table(context: &Context, with: &Column) -> Table {
-    let found = DETECTED_BY.map(|at| format!("found out by {at}"));
+    let found = DETECTED_BY.map(|at| format!("detected by {at}"));
     let names = std::iter::once("left out".to_owned()).chain(found).chain(["got a name".to_owned()]);
     let mut data = Records::new(names);
     for (name, detected, named) in with.ways.last().map_or(&[][..], |way| &way.objects) {
@@ -239,11 +238,10 @@ fn objects_table(context: &Context, with: &Column) -> Table {
     }
     Table {
         id: "strangers-objects".into(),
-        title: "Strangers one by one".into(),
-        caption:
-            "With a background, names being held back (certain). Objects that feel alike are hardly found out: by \
+        title: "Detection rate of each stranger".into(),
+        caption: "With a background, names being held back (certain). Objects that feel alike are rarely detected: by \
                   curvature alone a fork feels like a spoon, and a hammer like a paper clip."
-                .into(),
+            .into(),
         command: context.settings.command.clone(),
         data,
     }

@@ -1,4 +1,4 @@
-//! The page of objects that were learned from recorded touches: how well, and what more approaches would come to.
+//! The page of objects that were learned from recorded touches: their accuracy, and the benefit of more approaches.
 
 use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Shape};
@@ -13,14 +13,14 @@ use palpate::teach::{LEAST, Needed, Taught, TaughtObject};
 /// # Errors
 /// If a chart cannot be drawn.
 pub fn page(taught: &Taught, command: &str) -> Result<Page> {
-    let mut result = Section::new("result", "How well they are recognized");
+    let mut result = Section::new("result", "Accuracy for taught objects");
     result.text(
-        "Recorded touches were held out in parts: no part, nor a copy of one of its touches, was learned from while it was \
-         held out. A constant is added to an object's margin with every touch, so that it is missed as often as others are \
-         taken for it.",
+        "Recorded touches were held out in parts: no part, nor a copy of one of its touches, was learned from while it \
+         was held out. A constant is added to an object's margin with every touch, so that misses and false \
+         recognitions are equally frequent.",
     );
     result.table(objects(taught, command)).text(promise(taught));
-    let mut more = Section::new("more", "How many more approaches would help");
+    let mut more = Section::new("more", "Benefit of more approaches");
     more.figure(curve(taught, command)?);
     taught.objects.iter().for_each(|object| {
         more.text(more_approaches(object));
@@ -65,8 +65,8 @@ fn objects(taught: &Taught, command: &str) -> Table {
         id: "taught".into(),
         title: "Objects and how they were smoothed".into(),
         caption: format!(
-            "Shares of groups of {} approaches; what is taken for an object is added up over all other objects. Jitter is \
-             in multiples of 30 % and 10 ms on times, 8° on the pose.{others}",
+            "Shares of groups of {} approaches; false recognitions of an object are summed over all other objects. \
+             Jitter is in multiples of 30 % and 10 ms on times, 8° on the pose.{others}",
             taught.approaches
         ),
         command: command.into(),
@@ -106,9 +106,9 @@ fn curve(taught: &Taught, command: &str) -> Result<Figure> {
         id: "learning-curve".into(),
         title: "Errors against approaches".into(),
         caption: format!(
-            "The mean of the share of groups of {} approaches that are missed, and of those of other objects that are taken \
-             for the object, on touches that were held out. The last point of each line is not measured: it carries the \
-             errors on to twice as many approaches, falling with a power of their number.",
+            "The mean of the share of groups of {} approaches that are missed, and of those of other objects that are \
+             taken for the object, on touches that were held out. The last point of each line is not measured: it \
+             extrapolates the errors to twice as many approaches by a power law.",
             taught.approaches
         ),
         command: command.into(),
@@ -117,7 +117,7 @@ fn curve(taught: &Taught, command: &str) -> Result<Figure> {
     })
 }
 
-/// Whether more approaches to an object would help, in a sentence.
+/// Says in a sentence if more approaches to an object would help.
 pub fn more_approaches(object: &TaughtObject) -> String {
     let Some(last) = object.curve.points.last() else { return String::new() };
     let (now, then) = (last.error, object.curve.with_twice);
@@ -133,7 +133,7 @@ pub fn more_approaches(object: &TaughtObject) -> String {
     )
 }
 
-/// Whether enough was recorded for a promise, in two sentences.
+/// Says in two sentences if enough was recorded for a promise.
 pub fn promise(taught: &Taught) -> String {
     let Needed { sequences, of_each, approaches } = taught.promise;
     let recorded = taught.objects.iter().map(|object| object.approaches).min().unwrap_or(0);

@@ -13,7 +13,7 @@ pub(super) struct Ahead<'m> {
     model: &'m Model<'m>,
     trained: TrainedTouches,
     together: Together,
-    /// How many touches of a pool at once.
+    /// Number of touches drawn from a pool at once.
     size: usize,
     blocks: Vec<Block>,
 }

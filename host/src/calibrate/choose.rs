@@ -17,7 +17,7 @@ const LEARNED: usize = 3;
 /// From how much stricter than the learned thresholds by name to how much looser the tested ones are, in nats.
 const AROUND: [f64; 2] = [2.0, -1.0];
 
-/// What is promised.
+/// Terms of a promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Terms {
     /// The error rate: wrong names of those that are given.
@@ -28,7 +28,7 @@ pub struct Terms {
     pub per: Per,
 }
 
-/// Thresholds that keep a promise, and what the sequences that they were tested on came to.
+/// Thresholds that keep a promise, and the results of the sequences that they were tested on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chosen {
     /// The thresholds.
@@ -123,7 +123,7 @@ fn stored(margin: f64) -> u64 {
     odds_of(margin) >> 24 << 24
 }
 
-/// What names are counted by.
+/// Cases that names are counted by.
 #[derive(Clone, Copy)]
 enum By {
     All,

@@ -6,13 +6,13 @@ use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::ObjectTouches;
-use palpate_onboard::{Fit, Model, Recognizer, Stopping};
+use palpate_onboard::{Familiarity, Model, Recognizer, Stopping};
 use palpate_shared::Touch;
 use palpate_shared::format::Plan;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
-/// What is known after a touch that is evidence.
+/// State after a touch that is evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'s> {
     /// The touch.
@@ -45,7 +45,7 @@ pub struct Supply<'d> {
     pools: Vec<Pool>,
     /// The pool of the next sequence.
     next: usize,
-    /// Whether a pool makes one sequence only.
+    /// True if a pool makes one sequence only.
     is_once: bool,
     /// The poses that the model's plan may propose; none where touches are taken in their order.
     candidates: Vec<u16>,
@@ -139,7 +139,7 @@ struct Order<'o, 'd, 'm> {
     candidates: &'o [u16],
     ahead: &'o mut Ahead<'m>,
     pool: &'o mut Pool,
-    /// Which pool it is.
+    /// Number of the pool.
     turn: usize,
     /// Position of the next touch in the pool's order.
     next: usize,
@@ -190,7 +190,7 @@ pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_
     Ok(())
 }
 
-/// Follows one sequence; whether it came to its end before the touches did.
+/// Follows one sequence; returns true if it ended before the touches did.
 fn one<const N: usize>(
     object: usize,
     recognizer: &mut Recognizer<'_, N>,
@@ -210,10 +210,11 @@ fn one<const N: usize>(
         }
         let (evidence, best, touches) = (recognizer.evidence(), recognizer.best(), recognizer.touches());
         // What the model's own test says, as on the chip: a name is held back, or there is none.
-        let fit = recognizer.fit();
-        let may_name = gate(&Moment { touch, evidence, best, touches, approaches }) && fit == Fit::Fits;
+        let familiarity = recognizer.familiarity();
+        let may_name =
+            gate(&Moment { touch, evidence, best, touches, approaches }) && familiarity == Familiarity::Known;
         let odds = sequence.push(recognizer, approaches, may_name);
-        if (may_name && odds <= strictest) || fit == Fit::Stranger || touches >= until.max_touches {
+        if (may_name && odds <= strictest) || familiarity == Familiarity::Stranger || touches >= until.max_touches {
             return (sequence, true);
         }
     }

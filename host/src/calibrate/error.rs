@@ -1,4 +1,4 @@
-//! What can be wrong with calibrating.
+//! Problems with calibrating.
 
 use crate::error::Problem;
 
@@ -17,7 +17,7 @@ pub enum CalibrateProblem {
         found: u64,
         /// Names needed, if none is wrong.
         needed: u64,
-        /// What the sequences were drawn from, if it was used up.
+        /// Supply that the sequences were drawn from, if it was used up.
         supplied: Option<Supplied>,
     },
     /// No threshold keeps the promise.
@@ -39,22 +39,22 @@ pub enum CalibrateProblem {
         objects: Vec<String>,
     },
     /// The touches are those that the model was trained on.
-    #[error("the model was trained on these touches of {}: a promise that they keep would not hold for others", objects.join(", "))]
+    #[error("the model was trained on these touches of {}: a promise calibrated on them would not hold for others", objects.join(", "))]
     TrainedOn {
         /// The objects.
         objects: Vec<String>,
     },
     /// There are no objects to choose between.
-    #[error("the model knows one object only, which it cannot take for another")]
+    #[error("the model knows only one object: there is nothing to mistake it for")]
     OneObject,
 }
 
 /// The touches of a data set that sequences used up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Supplied {
-    /// Whether it holds approaches, or full touches only.
+    /// True if it holds approaches, and not full touches only.
     pub approaches: bool,
-    /// How many of these it holds of the object that it has the fewest of.
+    /// Number of these that it holds of the object with the fewest.
     pub fewest: u64,
 }
 
@@ -79,7 +79,7 @@ fn percent(rate: f64) -> f64 {
     (rate * 1e9).round() / 1e7
 }
 
-/// How many touches of each object as many names take, in words: in proportion.
+/// Estimate, in words, of the touches of each object that yield the names needed: in proportion.
 fn in_touches(supplied: Option<Supplied>, found: u64, needed: u64) -> String {
     let Some(Supplied { approaches, fewest }) = supplied else { return String::new() };
     let what = if approaches { "approaches" } else { "touches" };

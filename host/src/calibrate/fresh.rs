@@ -15,7 +15,7 @@ use palpate_onboard::{Model, Refused, Stopping};
 const FIRST: u64 = 2_000;
 /// The most samples of an object.
 const MOST: u64 = 4_000_000;
-/// How much more is captured than is expected to be used.
+/// Amount captured, relative to the amount expected to be used.
 const SPARE: f64 = 1.15;
 
 /// Touches that were captured to calibrate on, kept for another model: of the same objects, touched in the same way, none is
@@ -28,7 +28,7 @@ pub struct Fresh {
 }
 
 impl Fresh {
-    /// What is kept of these objects, touched like this, in their order.
+    /// The touches kept of these objects, touched like this, in their order.
     fn of(&mut self, objects: &[(&str, &[Scene])], origin: &Origin) -> &mut [ObjectTouches] {
         let names = self.objects.iter().map(|object| object.name.as_str());
         if self.origin.as_ref() != Some(origin) || !names.eq(objects.iter().map(|(name, _)| *name)) {
@@ -111,7 +111,7 @@ struct Lengths {
     pools: usize,
 }
 
-/// How many samples of each object a sequence takes on average.
+/// Mean number of samples of each object in a sequence.
 fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Vec<Lengths>> {
     let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
     let (_, known) = Candidate::Compiled(model).of(dataset)?;

@@ -1,6 +1,6 @@
 //! Thresholds that keep a promised error rate, and use it up.
 //!
-//! A recognizer that stops when the posterior passes 1 − α is wrong less often than α: the last touch carries the
+//! A recognizer that stops when the posterior exceeds 1 − α makes fewer errors than α: the last touch carries the
 //! evidence beyond the threshold. How much less depends on the model and the touches. [`calibrate`](fn@calibrate) finds
 //! out on touches that nothing was trained on: it sets the model's thresholds by Learn-then-Test ([`walk`]) on whole
 //! sequences ([`Sequence`]), followed by the onboard recognizer's own integers.
@@ -14,7 +14,7 @@
 //! - per object ([`Per::Object`]): of the names given to each object, however often it is touched; the rates of all objects
 //!   are kept at once with the stated probability.
 //!
-//! The probability is over calibrations: of calibrations on touches drawn anew, at most the share of one less the confidence
+//! The probability is over calibrations: of calibrations on touches drawn anew, at most a share of 1 − confidence
 //! gives thresholds whose rate is above the promised one.
 //!
 //! ```no_run
@@ -55,7 +55,7 @@ pub(crate) use model::{STRICTEST, add_noise, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
 pub use temperature::temperature;
-/// What the promised rate is of, in words.
+/// The cases that the promised rate refers to, in words.
 pub fn of_what(per: Per) -> &'static str {
     match per {
         Per::Average => "all names given, on average,",

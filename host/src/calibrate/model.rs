@@ -9,8 +9,8 @@ use crate::compile::{self, Restated, restate};
 use crate::ensemble::StatedProbe;
 use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result, Supplied};
 use crate::evaluate::{Candidate, OfTouches};
+use crate::probe::noise::Noise;
 use crate::progress::Progress;
-use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused, Stopping};
 use palpate_shared::format::{OddsByObject, Promise, SECTION_HEADER_LENGTH, Tag, Temperature};
@@ -22,7 +22,7 @@ const PILOT: usize = 30;
 /// The strictest threshold beyond that of the posterior, in nats: usually, and where a tenth of that is not enough.
 pub(crate) const STRICTEST: [f64; 2] = [2.5, 10.0];
 
-/// What is promised, and on how much.
+/// Settings of a promise, and of the touches that it rests on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// The error rate: wrong names of those that are given.
@@ -35,9 +35,9 @@ pub struct Settings {
     pub sequences: usize,
     /// Touches after which a sequence ends undecided; `None` takes the model's own limit.
     pub max_touches: Option<u32>,
-    /// What is added to the touches. The promise holds for touches with the same.
+    /// Noise added to the touches. The promise holds for touches with the same.
     pub noise: Noise,
-    /// Whether every approach is where the model's plan says. The promise then holds for a robot that goes there.
+    /// True if every approach is where the model's plan says. The promise then holds for a robot that goes there.
     pub active: bool,
     /// Seed of the order of the touches, and of the noise.
     pub seed: u64,
@@ -61,10 +61,10 @@ impl Default for Settings {
 /// A calibrated model, and what its calibration found.
 #[derive(Clone, Debug, Serialize)]
 pub struct Calibrated {
-    /// What the chip reads.
+    /// Bytes of the model, as the chip reads them.
     #[serde(skip)]
     pub model: Vec<u8>,
-    /// What it promises.
+    /// Its promise.
     #[serde(skip)]
     pub promise: Promise,
     /// The promised error rate.
@@ -73,7 +73,7 @@ pub struct Calibrated {
     pub per: &'static str,
     /// The probability that it is kept.
     pub confidence: f64,
-    /// What is counted: "touches" or "approaches".
+    /// Unit of the counts: "touches" or "approaches".
     pub counted: &'static str,
     /// Sequences that the promise rests on.
     pub sequences: usize,
@@ -94,7 +94,7 @@ pub struct Calibrated {
     pub errors: BTreeMap<String, f64>,
     /// Each object, whatever the rate is promised of.
     pub objects: BTreeMap<String, OfObject>,
-    /// What evidence is divided by before it is shown as a posterior.
+    /// Divisor of the evidence before it is shown as a posterior.
     pub temperature: f64,
 }
 
@@ -264,7 +264,7 @@ pub(crate) fn add_noise(model: &Model<'_>, dataset: &mut Dataset, noise: &Noise,
     }
 }
 
-/// How often each object of the data set is touched: as its prior says.
+/// Share of the touches that each object of the data set gets, by its prior.
 fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
     let weights: Vec<f64> =
         known.iter().map(|&object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect();
@@ -272,7 +272,7 @@ fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
     weights.into_iter().map(|weight| weight / sum).collect()
 }
 
-/// Whether at this margin clearly fewer names are wrong than promised, as far as a few sequences tell.
+/// True if at this margin clearly fewer names are wrong than promised, as far as a few sequences tell.
 fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
     let odds = Odds::All(odds_of(margin));
     let given = pilot.iter().filter_map(|sequence| Some((sequence, sequence.given(&odds)?)));

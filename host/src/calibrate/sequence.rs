@@ -1,8 +1,8 @@
-//! Whole sequences, and what each comes to under any threshold.
+//! Whole sequences, and the result of each under any threshold.
 
 use palpate_onboard::Recognizer;
 
-/// Thresholds: what the weights of all other objects may come to, the leader's being 1, for its name to be given; in Q56.
+/// Thresholds: the largest sum of the weights of all other objects, the leader's being 1, at which it is named; in Q56.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Odds {
     /// The same for all objects.
@@ -48,7 +48,7 @@ const ONE: f64 = 72_057_594_037_927_936.0;
 pub struct Look {
     /// The object with the most evidence.
     pub name: usize,
-    /// What the weights of the others came to, in Q56: the recognizer's own integers.
+    /// Sum of the weights of the others, in Q56: the recognizer's own integers.
     pub odds: u64,
     /// Touches so far that are evidence.
     pub touches: u32,
@@ -76,7 +76,7 @@ impl Sequence {
 
     /// Takes in what a recognizer knows after the approach with this number. `may_name` is false where a verdict would be
     /// held back, such as by a test for unknown objects: then no threshold gives a name here. The recognizer must not stop
-    /// by itself. The answer is what the weights of the others come to, as [`Look::odds`].
+    /// by itself. The answer is the sum of the weights of the others, as [`Look::odds`].
     pub fn push<const N: usize>(&mut self, recognizer: &Recognizer<'_, N>, approaches: u32, may_name: bool) -> u64 {
         let odds = recognizer.rivals();
         let look = Look { name: recognizer.best(), odds, touches: recognizer.touches(), approaches };

@@ -11,9 +11,9 @@ const MOST: usize = 10_000;
 /// Halvings of the range of the logarithm of the temperature, from 1/16 to 16.
 const HALVINGS: usize = 24;
 
-/// What margins have to be divided by for the posteriors of single touches to explain their objects best: the least mean
-/// negative log-likelihood, each object weighted equally. `known` are the indices of the data set's objects in the model.
-/// 1 if no touch is evidence.
+/// Divisor of the margins with which the posteriors of single touches explain their objects best: the least mean
+/// negative log-likelihood, each object weighted equally. `known` are the indices of the data set's objects in the
+/// model. 1 if no touch is evidence.
 pub fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
     let rows = |(touched, &object): (&ObjectTouches, &usize)| {
         let evidence = touched.touches().iter().filter(|touch| model.accepts(touch).is_ok());

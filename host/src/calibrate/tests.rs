@@ -3,10 +3,11 @@ use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train;
 use crate::error::CalibrateProblem;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::probe::noise::Noise;
 use crate::random::{Purpose, generator};
-use crate::repetitions::{assert_rare, repetitions};
-use crate::touches::noise::Noise;
-use crate::touches::{Dataset, ObjectTouches, synthetic};
+use crate::tests::repetitions::{assert_rare, repetitions};
+use crate::tests::synthetic;
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use rand::RngExt;
 use std::collections::BTreeSet;
@@ -130,7 +131,7 @@ fn a_promise_per_name_or_object_is_kept_for_each_of_them() {
 /// Objects of made-up sequences whose error rates are known.
 const KNOWN: usize = 6;
 
-/// The probability that a sequence comes to lead by this margin for a wrong object: for the first wrong one and, if that
+/// The probability that a sequence leads by this margin for a wrong object: for the first wrong one and, if that
 /// is not named, for the second. Each name has its own.
 fn led_wrongly(name: usize, margin: f64) -> [f64; 2] {
     [0.4, 0.3].map(|share| share * 1.5_f64.powi(name as i32 % 3) * (-margin).exp())
@@ -486,7 +487,7 @@ fn with_other_priors_or_fewer_objects_errors_stay_below_what_theory_says() {
     let calibrated = calibrate(&compiled.model(), fresh(60_000, 2), &settings, &()).unwrap();
     let model = Model::new(&calibrated.model).unwrap();
     let bound = crate::evaluate::by_theory(&model);
-    // The threshold is looser than the posterior's, so that is what it may come to.
+    // The threshold is looser than the posterior's, so that is its largest value.
     assert!(bound > 0.05 && bound < 0.3, "{bound}");
     let unseen = fresh(4_000, 4);
     let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 2_000, seed: 1 };

@@ -1,7 +1,7 @@
 //! Learn-then-Test with fixed-sequence testing (Angelopoulos and others, 2022, arXiv 2110.01052).
 //!
 //! Thresholds are tried from strict to loose, an order that is fixed before the data are looked at. Each is a hypothesis:
-//! "at this threshold the error rate is above the promised one". It is rejected if so few errors as were found have a
+//! "at this threshold the error rate is above the promised one". It is rejected if as few errors as were found have a
 //! probability of at most 1 − confidence under it, by the binomial tail. The walk ends before the first threshold whose
 //! hypothesis is not rejected; the one before is kept. So the probability that a threshold is kept whose error rate is
 //! above the promised one is at most 1 − confidence, however many are tried.
@@ -11,7 +11,7 @@
 //! of successes in independent trials, 1956). How many names are given is taken as given; the simulations of
 //! `calibrate/tests.rs`, whose error rates are known, count how often a promise is broken in the end.
 
-/// What happened at a threshold: errors, of cases that could have been errors.
+/// Results at a threshold: errors, of cases that could have been errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Errors.
@@ -25,7 +25,7 @@ pub struct Tally {
 pub struct Kept<T> {
     /// The threshold.
     pub threshold: T,
-    /// What happened: one tally, or one of each that the rate is promised for.
+    /// Results: one tally, or one of each that the rate is promised for.
     pub tallies: Vec<Tally>,
 }
 
@@ -43,7 +43,7 @@ pub enum Stop {
     TooMany {
         /// The position of the tally.
         position: usize,
-        /// What it was.
+        /// Its tally.
         tally: Tally,
     },
 }
@@ -53,7 +53,7 @@ pub enum Stop {
 ///
 /// With several tallies all rates are kept at once with that probability, without dividing it among them: the
 /// hypothesis is that one of the rates is above, and to reject it every test has to (an intersection-union test).
-/// Thresholds at which a tally is so small that it could not pass without any error say nothing and are passed over
+/// Thresholds whose tally is so small that it could not pass even without an error are uninformative and skipped
 /// (Tarone, 1990): how many cases there are decides that, not how many are errors. That is exact as long as how many there
 /// are at one threshold says nothing about how many are errors at another.
 ///
@@ -92,7 +92,7 @@ pub fn walk<T>(steps: impl IntoIterator<Item = (T, Vec<Tally>)>, rate: f64, conf
     })
 }
 
-/// How many cases it takes at least to promise `rate` with probability `confidence`, if none is an error.
+/// Smallest number of cases that allows a promise of `rate` with probability `confidence`, if none is an error.
 pub fn needed(rate: f64, confidence: f64) -> u64 {
     ((1.0 - confidence).ln() / (-rate).ln_1p()).ceil() as u64
 }

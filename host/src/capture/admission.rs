@@ -1,13 +1,13 @@
-//! Whether a capture may write into a directory, given what is there.
+//! Admission of a capture to a directory, given what is there.
 
 use super::Settings;
 use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::touches::{Entry, Listing, Origin, files};
 use std::path::Path;
 
-/// What a capture begins with.
+/// State that a capture begins with.
 pub(super) struct Admission {
-    /// The data set that is to be deleted first.
+    /// The data set to delete first.
     pub(super) replaced: Option<Listing>,
     /// The listing to start or go on from: it names every object of the capture.
     pub(super) listing: Listing,
@@ -66,7 +66,7 @@ pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) ->
     Ok(Admission { replaced: Some(found), listing: wanted })
 }
 
-/// What to go on from.
+/// Returns the state to resume from.
 fn resumed(directory: &Path, found: Listing, wanted: &Listing, add: bool) -> Result<Admission> {
     let refuse = |problem| Err(Error::at(Place::file(Listing::path(directory)), problem));
     if found.palpate != wanted.palpate {
@@ -90,7 +90,7 @@ fn resumed(directory: &Path, found: Listing, wanted: &Listing, add: bool) -> Res
     Ok(Admission { replaced: None, listing: merged(found, wanted) })
 }
 
-/// What was found, incomplete again, with the wanted objects that it lacks.
+/// Returns the listing that was found, incomplete again, with the wanted objects that it lacks.
 fn merged(found: Listing, wanted: &Listing) -> Listing {
     let mut objects = found.objects;
     for entry in &wanted.objects {
@@ -103,13 +103,13 @@ fn merged(found: Listing, wanted: &Listing) -> Listing {
     Listing { palpate: wanted.palpate.clone(), complete, origin: found.origin, objects, recorded: Vec::new() }
 }
 
-/// Which settings differ, and how: "touches is 20 there and 30 here". Empty if none does.
+/// Settings that differ, with both values: "touches is 20 there and 30 here". Empty if none does.
 fn differences(there: &Listing, here: &Listing) -> String {
     let differences = [settings(&there.origin, &here.origin), meshes(there, here)].concat();
     differences.join(", ")
 }
 
-/// What differs about the meshes of the same objects.
+/// Differences between the meshes of the same objects.
 fn meshes(there: &Listing, here: &Listing) -> Vec<String> {
     let mut differences = Vec::new();
     for (name, own) in here.objects.iter().map(|entry| (&entry.name, entry)) {
@@ -135,7 +135,7 @@ fn meshes(there: &Listing, here: &Listing) -> Vec<String> {
     differences
 }
 
-/// Which settings differ, and how.
+/// Settings that differ, with both values.
 fn settings(there: &Origin, here: &Origin) -> Vec<String> {
     let fields = |origin| match serde_json::to_value(origin) {
         Ok(serde_json::Value::Object(fields)) => fields,

@@ -1,9 +1,9 @@
-//! What can be wrong with captures.
+//! Problems with captures.
 
 use crate::error::Problem;
 use std::io::ErrorKind;
 
-/// What can be wrong with captures.
+/// Problems with captures.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureProblem {
@@ -17,7 +17,7 @@ pub enum CaptureProblem {
         /// What to do about it, as a sentence.
         fix: String,
     },
-    /// An object is to be touched at its true size, which is not known.
+    /// The true size of an object is needed and not known.
     #[error("{name}: the unit of its mesh is not known, and so its true size is not")]
     NoTrueSize {
         /// The object.
@@ -28,7 +28,7 @@ pub enum CaptureProblem {
     Untouchable {
         /// The object.
         name: String,
-        /// How many approaches were tried.
+        /// Number of approaches tried.
         approaches: u64,
     },
     /// Another capture has locked the directory.
@@ -39,7 +39,7 @@ pub enum CaptureProblem {
     HoldsOtherObjects {
         /// The objects.
         objects: Vec<String>,
-        /// How many touches there are of them.
+        /// Number of touches of them.
         touches: u64,
     },
     /// The directory holds a data set of the same objects that was made in another way.
@@ -47,11 +47,11 @@ pub enum CaptureProblem {
     HoldsOtherSettings {
         /// The objects.
         objects: Vec<String>,
-        /// Which settings differ, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The directory holds files of touches that no listing names.
-    #[error("holds {}, which no capture listed: once this capture has, they would never be used", list(files))]
+    #[error("holds {}, which no capture has listed: after this capture, they would never be used", list(files))]
     HoldsFiles {
         /// The files' names.
         files: Vec<String>,
@@ -61,7 +61,7 @@ pub enum CaptureProblem {
     HoldsRecorded {
         /// The objects.
         objects: Vec<String>,
-        /// How many touches there are of them.
+        /// Number of touches of them.
         touches: u64,
     },
     /// The directory holds an unfinished capture.
@@ -69,10 +69,10 @@ pub enum CaptureProblem {
     HoldsUnfinished {
         /// Its objects.
         objects: Vec<String>,
-        /// How many touches there are.
+        /// Number of touches.
         touches: u64,
     },
-    /// Objects that are to be added are there already.
+    /// Objects to add are there already.
     #[error("already holds touches of {}", list(objects))]
     AlreadyThere {
         /// The objects.
@@ -81,7 +81,7 @@ pub enum CaptureProblem {
     /// Objects cannot be added to a data set that was made in another way.
     #[error("cannot add to these touches: other settings: {differences}")]
     AddsOtherSettings {
-        /// Which settings differ, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The capture to resume was started by another version.
@@ -93,7 +93,7 @@ pub enum CaptureProblem {
     /// The capture to resume was started with other settings.
     #[error("cannot resume: other settings: {differences}")]
     ResumesOtherSettings {
-        /// Which settings differ, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The capture to resume was started with other objects.
@@ -105,7 +105,7 @@ pub enum CaptureProblem {
     /// A part lost what was checkpointed.
     #[error("shorter than the {bytes} bytes that dataset.json states")]
     Shorter {
-        /// What is stated.
+        /// Stated size in bytes.
         bytes: u64,
     },
     /// Touches could not be written.
@@ -113,17 +113,17 @@ pub enum CaptureProblem {
     NotWritten {
         /// The kind of the operating system's error.
         kind: ErrorKind,
-        /// What the operating system said.
+        /// The operating system's message.
         message: String,
     },
     /// The operating system refused a thread.
     #[error("the system started only {started} of {asked} threads ({message})")]
     Threads {
-        /// How many were to start.
+        /// Number of threads asked for.
         asked: usize,
-        /// How many did.
+        /// Number of threads started.
         started: usize,
-        /// What the operating system said.
+        /// The operating system's message.
         message: String,
     },
     /// A worker ended without a result.
@@ -154,9 +154,11 @@ impl Problem for CaptureProblem {
             }
             Self::Shorter { .. } => "Capture again from the beginning, replacing these touches.",
             Self::NotWritten { kind: ErrorKind::StorageFull | ErrorKind::QuotaExceeded, .. } => {
-                "Free some space, then resume the capture: what is checkpointed is safe."
+                "Free some space, then resume the capture: everything up to the last checkpoint is safe."
             }
-            Self::NotWritten { .. } => "Check the disk, then resume the capture: what is checkpointed is safe.",
+            Self::NotWritten { .. } => {
+                "Check the disk, then resume the capture: everything up to the last checkpoint is safe."
+            }
             Self::Threads { .. } => "Use fewer threads.",
             Self::WorkerStopped => "Report this as a bug.",
         }

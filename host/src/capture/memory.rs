@@ -9,7 +9,7 @@ use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// How many samples are drawn between two looks at the progress.
+/// Number of samples drawn between two updates of the progress.
 const CHUNK: u64 = 256;
 
 /// Touches the objects as [`capture`](super::capture) does, and returns what reading its directory would: the same touches,

@@ -13,22 +13,22 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use std::ops::Range;
 use std::time::Instant;
 
-/// How many samples a chunk has: some milliseconds of work.
+/// Number of samples in a chunk: some milliseconds of work.
 const CHUNK: u64 = 256;
 
-/// How many chunks a producer may be ahead.
+/// Number of chunks that a producer may be ahead.
 const AHEAD: usize = 8;
 
 /// The most producers, however many are asked for: what they may be ahead together stays a few megabytes.
 const MOST_THREADS: usize = 256;
 
-/// What a producer hands to the writer.
+/// Samples that a producer hands to the writer.
 struct Chunk {
     text: String,
     approaches: u64,
 }
 
-/// Captures all that the store does not have yet.
+/// Captures everything that the store does not have yet.
 pub(super) fn run(
     samplers: &[Sampler<'_>],
     settings: &Settings,

@@ -17,7 +17,7 @@ use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How often what is on the disk is checkpointed.
+/// Time between checkpoints of the data on the disk.
 const CHECKPOINT: Duration = Duration::from_millis(500);
 
 pub(super) struct Store {
@@ -68,7 +68,7 @@ impl Store {
         })
     }
 
-    /// What there is of an object.
+    /// Entry of an object.
     pub(super) fn entry(&self, object: usize) -> &Entry {
         &self.listing.objects[self.positions[object]]
     }
@@ -90,7 +90,7 @@ impl Store {
     }
 
     /// Gives the object's file its name, once all its touches are there, and takes its checksum. An interruption between
-    /// any two of these steps is made up for when the capture is resumed.
+    /// any two of these steps is repaired when the capture is resumed.
     pub(super) fn complete(&mut self, object: usize) -> Result<()> {
         let format = self.listing.origin.format;
         let (part, done) = (self.part(object), self.entry(object).file(&self.directory, format));

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::{Duration, Instant};
 
-/// What a chip says by itself or about a command.
+/// Message of a chip, by itself or about a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Received {
     /// The outcome of a command, in the commands' order.
@@ -111,17 +111,17 @@ impl Connection {
         &mut self.transport
     }
 
-    /// What this end has seen.
+    /// Counts kept by this end.
     pub fn statistics(&self) -> HostStatistics {
         self.end.statistics()
     }
 
-    /// Whether no command is without an outcome.
+    /// True if every command has its outcome.
     pub fn is_idle(&self) -> bool {
         self.end.is_idle()
     }
 
-    /// Whether [`Connection::submit`] would take a command at once.
+    /// True if [`Connection::submit`] would take a command at once.
     pub fn has_room(&self) -> bool {
         self.end.has_room()
     }
@@ -137,7 +137,7 @@ impl Connection {
         sent.map(|()| number.is_some())
     }
 
-    /// What the chip has said. Waits for it, but no longer than `wait`.
+    /// Returns the chip's next message, waiting no longer than `wait` for it.
     ///
     /// # Errors
     /// When the line broke, or the chip is silent or has forgotten the session: the error says how many commands are
@@ -245,7 +245,7 @@ impl Connection {
         }
     }
 
-    /// What the chip's end has seen.
+    /// Counts kept by the chip's end.
     ///
     /// # Errors
     /// When the line broke or the chip is silent.

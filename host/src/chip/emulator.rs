@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
 
-/// What to start for the port `emulator`.
+/// Program to start for the port `emulator`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Emulator {
     /// The program: QEMU for Arm.

@@ -1,23 +1,23 @@
-//! What can be wrong with chips, real and emulated, and the line to them.
+//! Problems with chips, real and emulated, and the line to them.
 
 use crate::error::Problem;
 use palpate_shared::link::{LinkError, Refusal};
 use std::path::PathBuf;
 
-/// What can be wrong with chips, real and emulated, and the line to them.
+/// Problems with chips, real and emulated, and the line to them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChipProblem {
     /// A port is written in a way that means nothing.
     #[error("`{text}` is not a port")]
     NotAPort {
-        /// What was given.
+        /// Text that was given.
         text: String,
     },
     /// Faults of a bad line are written in a way that means nothing.
-    #[error("`{text}` does not say what a bad line does")]
+    #[error("`{text}` does not describe a bad line")]
     NotFaults {
-        /// What was given.
+        /// Text that was given.
         text: String,
     },
     /// This build of the library has no serial ports.
@@ -26,7 +26,7 @@ pub enum ChipProblem {
     /// The operating system cannot open a serial port.
     #[error("cannot open the serial port: {reason}")]
     CannotOpen {
-        /// What the operating system said.
+        /// The operating system's message.
         reason: String,
         /// The serial ports that there are.
         ports: Vec<String>,
@@ -34,13 +34,13 @@ pub enum ChipProblem {
     /// Nobody answers at a TCP address.
     #[error("cannot connect to the chip: {reason}")]
     CannotConnect {
-        /// What the operating system said.
+        /// The operating system's message.
         reason: String,
     },
     /// The line to a chip broke while it was used.
     #[error("the connection to the chip was lost: {reason}")]
     Lost {
-        /// What the operating system said.
+        /// The operating system's message.
         reason: String,
     },
     /// The chip does not answer.
@@ -72,7 +72,7 @@ pub enum ChipProblem {
     #[error("the chip refuses the model: {0}")]
     ModelRefused(Refusal),
     /// An answer or outcome does not belong to what was asked.
-    #[error("the chip's answer does not belong to what it was asked")]
+    #[error("the chip's answer does not match the question")]
     UnexpectedAnswer,
     /// The chip's model is not the one that its verdicts shall be compared with.
     #[error("the chip's model is not the one to compare with: checksum {chip:08x} instead of {expected:08x}")]
@@ -95,7 +95,7 @@ pub enum ChipProblem {
     /// A line of a journal is wrong.
     #[error("not an entry of a journal: {reason}")]
     NotAnEntry {
-        /// What the parser said.
+        /// The parser's message.
         reason: String,
     },
     /// The emulator is not installed.
@@ -110,21 +110,21 @@ pub enum ChipProblem {
     /// The emulator ended by itself.
     #[error("the emulator ended{}", after_colon(said))]
     EmulatorEnded {
-        /// What it wrote to standard error.
+        /// Its standard error.
         said: String,
     },
-    /// The emulated chip did not come to an end.
+    /// The emulated chip did not finish.
     #[error("the emulated chip did not finish within {seconds} s{}", after_colon(said))]
     EmulatorTimeout {
-        /// How long it was given.
+        /// Time that it was given, in seconds.
         seconds: u64,
-        /// What it wrote.
+        /// Its output.
         said: String,
     },
     /// The emulated chip says nothing about a touch's instructions.
-    #[error("the emulated chip does not say how many instructions a touch takes{}", after_colon(said))]
+    #[error("the emulated chip did not report the instructions of a touch{}", after_colon(said))]
     NoCost {
-        /// What it wrote instead.
+        /// Its output instead.
         said: String,
     },
     /// A chip that cannot be reset from here.

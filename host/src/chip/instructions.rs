@@ -47,8 +47,8 @@ impl Chip {
         ["onboard/firmware/target", target, "release/cost"].iter().collect()
     }
 
-    /// Why instructions cannot be measured here: [`ChipProblem::NoEmulator`] or [`ChipProblem::NoImage`]. `None` if they
-    /// can be.
+    /// Reason why instructions cannot be measured here: [`ChipProblem::NoEmulator`] or [`ChipProblem::NoImage`]. `None`
+    /// if they can be.
     pub fn obstacle(self) -> Option<ChipProblem> {
         if !qemu::is_installed(Path::new(qemu::PROGRAM)) {
             return Some(ChipProblem::NoEmulator);
@@ -57,7 +57,7 @@ impl Chip {
         (!path.is_file()).then_some(ChipProblem::NoImage { path })
     }
 
-    /// Whether instructions can be measured here.
+    /// True if instructions can be measured here.
     pub fn is_there(self) -> bool {
         self.obstacle().is_none()
     }

@@ -1,4 +1,4 @@
-//! What happened on a link, as lines of JSON: for programs, and to be watched meanwhile or later.
+//! Journal of a link, as lines of JSON: for programs, and to be watched meanwhile or later.
 
 use super::{ChipModel, Update};
 use crate::error::{Error, Result};
@@ -52,15 +52,15 @@ pub enum Entry {
         direction: [f64; 3],
         /// Unit vector along the row of fingers.
         alignment: [f64; 3],
-        /// How well it distinguishes the likeliest object from the others, from 0 (not at all) to 1.
+        /// Degree to which it distinguishes the likeliest object from the others, from 0 (not at all) to 1.
         score: f64,
     },
     /// A fault of the chip's own fingers.
     Fault {
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
-    /// What both ends of the link have seen so far.
+    /// Counts of both ends of the link so far.
     Link {
         /// Frames that one end sent again.
         resent: u64,

@@ -117,7 +117,7 @@ pub(super) fn output(mut command: Command, patience: Duration) -> Result<String>
     if late { Err(ChipProblem::EmulatorTimeout { seconds: patience.as_secs(), said: text }.into()) } else { Ok(text) }
 }
 
-/// Whether `program` can be started.
+/// True if `program` can be started.
 pub(super) fn is_installed(program: &Path) -> bool {
     let version = Command::new(program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     version.is_ok_and(|status| status.success())

@@ -1,4 +1,4 @@
-//! What a chip's own fingers report, into a data set.
+//! Recording of the reports of a chip's own fingers into a data set.
 
 use super::{ChipModel, Connection, Received, Transport};
 use crate::error::{ChipProblem, Error, Result};
@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// How long to wait before the line is tried again.
+/// Time before the line is tried again.
 const RETRY: Duration = Duration::from_millis(500);
 
 /// Something new while touches are recorded.
@@ -30,9 +30,9 @@ pub enum Heard<'a> {
     Touch {
         /// The touch.
         touch: Touch,
-        /// How many touches of the object there are now.
+        /// Number of touches of the object there are now.
         number: u64,
-        /// What the chip made of it: that it does not count it does not matter here.
+        /// The chip's verdict; a touch that it does not count is recorded all the same.
         verdict: Result<VerdictMessage, Refusal>,
     },
     /// A touch was not recorded, because it was made before the recording began: the chip tells it again since it started.
@@ -41,7 +41,7 @@ pub enum Heard<'a> {
     NoPose(Touch),
     /// A finger is faulty.
     Fault {
-        /// What is wrong.
+        /// Kind of the fault.
         kind: FaultKind,
         /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
@@ -52,7 +52,7 @@ pub enum Heard<'a> {
     Idle,
 }
 
-/// How a recording went.
+/// Results of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RecordSummary {
     /// The object.
@@ -61,7 +61,7 @@ pub struct RecordSummary {
     pub touches: u64,
     /// Touches of the object that the data set holds now.
     pub all_touches: u64,
-    /// How many of the recorded touches have one, two and three contacts.
+    /// Number of the recorded touches with one, two and three contacts.
     pub contacts: [u64; 3],
     /// Touches that were not recorded because they lack the pose.
     pub without_pose: u64,
@@ -208,7 +208,7 @@ fn wait(
     }
 }
 
-/// Whether the line broke, or the chip does not know the session any more: it may come back.
+/// True if the line broke, or the chip does not know the session any more: it may come back.
 fn is_lost(error: &Error) -> bool {
     let lost = |problem: &ChipProblem| {
         matches!(problem, ChipProblem::Lost { .. } | ChipProblem::Silent { .. } | ChipProblem::Forgotten { .. })
@@ -216,7 +216,7 @@ fn is_lost(error: &Error) -> bool {
     is(error, lost)
 }
 
-/// Whether nothing is there yet.
+/// True if nothing is there yet.
 fn is_closed(problem: &ChipProblem) -> bool {
     matches!(problem, ChipProblem::CannotOpen { .. } | ChipProblem::CannotConnect { .. })
 }

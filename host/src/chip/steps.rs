@@ -1,4 +1,4 @@
-//! What is streamed to a chip: touches, and where one object ends and the next begins.
+//! Steps that are streamed to a chip: touches, and where one object ends and the next begins.
 
 use crate::error::{Error, Place, Result};
 use crate::touches::{Dataset, Log, ObjectTouches, Pool, parse_touch};
@@ -27,7 +27,7 @@ pub enum Steps {
         left: u64,
         /// Of each object the touches that may follow each other.
         pools: Vec<Vec<Pool>>,
-        /// Which sequence, and which touch of it.
+        /// Indices of the sequence and of its touch.
         at: (usize, usize),
     },
     /// Touches of a log, in the order of their times; where the object changes, another one begins.
@@ -72,7 +72,7 @@ impl Steps {
         Self::Logged(steps.into_iter())
     }
 
-    /// How many touches there will be, where that is known.
+    /// Number of touches there will be, where that is known.
     pub fn count(&self) -> Option<u64> {
         match self {
             Self::Sequences { left, .. } => Some(*left),

@@ -22,9 +22,9 @@ pub enum Update {
     Touch {
         /// The touch.
         touch: Touch,
-        /// What the chip knows after it.
+        /// The chip's verdict after it.
         verdict: VerdictMessage,
-        /// Whether this touch decided.
+        /// True if this touch decided.
         decided: bool,
         /// The posterior of each object, where the host recognizes too.
         posteriors: Option<Vec<f64>>,
@@ -33,7 +33,7 @@ pub enum Update {
     Refused {
         /// The touch.
         touch: Touch,
-        /// Why.
+        /// The reason.
         refusal: Refusal,
     },
     /// The approach that the chip proposes next, after a touch that decided nothing.
@@ -44,7 +44,7 @@ pub enum Update {
     Idle,
 }
 
-/// How a stream went.
+/// Results of a stream.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Touches that the chip counted.
@@ -55,13 +55,13 @@ pub struct Summary {
     pub compared: u64,
     /// Proposed approaches that were compared with the host's recognizer.
     pub approaches: u64,
-    /// Of all that was compared, with another verdict, posterior, evidence or approach.
+    /// Of everything that was compared, with another verdict, posterior, evidence or approach.
     pub differences: u64,
     /// The first of them.
     pub first_difference: Option<String>,
     /// Objects whose names were known and that were recognized correctly.
     pub right: u64,
-    /// Objects whose names were known and that were taken for others.
+    /// Objects whose names were known and that were mistaken for others.
     pub wrong: u64,
     /// Objects whose names were known and that were not recognized.
     pub undecided: u64,
@@ -111,7 +111,7 @@ impl Busy {
     }
 }
 
-/// What was sent and has no outcome yet.
+/// Messages that were sent and have no outcome yet.
 enum Sent {
     Object(Option<String>),
     Touch { touch: Touch, expected: Option<Result<VerdictMessage, Refusal>>, posteriors: Option<Vec<f64>> },
@@ -235,7 +235,7 @@ pub fn probability(q56: u64) -> f64 {
     q56 as f64 / (1_u64 << 56) as f64
 }
 
-/// What is known while a stream runs.
+/// State of a running stream.
 struct Run {
     summary: Summary,
     under_way: VecDeque<Sent>,

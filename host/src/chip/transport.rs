@@ -59,7 +59,7 @@ impl Transport {
         self
     }
 
-    /// What the transport is called in messages.
+    /// Name of the transport in messages.
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::ensemble::train::{Settings, train};
 use crate::ensemble::{Inputs, Node, Output};
-use crate::touches::synthetic;
+use crate::tests::synthetic;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ fn load(text: &[u8]) -> Result<Ensemble> {
     })
 }
 
-/// What is said about the document with the value at `pointer` replaced.
+/// Error message for the document with the value at `pointer` replaced.
 fn complaint(multi_output: bool, pointer: &str, value: Value) -> String {
     let mut changed = document(multi_output);
     *changed.pointer_mut(pointer).unwrap() = value;

@@ -4,20 +4,14 @@ use super::{Origin, Trained};
 use crate::compile::{self, CompiledModel};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
 use crate::probe::approach::Probe;
-use crate::touches::noise::Noise;
-use crate::touches::{self, Captured, Dataset, short, tenth, unit};
+use crate::probe::noise::Noise;
+use crate::probe::unit::{self, tenth};
+use crate::touches::{self, Captured, Dataset, short};
 use palpate_shared::format::{Length, TrainedProbe};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What an ensemble over touches states of them: attributes of its [`Origin`], as JSON.
-///
-/// | attribute | content |
-/// |---|---|
-/// | `palpate_probe` | [`probe`](Self::probe), a JSON object |
-/// | `palpate_noise` | [`noise`](Self::noise), a JSON object |
-/// | `palpate_touches` | [`touches`](Self::touches), a JSON object of hexadecimal numbers |
-/// | `palpate_captured` | [`captured`](Self::captured), a JSON object |
+/// Statements of an ensemble about its training touches. Empty for ensembles from elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TouchOrigin {
     /// The probe that made them, where the data set states it.
@@ -140,7 +134,7 @@ pub struct StatedProbe {
     /// The probe's measures.
     #[serde(flatten)]
     pub probe: Probe,
-    /// What its lengths are measured in.
+    /// Unit of its lengths.
     #[serde(default = "tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning in millimeters.
@@ -160,7 +154,7 @@ impl StatedProbe {
         dataset.origin.as_ref().map(Self::from)
     }
 
-    /// What a compiled model states about it. Units are made tenths of the longest side, whatever side objects were
+    /// Statements of a compiled model about it. Units are made tenths of the longest side, whatever side objects were
     /// scaled to.
     pub fn trained(&self) -> TrainedProbe {
         let scale = match self.unit {
@@ -252,7 +246,7 @@ fn fingerprints(dataset: &Dataset) -> BTreeMap<String, u64> {
 #[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     #[test]
     fn training_touches_are_known_again_and_others_are_not() {

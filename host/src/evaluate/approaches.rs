@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What a model does with approaches, drawn at random from those of an object. A touch that is no evidence to the model
+/// Results of a model on approaches, drawn at random from those of an object. A touch that is no evidence to the model
 /// costs an approach and changes nothing. Each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Approaches {
@@ -24,15 +24,15 @@ pub struct Approaches {
     pub accuracy_standard_error: BTreeMap<usize, f64>,
     /// The same for each object.
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
-    /// What the recognizer does that stops by itself.
+    /// Results of the recognizer that stops by itself.
     pub sequential: ApproachSequential,
 }
 
-/// What a recognizer does with approaches that stops by itself. Each object is weighted by its prior, as in
+/// Results on approaches of a recognizer that stops by itself. Each object is weighted by its prior, as in
 /// [`Sequential`](super::Sequential).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ApproachSequential {
-    /// What it was asked to stay below: the promised rate, or that of the posterior.
+    /// Error rate that it was asked to keep: the promised rate, or that of the posterior.
     pub error_rate: f64,
     /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
     pub promised: Option<f64>,

@@ -1,9 +1,9 @@
-//! What noise would cost a model that was trained without.
+//! Cost of noise to a model that was trained without it.
 
 use super::{Candidate, Margins, add_noise};
 use crate::ensemble::train::{self, train};
 use crate::error::Result;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use crate::touches::{Dataset, folds};
 use serde::Serialize;
 
@@ -59,7 +59,7 @@ pub fn cost_of_noise(dataset: &Dataset, settings: &train::Settings, noise: &Nois
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     #[test]
     fn much_noise_costs_much_and_none_costs_nothing() {

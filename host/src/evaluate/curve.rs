@@ -6,7 +6,7 @@ use super::margins::{Margins, rivals};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
-/// How often the object with the most evidence was the right one, after 1, 2, 3 … touches.
+/// Share of groups in which the object with the most evidence was the right one, after 1, 2, 3 … touches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     groups: usize,
@@ -14,12 +14,12 @@ pub struct Curve {
     correct: Vec<Vec<usize>>,
 }
 
-/// How sure a model was of the object with the most evidence, and whether that was the right one.
+/// Confidence of a model in the object with the most evidence, and its correctness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Confidence {
     /// The posterior of the best object.
     pub posterior: f64,
-    /// Whether it was the right one.
+    /// True if it was the right one.
     pub correct: bool,
 }
 
@@ -47,7 +47,8 @@ impl Margins<'_> {
         Ok(Curve { groups, correct: correct.collect() })
     }
 
-    /// How often each tested object (rows) was taken for each known one (columns) after `touches` touches.
+    /// Confusion matrix after `touches` touches: number of groups of each tested object (rows) recognized as each known
+    /// one (columns).
     ///
     /// # Errors
     /// As [`Margins::curve`], and `at` if `touches` is 0.
@@ -63,7 +64,7 @@ impl Margins<'_> {
         Ok((0..self.tested.len()).map(row).collect())
     }
 
-    /// How sure the model was after `touches` touches, for each group of each object; for calibration.
+    /// Confidence of the model after `touches` touches, for each group of each object; for calibration.
     ///
     /// # Errors
     /// As [`Margins::curve`], and `at` if `touches` is 0.
@@ -111,7 +112,7 @@ impl Margins<'_> {
         }
     }
 
-    /// What `end` makes of the evidence at the end of each group.
+    /// Applies `end` to the evidence at the end of each group.
     fn ends<T: Send>(
         &self,
         position: usize,
@@ -153,7 +154,7 @@ impl Curve {
         Estimate::share(self.correct[position][touches - 1], self.groups)
     }
 
-    /// The smallest number of touches from which on accuracy stays at or above one less `error_rate`, if there is one.
+    /// The smallest number of touches from which on accuracy stays at or above 1 − `error_rate`, if there is one.
     /// An empty curve has none.
     pub fn touches_to_error(&self, error_rate: f64) -> Option<usize> {
         let fails = |touches: &usize| self.accuracy(*touches).value < 1.0 - error_rate;

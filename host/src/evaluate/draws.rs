@@ -20,7 +20,7 @@ impl Draws {
         Self { moved: HashMap::new(), next: 0, all, random }
     }
 
-    /// How many numbers are left.
+    /// Number of numbers that are left.
     pub(super) fn left(&self) -> usize {
         self.all - self.next
     }

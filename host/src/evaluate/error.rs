@@ -1,9 +1,9 @@
-//! What can be wrong with evaluating.
+//! Problems with evaluating.
 
 use crate::error::Problem;
 use palpate_shared::Descriptor;
 
-/// What can be wrong with evaluating.
+/// Problems with evaluating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateProblem {
@@ -28,9 +28,9 @@ pub enum EvaluateProblem {
         object: String,
     },
     /// An object has too few touches to say what its touches give.
-    #[error("an object has only {found} touches to learn from what its touches give, or they are all alike")]
+    #[error("an object has only {found} touches to learn the expected evidence from, or they are all alike")]
     TooFewForFit {
-        /// How many there are.
+        /// Number of touches.
         found: usize,
     },
     /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
@@ -38,7 +38,7 @@ pub enum EvaluateProblem {
     TooFewForAlarms {
         /// Sequences of the object with the fewest.
         object_sequences: usize,
-        /// How many of each object it takes.
+        /// Number of sequences of each object that it takes.
         needed: u64,
     },
     /// The model works on other rows than touches.
@@ -51,7 +51,7 @@ pub enum EvaluateProblem {
         descriptor: Descriptor,
     },
     /// A compiled model and an ensemble are not of the same objects and descriptor.
-    #[error("the model was not compiled from this ensemble: its objects or its descriptor are others")]
+    #[error("the model was not compiled from this ensemble: its objects or its descriptor differ")]
     OtherModel,
     /// There is nothing to compare models on.
     #[error("there are no touches to compare the models on")]
@@ -78,7 +78,7 @@ pub enum EvaluateProblem {
     #[error("the model has no plan of approaches")]
     NoPlan,
     /// A plan was asked for a model of one object.
-    #[error("the model has one object: there is nothing to tell it from")]
+    #[error("the model has one object: there is nothing to distinguish it from")]
     OneObjectToPlan,
     /// A plan needs approaches, also those that missed.
     #[error("the data set holds full touches only, without the approaches in between")]
@@ -102,11 +102,11 @@ pub enum EvaluateProblem {
         object: String,
         /// The fewest approaches in a pose.
         found: usize,
-        /// How many there must be.
+        /// Smallest number allowed.
         needed: usize,
     },
     /// Something was asked for that only compiled models do.
-    #[error("forgetting is what a compiled model's recognizer does, and this is an ensemble")]
+    #[error("forgetting is a feature of a compiled model's recognizer, and this is an ensemble")]
     NotCompiled,
     /// There is one object only.
     #[error("the data set has one object: there is nothing to exchange it for")]
@@ -114,13 +114,13 @@ pub enum EvaluateProblem {
     /// Recorded and simulated touches cannot be compared.
     #[error("the touches cannot be compared: {detail}")]
     Incomparable {
-        /// Why not.
+        /// The reason.
         detail: String,
     },
     /// A line is not a touch.
     #[error("{detail}")]
     Touch {
-        /// What is wrong with it.
+        /// Description of the fault.
         detail: String,
     },
     /// A contact time is longer than an object can make it.
@@ -137,7 +137,7 @@ pub enum EvaluateProblem {
     },
 }
 
-/// Which of the two it is.
+/// Message about too few sequences: too few in all, or too few that do not end as unknown.
 fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
     if (object_sequences as u64) < needed {
         format!(

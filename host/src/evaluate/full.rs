@@ -8,9 +8,9 @@ use palpate_onboard::{Model, Rivals, Stopping, Verdict};
 pub(super) struct FullRecognizer {
     evidence: Vec<f64>,
     stopping: Stopping,
-    /// For each object, what the other objects' weights may come to, its own being 1.
+    /// For each object, the largest sum of the other objects' weights at which it is named, its own being 1.
     odds: Vec<f64>,
-    /// How many objects can be named.
+    /// Number of objects that can be named.
     known: usize,
     touches: u32,
     verdict: Verdict,

@@ -18,16 +18,16 @@ pub struct Margins<'m> {
     descriptor: Descriptor,
     /// The objects that the model has margins for.
     objects: Vec<String>,
-    /// How many of them can be named: all but a background.
+    /// Number of them that can be named: all but a background.
     known: usize,
     /// The data set's objects.
     pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
     hold_approaches: bool,
-    /// Whether a real probe made the touches.
+    /// True if a real probe made the touches.
     pub(super) is_recorded: bool,
     shares: [f64; 6],
-    /// How often each object that the model knows is touched, if not as the model says.
+    /// Weights of the objects that the model knows, if not as the model says.
     pub(super) weights: Option<Vec<u32>>,
 }
 
@@ -38,7 +38,7 @@ const STRANGER: usize = usize::MAX;
 pub(super) struct Tested<'m> {
     /// The object's index in the model, or [`STRANGER`].
     pub(super) object: usize,
-    /// How many touches are evidence to the model.
+    /// Number of touches that are evidence to the model.
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
     pub(super) approaches: Vec<Option<u32>>,
@@ -194,7 +194,7 @@ impl<'m> Margins<'m> {
         Ok(self)
     }
 
-    /// How often a tested object is touched, compared with others.
+    /// Frequency of touches of a tested object, compared with others.
     pub(super) fn frequency(&self, position: usize) -> f64 {
         let object = self.tested[position].object;
         match (&self.weights, self.candidate) {
@@ -229,7 +229,7 @@ impl<'m> Margins<'m> {
         self.tested.iter().map(|tested| tested.touches).sum()
     }
 
-    /// Whether the data set holds approaches.
+    /// True if the data set holds approaches.
     pub fn hold_approaches(&self) -> bool {
         self.hold_approaches
     }
@@ -259,7 +259,8 @@ impl<'m> Margins<'m> {
         self.tested[position].pool(group).fewest
     }
 
-    /// What the `draw`-th approach of the pool of group `group` is to the model.
+    /// Number, among the touches that are evidence, of the `draw`-th approach of the pool of group `group`; `None` if
+    /// it is no evidence.
     pub(super) fn approach(&self, position: usize, group: usize, draw: usize) -> Option<u32> {
         let tested = &self.tested[position];
         tested.approaches[tested.pool(group).touches[draw] as usize]
@@ -275,7 +276,7 @@ impl<'m> Margins<'m> {
         self.tested[position].pools.iter().map(|pool| pool.fewest_evidence).min().unwrap_or(0)
     }
 
-    /// What a group of this tested object is of, if not of all of its touches: for messages.
+    /// The touches that a group of this tested object is drawn from, if not of all of its touches: for messages.
     pub(super) fn of_what(&self, name: &str) -> &'static str {
         let position = self.tested_names.iter().position(|tested| tested == name);
         let pools = position.and_then(|position| self.tested.get(position)).map_or(1, |tested| tested.pools.len());
@@ -287,8 +288,8 @@ impl<'m> Margins<'m> {
         self.tested[position].pool(group).fewest_evidence
     }
 
-    /// How many different groups of `touches` touches can be drawn from the object with the fewest, where that is below
-    /// 2⁶⁴.
+    /// Number of different groups of `touches` touches that can be drawn from the object with the fewest, where that is
+    /// below 2⁶⁴.
     pub fn distinct_groups(&self, touches: usize) -> u64 {
         let all = self.fewest_touches();
         if touches > all {
@@ -404,7 +405,7 @@ pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
     (0..evidence.len()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best })
 }
 
-/// What the other objects' weights come to, the best one's being 1: its posterior is 1 / (1 + this).
+/// Sum of the other objects' weights, the best one's being 1: its posterior is 1 / (1 + this).
 pub(super) fn rivals(evidence: &[f64], best: usize, unit: f64) -> f64 {
     let most = evidence[best];
     let others = evidence.iter().enumerate().filter(|(object, _)| *object != best);

@@ -5,8 +5,8 @@ use super::{
     evaluate_active, strangers,
 };
 use crate::error::{Error, Result};
+use crate::probe::noise::Noise;
 use crate::touches::Dataset;
-use crate::touches::noise::Noise;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! How often, and after how many touches, a model is right.
+//! Accuracy of a model, and the touches that it needs.
 //!
 //! Margins are computed once for every test touch ([`Margins`]); everything else is sums of them over groups of touches,
 //! each group drawn at random without replacement from one object's touches:
@@ -32,10 +32,7 @@
 //! # }
 //! ```
 
-mod active;
 mod approaches;
-#[cfg(feature = "train")]
-pub mod compare;
 #[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
@@ -48,16 +45,15 @@ pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
-mod poses;
 mod promise;
+#[cfg(feature = "train")]
+pub mod recorded;
 mod sequential;
 mod strangers;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
-mod under_plan;
 
-pub use active::{Active, ActiveFacts};
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
@@ -72,17 +68,15 @@ pub use noisy::{ROBOTS, add_noise};
 pub use palpate_trees::verify::{
     self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict, together,
 };
-pub use plan::{Hardest, LEAST_IN_POSE, Planned, plan};
-pub use poses::{ByPose, Stock};
+pub use plan::{Active, ActiveFacts, ByPose, Hardest, LEAST_IN_POSE, Planned, Stock, evaluate_active, plan};
 pub use promise::{Finding, PromiseCheck, by_theory};
 pub use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};
 pub use switch::{Rule, Stopped, Switched};
-pub use under_plan::evaluate_active;
 
 use crate::error::{Error, Result};
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use palpate_shared::ContactPattern;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -96,7 +90,7 @@ pub const ERROR_RATE: f64 = 0.01;
 /// Accuracies that rest on fewer different groups than this say little.
 pub const LEAST_GROUPS: u64 = 200;
 
-/// What is evaluated.
+/// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Numbers of touches after which accuracy is wanted.
@@ -105,14 +99,14 @@ pub struct Settings {
     pub at_approaches: Vec<usize>,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
-    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
-    /// ensemble.
+    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds, 1 % for
+    /// an ensemble.
     pub error_rate: Option<f64>,
     /// Touches after which the recognizer gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble.
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,
-    /// What was added to the touches: what a model promises is void with other noise.
+    /// Noise added to the touches: the promise of a model is void with other noise.
     pub noise: Noise,
 }
 
@@ -133,14 +127,14 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// How sequences are drawn and stopped.
+    /// Settings for drawing and stopping sequences.
     pub fn sequential(&self) -> SequentialSettings {
         let &Self { error_rate, max_touches, groups, seed, .. } = self;
         SequentialSettings { error_rate, max_touches, sequences: groups, seed }
     }
 }
 
-/// What an evaluation found; as JSON, `palpate evaluate --json`. Shares are between 0 and 1; maps go from numbers of
+/// Results of an evaluation; as JSON, `palpate evaluate --json`. Shares are between 0 and 1; maps go from numbers of
 /// touches or objects' names to values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
@@ -156,13 +150,13 @@ pub struct Evaluation {
     pub accuracy_standard_error: BTreeMap<usize, f64>,
     /// The same for each object.
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
-    /// What the recognizer does that stops by itself.
+    /// Results of the recognizer that stops by itself.
     pub sequential: Sequential,
     /// The same counted in approaches, where the data set holds those; touches that are no evidence to the model cost an
     /// approach and change nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub approaches: Option<Approaches>,
-    /// Whether the model keeps what it promises: counted in approaches where the data set holds those.
+    /// Check of the model's promise: counted in approaches where the data set holds those.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promise: Option<PromiseCheck>,
     /// Share of each contact pattern among the touches of the data set, each object weighted equally.

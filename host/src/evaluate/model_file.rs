@@ -59,7 +59,7 @@ mod tests {
     use super::*;
     use crate::compile::{self, compile};
     use crate::ensemble::train::{Settings, train};
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     #[test]
     fn both_kinds_are_distinguished_and_anything_else_is_refused_by_name() {

@@ -1,7 +1,7 @@
 //! Test touches with noise.
 
 use crate::error::Result;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 
 /// The most robots whose biases are drawn.
@@ -28,7 +28,7 @@ mod tests {
     use super::*;
     use crate::ensemble::train::{Settings, train};
     use crate::evaluate::{Candidate, Margins};
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
     use std::collections::BTreeSet;
 
     #[test]

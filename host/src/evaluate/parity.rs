@@ -13,10 +13,10 @@ use palpate_shared::Touch;
 use rand::RngExt;
 use rayon::prelude::*;
 
-/// How far two models are apart.
+/// Distance between two models.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Parity {
-    /// How many touches were compared.
+    /// Number of touches compared.
     pub touches: usize,
     /// The largest difference of a margin, in nats.
     pub max_margin_error: f64,
@@ -24,7 +24,7 @@ pub struct Parity {
     pub stated_bound: f64,
     /// Touches after which another object is the best.
     pub best_differs: usize,
-    /// How many random sequences were compared.
+    /// Number of random sequences compared.
     pub sequences: usize,
     /// Sequences with another verdict: another object, or a decision by one model only.
     pub verdict_differs: usize,
@@ -94,7 +94,7 @@ pub fn parity(
     })
 }
 
-/// How far the margins of two models are apart.
+/// Distance between the margins of two models.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Difference {
     /// The largest difference of a margin, in nats.
@@ -178,8 +178,9 @@ fn compare_margins(full: &[f32], model: &Model<'_>, compiled: &[i32]) -> Differe
     Difference { max_margin_error: errors.fold(0.0, f64::max), best_differs }
 }
 
-/// Whether the verdicts differ (1, 0), or only the numbers of touches (0, 1). `draw` gives each touch's margins by the full
-/// and by the compiled model, and nothing for a touch that the model was not trained for: it is not counted by either.
+/// Compares two verdicts: (1, 0) if they differ, (0, 1) if only the numbers of touches do. `draw` gives each touch's
+/// margins by the full and by the compiled model, and nothing for a touch that the model was not trained for: it is not
+/// counted by either.
 ///
 /// # Errors
 /// [`EvaluateProblem::TooManyObjects`] if the model has more than `N` objects.
@@ -223,7 +224,7 @@ mod tests {
     use crate::compile::{self, compile};
     use crate::ensemble::train::{self, train};
 
-    use crate::touches::synthetic;
+    use crate::tests::synthetic;
 
     fn ensemble() -> Ensemble {
         let settings = train::Settings { rounds: 5, depth: 3, ..train::Settings::compact() };

@@ -1,16 +1,16 @@
-//! Whether a model keeps what it promises.
+//! Check of a model's promise.
 
 use super::Candidate;
 use super::Estimate;
 use super::margins::Margins;
 use super::sequential::Outcome;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{Counted, Per};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Whether a promise is kept on test touches.
+/// Finding about a promise on test touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Finding {
@@ -28,8 +28,8 @@ pub enum Finding {
 /// The probability of errors that a promise just kept is taken to be able to make.
 const BY_CHANCE: f64 = 0.01;
 
-/// Whether a model keeps its promise on test touches. Shares are of the names that are given; a sequence that ends
-/// undecided counts as neither right nor wrong.
+/// Check of a model's promise on test touches. Shares are of the names that are given; a sequence that ends undecided
+/// counts as neither right nor wrong.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PromiseCheck {
     /// The promised error rate.
@@ -48,12 +48,13 @@ pub struct PromiseCheck {
     pub of: Option<String>,
     /// By how much [`PromiseCheck::error`] is above the promised rate; negative below it.
     pub exceeded_by: f64,
-    /// Whether that is more than chance.
+    /// Result of a test of significance of that error rate.
     pub finding: Finding,
-    /// What differs from the calibration: with any of these the promise was made for other touches, and is void for these.
+    /// Differences from the calibration: with any of these the promise was made for other touches, and is void for
+    /// these.
     pub void: Vec<String>,
-    /// What the error rate is at most by theory, whatever the priors and the objects, if posteriors can be believed: which
-    /// they cannot with other noise than the calibration's.
+    /// Largest error rate by theory, whatever the priors and the objects, if posteriors can be believed: which they
+    /// cannot with other noise than the calibration's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub by_theory: Option<f64>,
 }
@@ -160,8 +161,8 @@ impl Margins<'_> {
         names.map(|(position, name)| (name, wrong(position))).filter(|(_, of)| of.given > 0.0).collect()
     }
 
-    /// What is wrong of the names given that `counts` (tested object's position, named object), each tested object weighted
-    /// by its frequency.
+    /// Share of wrong names among those that `counts` (tested object's position, named object), each tested object
+    /// weighted by its frequency.
     fn wrong_of(&self, outcomes: &[Vec<Outcome>], counts: impl Fn(usize, usize) -> bool) -> Wrong {
         let mut of = Wrong::default();
         for (position, outcomes) in outcomes.iter().enumerate() {
@@ -202,7 +203,7 @@ impl Wrong {
         Estimate { value, standard_error: (value * (1.0 - value) / self.effective()).sqrt() }
     }
 
-    /// Whether each of these is at most `rate`.
+    /// Finding about all of these, each compared with `rate`.
     fn finding<'w>(all: impl Iterator<Item = &'w Self> + Clone, rate: f64) -> Finding {
         let number = all.clone().count();
         let each = || all.clone().map(|wrong| Self::finding_of(*wrong, rate, number));
@@ -242,9 +243,9 @@ fn at_least(errors: f64, trials: f64, rate: f64) -> f64 {
     tail.min(1.0)
 }
 
-/// What the error rate of a model's thresholds is at most by theory, with any priors and of any of its objects: one less
-/// the posterior at the loosest threshold. A touch that passes it with little to spare comes close to this, as touches
-/// that say little do; a calibration finds how much is to spare on average, for all objects together.
+/// Largest error rate of a model's thresholds by theory, with any priors and of any of its objects: 1 minus the
+/// posterior at the loosest threshold. A touch that passes it with little to spare comes close to this, as touches that
+/// say little do; a calibration finds how much is to spare on average, for all objects together.
 ///
 /// With a temperature T above 1 the posterior is that of the evidence divided by T. The margin over n others together is
 /// then at least (margin − (T − 1) ln n) / T.

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// How sequences are drawn and stopped.
+/// Settings for drawing and stopping sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SequentialSettings {
-    /// The recognizer stops when the posterior passes one less this; `None` takes the model's own thresholds, 1 % for an
-    /// ensemble.
+    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds, 1 % for
+    /// an ensemble.
     pub error_rate: Option<f64>,
     /// Touches after which it gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble. An object
     /// with fewer test touches gives up when they are used up.
@@ -27,11 +27,11 @@ pub struct SequentialSettings {
     pub seed: u64,
 }
 
-/// What a recognizer does that stops by itself. Each object is weighted by its prior: equally, unless the model or
+/// Results of a recognizer that stops by itself. Each object is weighted by its prior: equally, unless the model or
 /// [`Margins::expecting`] says otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
-    /// What it was asked to stay below: the promised rate, or that of the posterior.
+    /// Error rate that it was asked to keep: the promised rate, or that of the posterior.
     pub error_rate: f64,
     /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
     pub promised: Option<f64>,
@@ -70,7 +70,7 @@ pub struct Sequential {
     pub outcomes: Vec<Vec<Outcome>>,
 }
 
-/// How a sequence ended.
+/// Outcome of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outcome {
     /// Touches used that were evidence.
@@ -79,7 +79,7 @@ pub struct Outcome {
     pub approaches: usize,
     /// The object recognized (its index in the model), or none.
     pub recognized: Option<usize>,
-    /// Whether the touches fitted no object. Neither this nor recognized: the recognizer gave up.
+    /// True if the touches fitted no object. Neither this nor recognized: the recognizer gave up.
     pub unknown: bool,
 }
 
@@ -161,7 +161,7 @@ impl Margins<'_> {
         self.figure(outcomes, |_, outcomes| Estimate::mean(outcomes.iter().map(|outcome| number(outcome) as f64)))
     }
 
-    /// What `of` makes of a tested object's position and the sequences of it.
+    /// Estimate that `of` computes from a tested object's position and the sequences of it.
     fn figure(&self, outcomes: &[Vec<Outcome>], of: impl Fn(usize, &[Outcome]) -> Estimate) -> Figure {
         let estimates: Vec<Estimate> =
             outcomes.iter().enumerate().map(|(position, outcomes)| of(position, outcomes)).collect();
@@ -203,7 +203,7 @@ impl Margins<'_> {
         }
     }
 
-    /// What a recognizer that stops like this was asked to stay below, and what the model promises then.
+    /// Error rate that a recognizer with this stopping rule was asked to keep, and the model's promise for it.
     pub(super) fn stated(&self, settings: &SequentialSettings, stopping: Stopping) -> Stated {
         match (settings.error_rate, self.candidate) {
             (None, Candidate::Compiled(model)) => match model.promise() {
@@ -220,8 +220,8 @@ impl Margins<'_> {
         }
     }
 
-    /// How a sequence of approaches of a tested object ends: each the position of a touch among those that are evidence,
-    /// or none.
+    /// Outcome of a sequence of approaches of a tested object: each the position of a touch among those that are
+    /// evidence, or none.
     pub(super) fn outcome(
         &self,
         position: usize,
@@ -248,7 +248,7 @@ impl Margins<'_> {
     }
 }
 
-/// What a model was asked to stay below, and what it promises.
+/// Error rate that a model was asked to keep, and its promise.
 pub(super) struct Stated {
     pub(super) error_rate: f64,
     pub(super) promised: Option<f64>,

@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 /// Numbers of touches by which strangers are counted as detected.
 pub const DETECTED_BY: [usize; 3] = [30, 60, 120];
 
-/// What a recognizer that stops by itself does with objects that its model does not know. Touches are those that are
+/// Results of a recognizer that stops by itself on objects that its model does not know. Touches are those that are
 /// evidence; each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Strangers {
-    /// Whether the model has a test of fit; without one nothing is ever found out.
+    /// True if the model has a test of fit; without one no stranger is ever detected.
     pub has_test: bool,
     /// Share of the known objects' sequences that ended as unknown.
     pub false_alarms: f64,
@@ -32,8 +32,8 @@ pub struct Strangers {
     pub false_alarms_per_object: BTreeMap<String, f64>,
 }
 
-/// What a model says to sequences of strangers; `known` is what it says to those of objects that it knows, under the same
-/// settings. `strangers` are the model's margins for [objects that it does not know](Margins::of_strangers).
+/// Verdicts of a model on sequences of strangers; `known` are those on sequences of objects that it knows, under the
+/// same settings. `strangers` are the model's margins for [objects that it does not know](Margins::of_strangers).
 ///
 /// # Errors
 /// As [`Margins::sequential`].

@@ -1,4 +1,4 @@
-//! What happens when the object is exchanged while it is being touched, and what forgetting does about it.
+//! Effects of exchanging the object while it is being touched, and of forgetting.
 
 use super::Estimate;
 use super::margins::{Margins, Values, row};
@@ -21,7 +21,7 @@ pub struct Switched {
     pub on: Rule,
 }
 
-/// What a rule comes to. Each object is weighted equally.
+/// Results of a rule. Each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rule {
     /// The object stays the same: approaches to a verdict.
@@ -33,7 +33,7 @@ pub struct Rule {
     pub old: f64,
 }
 
-/// How sequences ended.
+/// Outcomes of sequences.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stopped {
     /// Approaches on average, also where no verdict was reached.

@@ -1,9 +1,9 @@
-//! What can be wrong with meshes and where they come from.
+//! Problems with meshes and where they come from.
 
 use crate::error::Problem;
 use std::path::PathBuf;
 
-/// What can be wrong with meshes and where they come from.
+/// Problems with meshes and where they come from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshProblem {
@@ -19,7 +19,7 @@ pub enum MeshProblem {
     /// Several objects where one is asked for.
     #[error("{count} objects, where one is needed")]
     SeveralObjects {
-        /// How many there are.
+        /// Number of objects.
         count: usize,
     },
     /// Two sources give objects of one name.
@@ -41,21 +41,21 @@ pub enum MeshProblem {
     /// A coordinate is no number.
     #[error("{text:?} is not a number")]
     NotANumber {
-        /// What stands there instead, shortened.
+        /// Text that is there instead, shortened.
         text: String,
     },
     /// A coordinate is infinite, not a number, or beyond the range of an `f32`.
     #[error("the coordinate {axis} = {text:?} is not finite")]
     NotFinite {
-        /// Which one: `x`, `y` or `z`.
+        /// The axis: `x`, `y` or `z`.
         axis: char,
-        /// What stands there, shortened.
+        /// Text that is there, shortened.
         text: String,
     },
     /// A face has something else than vertex indices.
     #[error("{text:?} is not a vertex of a face")]
     NotAnIndex {
-        /// What stands there instead, shortened.
+        /// Text that is there instead, shortened.
         text: String,
     },
     /// A face's index is 0, or counts back to before the first vertex.
@@ -63,7 +63,7 @@ pub enum MeshProblem {
     IndexBeforeFirst {
         /// The index as it stands in the file: negative ones count back from the last vertex.
         index: i64,
-        /// How many vertices the file has before the face.
+        /// Number of vertices before the face in the file.
         vertices: u64,
     },
     /// A face's index is larger than the number of vertices.
@@ -71,7 +71,7 @@ pub enum MeshProblem {
     IndexAfterLast {
         /// The index, counted from 1.
         index: u64,
-        /// How many vertices the file has.
+        /// Number of vertices of the file.
         vertices: u64,
     },
     /// A face's index is negative, or larger than the number of vertices.
@@ -79,7 +79,7 @@ pub enum MeshProblem {
     NoSuchVertex {
         /// The index as it stands in the file, counted from 0.
         index: i64,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: u64,
     },
     /// A file is not what a file of its kind must be.
@@ -87,21 +87,21 @@ pub enum MeshProblem {
     Damaged {
         /// The kind of file: `STL`.
         format: &'static str,
-        /// What is wrong with it.
+        /// Description of the fault.
         what: String,
     },
     /// A file uses what is not read and would change the surface.
     #[error("{what} is not read")]
     Unsupported {
-        /// What it is, by name.
+        /// Name of the feature.
         what: String,
-        /// What to do instead, as a sentence without its full stop.
+        /// Remedy, as a sentence without its full stop.
         instead: &'static str,
     },
     /// The meshes of a file, placed as often as it says, are too large for a file of its length; or a pipe does not end.
     #[error("the mesh would take more than {limit} bytes")]
     TooLarge {
-        /// How many bytes it may take.
+        /// Largest number of bytes allowed.
         limit: u64,
     },
     /// More vertices than an index can tell apart.
@@ -110,7 +110,7 @@ pub enum MeshProblem {
     /// The parser refuses the file for another reason.
     #[error("cannot be read as a mesh ({reason})")]
     Unreadable {
-        /// What the parser says.
+        /// The parser's message.
         reason: String,
     },
     /// The mesh has no triangles.
@@ -124,7 +124,7 @@ pub enum MeshProblem {
     MissingVertex {
         /// The index, counted from 0.
         index: u32,
-        /// How many vertices the mesh has.
+        /// Number of vertices of the mesh.
         vertices: usize,
     },
     /// A triangle has a vertex that is infinite or not a number.

@@ -9,8 +9,8 @@ use glam::DVec3;
 /// A mesh as it was read, and what was subtracted from its coordinates.
 pub(super) type Moved = (Mesh, [f64; 3]);
 
-/// How many times a mesh's longest side its center may be from the origin, along an axis, for its coordinates to stay as
-/// they are. So far out, rounding moves a surface by less than a probe moves in a microsecond.
+/// Largest distance of a mesh's center from the origin, along an axis and in longest sides, at which its coordinates
+/// stay as they are. So far out, rounding moves a surface by less than a probe moves in a microsecond.
 const FAR: f64 = 16.0;
 
 /// The bounding box of vertices, one after the other. What is not finite is left out.
@@ -40,7 +40,7 @@ impl Bounds {
         }
     }
 
-    /// What is to be subtracted from the coordinates: the center, if it is far from the origin, else nothing.
+    /// Offset to subtract from the coordinates: the center, if it is far from the origin, else nothing.
     pub(super) fn offset(&self) -> [f64; 3] {
         let (center, side) = (self.low.midpoint(self.high), (self.high - self.low).max_element());
         // Without a vertex, neither is a number.

@@ -47,10 +47,10 @@ pub mod obj;
 mod placed;
 mod ply;
 mod polygon;
-#[cfg(test)]
-mod samples;
 pub mod source;
 mod stl;
+#[cfg(test)]
+mod tests;
 mod triangles;
 mod words;
 
@@ -66,9 +66,9 @@ pub const BACKGROUND: &str = "background";
 pub struct Object {
     /// Its name: the label of its touches and of its output in a model, and the stem of its files.
     pub name: String,
-    /// How many millimeters a unit of its meshes is, where that is known: what touching it at its true size needs.
+    /// Number of millimeters in a unit of its meshes, where that is known: what touching it at its true size needs.
     pub millimeters: Option<f64>,
-    /// What a user should know of how it was found and read: other files of its name that were passed over.
+    /// Notes for the user on how it was found and read: other files of its name that were passed over.
     pub notes: Vec<String>,
     first: Instance,
     others: Vec<Instance>,
@@ -77,7 +77,7 @@ pub struct Object {
 /// One mesh of an object.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// What distinguishes it from the object's other instances.
+    /// Name that distinguishes it from the object's other instances.
     pub name: String,
     /// Its mesh, in the units of its file.
     pub mesh: Mesh,

@@ -38,7 +38,7 @@ impl Cutter {
     }
 }
 
-/// Whether the polygon turns the same way at every corner.
+/// True if the polygon turns the same way at every corner.
 fn is_convex(corners: &[[f64; 3]]) -> bool {
     let corner = |index: usize| glam::DVec3::from(corners[index % corners.len()]);
     let turn = |i: usize| (corner(i + 1) - corner(i)).cross(corner(i + 2) - corner(i + 1));

@@ -36,9 +36,9 @@ use crate::capture::Sampler;
 use crate::error::{EvaluateProblem, Result};
 use crate::mesh::Mesh;
 use crate::probe::approach::{Approach, FINGERS};
+use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::touches::Origin;
-use crate::touches::noise::Noise;
 use glam::DVec3;
 use palpate_onboard::{Model, Proposal, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
@@ -46,7 +46,7 @@ use palpate_shared::Touch;
 /// The most approaches that are drawn to find one in a pose. Of 104 poses the rarest is one approach in about 300.
 const MOST_DRAWN: u64 = 100_000;
 
-/// What is played with: objects, models, and what is added to touches.
+/// Parts of a game: objects, models, and the noise that is added to touches.
 #[derive(Debug)]
 pub struct Game<'m> {
     origin: Origin,
@@ -85,7 +85,7 @@ pub struct Player<'m> {
 pub struct Approached {
     /// Where the probe came from.
     pub approach: Approach,
-    /// How far each finger moved to its contact, in units; none for one that missed.
+    /// Distance that each finger moved to its contact, in units; none for one that missed.
     pub distances: [Option<f64>; FINGERS],
     /// The touch as it was.
     pub exact: Touch,
@@ -132,7 +132,7 @@ impl<'m> Game<'m> {
         Ok(())
     }
 
-    /// How many objects there are.
+    /// Number of objects.
     pub fn objects(&self) -> usize {
         self.objects.len()
     }
@@ -152,7 +152,7 @@ impl<'m> Game<'m> {
         self.objects.get(object).map(|thing| &thing.scene)
     }
 
-    /// Begins to touch an object; `None` if there is no such object. The seed decides about all that is random.
+    /// Begins to touch an object; `None` if there is no such object. The seed determines all random numbers.
     pub fn round(&self, object: usize, seed: u64) -> Option<Round<'m>> {
         self.objects.get(object)?;
         let player = |model| {
@@ -251,7 +251,7 @@ impl<'m> Player<'m> {
         }
     }
 
-    /// What it knows.
+    /// Its recognizer.
     pub fn recognizer(&self) -> &Recognizer<'m, 256> {
         &self.recognizer
     }
@@ -261,12 +261,12 @@ impl<'m> Player<'m> {
         self.approaches
     }
 
-    /// Why the last approach was no evidence to it, if it was not.
+    /// Reason why the last approach was no evidence to it, if it was not.
     pub fn refused(&self) -> Option<Refused> {
         self.refused
     }
 
-    /// Whether it has a verdict, or gave up.
+    /// True if it has a verdict, or gave up.
     pub fn is_done(&self) -> bool {
         self.recognizer.verdict() != Verdict::Undecided
     }

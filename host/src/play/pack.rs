@@ -1,4 +1,4 @@
-//! What a page holds: bytes compressed by DEFLATE, and a mesh as few of them.
+//! Packed data of a page: bytes compressed by DEFLATE, and a mesh as few of them.
 //!
 //! Corners are multiples of a step, so that a vertex is three whole numbers of 16 bits. Vertices stand in the order in
 //! which triangles first use them, each as its differences from the one before; an index is how far it lies behind the

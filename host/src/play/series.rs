@@ -15,7 +15,7 @@ pub struct Series<'m> {
     scores: Vec<Score>,
 }
 
-/// How one model did.
+/// Results of one model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Score {
     /// Rounds that it has finished.
@@ -59,12 +59,12 @@ impl<'m> Series<'m> {
         Self { seed, rounds: 0, current: None, scores: vec![Score::default(); game.models().len()] }
     }
 
-    /// How each model did, in rounds that all have finished.
+    /// Results of each model, in rounds that all have finished.
     pub fn scores(&self) -> &[Score] {
         &self.scores
     }
 
-    /// How many rounds are finished.
+    /// Number of rounds finished.
     pub fn rounds(&self) -> u64 {
         self.rounds
     }

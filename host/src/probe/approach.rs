@@ -12,7 +12,7 @@ use rand::{Rng, RngExt};
 /// The number of the probe's fingers.
 pub const FINGERS: usize = 3;
 
-/// How far outside the sphere about the object's bounding box an approach starts, in units.
+/// Distance from the sphere about the object's bounding box at which an approach starts, in units.
 pub const CLEARANCE: f64 = 5.0;
 
 /// The probe's dimensions and motion.
@@ -23,9 +23,9 @@ pub struct Probe {
     pub radius: f64,
     /// The distance between neighboring fingers' centers, in units.
     pub spacing: f64,
-    /// How fast the probe moves, in units per second.
+    /// Speed of the probe, in units per second.
     pub speed: f64,
-    /// How far the row of fingers may be tilted from the perpendicular to the motion, in degrees, to either side.
+    /// Largest tilt of the row of fingers from the perpendicular to the motion, in degrees, to either side.
     pub tilt: f64,
 }
 
@@ -107,7 +107,7 @@ impl Aim {
         [center - half, center + half]
     }
 
-    /// Whether this is the default, which files leave out.
+    /// True if this is the default, which files leave out.
     pub(crate) fn is_box(&self) -> bool {
         *self == Self::Box
     }
@@ -153,7 +153,7 @@ impl Approach {
         [-1.0, 0.0, 1.0].map(|place| self.start + self.alignment * (place * spacing))
     }
 
-    /// How far the probe has moved when each finger first touches, in units; none for a finger that never does.
+    /// Distance that the probe has moved when each finger first touches, in units; none for a finger that never does.
     pub fn distances(&self, scene: &Scene, probe: &Probe) -> [Option<f64>; FINGERS] {
         self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius))
     }

@@ -108,12 +108,12 @@ pub fn annotate(lines: &[Line], times: &[Option<f64>]) -> String {
     text
 }
 
-/// How well the times of one set agree with those that a file gives.
+/// Agreement of the times of one set with those that a file gives.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Agreement {
     /// The name of the set.
     pub set: String,
-    /// How many of its casts have a known time.
+    /// Number of its casts with a known time.
     pub casts: usize,
     /// Known contacts that were not found.
     pub missed: usize,

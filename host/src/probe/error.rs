@@ -1,4 +1,4 @@
-//! What can be wrong with scenes, probes and casts.
+//! Problems with scenes, probes and casts.
 
 use crate::error::Problem;
 
@@ -16,31 +16,39 @@ pub enum ProbeProblem {
         first: String,
         /// The other.
         second: String,
-        /// What differs: "radius 0.15 and 0.3".
+        /// The differences: "radius 0.15 and 0.3".
         differences: String,
     },
     /// A probe file is not TOML, or not a probe.
     #[error("not a usable probe file: {message}")]
     BadFile {
-        /// What is wrong.
+        /// Description of the fault.
         message: String,
+    },
+    /// A text is no duration, angle or share.
+    #[error("{text:?} is not a quantity with its unit")]
+    BadQuantity {
+        /// The text.
+        text: String,
+        /// What to write, with an example.
+        example: &'static str,
     },
     /// A line of a file of casts has too few or too many fields.
     #[error("{fields} fields where a cast has 7, or 8 with a time")]
     CastFields {
-        /// How many fields the line has.
+        /// Number of fields of the line.
         fields: usize,
     },
     /// A coordinate of a cast is not a finite number.
     #[error("{text:?} is not a finite number")]
     CastCoordinate {
-        /// What stands there instead.
+        /// Text that is there instead.
         text: String,
     },
     /// The known time of a cast is neither a number that is at least 0 nor `miss`.
     #[error("{text:?} is neither a time nor `miss`")]
     CastTime {
-        /// What stands there instead.
+        /// Text that is there instead.
         text: String,
     },
 }
@@ -48,10 +56,11 @@ pub enum ProbeProblem {
 impl Problem for ProbeProblem {
     fn fix(&self) -> String {
         match self {
-            Self::Differs { .. } => "Use both with the same probe: times mean something else with another.".into(),
+            Self::Differs { .. } => "Use both with the same probe: with another, times have another meaning.".into(),
             Self::BadFile { .. } => {
                 "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, timer and [real].".into()
             }
+            Self::BadQuantity { example, .. } => format!("Give {example}."),
             Self::CastFields { .. } | Self::CastCoordinate { .. } | Self::CastTime { .. } => {
                 "Give set,ox,oy,oz,dx,dy,dz and, if known, t.".into()
             }

@@ -23,29 +23,29 @@
 //! Radius, spacing, speed and unit are what a data set and a model state and what is compared. What the real probe adds
 //! is not compared: it is added to touches by a capture with this file or else in training and testing, and never twice.
 
-use crate::error::{Error, Place, ProbeProblem, Problem, Result, TouchesProblem};
+use crate::error::{Error, Place, ProbeProblem, Problem, Result};
 use crate::probe::approach::{FINGERS, Probe};
-use crate::touches::noise::{Deviation, Noise, quantity};
+use crate::probe::noise::{Deviation, Noise, quantity};
 use palpate_shared::format::Length;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use std::path::Path;
 
-/// What a probe file states.
+/// Contents of a probe file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeFile {
     /// The probe's measures.
     pub probe: Probe,
-    /// What they are measured in.
+    /// Unit of the lengths.
     pub unit: Length,
-    /// What the real probe adds.
+    /// Noise that the real probe adds.
     pub real: Noise,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    #[serde(default = "crate::touches::tenth", with = "crate::touches::unit")]
+    #[serde(default = "super::unit::tenth", with = "super::unit")]
     unit: Length,
     radius: f64,
     spacing: f64,
@@ -143,7 +143,7 @@ fn tilt() -> f64 {
 /// A quantity that is written as text with its unit.
 fn read<'de, D: Deserializer<'de>, T>(
     deserializer: D,
-    parse: impl Fn(&str) -> Result<T, TouchesProblem>,
+    parse: impl Fn(&str) -> Result<T, ProbeProblem>,
 ) -> Result<Option<T>, D::Error> {
     let text = String::deserialize(deserializer)?;
     parse(&text).map(Some).map_err(|problem| D::Error::custom(format!("{problem}. {}", problem.fix())))

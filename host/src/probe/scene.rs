@@ -80,7 +80,7 @@ impl Scene {
         self.surface.first_contact(origin, direction, radius)
     }
 
-    /// Whether such a sphere's path meets the bounding box; if not, it never touches. Much cheaper than a cast.
+    /// True if the sphere's path meets the bounding box; if not, it never touches. Much cheaper than a cast.
     pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
         self.surface.may_touch(origin, direction, radius)
     }

@@ -15,7 +15,7 @@ pub(super) enum Until {
     Named { level: f64 },
 }
 
-/// How sequences are followed.
+/// Rules for following sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Policy {
     pub(super) until: Until,
@@ -33,12 +33,12 @@ impl Policy {
     }
 }
 
-/// What is known at a look.
+/// State at a look.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Look {
     /// The misfit of the leading object less what is allowed at first, in nats; infinitely small before the first test.
     level: f64,
-    /// Whether the leading object's posterior has passed the model's threshold.
+    /// True if the leading object's posterior has passed the model's threshold.
     is_decided: bool,
 }
 
@@ -46,7 +46,7 @@ struct Look {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sequence(Vec<Look>);
 
-/// How a sequence ends.
+/// End of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct End {
     pub(super) is_alarm: bool,
@@ -54,7 +54,7 @@ pub(super) struct End {
 }
 
 impl Sequence {
-    /// How it ends with these limits of misfit and names from `least` touches on.
+    /// Its end with these limits of misfit and names from `least` touches on.
     pub(super) fn end(&self, threshold: f64, doubt: f64, least: u32) -> End {
         for (look, touches) in self.0.iter().zip(1_u64..) {
             if look.level > threshold {
@@ -83,7 +83,7 @@ pub(super) fn shuffle<T>(touches: &mut [T], name: &str, seed: u64, pool: u64) {
     touches.shuffle(&mut random::generator(seed, Purpose::Fit, name, pool));
 }
 
-/// How far beyond the threshold a misfit may be after this number of touches, in nats.
+/// Amount by which a misfit may exceed the threshold after this number of touches, in nats.
 pub(super) fn early(touches: u32) -> f64 {
     EARLY * libm::exp2(-f64::from(touches) / HALVED_AFTER)
 }
@@ -122,7 +122,7 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy,
     supplies.par_iter().map(of).collect()
 }
 
-/// Follows one sequence; whether it came to its end before the touches did.
+/// Follows one sequence; returns true if it ended before the touches did.
 fn one<'r>(
     model: &Model<'_>,
     rows: &mut impl Iterator<Item = &'r [i32]>,
@@ -146,7 +146,7 @@ fn one<'r>(
     true
 }
 
-/// Whether the leader's posterior passes the model's threshold.
+/// True if the leader's posterior passes the model's threshold.
 fn is_decided(model: &Model<'_>, evidence: &[i64]) -> bool {
     let known = 0..model.known_count();
     let leader = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best }).unwrap_or(0);

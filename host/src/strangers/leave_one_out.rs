@@ -1,4 +1,4 @@
-//! How many strangers a test finds out: each object in turn is left out of the training.
+//! Detection rate of a test for strangers: each object in turn is left out of the training.
 
 use super::{Calibrated, Settings, calibrate};
 use crate::compile::{self, compile};
@@ -20,18 +20,18 @@ pub struct Sets<'d> {
     pub test: &'d Dataset,
 }
 
-/// What happened with one object left out.
+/// Results with one object left out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeftOut {
     /// The object.
     pub object: String,
-    /// What the calibration found; none without a test.
+    /// Result of the calibration; none without a test.
     pub calibrated: Option<Calibrated>,
-    /// What was said to it, and how often a known object was taken for unknown.
+    /// Verdicts on it, and the rate at which a known object was taken for unknown.
     pub strangers: evaluate::Strangers,
-    /// How its sequences ended.
+    /// Outcomes of its sequences.
     pub outcomes: Vec<Outcome>,
-    /// What was said to the other objects.
+    /// Verdicts on the other objects.
     pub known: Sequential,
 }
 

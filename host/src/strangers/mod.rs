@@ -1,7 +1,7 @@
 //! A test of whether touches fit any object that a model knows, made from touches that its training never saw.
 //!
 //! ```text
-//! touches ──► margins ──┬─ a quarter ──► what touches of each object give: means and covariances (fit)
+//! touches ──► margins ──┬─ a quarter ──► what touches of each object give: means and covariances (misfit)
 //! other shapes ─────────┼──────────────► what touches of strangers give
 //!                       │                        └──► the misfit, in integers (fixed)
 //!                       └─ the rest ───► sequences (follow) ──► its threshold, by Learn-then-Test
@@ -12,17 +12,18 @@
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
 //! each object does; measured, that detects as many strangers as the exact ratio.
 //!
-//! Measured on ten real meshes, each left out in turn, with a background column, at most 2 % of known objects' sequences
-//! being taken for unknown (`tests/src/bin/left_out.rs`; 40 trees of depth 5 on curvature of full touches): [`Held::Certain`]
-//! finds out .28 of the strangers by 30 touches, .60 by 60, .88 by 120, and names .007; a known object takes 93 touches
-//! instead of 27.5; on oriented touches .95 by 30 and .97 by 60, and 20 touches instead of 7. [`Held::Likely`] finds out .53 by 60 touches and names .40, for 27.2 touches. Hopeless by curvature
-//! alone: a fork where a spoon is known (.23 by 120 touches), and until 60 touches a hammer where a paper clip is (.18).
+//! Measured on ten real meshes, each left out in turn, with a background column, at most 2 % of known objects'
+//! sequences being declared unknown (`tests/src/bin/left_out.rs`; 40 trees of depth 5 on curvature of full touches):
+//! [`Held::Certain`] detects .28 of the strangers by 30 touches, .60 by 60, .88 by 120, and names .007; a known
+//! object takes 93 touches instead of 27.5; on oriented touches .95 by 30 and .97 by 60, and 20 touches instead of 7.
+//! [`Held::Likely`] detects .53 by 60 touches and names .40, for 27.2 touches. Hopeless by curvature alone: a fork
+//! where a spoon is known (.23 by 120 touches), and until 60 touches a hammer where a paper clip is (.18).
 
-mod fit;
 mod fixed;
 mod follow;
 mod found;
 mod leave_one_out;
+mod misfit;
 mod promised;
 #[cfg(feature = "objects")]
 mod shapes;
@@ -41,23 +42,23 @@ use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::together::margins_of_touches;
 use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
-use fit::Moments;
 use follow::{Policy, Sequence};
+use misfit::Moments;
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
-use palpate_shared::format::{FitTerms, Held, Strangers, Tag};
+use palpate_shared::format::{Held, MisfitTerms, Strangers, Tag};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Touches from which on a test is made.
 const FIRST: u32 = 5;
-/// How much higher the limits of misfit are at first, in nats, and the touches after which this has halved. Measured to
-/// find out most strangers after 60 and 120 touches.
+/// Amount by which the limits of misfit are higher at first, in nats, and the touches after which this has halved.
+/// Measured to detect most strangers after 60 and 120 touches.
 const EARLY: f64 = 12.0;
 const HALVED_AFTER: f64 = 21.0;
 /// With [`Held::Certain`] no name is given whose misfit is not this far below the threshold, in nats.
 const DOUBT: f64 = 8.0;
-/// The share of strangers that must have been found out before a name is given, and the most touches to wait for it.
+/// The share of strangers that must have been detected before a name is given, and the most touches to wait for it.
 const FOUND_OUT: f64 = 0.8;
 const MOST_HELD: u32 = 120;
 /// Between two thresholds that are tried, in nats, and how many are.
@@ -66,10 +67,10 @@ const STEPS: usize = 400;
 /// 2^-16 nats.
 const NAT: f64 = 65_536.0;
 
-/// What is asked of a test.
+/// Requirements on a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// How long names are held back.
+    /// Rule for holding names back.
     pub held: Held,
     /// The share of known objects' sequences that may end as unknown.
     pub alarms: f64,
@@ -93,14 +94,14 @@ pub struct Calibrated {
     /// The model's bytes.
     pub bytes: Vec<u8>,
     /// What is the same for all objects.
-    pub terms: FitTerms,
+    pub terms: MisfitTerms,
     /// Of the sequences that the threshold was tested on, those that ended as unknown.
     pub alarms: usize,
     /// Touches used on average in these sequences.
     pub mean_touches: f64,
     /// The same without a test.
     pub mean_touches_without: f64,
-    /// For each known object the share of its sequences that are found out after 30, 60 and 120 touches when the model
+    /// For each known object the share of its sequences that are detected after 30, 60 and 120 touches when the model
     /// does not use its column: an estimate of what happens to strangers.
     pub left_out: BTreeMap<String, BTreeMap<u32, f64>>,
 }
@@ -110,7 +111,7 @@ pub struct Calibrated {
 struct Supply {
     /// For each source, such as an instance, and each robot one row after the other, in units.
     pools: Vec<Vec<i32>>,
-    /// Whether a pool is a robot's, which makes one sequence.
+    /// True if a pool is a robot's, which makes one sequence.
     is_once: bool,
 }
 
@@ -127,7 +128,7 @@ impl Supply {
     }
 }
 
-/// Gives a model a test of fit, or replaces the one that it has. `dataset` holds touches of every object that the model
+/// Gives a model a misfit test, or replaces the one that it has. `dataset` holds touches of every object that the model
 /// knows, none of them used in training; `shapes` touches of many other shapes, if there are any: every instance of each of
 /// these objects is one.
 ///
@@ -150,17 +151,17 @@ pub fn calibrate(
     let (learn, test) = learned_and_tested(supplies, objects);
     let known = model.known_count();
     let moments = Moments::new(&learn, &of_shapes(model, shapes), known, objects, unit);
-    let fits =
-        fit::fits(&moments, None).ok_or(EvaluateProblem::TooFewForFit { found: learn_count(&learn, objects) })?;
-    let terms = |threshold: f64, least: u32| terms(settings, &fits, threshold, least);
+    let misfits =
+        misfit::misfits(&moments, None).ok_or(EvaluateProblem::TooFewForFit { found: learn_count(&learn, objects) })?;
+    let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
     // Levels of misfit do not depend on any threshold.
-    let untested = stated(model, &terms(0.0, FIRST), &fits)?;
+    let untested = stated(model, &terms(0.0, FIRST), &misfits)?;
     let untested = compile::open(&untested)?;
     let follow = |of: &[Supply], policy: &Policy| follow::sequences(&untested, of, policy, settings.sequences);
 
     let free = Policy { until: follow::Until::Touches(MOST_HELD.min(model.header().max_touches())), least: FIRST };
     let rough = follow::quantile(&follow(&learn, &free), 1.0 - settings.alarms);
-    let left_out = fit::left_out(&moments, &learn, rough, unit, free.last());
+    let left_out = misfit::left_out(&moments, &learn, rough, unit, free.last());
     let least = match settings.held {
         Held::Likely => FIRST,
         Held::Certain => found_out(&left_out).min(free.last()).max(FIRST),
@@ -169,8 +170,8 @@ pub fn calibrate(
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
     let kept = threshold(&sequences, settings, loosest, least, known)?;
-    let terms = FitTerms { sequences: kept.sequences, ..terms(kept.threshold, least) };
-    let bytes = stated(model, &terms, &fits)?;
+    let terms = MisfitTerms { sequences: kept.sequences, ..terms(kept.threshold, least) };
+    let bytes = stated(model, &terms, &misfits)?;
     let names = compile::names(model);
     let at = |path: &[f64], touches: u32| path.get(touches as usize - 1).or(path.last()).copied().unwrap_or(0.0);
     Ok(Calibrated {
@@ -223,8 +224,8 @@ fn learned_and_tested(supplies: Vec<Supply>, objects: usize) -> (Vec<Supply>, Ve
 /// [`calibrate`] tested the threshold on.
 fn tested_means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<[f64; 2]> {
     let (_, test) = learned_and_tested(supplies(model, dataset, settings.seed)?, model.object_count());
-    let Some(test_of_fit) = model.strangers().and_then(|strangers| strangers.test) else { return Ok([0.0; 2]) };
-    let FitTerms { threshold, doubt, least, .. } = test_of_fit.terms;
+    let Some(misfit_test) = model.strangers().and_then(|strangers| strangers.test) else { return Ok([0.0; 2]) };
+    let MisfitTerms { threshold, doubt, least, .. } = misfit_test.terms;
     let [threshold, doubt] = [threshold, doubt].map(|limit| f64::from(limit) / NAT);
     let policy = Policy { until: follow::Until::Named { level: doubt }, least };
     let sequences = follow::sequences(model, &test, &policy, settings.sequences);
@@ -295,7 +296,7 @@ fn of_shapes(model: &Model<'_>, shapes: &[ObjectTouches]) -> Vec<Vec<f64>> {
     of.filter(|touches| touches.len() >= 20).map(mean).collect()
 }
 
-/// How far below the threshold a misfit must be for a name, in nats.
+/// Amount by which a misfit must be below the threshold for a name, in nats.
 fn doubt(held: Held) -> f64 {
     match held {
         Held::Likely => 0.0,
@@ -303,7 +304,7 @@ fn doubt(held: Held) -> f64 {
     }
 }
 
-/// How far below a first guess, which was found without any name being given, thresholds are tried, in nats.
+/// Distance below a first guess, which was found without any name being given, to which thresholds are tried, in nats.
 fn below(held: Held) -> f64 {
     match held {
         Held::Likely => 6.0,
@@ -311,12 +312,12 @@ fn below(held: Held) -> f64 {
     }
 }
 
-fn terms(settings: &Settings, fits: &[fit::Fit], threshold: f64, least: u32) -> FitTerms {
+fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64, least: u32) -> MisfitTerms {
     // `as` saturates.
     let millionths = |share: f64| (share * 1e6).round() as u32;
-    FitTerms {
+    MisfitTerms {
         held: settings.held,
-        rivals: fits.first().map_or(0, |fit| fit.rivals.len() as u8),
+        rivals: misfits.first().map_or(0, |misfit| misfit.rivals.len() as u8),
         first: FIRST,
         least,
         threshold: (threshold * NAT).round() as i32,
@@ -330,15 +331,15 @@ fn terms(settings: &Settings, fits: &[fit::Fit], threshold: f64, least: u32) -> 
 }
 
 /// The model with a test.
-fn stated(model: &Model<'_>, terms: &FitTerms, fits: &[fit::Fit]) -> Result<Vec<u8>> {
+fn stated(model: &Model<'_>, terms: &MisfitTerms, misfits: &[misfit::Misfit]) -> Result<Vec<u8>> {
     let mut section = Strangers::header(model.background().is_some(), true).to_vec();
     section.extend(terms.to_bytes());
-    fits.iter().for_each(|fit| fixed::write(fit, f64::from(model.unit()), &mut section));
+    misfits.iter().for_each(|misfit| fixed::write(misfit, f64::from(model.unit()), &mut section));
     let sections = vec![(Tag::Strangers, Some((true, section))), (Tag::Promise, None)];
     Ok(restate(model, &Restated { sections, ..Restated::default() })?)
 }
 
-/// The touches after which four of five sequences of left-out objects are found out.
+/// The touches after which four of five sequences of left-out objects are detected.
 fn found_out(left_out: &[Vec<f64>]) -> u32 {
     let longest = left_out.iter().map(Vec::len).max().unwrap_or(0);
     let mean = |touches: usize| {
@@ -358,7 +359,8 @@ struct Kept {
 }
 
 /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): from strict to loose, up to the last
-/// threshold before the first at which so few false alarms would not be unlikely if the promise were broken.
+/// threshold before the first at which the observed number of false alarms would not be unlikely if the promise were
+/// broken.
 fn threshold(sequences: &[Vec<Sequence>], settings: &Settings, loosest: f64, least: u32, known: usize) -> Result<Kept> {
     let all = equally_many(sequences);
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! A test of fit and a promised error rate together.
+//! A misfit test and a promised error rate together.
 //!
 //! Which names are given depends on the test: it holds some back and ends sequences. How often known objects are taken
 //! for unknown depends on the thresholds: the later names are given, the longer there is for a false alarm. So both are
@@ -26,13 +26,13 @@ use palpate_shared::format::Tag;
 /// The share of touches that the promise is tested on, and of the others the share that thresholds begin with.
 const PROMISED: f64 = 0.5;
 const BEGUN: f64 = 0.25;
-/// How much stricter than the first thresholds sequences are followed, in nats: room for the loosest that keeps the
+/// Amount by which sequences are followed beyond the first thresholds, in nats: room for the loosest that keeps the
 /// promise, as far as fewer touches say where it is.
 const STRICTER: f64 = 0.5;
 /// The confidence of the first thresholds, which promise nothing: that of an estimate.
 const EVEN: f64 = 0.5;
 
-/// Gives a model a test of fit, or replaces the one that it has, and thresholds that keep a promised error rate with that
+/// Gives a model a misfit test, or replaces the one that it has, and thresholds that keep a promised error rate with that
 /// test: a sequence that ends as unknown is one without a name, and a name is given when the test lets it be. `promise.noise`
 /// is added to touches and shapes. Each of the two shares is kept with its own confidence.
 ///

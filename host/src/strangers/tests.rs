@@ -3,8 +3,8 @@ use crate::compile::{Settings as Compilation, compile};
 use crate::ensemble::train::{self, train, train_with_background};
 
 use crate::evaluate::{self, Margins, SequentialSettings};
-use crate::repetitions::{assert_rare, repetitions};
-use crate::touches::synthetic;
+use crate::tests::repetitions::{assert_rare, repetitions};
+use crate::tests::synthetic;
 use palpate_onboard::{Recognizer, Stopping, Verdict};
 use std::sync::LazyLock;
 
@@ -72,9 +72,9 @@ fn the_chip_computes_the_misfit_that_was_learned() {
         let (objects, unit) = (model.object_count(), f64::from(model.unit()));
         let supplies = supplies(&model, &of(0..KNOWN, 4_000, 2), 1).unwrap();
         let moments = Moments::new(&supplies, &of_shapes(&model, &shapes()), model.known_count(), objects, unit);
-        let fits = fit::fits(&moments, None).unwrap();
+        let misfits = misfit::misfits(&moments, None).unwrap();
         let settings = Settings::default();
-        let tested = stated(&model, &terms(&settings, &fits, 0.0, FIRST), &fits).unwrap();
+        let tested = stated(&model, &terms(&settings, &misfits, 0.0, FIRST), &misfits).unwrap();
         let tested = compile::open(&tested).unwrap();
         for rows in supplies.iter().map(|supply| &supply.pools[0]) {
             let mut sums = vec![0_i64; objects];
@@ -82,7 +82,7 @@ fn the_chip_computes_the_misfit_that_was_learned() {
                 sums.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += i64::from(margin));
                 let nats: Vec<f64> = sums.iter().map(|&sum| sum as f64 * unit).collect();
                 let leader = (0..model.known_count()).fold(0, |a, b| if sums[b] > sums[a] { b } else { a });
-                let exact = fits[leader].misfit(&nats, leader, touches);
+                let exact = misfits[leader].of(&nats, leader, touches);
                 let chip = tested.misfit(&sums, touches).unwrap() as f64 / NAT;
                 assert!((chip - exact).abs() < 0.05 + 0.02 * exact.abs(), "{touches}: {chip} for {exact}");
             }
@@ -177,8 +177,8 @@ fn promised(seed: u64, held: Held, rate: f64) -> (crate::calibrate::Calibrated, 
     calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), &shapes(), &settings, &promise, &()).unwrap()
 }
 
-/// What a model does with sequences of touches that nothing was made from, each touch in one of them: shares of the names
-/// that are wrong, and of the sequences that are unknown; and the touches used on average.
+/// Results of a model on sequences of touches that nothing was made from, each touch in one of them: shares of the
+/// names that are wrong, and of the sequences that are unknown; and the touches used on average.
 fn on_fresh_touches(bytes: &[u8], fresh: &Dataset) -> [f64; 3] {
     let model = compile::open(bytes).unwrap();
     let (mut sequences, mut given, mut wrong, mut unknown, mut used) = (0.0, 0.0, 0.0, 0.0, 0.0);

@@ -12,7 +12,7 @@ use palpate_onboard::Refused;
 use palpate_shared::Touch;
 use palpate_shared::format::Counted;
 
-/// How jitters are compared, and how errors are counted. Trees are grown for each part.
+/// Division by which jitters are compared and errors counted. Trees are grown for each part.
 const COMPARED: Division = Division { parts: 5, used: 4 };
 /// The shares of the learning curve, besides that.
 const SHARES: [Division; 2] = [Division { parts: 4, used: 1 }, Division { parts: 2, used: 1 }];
@@ -122,7 +122,7 @@ fn margins(ensemble: &Ensemble, touch: &Touch) -> Option<Vec<f64>> {
     is_evidence.then(|| ensemble.margins(touch).into_iter().map(f64::from).collect())
 }
 
-/// How many touches of each object are evidence.
+/// Number of touches of each object that are evidence.
 fn evidence(recorded: &Dataset, training: &train::Settings) -> Result<Vec<usize>> {
     let patterns = training.counted.unwrap_or(Counted::Full).patterns();
     let is_evidence = |touch: &&Touch| patterns.contains(touch.pattern());

@@ -20,7 +20,7 @@ const HALVINGS: usize = 12;
 /// Rounds over several taught objects, whose constants depend on each other.
 const ROUNDS: usize = 4;
 
-/// What an approach is to a model that never saw it: the margins of all objects, or no evidence.
+/// Evidence of an approach for a model that never saw it: the margins of all objects, or no evidence.
 pub(super) type Held = Vec<Option<Vec<f64>>>;
 
 /// A group of approaches to one object.
@@ -43,7 +43,7 @@ pub(super) struct Groups {
     background: Option<usize>,
 }
 
-/// How often a taught object is named, rightly or not.
+/// Frequency with which a taught object is named, rightly or not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Named {
     /// The share of its groups that are given its name.
@@ -94,7 +94,7 @@ impl Groups {
         groups.iter().filter(named).count() as f64 / groups.len().max(1) as f64
     }
 
-    /// How often taught object number `index` is named.
+    /// Frequency with which taught object number `index` is named.
     pub(super) fn named(&self, index: usize, constants: &[f64]) -> Named {
         let own = self.taught[index];
         let shares = |object| self.share(object, constants, |name| name == own);
@@ -169,7 +169,7 @@ impl Judged {
         Self((0..PARTS).map(part).collect())
     }
 
-    /// How often taught object number `index` is named, in the mean of the parts.
+    /// Frequency with which taught object number `index` is named, in the mean of the parts.
     pub(super) fn named(&self, index: usize) -> Named {
         let of = |(groups, constants): &(Groups, Vec<f64>)| groups.named(index, constants);
         let sum = self.0.iter().map(of).fold([0.0; 2], |[right, wrong], of| [right + of.right, wrong + of.wrong]);

@@ -1,10 +1,10 @@
-//! Whether objects can be taught to an ensemble.
+//! Check that objects can be taught to an ensemble.
 
 use super::{LEAST, Settings};
 use crate::ensemble::{Ensemble, Output, StatedProbe, TouchOrigin};
 use crate::error::{Error, Result, TeachProblem};
 use crate::mesh::BACKGROUND;
-use crate::touches::noise::Noise;
+use crate::probe::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
@@ -92,7 +92,7 @@ pub(super) fn enough(recorded: &Dataset, evidence: &[usize]) -> Result<()> {
     }
 }
 
-/// What touches of the known objects lack of the noise that the ensemble was trained for.
+/// Noise that the ensemble was trained for and touches of the known objects lack.
 pub(super) fn missing_noise(ensemble: &Ensemble, known: &Dataset) -> Result<Noise> {
     let (stated, there) = (TouchOrigin::of(&ensemble.origin)?.noise.unwrap_or_default(), known.real());
     match there {

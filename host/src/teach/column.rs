@@ -74,7 +74,7 @@ pub(super) fn fit(leaves: &Leaves, parts: &[Part<'_>], priors: &[f64]) -> Vec<Ve
     columns
 }
 
-/// How many different touches a part has: copies count once.
+/// Number of different touches of a part: copies count once.
 fn touches(part: &Part<'_>) -> usize {
     let mut sources: Vec<u32> = part.chosen.iter().map(|&row| part.rows.sources[row as usize]).collect();
     sources.sort_unstable();
@@ -82,7 +82,7 @@ fn touches(part: &Part<'_>) -> usize {
     sources.len()
 }
 
-/// The posterior of each column, where the other objects' margins come to `log_sum`.
+/// The posterior of each column, where the logarithm of the sum over the other objects is `log_sum`.
 fn posteriors(log_sum: f64, margins: &[f64], shares: &mut [f64]) {
     let most = margins.iter().copied().fold(log_sum, f64::max);
     let mut all = (log_sum - most).exp();

@@ -1,4 +1,4 @@
-//! How much more approaches would help.
+//! Benefit of more approaches.
 
 use super::Smoothing;
 use super::balance::{Held, Judged, Named};
@@ -16,7 +16,7 @@ pub(super) fn parts() -> usize {
     SHARES.iter().map(|division| division.parts).sum()
 }
 
-/// How an object is recognized after having been taught with ever more approaches.
+/// Accuracy for an object after having been taught with ever more approaches.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Curve {
     /// From few approaches to nearly all that were recorded.
@@ -26,14 +26,14 @@ pub struct Curve {
     pub with_twice: f64,
 }
 
-/// A number of approaches, and what they come to.
+/// A number of approaches, and the results with it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Point {
     /// Approaches to the object that were fitted on.
     pub approaches: usize,
     /// The share of its groups that are recognized, with a constant for this number.
     pub recognized: f64,
-    /// The mean of its groups that are missed and of others' that are taken for it.
+    /// The mean of its groups that are missed and of others' that are mistaken for it.
     pub error: f64,
 }
 
@@ -42,7 +42,7 @@ impl Curve {
         self.points.push(Point { approaches, recognized: right, error: f64::midpoint(1.0 - right, wrong) });
     }
 
-    /// Adds the point for `share` of the approaches that were recorded, and says what twice as many would come to.
+    /// Adds the point for `share` of the approaches that were recorded, and extrapolates to twice as many.
     pub(super) fn finish(&mut self, recorded: usize, share: f64, named: Named) {
         self.add((recorded as f64 * share).round() as usize, named);
         self.with_twice = expected(&self.points, 2 * recorded);

@@ -1,10 +1,10 @@
-//! What can be wrong with teaching objects from recorded touches.
+//! Problems with teaching objects from recorded touches.
 
 use crate::error::Problem;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
-/// What can be wrong with teaching objects from recorded touches.
+/// Problems with teaching objects from recorded touches.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TeachProblem {
@@ -24,27 +24,27 @@ pub enum TeachProblem {
         objects: Vec<String>,
     },
     /// A name is taken.
-    #[error("{object} is known already: an object that is taught needs a name of its own")]
+    #[error("{object} is known already: a taught object needs a name that no other object has")]
     Known {
         /// The name.
         object: String,
     },
     /// Partial touches are evidence, but none were recorded.
     #[error(
-        "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never give \
-         other touches",
+        "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never \
+         cause other touches",
         match counted { Counted::All => "every approach", _ => "every touch with a contact" }
     )]
     FullTouches {
-        /// Which touches are evidence.
+        /// Touches that are evidence.
         counted: Counted,
     },
     /// The known objects' touches have other noise than the ensemble was trained for.
     #[error("the ensemble was trained for {stated}, and the touches of its objects have {there} already")]
     OtherNoise {
-        /// What the ensemble was trained for.
+        /// Statement of the ensemble about its training.
         stated: String,
-        /// What the touches have.
+        /// Kind of touches there are.
         there: String,
     },
     /// A pose is missing.
@@ -56,13 +56,13 @@ pub enum TeachProblem {
         descriptor: Descriptor,
     },
     /// There are too few touches to hold a part of them out.
-    #[error("only {touches} recorded touches of {object} are evidence, of at least {least} that are needed")]
+    #[error("only {touches} recorded touches of {object} are evidence, and at least {least} are needed")]
     TooFew {
         /// The object.
         object: String,
         /// Its touches that are evidence.
         touches: usize,
-        /// How many are needed.
+        /// Number of touches needed.
         least: usize,
     },
 }

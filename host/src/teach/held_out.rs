@@ -1,4 +1,4 @@
-//! What columns say about touches that they were not fitted on.
+//! Predictions of columns for touches that they were not fitted on.
 
 use super::Smoothing;
 use super::balance::Held;
@@ -6,16 +6,16 @@ use super::column::{Part, fit};
 use super::rows::{Leaves, Rows, log_sum};
 use crate::ensemble::Ensemble;
 use crate::error::Result;
+use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
-use crate::touches::noise::Noise;
 use palpate_shared::{Descriptor, Touch};
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
 /// Copies of recorded touches under jitter, for each object and all of its touches together.
 const COPIES: usize = 12_000;
-/// How often a touch is repeated at most.
+/// Largest number of copies of a touch.
 const MOST_COPIES: usize = 64;
 
 /// A recorded object.
@@ -28,7 +28,7 @@ pub(super) struct Recorded {
     place: Vec<f64>,
 }
 
-/// How touches are divided: into `parts` parts, each of which is held out once, while `used` others are fitted on.
+/// Division of touches: into `parts` parts, each of which is held out once, while `used` others are fitted on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Division {
     pub(super) parts: usize,
@@ -41,7 +41,7 @@ impl Division {
         ((place * self.parts as f64) as usize).min(self.parts - 1)
     }
 
-    /// Whether a part is fitted on while another one is held out.
+    /// True if a part is fitted on while another one is held out.
     pub(super) fn uses(self, part: usize, held_out: usize) -> bool {
         (1..=self.used).any(|step| (held_out + step) % self.parts == part)
     }
@@ -114,7 +114,7 @@ impl Material {
         self.recorded[recorded].plain.count()
     }
 
-    /// How many objects the trees know, a background included.
+    /// Number of objects that the trees know, a background included.
     pub(super) fn known_count(&self) -> usize {
         self.known.len()
     }

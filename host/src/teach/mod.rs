@@ -30,8 +30,8 @@ use crate::ensemble::train::{BASE_MARGIN, round_leaves};
 use crate::ensemble::{Ensemble, Node, TouchOrigin};
 use crate::error::Result;
 use crate::evaluate::ROBOTS;
+use crate::probe::noise::Noise;
 use crate::progress::Progress;
-use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches, Source};
 use balance::{Groups, Judged};
 use held_out::{Division, Material};
@@ -44,9 +44,9 @@ use serde::Serialize;
 const JITTERS: [f64; 3] = [0.5, 1.0, 2.0];
 /// Priors that are tried, in touches.
 const PRIORS: [f64; 3] = [4.0, 16.0, 64.0];
-/// How smoothings are compared: with few parts, on a share of the known objects' touches.
+/// Division by which smoothings are compared: with few parts, on a share of the known objects' touches.
 const COMPARED: (Division, usize) = (Division { parts: 5, used: 4 }, 4);
-/// How the constants are found.
+/// Division by which the constants are found.
 const BALANCED: Division = Division { parts: 10, used: 9 };
 /// Touches of a known object that columns are fitted on at most, and of all of them together.
 const KNOWN: [usize; 2] = [12_000, 240_000];
@@ -57,7 +57,7 @@ const TOUCHES_OF_A_ROBOT: usize = 250;
 /// Touches of a recorded object that are needed at least, for a part of them to say something.
 pub const LEAST: usize = 20;
 
-/// How objects are taught.
+/// Settings of teaching.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Approaches after which errors are balanced and counted; fewer where fewer were recorded.
@@ -70,7 +70,7 @@ pub struct Settings {
     pub threads: Option<usize>,
     /// As [`crate::ensemble::train::Settings::leaf_bits`].
     pub leaf_bits: Option<u32>,
-    /// What is added to the touches of the known objects; `None` takes what the ensemble states, less what they have
+    /// Noise added to the touches of the known objects; `None` takes what the ensemble states, less what they have
     /// already.
     pub noise: Option<Noise>,
 }
@@ -81,7 +81,7 @@ impl Default for Settings {
     }
 }
 
-/// How the touches of an object are smoothed.
+/// Smoothing of the touches of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Smoothing {
     /// In multiples of 30 % and 10 ms on times, 8° on the pose.
@@ -97,8 +97,8 @@ impl Smoothing {
     }
 }
 
-/// What was found out about objects that were taught, on recorded touches that were held out: from columns as from
-/// constants. Only the smoothing, one of nine, was chosen on all of them. Shares are between 0 and 1.
+/// Results for objects that were taught, on recorded touches that were held out: from columns as from constants. Only
+/// the smoothing, one of nine, was chosen on all of them. Shares are between 0 and 1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Taught {
     /// Approaches of a group.
@@ -107,11 +107,11 @@ pub struct Taught {
     pub objects: Vec<TaughtObject>,
     /// The share of groups of the other objects that are recognized; none if there are none.
     pub others: Option<f64>,
-    /// What a promise of 1 % wrong names takes.
+    /// Requirements of a promise of 1 % wrong names.
     pub promise: Needed,
 }
 
-/// What was found out about one of them.
+/// Results for one of them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaughtObject {
     /// Its name.
@@ -120,15 +120,15 @@ pub struct TaughtObject {
     pub approaches: usize,
     /// Those of them that are evidence.
     pub touches: usize,
-    /// How they were smoothed.
+    /// Their smoothing.
     pub smoothing: Smoothing,
-    /// What is added to its margin with every touch, in nats.
+    /// Constant added to its margin with every touch, in nats.
     pub constant: f64,
     /// The share of its groups that are recognized.
     pub recognized: f64,
-    /// The share of the others' groups that are taken for it, added up over the other objects.
+    /// The share of the others' groups that are mistaken for it, summed over the other objects.
     pub taken_for_it: f64,
-    /// How that would be with fewer approaches, and with more.
+    /// The same results with fewer approaches, and with more.
     pub curve: Curve,
 }
 
@@ -278,7 +278,7 @@ fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], const
     extended
 }
 
-/// What is evidence to a model that was also taught these objects.
+/// Touches that are evidence to a model that was also taught these objects.
 fn with(mut trained: TrainedTouches, recorded: &[ObjectTouches]) -> TrainedTouches {
     let patterns = trained.counted.patterns();
     for touch in recorded.iter().flat_map(ObjectTouches::touches) {

@@ -1,4 +1,4 @@
-//! Whether there are enough recorded touches for a promise.
+//! Check that there are enough recorded touches for a promise.
 
 use super::balance::Held;
 use super::rows::log_sum;
@@ -11,14 +11,15 @@ use serde::Serialize;
 /// The error rate that is promised, and the probability with which it is kept: `palpate calibrate`'s own.
 const RATE: f64 = 0.01;
 const CONFIDENCE: f64 = 0.95;
-/// How far sequences of a calibration are followed, in nats beyond the posterior's threshold, and in touches.
+/// Limits to which sequences of a calibration are followed, in nats beyond the posterior's threshold, and in touches.
 const STRICTEST: f64 = calibrate::STRICTEST[0];
 const MAX_TOUCHES: usize = crate::evaluate::MAX_TOUCHES as usize;
 /// Sequences of each taught object that say how many approaches one takes.
 const SEQUENCES: u64 = 100;
 
-/// What `palpate calibrate` needs at least, to promise 1 % wrong names of all that are given: so many sequences that end
-/// with a name and without any error, equally many of each object, of touches that the model was not taught with.
+/// Smallest input with which `palpate calibrate` can promise 1 % wrong names of all that are given: the number of
+/// sequences that end with a name and without any error, equally many of each object, of touches that the model was not
+/// taught with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Needed {
     /// Sequences of all objects together.

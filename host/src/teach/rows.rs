@@ -31,7 +31,7 @@ impl Leaves {
         Self { numbers, trees }
     }
 
-    /// How many there are.
+    /// Number of rows.
     pub(super) fn count(&self) -> usize {
         self.trees.last().map_or(0, |leaves| leaves.end)
     }
@@ -45,11 +45,11 @@ impl Leaves {
 /// Touches of one object that are evidence.
 #[derive(Default)]
 pub(super) struct Rows {
-    /// How many trees there are.
+    /// Number of trees.
     trees: usize,
     /// Row after row the leaf that it reaches in each tree.
     leaves: Vec<u32>,
-    /// How many objects the ensemble knows.
+    /// Number of objects that the ensemble knows.
     known: usize,
     /// Row after row the ensemble's margins.
     margins: Vec<f32>,
@@ -57,7 +57,7 @@ pub(super) struct Rows {
     pub(super) log_sums: Vec<f64>,
     /// For each row the touch that it is, or is a copy of: its position among all that were given.
     pub(super) sources: Vec<u32>,
-    /// How many touches were given, evidence or not.
+    /// Number of touches that were given, evidence or not.
     pub(super) given: usize,
 }
 

@@ -8,9 +8,9 @@ use crate::compile;
 use crate::ensemble::train::{self, train, train_with_background};
 use crate::error::TeachProblem;
 use crate::evaluate::{Candidate, Margins};
-use crate::repetitions::repetitions;
-use crate::touches::noise::Noise;
-use crate::touches::synthetic;
+use crate::probe::noise::Noise;
+use crate::tests::repetitions::repetitions;
+use crate::tests::synthetic;
 use palpate_shared::{Descriptor, Pose, Q15_ONE};
 use rand_distr::{Distribution, StandardNormal};
 

@@ -1,4 +1,4 @@
-//! Which touches a capture made, so that the same ones are known again.
+//! Identity of the touches of a capture, so that the same ones are known again.
 
 use super::{Dataset, ObjectTouches, Origin};
 use palpate_shared::format::{Length, TrainedCapture};
@@ -11,12 +11,12 @@ use std::ops::Range;
 pub struct Meshes {
     /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits.
     pub checksums: Vec<String>,
-    /// How many millimeters a unit of the meshes is, if the object was touched at its true size.
+    /// Number of millimeters in a unit of the meshes, if the object was touched at its true size.
     pub millimeters: Option<f64>,
 }
 
-/// What the touches of a capture are a function of, and which of its samples they are. A sample depends on seed, settings,
-/// meshes and its number, not on how many others there are.
+/// The settings that the touches of a capture are a function of, and the range of its samples. A sample depends on
+/// seed, settings, meshes and its number, not on how many others there are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stated", into = "Stated")]
 pub struct Captured {
@@ -31,7 +31,7 @@ pub struct Captured {
 const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
 
 impl Captured {
-    /// What is known of the touches of a data set, or of a part of one; nothing if no capture of this version or later made
+    /// Identity of the touches of a data set, or of a part of one; nothing if no capture of this version or later made
     /// them.
     pub fn of(dataset: &Dataset) -> Option<Self> {
         let origin = dataset.origin.as_ref().filter(|_| !dataset.is_recorded())?;
@@ -57,18 +57,18 @@ impl Captured {
         other.objects.iter().filter(is_same).map(|(name, _)| name.as_str()).collect()
     }
 
-    /// What a compiled model states of it, but for the objects.
+    /// Statement of a compiled model about it, but for the objects.
     pub(crate) fn stated(&self) -> (u16, Range<u32>) {
         let number = |sample: u64| u32::try_from(sample).unwrap_or(u32::MAX);
         (short(self.settings), number(self.samples.start)..number(self.samples.end))
     }
 
-    /// What a compiled model states of an object.
+    /// Statement of a compiled model about an object.
     pub(crate) fn stated_of(&self, object: &str) -> Option<u16> {
         self.objects.get(object).map(|&object| short(object))
     }
 
-    /// Whether a compiled model's statement is about these settings, and some of these samples.
+    /// True if a compiled model's statement is about these settings, and some of these samples.
     pub(crate) fn is_near(&self, stated: &TrainedCapture<'_>) -> bool {
         let (settings, samples) = self.stated();
         let end = |range: &Range<u32>| if range.end == u32::MAX { u64::MAX } else { range.end.into() };

@@ -2,11 +2,11 @@
 
 use super::checksum::checksum;
 use super::files::files;
-use super::noise::Noise;
 use super::warning::Warning;
 use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
+use crate::probe::noise::Noise;
 use palpate_shared::Touch;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,14 +16,15 @@ use std::path::{Path, PathBuf};
 pub struct Dataset {
     /// The objects, sorted by name.
     pub objects: Vec<ObjectTouches>,
-    /// How the touches were made, where that is known: a directory without `dataset.json` does not say.
+    /// Origin of the touches, where that is known: a directory without `dataset.json` does not say.
     pub origin: Option<Origin>,
-    /// What looked wrong when the data set was read, and may be meant.
+    /// Warnings from reading the data set: things that look wrong, but may be meant.
     pub warnings: Vec<Warning>,
 }
 
 impl Dataset {
-    /// Touches that nothing is known about but their sources: no origin, no warnings. The objects are to be sorted by name.
+    /// Touches that nothing is known about but their sources: no origin, no warnings. The objects must be sorted by
+    /// name.
     pub fn new(objects: Vec<ObjectTouches>) -> Self {
         Self { objects, ..Self::default() }
     }
@@ -53,7 +54,7 @@ impl Dataset {
         }
     }
 
-    /// Whether a real probe made touches, as far as the data set states it.
+    /// True if a real probe made touches, as far as the data set states it.
     pub fn is_recorded(&self) -> bool {
         self.sources().any(|(_, source)| matches!(source, Source::Recording(_)))
     }
@@ -76,7 +77,8 @@ impl Dataset {
         all
     }
 
-    /// How many instances, recordings or logs the objects have that have several, by name: a sequence is of touches of one.
+    /// Number of instances, recordings or logs of the objects that have several, by name: a sequence is of touches of
+    /// one.
     pub fn several(&self) -> BTreeMap<String, usize> {
         let several = self.objects.iter().filter(|object| object.sources().len() > 1);
         several.map(|object| (object.name.clone(), object.sources().len())).collect()
@@ -148,7 +150,7 @@ impl Dataset {
         Ok(ObjectTouches::new(name, format.read(path)?, Source::Object))
     }
 
-    /// What a listing names.
+    /// Reads the data set that a listing describes.
     fn listed(directory: &Path, listing: Listing) -> Result<Self> {
         if !listing.complete {
             return Err(Error::at(Place::file(directory), TouchesProblem::Incomplete));
@@ -211,14 +213,14 @@ impl Dataset {
         self.origin.as_ref().map(|origin| &origin.probe)
     }
 
-    /// Whether every approach is kept, also those that were not full touches: what the origin says or, without one,
+    /// True if every approach is kept, also those that were not full touches: what the origin says or, without one,
     /// whether any touch is partial.
     pub fn holds_approaches(&self) -> bool {
         let any_partial = || self.touches().any(|touch| !touch.is_full());
         self.origin.as_ref().map_or_else(any_partial, |origin| origin.approaches)
     }
 
-    /// What a real probe added to the touches, as far as the data set states it: noise that they have already.
+    /// Noise that a real probe added to the touches, as far as the data set states it: noise that they have already.
     pub fn real(&self) -> Noise {
         self.origin.as_ref().map_or_else(Noise::default, |origin| origin.real)
     }
@@ -246,12 +248,12 @@ impl Dataset {
         self.objects.iter().map(|object| object.name.clone()).collect()
     }
 
-    /// How many touches there are, of all objects together.
+    /// Number of touches of all objects together.
     pub fn len(&self) -> usize {
         self.objects.iter().map(ObjectTouches::len).sum()
     }
 
-    /// Whether there is no touch at all.
+    /// True if there is no touch at all.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -289,7 +291,7 @@ struct Found {
     file: PathBuf,
 }
 
-/// What logs hold by object, one log after the other, and what was skipped.
+/// Contents of logs by object, one log after the other, and what was skipped.
 fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)> {
     let (mut objects, mut warnings) = (BTreeMap::<String, Found>::new(), Vec::new());
     for file in logs {

@@ -1,16 +1,16 @@
-//! What can be wrong with data sets and files of touches.
+//! Problems with data sets and files of touches.
 
 use crate::error::Problem;
 use std::path::PathBuf;
 
-/// What can be wrong with data sets and files of touches.
+/// Problems with data sets and files of touches.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TouchesProblem {
     /// A line has neither three nor nine fields.
     #[error("{count} fields where a touch has three times, or three times and six direction cosines")]
     Fields {
-        /// How many there are.
+        /// Number of fields.
         count: usize,
     },
     /// A field is not a number.
@@ -40,7 +40,7 @@ pub enum TouchesProblem {
     /// A direction or alignment is not a unit vector.
     #[error("the {vector} has length {length:.3} where a unit vector has 1")]
     NotUnit {
-        /// Which vector: "direction" or "alignment".
+        /// The vector: "direction" or "alignment".
         vector: &'static str,
         /// Its length.
         length: f64,
@@ -61,7 +61,7 @@ pub enum TouchesProblem {
     Row {
         /// The row, counted from 1.
         row: u64,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: Box<Self>,
     },
     /// A row of a file of touches names another object than the file.
@@ -75,7 +75,7 @@ pub enum TouchesProblem {
     /// A file is not Parquet, or its structure is damaged.
     #[error("not a usable Parquet file ({message})")]
     NotParquet {
-        /// What the reader said.
+        /// The reader's message.
         message: String,
     },
     /// A Parquet file lacks a column.
@@ -89,13 +89,13 @@ pub enum TouchesProblem {
     Column {
         /// The column.
         name: &'static str,
-        /// What is wrong with it.
+        /// Description of the fault.
         message: String,
     },
     /// Touches could not be written as Parquet.
     #[error("cannot write the touches ({message})")]
     ParquetNotWritten {
-        /// What the writer said.
+        /// The writer's message.
         message: String,
     },
     /// A Parquet file, read by a build without Parquet.
@@ -104,7 +104,7 @@ pub enum TouchesProblem {
     /// A file is no log in MCAP, or is damaged.
     #[error("not a usable MCAP file: {message}")]
     NotMcap {
-        /// What is wrong with it.
+        /// Description of the fault.
         message: String,
     },
     /// A log, for a build without MCAP.
@@ -113,17 +113,17 @@ pub enum TouchesProblem {
     /// Something in a log is larger than what is read.
     #[error("{what} of {bytes} bytes, where at most {most} are read")]
     TooLarge {
-        /// What: "a record".
+        /// The thing that is too large: "a record".
         what: String,
-        /// How large it is.
+        /// Its size.
         bytes: u64,
-        /// How large it may be.
+        /// Largest size allowed.
         most: u64,
     },
     /// A log has more touches than are read.
     #[error("more than {most} touches")]
     TooMany {
-        /// How many are read.
+        /// Largest number that is read.
         most: usize,
     },
     /// A chunk of a log is compressed by something that nobody here knows.
@@ -147,9 +147,9 @@ pub enum TouchesProblem {
     OtherDefinition {
         /// The channel: its topic, with the name of its schema.
         channel: String,
-        /// What the log says.
+        /// Content of the log.
         found: String,
-        /// What it should say.
+        /// Content that was expected.
         expected: String,
     },
     /// A log has no channel of touches.
@@ -165,15 +165,15 @@ pub enum TouchesProblem {
         topic: String,
         /// The message among those of its channel, counted from 1.
         number: u64,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: Box<Self>,
     },
     /// A message of a log is not what its schema says.
     #[error("no {what}: {message}")]
     BadMessage {
-        /// What it should be: "touch in JSON".
+        /// Description of the expected content: "touch in JSON".
         what: &'static str,
-        /// What is wrong with it.
+        /// Description of the fault.
         message: String,
     },
     /// Some touches of a log name an object and others do not.
@@ -215,27 +215,28 @@ pub enum TouchesProblem {
     /// `dataset.json` is no listing.
     #[error("not the listing of a data set ({message})")]
     BadListing {
-        /// What the parser said.
+        /// The parser's message.
         message: String,
     },
     /// Touches of several instances or logs, without an origin that `dataset.json` could state.
     #[error(
-        "{name} has {sources} instances or logs, and without a known probe no dataset.json says which touch is of which"
+        "{name} has {sources} instances or logs, and without a known probe no dataset.json states the source of each \
+         touch"
     )]
     Unsaid {
         /// The object's name.
         name: String,
-        /// How many there are.
+        /// Number of sources.
         sources: usize,
     },
     /// Touches of robots that differ, which no file can say.
-    #[error("the touches of {name} are of robots with biases of their own, and no file says which touch is of which")]
+    #[error("the touches of {name} are of robots with different biases, and no file states the robot of each touch")]
     OfRobots {
         /// The object's name.
         name: String,
     },
     /// `dataset.json` names an object that no file of the directory can be called after.
-    #[error("no file can be called after the object {name:?}")]
+    #[error("no file can be named after the object {name:?}")]
     BadName {
         /// The name.
         name: String,
@@ -255,9 +256,9 @@ pub enum TouchesProblem {
     /// A file has another number of touches than listed.
     #[error("{found} touches where dataset.json states {stated}")]
     OtherCount {
-        /// How many are listed.
+        /// Number of touches listed.
         stated: u64,
-        /// How many there are.
+        /// Number of touches found.
         found: u64,
     },
     /// A Parquet file is not the one that was captured.
@@ -266,24 +267,24 @@ pub enum TouchesProblem {
     /// Another program has locked the directory.
     #[error("another program is writing into this directory")]
     Busy,
-    /// Touches are to be recorded into a directory that holds simulated ones.
+    /// Recording into a directory that holds simulated ones.
     #[error("holds {touches} simulated touches of {objects}")]
     HoldsSimulated {
         /// The objects.
         objects: String,
-        /// How many touches there are of them.
+        /// Number of touches of them.
         touches: u64,
     },
-    /// Touches are to be recorded into a directory with files of touches that no listing names.
+    /// Recording into a directory with files of touches that no listing names.
     #[error("holds {files}, which dataset.json does not list")]
     Unlisted {
         /// The files' names.
         files: String,
     },
-    /// Recorded touches are to be added to others that were made in another way.
+    /// Adding recorded touches to others that were made in another way.
     #[error("cannot add to these recorded touches: {differences}")]
     OtherRecording {
-        /// What differs, and how.
+        /// The settings that differ, with both values.
         differences: String,
     },
     /// The same lines were recorded before.
@@ -291,33 +292,25 @@ pub enum TouchesProblem {
     RecordedBefore {
         /// The object.
         object: String,
-        /// How many touches they are.
+        /// Number of touches.
         touches: u64,
         /// When they were recorded.
         began: String,
     },
-    /// A touch has no pose, and is to be recorded with one.
-    #[error("no pose, and it is to be recorded with one")]
+    /// A touch has no pose, but the data set is recorded with one.
+    #[error("no pose, but this data set is recorded with one")]
     NoPose,
     /// A text names no shard.
-    #[error("{text:?} is no shard")]
+    #[error("{text:?} is not a shard")]
     BadShard {
         /// The text.
         text: String,
     },
     /// A text names no format of touches.
-    #[error("{name:?} is no format of touches")]
+    #[error("{name:?} is not a format of touches")]
     UnknownFormat {
         /// The text.
         name: String,
-    },
-    /// A text is no duration, angle or share.
-    #[error("{text:?} is not a quantity with its unit")]
-    BadQuantity {
-        /// The text.
-        text: String,
-        /// What to write, with an example.
-        example: &'static str,
     },
     /// A file whose name does not say what it holds.
     #[error("not a file of touches by its name")]
@@ -331,7 +324,7 @@ pub enum TouchesProblem {
     /// A check of a data set found what would make training wrong.
     #[error("training on these touches would be wrong, for {count} reason{}", if *count == 1 { "" } else { "s" })]
     WouldTrainWrong {
-        /// How many reasons there are.
+        /// Number of reasons.
         count: usize,
     },
     /// An object has too few touches to be divided.
@@ -339,9 +332,9 @@ pub enum TouchesProblem {
     TooFew {
         /// The object.
         name: String,
-        /// How many touches it has.
+        /// Number of touches of the object.
         touches: usize,
-        /// How many it needs.
+        /// Number of touches needed.
         least: usize,
     },
 }
@@ -360,10 +353,10 @@ impl Problem for TouchesProblem {
                  alignment."
             }
             Self::HalfPose { .. } => "Give both or neither.",
-            Self::OtherObject { .. } => "Give each object a file that is called like it.",
+            Self::OtherObject { .. } => "Give each object a file with its name.",
             Self::Row { problem, .. } => match **problem {
                 Self::HalfPose { .. } => "Give both or neither.",
-                Self::OtherObject { .. } => "Give each object a file that is called like it.",
+                Self::OtherObject { .. } => "Give each object a file with its name.",
                 _ => "Correct the row, or capture the object again.",
             },
             Self::NotParquet { .. } | Self::NoColumn { .. } | Self::Column { .. } | Self::NoTouches => {
@@ -411,10 +404,9 @@ impl Problem for TouchesProblem {
             Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
             Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
-            Self::NoFormat => "Call it like the object, with the ending .txt or .parquet.",
+            Self::NoFormat => "Name it after the object, with the extension .txt or .parquet.",
             Self::RecordedTwice { .. } => "Put its touches into one file.",
             Self::UnknownFormat { .. } => "Use text or parquet.",
-            Self::BadQuantity { example, .. } => return format!("Give {example}."),
             Self::WouldTrainWrong { .. } => "Correct what is said to be wrong, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }

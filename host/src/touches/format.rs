@@ -4,7 +4,7 @@ use crate::error::{Result, TouchesProblem};
 use palpate_shared::Touch;
 use std::path::Path;
 
-/// How touches are kept on the disk.
+/// Format of touches on the disk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Format {
@@ -27,7 +27,7 @@ impl Format {
         }
     }
 
-    /// How the files' names end.
+    /// Extension of the files.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Text => "txt",
@@ -35,7 +35,7 @@ impl Format {
         }
     }
 
-    /// Whether this build can read and write the format.
+    /// True if this build can read and write the format.
     pub fn is_built_in(self) -> bool {
         self != Self::Parquet || cfg!(feature = "parquet")
     }

@@ -6,15 +6,15 @@ use crate::output;
 use palpate_shared::Touch;
 use std::path::{Component, Path, PathBuf};
 
-/// What a data set's directory holds. The same capture writes the same bytes: no times of day, no durations. A recording
-/// says when it was made.
+/// Contents of a data set's directory. The same capture writes the same bytes: no times of day, no durations. A
+/// recording says when it was made.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Listing {
     /// The version of the program that made it.
     pub palpate: String,
-    /// Whether every touch is there.
+    /// True if every touch is there.
     pub complete: bool,
-    /// How the touches were made.
+    /// Origin of the touches.
     #[serde(rename = "settings")]
     pub origin: Origin,
     /// The objects, sorted by name.
@@ -24,14 +24,14 @@ pub struct Listing {
     pub recorded: Vec<Recorded>,
 }
 
-/// What there is of one object.
+/// Entry of one object.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Entry {
     /// The object's name.
     pub name: String,
-    /// How many touches are on the disk.
+    /// Number of touches on the disk.
     pub touches: u64,
-    /// How many approaches it took to get them.
+    /// Number of approaches that they took.
     pub approaches: u64,
     /// The size of the object's file; of the text so far, while the object is being captured.
     pub bytes: u64,
@@ -42,15 +42,15 @@ pub struct Entry {
     /// otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instances: Vec<String>,
-    /// How many touches are of each instance, one instance after the other in the file, where they are not in turn, such as
-    /// after a split.
+    /// Number of touches of each instance, one instance after the other in the file, where they are not in turn, such
+    /// as after a split.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub counts: Vec<u64>,
     /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits. Versions
     /// before 0.3.0 wrote none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub meshes: Vec<String>,
-    /// How many millimeters a unit of its meshes is, if it was touched at its true size.
+    /// Number of millimeters in a unit of its meshes, if it was touched at its true size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub millimeters: Option<f64>,
 }
@@ -70,7 +70,7 @@ impl Listing {
         }
     }
 
-    /// Whether a real probe made the touches. Such a data set may grow at any time: what its files hold beyond what is
+    /// True if a real probe made the touches. Such a data set may grow at any time: what its files hold beyond what is
     /// listed counts, up to the last whole line.
     pub fn is_recorded(&self) -> bool {
         !self.recorded.is_empty()
@@ -168,7 +168,7 @@ impl Entry {
     }
 }
 
-/// Whether files of the directory itself can be called this.
+/// True if files of the directory itself can have this name.
 pub(super) fn is_file_name(name: &str) -> bool {
     let mut components = Path::new(name).components();
     !name.is_empty()

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 const FIRST: u8 = 0x89;
 /// More touches than this are refused: a probe that touches every second takes four months for them.
 const MOST: usize = 10_000_000;
-/// How many bytes all names of objects may take.
+/// Largest size of all names of objects, in bytes.
 const NAMES: usize = 16 << 20;
 
 /// The touches of a log, in the order of their log times.
@@ -39,12 +39,12 @@ pub struct Logged {
     object: Option<u32>,
 }
 
-/// Whether a file, or a stream, is a log, by how it begins.
+/// True if a file, or a stream, is a log, by how it begins.
 pub fn begins_log(bytes: &[u8]) -> bool {
     bytes.first() == Some(&FIRST)
 }
 
-/// Whether the file at `path` is a log, by how it begins; a file that cannot be read is none.
+/// True if the file at `path` is a log, by how it begins; a file that cannot be read is none.
 pub fn is_log(path: &Path) -> bool {
     let mut first = [0];
     path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut first)).is_ok() && begins_log(&first)
@@ -62,7 +62,7 @@ pub fn read_touches(path: &Path) -> Result<Vec<Touch>> {
 }
 
 impl Log {
-    /// How the names of logs end.
+    /// Extension of logs.
     pub const EXTENSION: &'static str = "mcap";
 
     /// Reads a log.
@@ -131,7 +131,7 @@ impl Log {
         &self.channels
     }
 
-    /// What there is to say about what was skipped.
+    /// Warning about what was skipped.
     pub fn skipped(&self) -> Option<Warning> {
         let channels = &self.channels.others;
         (!channels.is_empty()).then(|| Warning::SkippedChannels { path: self.path.clone(), channels: channels.clone() })

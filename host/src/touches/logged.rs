@@ -1,4 +1,4 @@
-//! What the messages of a robot's log say.
+//! Contents of the messages of a robot's log.
 
 use palpate_shared::Touch;
 
@@ -20,11 +20,11 @@ pub struct Message {
     pub time: u64,
     /// The byte at which the message, or the chunk with it, begins.
     pub offset: u64,
-    /// What it says.
+    /// Its contents.
     pub said: Said,
 }
 
-/// What a message of a log says.
+/// Contents of a message of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Said {
     /// A touch, and of which object, where that is known.
@@ -36,7 +36,7 @@ pub enum Said {
 /// A verdict as logs hold it: the fields of `palpate recognize --json`, and the posterior of every object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoggedVerdict {
-    /// How many touches it rests on.
+    /// Number of touches that it rests on.
     pub touch: u32,
     /// One of [`VERDICTS`](Self::VERDICTS).
     pub verdict: String,
@@ -44,13 +44,13 @@ pub struct LoggedVerdict {
     pub object: String,
     /// Its posterior, from 0 to 1.
     pub posterior: f64,
-    /// Why the touch was not counted.
+    /// Reason why the touch was not counted.
     pub refused: Option<String>,
     /// The posterior of every object.
     pub posteriors: Vec<(String, f64)>,
 }
 
 impl LoggedVerdict {
-    /// What a verdict can be.
+    /// Possible values of a verdict.
     pub const VERDICTS: [&'static str; 4] = ["undecided", "recognized", "unknown", "gave-up"];
 }

@@ -10,8 +10,8 @@
 //! [`Recording`] adds the touches of a real probe to such a directory, one by one as they come; its listing says when, from
 //! where and by which firmware ([`Recorded`]).
 //!
-//! [`check`] says what is wrong with a data set, line by line; [`noise`] adds what a real sensor, timer and robot add;
-//! [`folds`] divides touches into some to train on and others to test on.
+//! [`check`] says what is wrong with a data set, line by line; [`noise`](crate::probe::noise) adds what a real sensor,
+//! timer and robot add; [`folds`] divides touches into some to train on and others to test on.
 //!
 //! ```
 //! use palpate::touches::{Dataset, folds};
@@ -48,7 +48,6 @@ pub mod mcap;
 #[cfg(not(feature = "mcap"))]
 #[path = "no_mcap.rs"]
 mod mcap;
-pub mod noise;
 mod object;
 mod origin;
 #[cfg(feature = "parquet")]
@@ -57,8 +56,6 @@ mod recording;
 mod save;
 mod seconds;
 mod shard;
-#[cfg(all(test, feature = "train"))]
-pub(crate) mod synthetic;
 pub mod text;
 mod warning;
 
@@ -75,7 +72,6 @@ pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};
 pub use logged::{Channels, LoggedVerdict, Message, Said};
 pub use object::{ObjectTouches, Pool, Source};
 pub use origin::Origin;
-pub(crate) use origin::{tenth, unit};
 pub use recording::{Recorded, Recording};
 pub use seconds::touch_of_seconds;
 pub use shard::Shard;

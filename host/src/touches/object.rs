@@ -1,12 +1,12 @@
 //! The touches of one object, and what each of them is of.
 
-use super::noise::Noise;
 use super::{Meshes, Recorded};
+use crate::probe::noise::Noise;
 use palpate_shared::Touch;
 use std::path::PathBuf;
 
-/// What touches of an object have in common that may follow each other in a sequence. Touches of two sources never do: a
-/// robot touches one cup until it knows it, not several cups in turn.
+/// Origin that touches of an object share if they may follow each other in a sequence. Touches of two sources never do:
+/// a robot touches one cup until it knows it, not several cups in turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The object, of which nothing says that it has several instances or recordings.
@@ -32,7 +32,7 @@ pub struct ObjectTouches {
     source_of: Vec<u32>,
     /// For each touch the number of the robot that made it; empty if robots do not differ.
     robot_of: Vec<u32>,
-    /// What was touched, as far as that is known.
+    /// Meshes that were touched, as far as they are known.
     meshes: Option<Meshes>,
 }
 
@@ -81,7 +81,7 @@ impl ObjectTouches {
         Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), meshes: None }
     }
 
-    /// Touches of one source after the other: of each as many as are said, of the last one all that are left.
+    /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
     pub fn in_runs(name: impl Into<String>, touches: Vec<Touch>, runs: Vec<(Source, u64)>) -> Self {
         let last = runs.len().saturating_sub(1);
         let mut source_of = Vec::new();
@@ -183,17 +183,17 @@ impl ObjectTouches {
         &self.touches
     }
 
-    /// How many touches there are.
+    /// Number of touches.
     pub fn len(&self) -> usize {
         self.touches.len()
     }
 
-    /// Whether there is no touch.
+    /// True if there is no touch.
     pub fn is_empty(&self) -> bool {
         self.touches.is_empty()
     }
 
-    /// What the touches are of; each has at least one.
+    /// Sources of the touches; each has at least one.
     pub fn sources(&self) -> &[Source] {
         &self.sources
     }
@@ -210,8 +210,8 @@ impl ObjectTouches {
         by_source
     }
 
-    /// Which touches may be mixed in a sequence: one pool for each source and robot, those of different sources in turn. An
-    /// object without touches has one empty pool.
+    /// Pools of touches that may be mixed in a sequence: one pool for each source and robot, those of different sources
+    /// in turn. An object without touches has one empty pool.
     pub fn pools(&self) -> Vec<Pool> {
         let mut by_source: Vec<Vec<(u32, Pool)>> = vec![Vec::new(); self.sources.len().max(1)];
         let mut places = std::collections::HashMap::new();
@@ -234,7 +234,7 @@ impl ObjectTouches {
         if pools.is_empty() { vec![Pool { source: 0, touches: Vec::new() }] } else { pools }
     }
 
-    /// Whether every sequence is to be of one robot's touches, since robots differ.
+    /// True if every sequence must be of one robot's touches, since robots differ.
     pub fn has_robots(&self) -> bool {
         !self.robot_of.is_empty()
     }

@@ -1,26 +1,27 @@
-//! How touches were made.
+//! Origin of touches.
 
-use super::noise::Noise;
 use super::{Format, Shard};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::approach::{Aim, CLEARANCE, Probe};
+use crate::probe::noise::Noise;
+use crate::probe::unit;
 use glam::DVec3;
 use palpate_shared::format::Length;
 use std::ops::Range;
 
-/// How the touches of a data set were made. The same origin and mesh give the same touches. The default is the published
+/// Origin of the touches of a data set. The same origin and mesh give the same touches. The default is the published
 /// method: 21,000 full touches per object, longest side 10 units.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// How many touches of each object; with `approaches`, how many approaches. Of all shards together.
+    /// Number of touches of each object; with `approaches`, number of approaches. Of all shards together.
     pub touches: u64,
-    /// The seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// What the probe's lengths are measured in: units, with every object scaled to `length`, or millimeters, with objects
     /// at their true size. Before version 0.3.0, always units.
-    #[serde(default = "tenth", with = "unit")]
+    #[serde(default = "unit::tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning at true size.
     pub length: f64,
@@ -29,15 +30,15 @@ pub struct Origin {
     /// Where approaches aim.
     #[serde(default, skip_serializing_if = "Aim::is_box")]
     pub aim: Aim,
-    /// Whether the probe's direction and alignment are written too.
+    /// True if the probe's direction and alignment are written too.
     pub pose: bool,
-    /// Whether every approach is kept, not only full touches: sample i is then approach i.
+    /// True if every approach is kept, not only full touches: sample i is then approach i.
     pub approaches: bool,
-    /// How the touches are kept; Parquet keeps the pose in any case.
+    /// Format of the touches on the disk; Parquet keeps the pose in any case.
     pub format: Format,
-    /// Which part of the samples this data set holds.
+    /// The part of the samples that this data set holds.
     pub shard: Shard,
-    /// What the real probe added to each touch, as far as the touches were made as a real probe would make them.
+    /// Noise that the real probe added to each touch, as far as the touches were made as a real probe would make them.
     #[serde(default, skip_serializing_if = "Noise::is_none")]
     pub real: Noise,
 }
@@ -61,7 +62,7 @@ impl Default for Origin {
 }
 
 impl Origin {
-    /// How recorded touches are made: every touch with a contact is kept, nothing is drawn.
+    /// Origin of recorded touches: every touch with a contact is kept, nothing is drawn.
     pub fn recorded(probe: Probe, unit: Length, pose: bool) -> Self {
         Self { touches: 0, seed: 0, probe, unit, pose, approaches: true, ..Self::default() }
     }
@@ -94,8 +95,8 @@ impl Origin {
         }
     }
 
-    /// How far outside the sphere about a bounding box an approach starts: at true size half of the longest side, as
-    /// where objects are 10 units long, and at least as far as a tilted probe reaches.
+    /// Distance from the sphere about a bounding box at which an approach starts: at true size half of the longest
+    /// side, as where objects are 10 units long, and at least as far as a tilted probe reaches.
     pub fn clearance(&self, [low, high]: [DVec3; 2]) -> f64 {
         match self.unit {
             Length::Tenth => CLEARANCE,
@@ -108,30 +109,8 @@ impl Origin {
         self.shard.part(self.touches)
     }
 
-    /// Whether the pose is written.
+    /// True if the pose is written.
     pub fn writes_pose(&self) -> bool {
         self.pose || self.format == Format::Parquet
-    }
-}
-
-/// The unit of data sets and ensembles that state none.
-pub(crate) fn tenth() -> Length {
-    Length::Tenth
-}
-
-/// A unit of length by its name, `unit` or `mm`.
-pub(crate) mod unit {
-    use palpate_shared::format::Length;
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature is serde's")]
-    pub(crate) fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(unit.name())
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Length, D::Error> {
-        let name = std::borrow::Cow::<str>::deserialize(deserializer)?;
-        let named = Length::ALL.iter().copied().find(|unit| unit.name() == name);
-        named.ok_or_else(|| D::Error::custom(format!("unit {name:?}, where \"unit\" or \"mm\" is expected")))
     }
 }

@@ -137,7 +137,7 @@ fn write_parquet(path: &Path, _: &str, _: &[palpate_shared::Touch]) -> Result<()
 mod tests {
     use super::*;
 
-    use crate::touches::noise::Noise;
+    use crate::probe::noise::Noise;
     use crate::touches::{ObjectTouches, Origin, Recorded, folds, parse_touch};
 
     fn dataset(origin: Option<Origin>) -> Dataset {

@@ -1,9 +1,9 @@
-//! What looks wrong about a data set.
+//! Warnings about a data set.
 
 use super::Listing;
 use std::path::PathBuf;
 
-/// What looks wrong about a data set, and may be meant.
+/// Warning about a data set: it looks wrong, but may be meant.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {

@@ -1,5 +1,4 @@
-//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]), and the
-//! one that recorded touches came from ([`fit`]).
+//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]).
 //!
 //! A family of ensembles is trained (trees, depth, eta; for the table layout bins of each feature), each compiled with
 //! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Among them are trees for
@@ -23,7 +22,6 @@
 
 mod error;
 mod family;
-pub mod fit;
 pub mod probe;
 #[cfg(test)]
 mod tests;
@@ -33,19 +31,19 @@ use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
 use crate::ensemble::{Ensemble, StatedProbe};
 use crate::error::{CalibrateProblem, CompileProblem, Result};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
+use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use crate::touches::folds;
-use crate::touches::noise::Noise;
 pub use error::TuneProblem;
 use palpate_shared::Descriptor;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What a model has to fit, and how candidates are measured.
+/// Limits that a model has to fit, and settings for measuring candidates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Which features a touch is turned into.
+    /// Features that a touch is turned into.
     pub descriptor: Descriptor,
     /// The most bytes of a model.
     pub max_bytes: Option<usize>,
@@ -55,7 +53,7 @@ pub struct Settings {
     pub core: Core,
     /// The probe that made the touches, to be stated by the model.
     pub probe: Option<StatedProbe>,
-    /// What is added to the touches, in training as well as where models are measured.
+    /// Noise added to the touches, in training as well as where models are measured.
     pub noise: Noise,
     /// The error rate that recognizers stop at.
     pub error_rate: f64,
@@ -81,7 +79,7 @@ impl Default for Settings {
     }
 }
 
-/// How an ensemble of the family was trained.
+/// Training settings of an ensemble of the family.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Recipe {
     /// Multi-output trees.
@@ -99,12 +97,12 @@ pub struct Recipe {
 /// A compiled model of the family, and what it achieves on held-out touches.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// How its ensemble was trained.
+    /// Training settings of its ensemble.
     #[serde(flatten)]
     pub recipe: Recipe,
-    /// What leaves are stored as; `None` for the full model without limits that all are compared with.
+    /// Type that leaves are stored as; `None` for the full model without limits that all are compared with.
     pub leaf: Option<&'static str>,
-    /// How trees are laid out.
+    /// Layout of the trees.
     pub layout: Option<&'static str>,
     /// Size of the model with what a calibration adds, also where there are too few touches for one.
     pub bytes: Option<usize>,
@@ -120,13 +118,13 @@ pub struct Row {
     pub mean_approaches: Option<f64>,
     /// Share of wrong verdicts when it stops by itself.
     pub error: f64,
-    /// Whether no other model is at least as small, as fast (on the processor of the limit) and as quick to stop, and
+    /// True if no other model is at least as small, as fast (on the processor of the limit) and as quick to stop, and
     /// better in one of them.
     pub frontier: bool,
 }
 
 impl Row {
-    /// What a robot pays until a verdict: approaches, or touches where nothing else is known.
+    /// Cost of a verdict to a robot: approaches, or touches where nothing else is known.
     fn cost(&self) -> f64 {
         self.mean_approaches.unwrap_or(self.mean_touches)
     }
@@ -141,9 +139,9 @@ pub struct Tuned {
     pub rows: Vec<Row>,
     /// The one kept: its position in `rows`.
     pub chosen: usize,
-    /// How its thresholds were found, on touches that neither trained nor chose it; null if they were not.
+    /// Calibration of its thresholds, on touches that neither trained nor chose it; null if there is none.
     pub calibration: Option<Calibrated>,
-    /// Why they were not.
+    /// Reason why there is none.
     pub uncalibrated: Option<String>,
     /// Its figures on touches that neither trained, calibrated nor chose it.
     pub test: Evaluation,
@@ -223,7 +221,8 @@ fn calibrated(
     }
 }
 
-/// Why a model promises nothing, and how many touches of each object it would take, if there are `fewest` of one of them.
+/// Reason why a model promises nothing, with the number of touches of each object that it would take, if there are
+/// `fewest` of one of them.
 fn why(problem: &CalibrateProblem, fewest: usize) -> String {
     match *problem {
         CalibrateProblem::TooFew { ref object, rate, found, needed, .. } if found > 0 => {

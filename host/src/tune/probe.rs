@@ -1,4 +1,4 @@
-//! Which probe to build: the spacing, radius and tilt, and the aim of approaches, that need the fewest approaches.
+//! Search for the best probe: the spacing, radius and tilt, and the aim of approaches, that need the fewest approaches.
 //!
 //! Every probe tried touches the objects in the simulator; a model is trained on these approaches and tested on
 //! others, with the stopping rule set so that the share of wrong verdicts is the one asked for. What counts is how many approaches that takes on average. The search narrows down: a coarse grid with a quarter of the approaches
@@ -26,9 +26,9 @@ use crate::error::{Error, Result, TuneProblem};
 use crate::evaluate::{Approaches, Candidate, Margins, SequentialSettings};
 use crate::mesh::Object;
 use crate::probe::approach::{Aim, Probe};
+use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::noise::Noise;
 use crate::touches::{Dataset, Origin};
 use palpate_shared::format::{Counted, Length};
 use palpate_shared::{ContactPattern, Descriptor};
@@ -47,11 +47,11 @@ const HALVINGS: usize = 12;
 /// Logarithms of the odds between which the stopping threshold is searched.
 const ODDS: [f64; 2] = [-16.0, -0.05];
 
-/// What probes are searched, and how each is measured.
+/// Space of probes to search, and settings for measuring each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// What lengths are measured in: units, a tenth of the object's longest side, or millimeters, where objects have their
-    /// true sizes.
+    /// Unit of lengths: units, a tenth of the object's longest side, or millimeters, where objects have their true
+    /// sizes.
     pub unit: Length,
     /// Distances between neighboring fingers.
     pub spacing: RangeInclusive<f64>,
@@ -63,13 +63,14 @@ pub struct Settings {
     pub aims: Vec<Aim>,
     /// The probe's speed, per second.
     pub speed: f64,
-    /// What the best probe is compared with: the published one or, where objects have their true sizes, its likeness.
+    /// Probe that the best one is compared with: the published one or, where objects have their true sizes, its
+    /// likeness.
     pub published: Probe,
     /// Standard deviation of the Gaussian noise of contact times, in microseconds, in training and testing.
     pub noise: f64,
-    /// Which features a touch is turned into.
+    /// Features that a touch is turned into.
     pub descriptor: Descriptor,
-    /// Which approaches are evidence.
+    /// Approaches that are evidence.
     pub counted: Counted,
     /// The share of wrong verdicts that is asked for, above 0 and at most 0.25.
     pub error_rate: f64,
@@ -77,7 +78,7 @@ pub struct Settings {
     pub approaches: u64,
     /// Sequences of approaches for each object.
     pub sequences: usize,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -181,13 +182,13 @@ pub struct Trial {
     pub approaches: f64,
     /// Standard error of [`Trial::approaches`], from the drawing of sequences.
     pub approaches_standard_error: f64,
-    /// Whether no more verdicts than asked for were wrong, and no more than that missing after all test approaches.
+    /// True if no more verdicts than asked for were wrong, and no more than that missing after all test approaches.
     pub reached: bool,
     /// The share of wrong verdicts.
     pub error: f64,
     /// The share of sequences that used up the test approaches without a verdict.
     pub undecided: f64,
-    /// The posterior at which the recognizer stopped is one less this.
+    /// The posterior at which the recognizer stopped is 1 minus this.
     pub threshold: f64,
     /// Approaches to a verdict on average, for each object.
     pub per_object: BTreeMap<String, f64>,
@@ -196,7 +197,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// What is better: to reach the error rate at all, then fewer approaches.
+    /// Rank of a probe: first, reaching the error rate at all; then fewer approaches.
     fn rank(&self) -> (bool, f64) {
         if self.reached { (false, self.approaches) } else { (true, self.error + self.undecided) }
     }
@@ -214,15 +215,15 @@ pub struct Design {
     /// All probes tried in the rounds before, the best of each round first.
     pub rounds: Vec<Vec<Trial>>,
     /// What lengths are measured in.
-    #[serde(with = "crate::touches::unit")]
+    #[serde(with = "crate::probe::unit")]
     pub unit: Length,
     /// The error rate that was asked for.
     pub error_rate: f64,
     /// Standard deviation of the noise of contact times that was assumed, in microseconds.
     pub noise: f64,
-    /// Which features a touch was turned into.
+    /// Features that a touch was turned into.
     pub descriptor: &'static str,
-    /// Which approaches were evidence.
+    /// Approaches that were evidence.
     pub counted: &'static str,
 }
 

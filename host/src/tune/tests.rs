@@ -1,6 +1,6 @@
 use super::*;
 use crate::error::Setting;
-use crate::touches::synthetic;
+use crate::tests::synthetic;
 
 fn quick() -> Settings {
     Settings { groups: 60, max_bytes: Some(6_000), ..Settings::default() }

@@ -24,7 +24,7 @@ fn error(bytes: &[u8]) -> String {
     read(bytes).map(|log| log.touches().len()).unwrap_err().to_string()
 }
 
-/// What is wrong with these bytes, and at which of them.
+/// The problem with these bytes, and its place.
 #[track_caller]
 fn problem(bytes: &[u8]) -> (TouchesProblem, Place) {
     let error = read(bytes).map(|log| log.touches().len()).unwrap_err();
@@ -213,7 +213,7 @@ fn a_message_that_is_no_touch_is_named_with_file_byte_number_topic_and_what_is_w
     assert!(error(&late).contains("no log time: 18446744073709551615 ns, after 2262"));
 }
 
-/// How the record of a message with this text begins.
+/// First bytes of the record of a message with this text.
 fn record_head(text: &str) -> Vec<u8> {
     record(files::MESSAGE, &vec![0; 22 + text.len()])[..9].to_vec()
 }

@@ -10,6 +10,7 @@
 //! | [`rows`] | rows of features | [`rows::Rows`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`verify`] | margins, predictions and scores over rows; a model compared with its ensemble | [`verify::verify`](fn@verify::verify) |
+//! | [`train`] | grows boosted trees on rows of classes | [`train::train`] |
 //! | [`output`], [`progress`] | files that appear whole or not at all; progress of long calls | |
 //!
 //! The crate `palpate` builds on this one and adds meshes, probes and touches. The crates [`onboard`] and [`shared`] run on
@@ -21,6 +22,7 @@ pub mod error;
 pub mod output;
 pub mod progress;
 pub mod rows;
+pub mod train;
 pub mod verify;
 
 pub use error::{Error, Result};

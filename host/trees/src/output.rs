@@ -5,7 +5,7 @@ use std::fs::{File, TryLockError};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// How the temporary names begin and end.
+/// Prefix and suffix of the temporary names.
 const PREFIX: &str = ".palpate-";
 const SUFFIX: &str = ".tmp";
 
@@ -81,7 +81,7 @@ fn directory_of(path: &Path) -> &Path {
     }
 }
 
-/// Whether writing to this path means the program's standard output: `-`, and what systems call it.
+/// True if writing to this path means the program's standard output: `-`, and what systems call it.
 pub fn is_stdout(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|stdout| path == Path::new(stdout))
 }

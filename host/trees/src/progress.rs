@@ -1,8 +1,8 @@
-//! How far long work has come, told to whoever wants to know; and a way to stop it.
+//! Progress of long work, for whoever wants to show it; and a way to stop it.
 
 use crate::error::{Error, Result};
 
-/// Is told by long calls how far they have come, and may cancel them.
+/// Receives the progress of long calls, and may cancel them.
 ///
 /// Nothing in the library draws: a program implements this with a progress bar, a log, a callback. `&()` is told
 /// everything and does nothing. Calls come from the thread that made the long call and from its workers.
@@ -18,7 +18,7 @@ pub trait Progress: Sync {
         _ = steps;
     }
 
-    /// Whether the call should stop as soon as it can, with [`Error::Cancelled`]. Asked often; should be cheap.
+    /// True if the call should stop as soon as it can, with [`Error::Cancelled`]. Asked often; should be cheap.
     fn is_cancelled(&self) -> bool {
         false
     }

@@ -4,7 +4,7 @@
 //! go out through [`output`] (f64) and [`evidence`] (i64), whose memory holds until the next call. A function that can
 //! fail returns −1 then.
 //!
-//! `build` compiles it into `host/assets/play/palpate.wasm`, which the program puts into its pages.
+//! `build` compiles it into `host/report/assets/play/palpate.wasm`, which the program puts into its pages.
 
 mod exports;
 mod table;

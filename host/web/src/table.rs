@@ -1,25 +1,25 @@
-//! What is on the table: one game, one round, one series, and the memory that the script shares.
+//! State of the table: one game, one round, one series, and the memory that the script shares.
 
 use palpate::compile::open;
 use palpate::glam::DVec3;
 use palpate::mesh::Mesh;
 use palpate::onboard::{Refused, Verdict};
 use palpate::play::{Approached, Game, Round, Series, decompress, unpack};
+use palpate::probe::noise::{Deviation, Noise};
 use palpate::probe::{Aim, Probe};
 use palpate::shared::format::Length;
 use palpate::shared::{ContactPattern, Pose, Q15_ONE, Touch};
 use palpate::touches::Origin;
-use palpate::touches::noise::{Deviation, Noise};
 use std::cell::RefCell;
 
-/// What the functions work on.
+/// State that the functions work on.
 #[derive(Default)]
 pub(crate) struct Table {
     input: Vec<u8>,
     /// Numbers for the script.
     pub(crate) output: Vec<f64>,
     evidence: Vec<i64>,
-    /// What the game's objects look like, in their meshes' own units.
+    /// Meshes of the game's objects, in their own units.
     meshes: Vec<Mesh>,
     game: Option<Game<'static>>,
     round: Option<Round<'static>>,

@@ -40,7 +40,7 @@ pub fn section_sizes() -> [usize; 4] {
 }
 
 const PAINT: u32 = 0xdead_5afe;
-/// How far down the stack is painted.
+/// Depth to which the stack is painted, in bytes.
 const PAINTED: usize = 32 * 1024;
 /// Left unpainted below the stack pointer for the painting itself.
 const MARGIN: usize = 64;

@@ -1,4 +1,5 @@
-//! What every machine must make of a touch, as bytes: the same lines for the `identity` image and for the host's tests.
+//! The result of a touch that every machine must reproduce, as bytes: the same lines for the `identity` image and for
+//! the host's tests.
 
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;

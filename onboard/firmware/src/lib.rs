@@ -1,4 +1,4 @@
-//! What the firmware images have in common.
+//! Code that all firmware images share.
 //!
 //! | module | what |
 //! |---|---|

@@ -18,7 +18,7 @@ use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 
 /// Microseconds.
 static TIME: AtomicU32 = AtomicU32::new(0);
-/// Whether the pin interrupt still has to look at an edge.
+/// True while the pin interrupt still has to look at an edge.
 static EDGE: AtomicBool = AtomicBool::new(false);
 /// When the main loop last found that nothing more had happened.
 static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);
@@ -64,7 +64,7 @@ pub fn changed() {
     EDGE.store(false, Ordering::Relaxed);
 }
 
-/// What the pins have to say to the main loop.
+/// Returns the messages of the pins to the main loop.
 pub fn sense() -> Sensed {
     let sensed = with(|watcher| watcher.sense(&PlayedClock)).unwrap_or(Sensed::Nothing(0));
     if let Sensed::Nothing(now) = sensed {
@@ -73,7 +73,7 @@ pub fn sense() -> Sensed {
     sensed
 }
 
-/// Whether they have nothing to say.
+/// True if the pins have no message.
 pub fn is_idle() -> bool {
     with(|watcher| watcher.is_idle()).unwrap_or(true)
 }

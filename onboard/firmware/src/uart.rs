@@ -100,7 +100,7 @@ impl Uart {
         byte
     }
 
-    /// What was received, without waiting; how many bytes.
+    /// Reads the received bytes without waiting; returns their number.
     pub fn receive_all(&mut self, buffer: &mut [u8]) -> usize {
         let mut count = 0;
         while let Some(slot) = buffer.get_mut(count)
@@ -112,7 +112,7 @@ impl Uart {
         count
     }
 
-    /// Whether a byte has been received.
+    /// True if a byte has been received.
     pub fn is_ready(&self) -> bool {
         self.received.ready()
     }

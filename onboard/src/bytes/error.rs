@@ -1,17 +1,17 @@
-//! Why bytes are not a model.
+//! Reasons why bytes are not a model.
 
 use core::fmt;
 use palpate_shared::format::take_section;
 
-/// Why bytes are not a model; [`ModelError::offset`] is the place.
+/// Reason why bytes are not a model; [`ModelError::offset`] is the place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ModelError {
     /// There are fewer bytes than the model has, or more.
     Length {
-        /// How many bytes the model should have.
+        /// Number of bytes the model should have.
         expected: u32,
-        /// How many there are.
+        /// Number of bytes there are.
         found: usize,
     },
     /// The bytes do not start as a model does.
@@ -51,8 +51,7 @@ pub enum ModelError {
     },
 }
 
-/// What is wrong with a model whose bytes are as they were written, and the offset of what is: an error that fits two
-/// registers.
+/// Fault in a model whose bytes are as they were written, with its offset: an error that fits two registers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Wrong {
     Field(usize),

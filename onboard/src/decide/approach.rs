@@ -10,12 +10,12 @@ use palpate_shared::format::Plan;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
-    /// Which of the candidates it is.
+    /// Index of the candidate.
     pub index: usize,
     /// The number of its pose: see [`Poses`](palpate_shared::Poses).
     pub pose: u16,
-    /// How well it tells the object with the most evidence from the others, in Q15: the mean separation, each other
-    /// object counting as much as it is still in play.
+    /// Degree to which the approach distinguishes the object with the most evidence from the others, in Q15: the mean
+    /// separation, each other object counting as much as it is still in play.
     pub score: i32,
 }
 
@@ -58,7 +58,7 @@ fn mean(sum: i32, weights: i32) -> i32 {
 }
 
 impl<const N: usize> State<N> {
-    /// What [`propose`] proposes by the evidence so far: before the first touch, by the priors.
+    /// The approach that [`propose`] proposes by the evidence so far: before the first touch, by the priors.
     pub(crate) fn propose(&self, model: &Model<'_>, candidates: impl IntoIterator<Item = u16>) -> Option<Proposal> {
         propose(model, self.evidence_or_priors(model, &mut [0; N]), candidates)
     }

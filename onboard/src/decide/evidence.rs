@@ -1,6 +1,6 @@
-//! What the touches so far say about each object.
+//! Evidence of the touches so far for each object.
 
-use super::exponential::exp2_negative;
+use crate::exponential::exp2_negative;
 
 /// A posterior probability, in Q56: fine enough to distinguish 1 − 1e-16 from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,8 +30,8 @@ impl Posterior {
     }
 }
 
-/// What all objects but one weigh together, that one's weight being 1: what a posterior is computed from, at no cost until
-/// it is asked for.
+/// Sum of the weights of all objects but one, that one's weight being 1: the number that a posterior is computed from, at no cost
+/// until it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rivals(u64);
@@ -55,12 +55,12 @@ impl Rivals {
     }
 }
 
-/// How units of evidence turn into bits.
+/// Conversion of units of evidence into bits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unit {
     pub(crate) bits: u32,
     pub(crate) shift: u8,
-    /// What bits are multiplied by, in Q16: one over the temperature.
+    /// Factor applied to bits, in Q16: one over the temperature.
     pub(crate) sharpness: u32,
 }
 
@@ -95,8 +95,8 @@ pub(crate) fn best(evidence: &[i64]) -> (usize, i64) {
     best
 }
 
-/// What all objects but the best weigh together, the best one's weight being 1; `None` if that is more than `limit` (Q56):
-/// if its posterior does not pass the threshold.
+/// Sum of the weights of all objects but the best, the best one's weight being 1; `None` if that is more than `limit`
+/// (Q56): if its posterior does not pass the threshold.
 ///
 /// Cost: an exponential for each object, until it is clear that the answer is `None`; usually after the first rival.
 pub(crate) fn rivals(evidence: &[i64], (winner, most): (usize, i64), limit: u64, unit: Unit) -> Option<Rivals> {

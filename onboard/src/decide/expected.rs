@@ -1,4 +1,4 @@
-//! Which objects to expect, and how often, in whole numbers.
+//! Objects to expect, and their frequencies, in whole numbers.
 
 use super::evidence::Unit;
 use core::fmt;
@@ -6,7 +6,7 @@ use core::fmt;
 /// The evidence for an object that cannot be there: no number of touches makes it the best, and its weight is 0.
 pub(crate) const IMPOSSIBLE: i64 = i64::MIN;
 
-/// Whether the evidence for an object, whatever was touched, did not begin as [`IMPOSSIBLE`].
+/// True unless the evidence for an object began as [`IMPOSSIBLE`], whatever was touched.
 pub(crate) const fn is_possible(evidence: i64) -> bool {
     evidence > IMPOSSIBLE / 2
 }

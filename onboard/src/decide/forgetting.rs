@@ -1,4 +1,4 @@
-//! What to do when the object may be exchanged, or slip, while it is being touched.
+//! Forgetting: for objects that may be exchanged, or slip, while they are being touched.
 
 use super::expected::{IMPOSSIBLE, is_possible};
 use super::recognizer::{Recognizer, Verdict};
@@ -23,7 +23,7 @@ pub struct Forgetting<const N: usize> {
     start: [i64; N],
     /// Margins of the touches that are kept at a restart.
     recent: [i64; N],
-    /// How many these are.
+    /// Number of these touches.
     touches: u32,
     /// For each object what recent touches say against the leader, in units of a margin.
     against: [i32; N],
@@ -46,7 +46,7 @@ impl<const N: usize> Forgetting<N> {
         Self { start, recent: [0; N], touches: 0, against: [0; N], rival: 0, limit, restarts: 0 }
     }
 
-    /// How often it has made a recognizer restart.
+    /// Number of times that it has made a recognizer restart.
     pub const fn restarts(&self) -> u32 {
         self.restarts
     }

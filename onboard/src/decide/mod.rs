@@ -1,9 +1,8 @@
-//! Margins to a verdict: evidence, its exponential, when to stop, what fits no object, and the state as bytes.
+//! Margins to a verdict: evidence, when to stop, what fits no object, and the state as bytes.
 
 mod approach;
 mod evidence;
 mod expected;
-mod exponential;
 mod forgetting;
 mod recognizer;
 #[cfg(feature = "link")]
@@ -14,7 +13,6 @@ mod strangers;
 pub use approach::Proposal;
 pub use evidence::{Posterior, Rivals};
 pub use expected::NothingExpected;
-pub use exponential::exp2_negative;
 pub use forgetting::Forgetting;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;
@@ -22,4 +20,4 @@ pub use recognizer::{CapacityError, Recognizer, Verdict};
 #[cfg(feature = "link")]
 pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;
-pub use strangers::Fit;
+pub use strangers::Familiarity;

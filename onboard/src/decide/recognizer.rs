@@ -3,13 +3,13 @@
 use super::evidence::{self, Posterior, Rivals, SHARPNESS, Unit};
 use super::expected::{self, NothingExpected};
 use super::stopping::Stopping;
-use super::strangers::{self, Fit};
+use super::strangers::{self, Familiarity};
 use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
 use core::fmt;
 use palpate_shared::Touch;
 
-/// What is known after a touch.
+/// Result of the touches so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
@@ -19,9 +19,10 @@ pub enum Verdict {
     Recognized {
         /// The object's index in the model.
         object: u8,
-        /// How many touches it took.
+        /// Number of touches taken.
         touches: u32,
-        /// What all other objects weigh beside it; its [`posterior`](Rivals::posterior) is computed when it is asked for.
+        /// Weights of all other objects, relative to this one; its [`posterior`](Rivals::posterior) is computed when it
+        /// is asked for.
         rivals: Rivals,
     },
     /// The touches fit no object that the model knows, which stays so until [`Recognizer::reset`]. Only of a model with a
@@ -65,14 +66,14 @@ impl core::error::Error for CapacityError {}
 /// Recognizes an object by touch; has room for up to `N` objects.
 ///
 /// State: a number of 64 bits for each object, a few more, and the model, which is copied: where its parts are, not the bytes
-/// that it is read from. The README of this crate states what it comes to.
+/// that it is read from. The README of this crate states its size.
 #[derive(Clone, Debug)]
 pub struct Recognizer<'m, const N: usize> {
     model: Model<'m>,
     state: State<N>,
 }
 
-/// What a recognizer knows, without its model.
+/// State of a recognizer, without its model.
 #[derive(Clone, Debug)]
 pub(crate) struct State<const N: usize> {
     /// Margins summed over touches, and the prior, in units of a margin; anything while nothing is [`Decided::Fresh`].
@@ -127,7 +128,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         Self { model, state }
     }
 
-    /// What it knows, for [`Recognizer::continued`].
+    /// Returns the state, for [`Recognizer::continued`].
     pub(crate) fn into_state(self) -> State<N> {
         self.state
     }
@@ -172,7 +173,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.verdict()
     }
 
-    /// How many touches were taken in since the last [`reset`](Self::reset).
+    /// Number of touches taken in since the last [`reset`](Self::reset).
     pub const fn touches(&self) -> u32 {
         self.state.touches
     }
@@ -182,19 +183,19 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.best(&self.model)
     }
 
-    /// Whether the touches so far fit the [best](Self::best) object, by the model's test; [`Fit::Fits`] without one, and
-    /// before the first touch.
+    /// Result of the model's test of fit of the touches so far with the [best](Self::best) object; [`Fit::Fits`]
+    /// without one, and before the first touch.
     ///
     /// Cost: as the test in [`push`](Self::push).
-    pub fn fit(&self) -> Fit {
+    pub fn familiarity(&self) -> Familiarity {
         match self.state.covered() {
-            0 => Fit::Fits,
-            touches => strangers::fit(&self.model, self.evidence(), self.best(), touches),
+            0 => Familiarity::Known,
+            touches => strangers::familiarity(&self.model, self.evidence(), self.best(), touches),
         }
     }
 
-    /// What the weights of all objects but the [best](Self::best) come to, the best one's being 1, in Q56; the most
-    /// there is where the background has more. The best object is recognized once this is at most its
+    /// Sum of the weights of all objects but the [best](Self::best), the best one's being 1, in Q56; the largest value
+    /// where the background has more. The best object is recognized once this is at most its
     /// [threshold](Stopping::odds_of), and its touches [fit](Self::fit).
     ///
     /// Cost: an exponential for each object.
@@ -229,10 +230,11 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.decided = Decided::Fresh;
     }
 
-    /// Forgets all touches, for the next object, which is one of those with a weight: `weights` say how often each object
-    /// is touched, in any common unit, and replace the model's priors until the next [`reset`](Self::reset). An object of
-    /// weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the model
-    /// promises was found out for its own priors, and its test of fit takes the weights' for evidence. `&[3, 0, 1]` says that there are three of the first object for each of the third, and none of the second.
+    /// Forgets all touches, for the next object, which is one of those with a weight: `weights` say how often each
+    /// object is touched, in any common unit, and replace the model's priors until the next [`reset`](Self::reset). An
+    /// object of weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the
+    /// model promises was determined for its own priors, and its test of fit takes the weights' for evidence. The
+    /// weights `&[3, 0, 1]` say that there are three of the first object for each of the third, and none of the second.
     ///
     /// Cost: two logarithms for each object, bit by bit.
     ///
@@ -280,11 +282,12 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         }
         self.state.touches = self.state.touches.saturating_add(1);
         let best = strangers::leader(&self.model, self.evidence());
-        let fit = strangers::fit(&self.model, self.evidence(), best.0, self.state.covered());
+        let familiarity = strangers::familiarity(&self.model, self.evidence(), best.0, self.state.covered());
         let odds = self.state.stopping.odds_of(best.0, &self.model);
-        let may_be_named = fit == Fit::Fits && !strangers::is_background(&self.model, self.evidence(), best.1);
+        let may_be_named =
+            familiarity == Familiarity::Known && !strangers::is_background(&self.model, self.evidence(), best.1);
         let rivals = if may_be_named { evidence::rivals(self.evidence(), best, odds, unit(&self.model)) } else { None };
-        if fit == Fit::Stranger {
+        if familiarity == Familiarity::Stranger {
             self.state.decided = Decided::Unknown;
         } else if let Some(rivals) = rivals {
             self.state.decided = Decided::Object(u8::try_from(best.0).unwrap_or(u8::MAX));
@@ -345,7 +348,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// What all other objects weigh beside one that was recognized with this evidence.
+    /// Weights of all other objects, relative to one that was recognized with this evidence.
     pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize) -> Option<Rivals> {
         let evidence = evidence.get(..model.object_count())?;
         let best = strangers::leader(model, evidence);

@@ -9,7 +9,7 @@ use crate::Model;
 use core::fmt;
 use palpate_shared::format::checksum;
 
-/// Why a snapshot was not written or taken.
+/// Reason why a snapshot was not written or taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SnapshotError {

@@ -2,19 +2,19 @@
 
 use crate::model::Model;
 
-/// When a recognizer stops: once the posterior of the best object passes 1 − error rate, or after a number of touches.
+/// When a recognizer stops: once the posterior of the best object exceeds 1 − error rate, or after a number of touches.
 /// The posterior is that of the evidence as it is, without the model's temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopping {
-    /// Error rate / (1 − error rate) in Q56: what the other objects' weights may come to, the best object's being 1.
+    /// Error rate / (1 − error rate) in Q56: the largest sum of the other objects' weights, the best object's being 1.
     pub(crate) odds: u64,
     pub(crate) max_touches: u32,
-    /// Whether objects have the thresholds that their model states for each, where it does.
+    /// True if objects have the thresholds that their model states for each, where it does.
     pub(crate) by_object: bool,
 }
 
 impl Stopping {
-    /// Stops when the posterior passes 1 − `error_rate`, or gives up after `max_touches`. `None` unless the error rate
+    /// Stops when the posterior exceeds 1 − `error_rate`, or gives up after `max_touches`. `None` unless the error rate
     /// is between 1e-15 and 0.5 and there may be a touch.
     ///
     /// Cost: none where it is evaluated at compile time, as in `const STOPPING: Option<Stopping> = Stopping::new(…)`;
@@ -27,9 +27,9 @@ impl Stopping {
         Some(Self { odds: q56(odds), max_touches, by_object: false })
     }
 
-    /// Stops once the weights of all other objects come to at most `odds` (Q56), the best object's being 1, or after
+    /// Stops once the weights of all other objects sum to at most `odds` (Q56), the best object's being 1, or after
     /// `max_touches`, where 0 counts as 1. No object weighs more than the best one: at `odds` of 2^56 for each other object
-    /// every touch decides, also where all are level, unless the model's [test of fit](crate::Fit) or its
+    /// every touch decides, also where all are level, unless the model's [misfit test](crate::Familiarity) or its
     /// [background](Model::background) objects.
     pub const fn from_odds(odds: u64, max_touches: u32) -> Self {
         Self { odds, max_touches: 1, by_object: false }.with_max_touches(max_touches)
@@ -51,7 +51,7 @@ impl Stopping {
         self.max_touches
     }
 
-    /// The error rate: the posterior has to pass one less this.
+    /// The error rate: the posterior has to exceed 1 minus this.
     pub const fn error_rate(&self) -> f64 {
         let odds = self.odds as f64 / ONE;
         odds / (1.0 + odds)

@@ -1,17 +1,17 @@
-//! Whether the touches so far fit the object with the most evidence, or none that the model knows.
+//! Test of fit: do the touches so far fit the object with the most evidence, or none that the model knows?
 
 use super::evidence::best;
 use super::expected::is_possible;
-use super::exponential::exp2_negative;
+use crate::exponential::exp2_negative;
 use crate::model::Model;
-use palpate_shared::format::{FitTerms, FitTest, ObjectFit};
+use palpate_shared::format::{MisfitTerms, MisfitTest, ObjectMisfit};
 
-/// What a model's test of fit says.
+/// Result of a model's test of fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Fit {
+pub enum Familiarity {
     /// The object with the most evidence may be named: its touches fit, and enough were made. Always without a test.
-    Fits,
+    Known,
     /// No name yet: too few touches, or touches that fit badly.
     Doubtful,
     /// The touches do not fit the object with the most evidence: it is none that the model knows.
@@ -23,36 +23,36 @@ pub(crate) fn leader(model: &Model<'_>, evidence: &[i64]) -> (usize, i64) {
     best(evidence.get(..model.known_count()).unwrap_or(evidence))
 }
 
-/// Whether the background has more evidence than any other object.
+/// True if the background has more evidence than any other object.
 pub(crate) fn is_background(model: &Model<'_>, evidence: &[i64], most: i64) -> bool {
     model.background().and_then(|background| evidence.get(background)).is_some_and(|&background| background > most)
 }
 
-/// What the model's test says about evidence, priors included, that is the sum of `touches` touches.
+/// Result of the model's test about evidence, priors included, that is the sum of `touches` touches.
 ///
 /// Cost: without a test a few instructions for each optional section; with one some more for each rival, a
 /// multiplication for each number of the triangle (45 for nine rivals, 55 for ten), an exponential and a 64-bit division.
 /// Cannot fail or overflow: sums saturate.
-pub(crate) fn fit(model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Fit {
-    let Some(test) = model.strangers().and_then(|strangers| strangers.test) else { return Fit::Fits };
+pub(crate) fn familiarity(model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Familiarity {
+    let Some(test) = model.strangers().and_then(|strangers| strangers.test) else { return Familiarity::Known };
     if touches < test.terms.first {
-        return Fit::Doubtful;
+        return Familiarity::Doubtful;
     }
-    let Some(misfit) = misfit(&test, model, evidence, leader, touches) else { return Fit::Fits };
+    let Some(misfit) = misfit(&test, model, evidence, leader, touches) else { return Familiarity::Known };
     let early = early(&test.terms, touches);
     let above = |limit: i32| misfit > early.saturating_add(limit.into());
     if above(test.terms.threshold) {
-        Fit::Stranger
+        Familiarity::Stranger
     } else if touches < test.terms.least || above(test.terms.doubt) {
-        Fit::Doubtful
+        Familiarity::Doubtful
     } else {
-        Fit::Fits
+        Familiarity::Known
     }
 }
 
 impl Model<'_> {
-    /// How badly the evidence for each object, priors included, of `touches` touches fits the object with the most, in 2^-16
-    /// nats: what the model's test compares with its limits. `None` without a test.
+    /// Misfit of the evidence for each object, priors included, of `touches` touches with the object with the most, in
+    /// 2^-16 nats: the number that the model's test compares with its limits. `None` without a test.
     ///
     /// Cost: as the test in [`Recognizer::push`](crate::Recognizer::push). Cannot fail.
     pub fn misfit(&self, evidence: &[i64], touches: u32) -> Option<i64> {
@@ -62,14 +62,14 @@ impl Model<'_> {
 }
 
 /// How badly the touches fit the leader, in 2^-16 nats. `None` for an object without a record, which no valid model has.
-fn misfit(test: &FitTest<'_>, model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Option<i64> {
+fn misfit(test: &MisfitTest<'_>, model: &Model<'_>, evidence: &[i64], leader: usize, touches: u32) -> Option<i64> {
     let object = test.object(leader)?;
     // Of an object that cannot be there nothing is known: as if it had its mean.
     let sum = |object: usize| evidence.get(object).copied().filter(|&sum| is_possible(sum));
     let own = |object: usize| sum(object).map(|sum| sum.saturating_sub(i64::from(model.prior(object))));
-    let mut ahead = [0_i32; FitTest::MOST_RIVALS];
+    let mut ahead = [0_i32; MisfitTest::MOST_RIVALS];
     for ((ahead, &rival), index) in ahead.iter_mut().zip(object.rivals).zip(0..) {
-        let mean = i64::from(object.mean(index)) << (object.mean_shift & 63).min(ObjectFit::MOST_SHIFT);
+        let mean = i64::from(object.mean(index)) << (object.mean_shift & 63).min(ObjectMisfit::MOST_SHIFT);
         // 2^15 · 2^40 does not overflow; times the number of touches it may, and saturates.
         let expected = mean.saturating_mul(touches.into());
         if let (Some(rival), Some(leader)) = (own(rival.into()), own(leader)) {
@@ -107,7 +107,7 @@ fn held(number: i64) -> i32 {
 }
 
 /// How much higher the limits are after this number of touches, in 2^-16 nats.
-fn early(terms: &FitTerms, touches: u32) -> i64 {
+fn early(terms: &MisfitTerms, touches: u32) -> i64 {
     let left = exp2_negative(u64::from(touches) * u64::from(terms.halving)) >> 24;
     // Below 2^31 · 2^32.
     i64::try_from((u64::from(terms.early) * left) >> 32).unwrap_or(i64::MAX)

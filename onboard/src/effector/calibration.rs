@@ -40,7 +40,7 @@ pub struct Calibration {
     curvature: i64,
 }
 
-/// Why a calibration has no result.
+/// Reason why a calibration has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CalibrationError {

@@ -16,7 +16,7 @@ pub(super) struct Debounce {
     closed_since: u32,
 }
 
-/// What happened to a switch.
+/// Change of a switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Change {
     /// It has closed, its first closing edge was at this time.
@@ -49,7 +49,7 @@ impl Debounce {
         }
     }
 
-    /// Whether the switch has settled open.
+    /// True if the switch has settled open.
     pub(super) const fn is_open(&self) -> bool {
         !self.settled && self.left.is_none()
     }
@@ -94,7 +94,7 @@ impl Debounce {
         }
     }
 
-    /// What happened to the switch by `now`. Call it until it returns `None`.
+    /// Returns the change of the switch by `now`. Call it until it returns `None`.
     pub(super) fn fire(&mut self, now: u32, settings: &Settings) -> Option<Change> {
         let Some(left) = self.left else {
             let stuck = self.settled && !self.stuck_told && after(now, self.closed_since) >= settings.stuck;

@@ -257,7 +257,7 @@ impl Effector {
         }
     }
 
-    /// How long all fingers have to be open before a touch can begin. In an approach they may be for up to `release`.
+    /// Time that all fingers have to be open before a touch can begin. In an approach they may be for up to `release`.
     const fn rest(&self) -> u32 {
         let Settings { rest, release, .. } = self.settings;
         if self.unseen && release > rest { release } else { rest }
@@ -267,7 +267,7 @@ impl Effector {
         self.fingers.iter().all(Debounce::is_open)
     }
 
-    /// Whether the open fingers have been open for this long, counted from the first time that this is asked.
+    /// True if the open fingers have been open for this long, counted from the first time that this is asked.
     fn open_for(&mut self, time: u32, now: u32) -> bool {
         after(now, *self.open_since.get_or_insert(now)) >= time
     }
@@ -287,7 +287,7 @@ impl Effector {
         self.origin().map(|origin| origin.wrapping_add(self.settings.timeout))
     }
 
-    /// Whether a finger that has not touched yet began to close before the deadline and has not settled.
+    /// True if a finger that has not touched yet began to close before the deadline and has not settled.
     fn awaits_contact(&self, deadline: u32) -> bool {
         let awaited = |(finger, contact): (&Debounce, &Option<u32>)| {
             contact.is_none() && finger.closing_since().is_some_and(|since| !is_past(deadline, since))
@@ -317,7 +317,7 @@ impl Effector {
     }
 }
 
-/// Whether `at` is not after `now`, for times less than 2³¹ apart.
+/// True if `at` is not after `now`, for times less than 2³¹ apart.
 const fn is_past(at: u32, now: u32) -> bool {
     now.wrapping_sub(at) >> 31 == 0
 }

@@ -1,4 +1,4 @@
-//! What can go wrong with three switches.
+//! Faults of three switches.
 
 use super::Finger;
 use core::fmt;

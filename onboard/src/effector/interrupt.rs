@@ -5,7 +5,7 @@ use embedded_hal::digital::InputPin;
 use heapless::Deque;
 use palpate_shared::Touch;
 
-/// What the pins have to say.
+/// Message of the pins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sensed {
@@ -85,7 +85,7 @@ impl<A: InputPin, B: InputPin, C: InputPin, const EDGES: usize> Watcher<A, B, C,
         self.edges.len()
     }
 
-    /// Whether no edge waits for the main loop: it may sleep.
+    /// True if no edge waits for the main loop: it may sleep.
     pub fn is_idle(&self) -> bool {
         self.edges.is_empty() && !self.lost
     }

@@ -87,14 +87,13 @@ impl core::fmt::Display for Finger {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Edge {
-    /// Which finger.
+    /// The finger.
     pub finger: Finger,
     /// Closed (contact) or open.
     pub closed: bool,
     /// When, on the [`Clock`], in microseconds.
     pub at: u32,
-    /// Whether edges before this one were lost because the queue was full, or
-    /// the interrupt was held off too long.
+    /// True if edges before this one were lost because the queue was full, or the interrupt was held off too long.
     pub after_loss: bool,
 }
 

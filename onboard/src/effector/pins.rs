@@ -3,7 +3,7 @@
 use super::{Edge, Fault, Finger};
 use embedded_hal::digital::InputPin;
 
-/// Which level of a pin means contact.
+/// Level of a pin that means contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Active {
     /// The switch pulls the pin up.

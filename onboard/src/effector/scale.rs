@@ -24,9 +24,9 @@ pub struct Geometry {
 /// approximations are over the larger of the two spans. Below 10 % difference that is usually well under the noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
-    /// What differences of times are multiplied by, Q16: spacing and speed.
+    /// Factor for differences of times, Q16: spacing and speed.
     linear: u64,
-    /// What the second difference is multiplied by, Q16: spacing twice, and speed.
+    /// Factor for the second difference, Q16: spacing twice, and speed.
     square: u64,
 }
 

@@ -1,4 +1,4 @@
-//! How long the driver waits for what.
+//! Waiting times of the driver.
 
 use super::Scale;
 use crate::model::Model;
@@ -6,24 +6,24 @@ use crate::model::Model;
 /// The longest duration of any setting: 2³⁰ µs, 18 minutes, so that differences of wrapping times keep their sign.
 const LONGEST: u32 = 1 << 30;
 
-/// How long the driver waits for what, in microseconds. Anything above 2³⁰ (18 minutes) counts as 2³⁰.
+/// Waiting times of the driver, in microseconds. Anything above 2³⁰ (18 minutes) counts as 2³⁰.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// How long a level must hold before the switch has settled: longer than the longest pause in its bouncing.
+    /// Time that a level must hold before the switch has settled: longer than the longest pause in its bouncing.
     pub debounce: u32,
-    /// How long a switch may take to settle before it counts as bouncing. More than `debounce`.
+    /// Time that a switch may take to settle before it counts as bouncing. More than `debounce`.
     pub settle: u32,
     /// After the first contact, fingers that have not touched within this time are missing. Longer than the largest
     /// time between contacts that the model was trained on, or full touches become partial ones; see
     /// [`Settings::for_model`].
     pub timeout: u32,
-    /// How long all fingers must be open before a touch in progress ends without its missing contacts. Longer than a
+    /// Time that all fingers must be open before a touch in progress ends without its missing contacts. Longer than a
     /// finger loses contact within one approach, and shorter than the way from one approach to the next takes. Also how
     /// long they must be open at power-up, and after a touch was dropped, before a touch can begin.
     pub release: u32,
-    /// How long all fingers must be open after a touch before the next one can begin.
+    /// Time that all fingers must be open after a touch before the next one can begin.
     pub rest: u32,
-    /// How long a finger may stay closed before it counts as stuck. More than `timeout` and the time a touch is held.
+    /// Time that a finger may stay closed before it counts as stuck. More than `timeout` and the time a touch is held.
     pub stuck: u32,
     /// After this many touches in a row without a finger, that finger is reported as silent. 0 disables the report.
     pub silent_after: u16,

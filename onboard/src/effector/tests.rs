@@ -17,7 +17,7 @@ const SETTINGS: Settings = Settings {
     silent_after: 4,
 };
 
-/// What came out of a run: a touch or a fault, in order.
+/// Outcomes of a run: touches and faults, in order.
 type Outcomes = Vec<Result<Touch, Fault>>;
 
 fn poll(effector: &mut Effector, now: u32, outcomes: &mut Outcomes) {

@@ -137,14 +137,14 @@ impl Batch {
     }
 }
 
-/// How many columns a model has.
+/// Number of columns of a model.
 fn columns_of(model: &Sections<'_>) -> usize {
     let axes = model.axes_and_cuts().0.iter();
     axes.map(|&[_, columns, ..]| usize::from(columns & 1) + usize::from(columns >> 1 & 1)).sum()
 }
 
-/// Whether all trees start as the exporter starts them: other bytes in place of a root's number lead a row's walk astray,
-/// the same way every time, but not this one.
+/// True if all trees start as the exporter starts them: other bytes in place of a root's number lead a row's walk
+/// astray, the same way every time, but not this one.
 pub(crate) fn is_regular(model: &Sections<'_>) -> bool {
     let mut nodes = model.nodes;
     model.layout != Layout::Complete

@@ -18,7 +18,7 @@ pub(super) type Leaves = [u8; ROWS];
 pub(super) struct Block<'a> {
     /// Column by column.
     pub(super) ranks: &'a [u8],
-    /// How many columns.
+    /// Number of columns.
     pub(super) columns: usize,
     /// Ranks of a column, those of no row at its end: a multiple of [`LANES`].
     pub(super) stride: usize,

@@ -1,8 +1,9 @@
-//! What this build reads: layouts and types of leaves are features of the crate, so that only what is used is linked.
+//! Layouts and types of leaves that this build reads: they are features of the crate, so that only what is used is
+//! linked.
 
 use palpate_shared::format::{Layout, LeafType};
 
-/// Whether models of a layout are read.
+/// True if models of a layout are read.
 pub(crate) const fn layout(layout: Layout) -> bool {
     match layout {
         Layout::Compact => cfg!(feature = "compact"),
@@ -13,16 +14,16 @@ pub(crate) const fn layout(layout: Layout) -> bool {
     }
 }
 
-/// Whether models with trees are read, and not only tables.
+/// True if models with trees are read, and not only tables.
 pub(crate) const TREES: bool = layout(Layout::Compact) || layout(Layout::Complete) || layout(Layout::Wide);
 
-/// Whether tables are read, of which a search for a rank is a large part: it is written out then.
+/// True if tables are read, of which a search for a rank is a large part: it is written out then.
 pub(crate) const TABLES: bool = layout(Layout::Grid) || layout(Layout::Patterns);
 
-/// Whether trees with leaves in a table are read.
+/// True if trees with leaves in a table are read.
 pub(crate) const SHARED_LEAVES: bool = TREES && cfg!(feature = "shared-leaves");
 
-/// Whether models with a type of leaf are read.
+/// True if models with a type of leaf are read.
 pub(crate) const fn leaf(leaf: LeafType) -> bool {
     match leaf {
         LeafType::I8 => cfg!(feature = "i8-leaves"),

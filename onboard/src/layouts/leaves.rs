@@ -11,7 +11,7 @@ pub(crate) const BLOCK: usize = 64;
 pub(crate) struct Sum<'a> {
     /// One for each object.
     pub(crate) margins: &'a mut [i32],
-    /// What leaves are stored as.
+    /// Type that leaves are stored as.
     pub(crate) leaf: LeafType,
     /// The object that leaves of the present group are for; `None` when they have a value for each.
     pub(crate) object: Option<u8>,
@@ -19,7 +19,7 @@ pub(crate) struct Sum<'a> {
     pub(crate) shared: Option<SharedLeaves<'a>>,
 }
 
-/// How much more a stored byte is than its value.
+/// Difference between a stored byte and its value.
 pub(crate) const BIAS: i32 = 128;
 
 impl<'a> Sum<'a> {
@@ -141,7 +141,7 @@ impl<'a, T> Reached<'a, T> {
     }
 }
 
-/// Whether the chip loads words from anywhere, and has registers for sums (Cortex-M3 and up: the same that have atomic
+/// True if the chip loads words from anywhere, and has registers for sums (Cortex-M3 and up: the same that have atomic
 /// operations). A Cortex-M0+ puts words together byte by byte, and adds to margins in memory.
 const WORDS: bool = cfg!(target_has_atomic = "32");
 

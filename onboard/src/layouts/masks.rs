@@ -128,7 +128,7 @@ impl Masks {
         Some(place)
     }
 
-    /// What a rank leaves, all ranks above it leave at most.
+    /// Clears in every rank the bits that a rank below it has cleared.
     fn finish(&mut self) {
         let used = self.left.get_mut(..self.used).unwrap_or_default();
         // Two at a time: each is one chain of dependent steps.

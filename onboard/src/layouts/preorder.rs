@@ -103,7 +103,7 @@ pub(crate) fn add_wide(
     }
 }
 
-/// Whether a wide split goes right, and how many splits are in its left subtree.
+/// Returns true if a wide split goes right, and the number of splits in its left subtree.
 #[inline(always)]
 pub(super) fn wide_split(
     [feature, missing_left, a, b, c, d]: [u8; 6],

@@ -33,7 +33,7 @@ pub(crate) fn check(model: &Sections<'_>, last_feature: u8) -> Result<(), Wrong>
     if ends { Ok(()) } else { Err(Wrong::Section(model.offset(cuts))) }
 }
 
-/// Whether no threshold of `width` bytes is below the one before.
+/// True if no threshold of `width` bytes is below the one before.
 #[inline(never)]
 fn ascends(mut cuts: &[u8], width: usize) -> bool {
     let mut last = i32::MIN;
@@ -113,7 +113,7 @@ pub(crate) fn rank_rows(model: &Sections<'_>, features: &[i32], width: usize, st
 #[cfg(feature = "rows")]
 const ABREAST: usize = 8;
 
-/// How many of an axis's `count` thresholds are at or below each value.
+/// Number of an axis's `count` thresholds that are at or below each value.
 #[cfg(feature = "rows")]
 fn ranks_among(table: &[i32; 256], count: u8, values: &[i32; ABREAST]) -> [u8; ABREAST] {
     let mut passed = [0_usize; ABREAST];
@@ -177,7 +177,7 @@ impl<'m> Cuts<'m> {
     }
 }
 
-/// How many of an axis's thresholds, of `width` bytes each, are at or below `value`.
+/// Number of an axis's thresholds, of `width` bytes each, that are at or below `value`.
 ///
 /// Those of two or four bytes are loaded at once where they are aligned, which the exporter ensures if the model is aligned.
 // By itself, so that all that it needs is in registers on a Cortex-M0+.

@@ -17,7 +17,7 @@ pub(crate) struct Sections<'a> {
     pub(crate) groups: &'a [u8],
     pub(crate) nodes: &'a [u8],
     pub(crate) leaves: &'a [u8],
-    /// How many axes.
+    /// Number of axes.
     pub(crate) axis_count: u16,
     pub(crate) layout: Layout,
     pub(crate) leaf: LeafType,
@@ -68,7 +68,7 @@ impl<'a> Sections<'a> {
         Header::of(self.bytes)
     }
 
-    /// How many objects: 1 to 256.
+    /// Number of objects: 1 to 256.
     #[inline(always)]
     pub(crate) const fn objects(&self) -> usize {
         self.margins.len() / 8

@@ -1,4 +1,4 @@
-//! What is checked when a model is opened, so that no later step can fail.
+//! Checks made when a model is opened, so that no later step can fail.
 
 use super::{HAS_SHARED_LEAVES, Stated, optional};
 use crate::bytes::{Wrong, take};

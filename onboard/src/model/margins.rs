@@ -47,7 +47,7 @@ impl Model<'_> {
         }
     }
 
-    /// Whether margins are added up; those of a table are read.
+    /// True if margins are added up; those of a table are read.
     pub(super) fn has_trees(&self) -> bool {
         built_in::TREES && !matches!(self.layout(), Layout::Grid | Layout::Patterns)
     }

@@ -31,8 +31,8 @@ pub struct Model<'a> {
     stated: Stated,
 }
 
-/// What a model states that recognition depends on. Small, as [`Sections`] is: a model of more
-/// than 64 bytes is copied by a call, to a routine that most programs have no other use for.
+/// Statements of a model that recognition depends on. Small, as [`Sections`] is: a model of more than 64 bytes is
+/// copied by a call, to a routine that most programs have no other use for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stated {
     descriptor: Option<Descriptor>,
@@ -52,11 +52,11 @@ const HAS_STRANGERS: u32 = 1 << 31;
 const HAS_SHARED_LEAVES: u32 = 1 << 30;
 /// The same.
 const HAS_SENTINEL: u32 = 1 << 29;
-/// What is no place in [`Stated::by_object`].
+/// Flags that are not a place in [`Stated::by_object`].
 const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL;
 
 impl Stated {
-    /// What a model without optional sections states.
+    /// Statements of a model without optional sections.
     fn new(descriptor: Option<Descriptor>) -> Self {
         let TrainedTouches { patterns, counted, needs_pose, largest_spread } =
             TrainedTouches::full(descriptor.is_some_and(Descriptor::needs_pose));
@@ -119,13 +119,13 @@ impl<'a> Model<'a> {
         self.sections.bytes
     }
 
-    /// How many objects the model has margins for: 1 to 256. The last of them may be the
+    /// Number of objects that the model has margins for: 1 to 256. The last of them may be the
     /// [background](Model::background).
     pub fn object_count(&self) -> usize {
         self.sections.objects()
     }
 
-    /// What the model knows about objects that it does not know, if it states it.
+    /// Statements of the model about objects that it does not know, if it has any.
     ///
     /// Cost: a few instructions for each optional section, and more for its own. Cannot fail.
     pub fn strangers(&self) -> Option<Strangers<'a>> {
@@ -135,19 +135,19 @@ impl<'a> Model<'a> {
         Strangers::opened(optional::find(self.optional(), Tag::Strangers))
     }
 
-    /// The object that stands for all that the model does not know: the last one, if the model was trained with a
-    /// background. It is a rival of the others, and never named.
+    /// The object that stands for everything that the model does not know: the last one, if the model was trained with
+    /// a background. It is a rival of the others, and never named.
     pub fn background(&self) -> Option<usize> {
         self.strangers().filter(|strangers| strangers.background).map(|_| self.known_count())
     }
 
-    /// How many objects can be named: all but the background.
+    /// Number of objects that can be named: all but the background.
     pub fn known_count(&self) -> usize {
         let background = self.strangers().is_some_and(|strangers| strangers.background);
         self.object_count().saturating_sub(background.into())
     }
 
-    /// The table that leaves are numbers of, if equal leaves stand once.
+    /// The table that leaves are indices into, if equal leaves are stored once.
     ///
     /// Cost: a few instructions for each optional section. Cannot fail.
     pub fn shared_leaves(&self) -> Option<SharedLeaves<'a>> {
@@ -172,32 +172,32 @@ impl<'a> Model<'a> {
         optional::find(self.optional(), Tag::Prediction)
     }
 
-    /// How many features a row has: 1 to 256.
+    /// Number of features of a row: 1 to 256.
     pub fn feature_count(&self) -> usize {
         usize::from(self.header().last_feature()) + 1
     }
 
-    /// Which features a touch is turned into; `None` for a model over rows of features.
+    /// Features that a touch is turned into; `None` for a model over rows of features.
     pub const fn descriptor(&self) -> Option<Descriptor> {
         self.stated.descriptor
     }
 
-    /// How the trees are laid out.
+    /// Layout of the trees.
     pub const fn layout(&self) -> Layout {
         self.sections.layout
     }
 
-    /// What leaves are stored as.
+    /// Type that leaves are stored as.
     pub const fn leaf_type(&self) -> LeafType {
         self.sections.leaf
     }
 
-    /// Whether margins are added in f32; never without the feature `f32-leaves`, so that no code for it is linked.
+    /// True if margins are added in f32; never without the feature `f32-leaves`, so that no code for it is linked.
     pub(crate) const fn is_float(&self) -> bool {
         built_in::leaf(LeafType::F32) && matches!(self.sections.leaf, LeafType::F32)
     }
 
-    /// What features are compared as.
+    /// Type that features are compared as.
     pub fn key(&self) -> Key {
         Key::from_code(self.header().key()).unwrap_or(Key::Whole)
     }
@@ -245,7 +245,7 @@ impl<'a> Model<'a> {
         self.stated.touches()
     }
 
-    /// What the weights of all other objects may come to, this one's being 1, for it to be recognized, in Q56: the
+    /// Largest sum of the weights of all other objects, this one's being 1, with which it is recognized, in Q56: the
     /// model's own threshold for it. `None` if the model has one threshold for all objects, which its header states.
     ///
     /// Cost: a few instructions. Cannot fail.
@@ -255,12 +255,12 @@ impl<'a> Model<'a> {
         OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
     }
 
-    /// What the model promises about its verdicts, if it was calibrated.
+    /// Promise of the model about its verdicts, if it was calibrated.
     pub fn promise(&self) -> Option<Promise> {
         Promise::from_bytes(optional::find(self.optional(), Tag::Promise))
     }
 
-    /// What evidence is divided by before it becomes a posterior; 1 unless the model states it.
+    /// Divisor of the evidence before it becomes a posterior; 1 unless the model states it.
     ///
     /// Cost: a few instructions for each optional section.
     pub fn temperature(&self) -> Temperature {
@@ -272,12 +272,12 @@ impl<'a> Model<'a> {
         TrainedNoise::from_bytes(optional::find(self.optional(), Tag::Noise))
     }
 
-    /// How often each contact pattern occurred among the approaches of the training, if the model states it.
+    /// Frequency of each contact pattern among the approaches of the training, if the model states it.
     pub fn pattern_shares(&self) -> Option<PatternShares> {
         PatternShares::from_bytes(optional::find(self.optional(), Tag::PatternShares))
     }
 
-    /// Which touches the model was trained on, if it states it.
+    /// Kind of touches that the model was trained on, if it states it.
     pub fn trained_capture(&self) -> Option<TrainedCapture<'a>> {
         TrainedCapture::from_bytes(optional::find(self.optional(), Tag::Capture), self.object_count())
     }

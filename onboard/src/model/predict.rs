@@ -1,7 +1,7 @@
 //! A row to a class or a value, as the library that trained the model predicts it.
 
 use super::Model;
-use crate::decide::exp2_negative;
+use crate::exponential::exp2_negative;
 use palpate_shared::format::{Link, Prediction, f32_key};
 
 impl Model<'_> {
@@ -55,7 +55,7 @@ impl Model<'_> {
         self.predict_raw(features).map(|margin| inverse_link(self.prediction().link, margin))
     }
 
-    /// How margins become a class or a value: the [default](Prediction::default) unless the model states it.
+    /// Rule that turns margins into a class or a value: the [default](Prediction::default) unless the model states it.
     ///
     /// Cost: a few instructions for each optional section.
     pub fn prediction(&self) -> Prediction {

@@ -1,11 +1,11 @@
-//! What a model was not trained for, and so cannot take as evidence.
+//! Touches that a model was not trained for, and so cannot take as evidence.
 
 use super::Model;
 use core::fmt;
 use palpate_shared::format::TrainedTouches;
 use palpate_shared::{ContactPattern, Touch};
 
-/// Why a touch is not evidence. It was not counted, and nothing has changed.
+/// Reason why a touch is not evidence. It was not counted, and nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -54,7 +54,7 @@ impl fmt::Display for Refused {
 impl core::error::Error for Refused {}
 
 impl Model<'_> {
-    /// Whether a touch is one of those that the model was trained for.
+    /// Returns an error unless the touch is one that the model was trained for.
     ///
     /// Cost: a few instructions. Cannot panic.
     ///
@@ -69,7 +69,7 @@ impl Model<'_> {
 }
 
 impl Refused {
-    /// Whether a model that was trained on such touches takes this one as evidence.
+    /// Returns an error unless a model that was trained on the given touches takes this one as evidence.
     ///
     /// Cost: a few instructions.
     ///

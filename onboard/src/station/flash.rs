@@ -36,7 +36,7 @@ const ERASED: u8 = 0xff;
 /// The longest word that is written at once.
 const MAX_WRITE_SIZE: usize = 64;
 
-/// Why a flash cannot be used.
+/// Reason why a flash cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FlashError {

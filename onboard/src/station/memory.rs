@@ -5,7 +5,7 @@ use super::storage::{Place, Storage};
 use core::sync::atomic::{Ordering, compiler_fence};
 use palpate_shared::link::NotStored;
 
-/// Memory that is written like RAM: battery-backed or FRAM, or RAM where resets but no power cuts are to be survived.
+/// Memory that is written like RAM: battery-backed or FRAM, or RAM where it must survive resets but no power cuts.
 /// Every slice may be empty: then the chip does without.
 #[derive(Debug)]
 pub struct Memory<'a> {

@@ -22,7 +22,7 @@
 //! | storage | where |
 //! |---|---|
 //! | [`FlashStorage`] | NOR flash: a log that goes round its sectors, and two areas for models, read in place |
-//! | [`Memory`] | battery-backed RAM or FRAM, or RAM where resets but no power cuts are to be survived |
+//! | [`Memory`] | battery-backed RAM or FRAM, or RAM where it must survive resets but no power cuts |
 //! | [`NoStorage`] | nothing is kept, no model can be loaded |
 //!
 //! A loaded model is written to the place that is not in use and checked there; the record that follows switches to it.

@@ -8,12 +8,12 @@ use core::fmt;
 use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Refusal, TouchMessage, VerdictMessage};
 use palpate_shared::{Pose, Touch};
 
-/// What a board has to offer a [`ProbeStation`].
+/// Interface of a board to a [`ProbeStation`].
 pub trait Board {
-    /// Why the link failed; [`core::convert::Infallible`] for a UART.
+    /// Failure of the link; [`core::convert::Infallible`] for a UART.
     type Error;
 
-    /// What the switches have to say: [`Watcher::sense`](crate::effector::Watcher::sense), with the pins' interrupt held
+    /// Messages of the switches: [`Watcher::sense`](crate::effector::Watcher::sense), with the pins' interrupt held
     /// off.
     fn sense(&mut self) -> Sensed;
 
@@ -36,22 +36,22 @@ pub trait Board {
     }
 }
 
-/// How a [`ProbeStation`] works.
+/// Settings of a [`ProbeStation`].
 #[derive(Clone, Copy, Debug)]
 pub struct ProbeSettings {
-    /// How long the effector waits for what; the timeout is the model's, see [`Settings::for_model`].
+    /// Waiting times of the effector; the timeout is the model's, see [`Settings::for_model`].
     pub effector: Settings,
     /// From the probe that is there to the one that the model was trained for.
     pub scale: Scale,
     /// A pose that was announced longer before the first contact, in microseconds, is none; nor is one that was announced
     /// more than [`Settings::release`] after it, which is that of the next approach.
     pub pose_lasts: u32,
-    /// Whether verdicts carry what is needed to compare them with another recognizer's: 12 bytes, and a posterior.
+    /// True if verdicts carry the numbers needed to compare them with another recognizer's: 12 bytes, and a posterior.
     pub detail: bool,
     /// Another number after each start, counted or random: see [`DeviceEnd::new`]. A station that keeps records counts by
     /// itself and may be given 0.
     pub boot: u32,
-    /// What the program is called on the link: name and version.
+    /// Name and version of the program on the link.
     pub program: &'static str,
 }
 
@@ -63,7 +63,7 @@ impl Default for ProbeSettings {
     }
 }
 
-/// What happened in a step.
+/// Event of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Happened {
@@ -75,7 +75,8 @@ pub enum Happened {
         touch: Touch,
         /// Microseconds from the announcement of the pose to the first contact.
         pose_age: Option<u32>,
-        /// What is known now, or why the touch was not counted. A decision ends an object: the next touch begins another.
+        /// The verdict so far, or the reason why the touch was not counted. A decision ends an object: the next touch
+        /// begins another.
         outcome: Result<VerdictMessage, Refusal>,
     },
     /// A finger is faulty.
@@ -97,7 +98,7 @@ impl Happened {
 /// A link that failed in a step, and what happened in the step all the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LinkFailed<E> {
-    /// What [`ProbeStation::step`] would have returned.
+    /// The event that [`ProbeStation::step`] would have returned.
     pub happened: Option<Happened>,
     /// The link's error; the first of several.
     pub error: E,
@@ -145,7 +146,7 @@ impl<B: Board> Line<'_, B> {
 /// told: a verdict that the host has heard survives a power cut, and one that was stored is told after it.
 ///
 /// RAM: effector, link, recognition and the storage's. Stack: a few buffers for frames and records more than
-/// [`Recognizer::push`](crate::Recognizer::push). The README of the firmware states what both come to.
+/// [`Recognizer::push`](crate::Recognizer::push). The README of the firmware states the size of both.
 #[derive(Debug)]
 pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
     effector: Effector,
@@ -154,7 +155,8 @@ pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
     settings: ProbeSettings,
     /// The checksum of the model that the effector is set for.
     model: u32,
-    /// What was announced before the touch in progress, and how long before; once a step has seen it begin.
+    /// The announcement before the touch in progress, and the time between the two; known once a step has seen it
+    /// begin.
     announced: Option<Option<(Pose, u32)>>,
     started: bool,
 }

@@ -1,10 +1,10 @@
-//! What a chip remembers through a power cut, and how a record is recognized among other bytes.
+//! State that a chip keeps through a power cut, and how a record is recognized among other bytes.
 
 use super::storage::Place;
 use palpate_shared::link::{Payload, Progress, checksum};
 use serde::{Deserialize, Serialize};
 
-/// Which model is in use; bytes of it where it was loaded.
+/// Model in use; bytes of it where it was loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Source {
     BuiltIn,
@@ -21,13 +21,13 @@ impl Source {
         }
     }
 
-    /// Whether the model is in this place.
+    /// True if the model is in this place.
     pub(super) const fn is_in(self, place: Place) -> bool {
         matches!((self, place), (Self::First(_), Place::First) | (Self::Second(_), Place::Second))
     }
 }
 
-/// What is arriving in chunks, and how much of it is there.
+/// Data that arrives in chunks, and the length that has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Staged {
     pub(super) payload: Payload,
@@ -36,7 +36,8 @@ pub(super) struct Staged {
     pub(super) received: u32,
 }
 
-/// What the bytes of a record mean; goes into its checksum, so that records of other versions count as damaged.
+/// Version of the meaning of a record's bytes; part of its checksum, so that records of other versions count as
+/// damaged.
 const VERSION: u32 = 3;
 
 /// A record.
@@ -71,7 +72,7 @@ pub(super) struct Found<'p> {
 }
 
 impl Found<'_> {
-    /// Whether this record was written after `other`.
+    /// True if this record was written after `other`.
     pub(super) const fn is_newer_than(&self, other: u32) -> bool {
         let ahead = self.counter.wrapping_sub(other);
         ahead != 0 && ahead >> 31 == 0

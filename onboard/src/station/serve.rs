@@ -6,7 +6,7 @@ use core::fmt;
 use embedded_io::{Read, Write};
 use palpate_shared::link::DeviceEnd;
 
-/// Why a chip's program has ended.
+/// Reason why a chip's program has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ServeError<E> {

@@ -16,7 +16,7 @@ use palpate_shared::link::{
 /// object alone would take.
 type SnapshotBuffer<const N: usize> = [[u8; SNAPSHOT_LENGTH + 10]; N];
 
-/// What programs are called on the link that say nothing else: this crate and its version.
+/// Default name of programs on the link: this crate and its version.
 pub const PROGRAM: &str = concat!("palpate-onboard ", env!("CARGO_PKG_VERSION"));
 
 /// A storage whose records are too short for what a station has to keep.
@@ -51,7 +51,7 @@ pub struct Station<'m, const N: usize, S = NoStorage> {
     staged: Option<Staged>,
     /// Touches that were not counted.
     refused: u32,
-    /// What it is called on the link.
+    /// Name of the program on the link.
     program: &'static str,
 }
 
@@ -159,7 +159,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         Ok(done)
     }
 
-    /// What the recognizer says, without changing it.
+    /// Asks the recognizer without changing it.
     fn ask<T>(&self, question: impl FnOnce(&Model<'_>, &State<N>) -> T) -> Result<T, Refusal> {
         let (model, state) = (self.model().ok_or(Refusal::NoModel)?, self.state.as_ref().ok_or(Refusal::NoModel)?);
         Ok(question(&model, state))
@@ -191,12 +191,12 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         pushed.map_err(refusal)
     }
 
-    /// Whether the touches so far have decided; no further one counts before a reset.
+    /// True if the touches so far have decided; no further one counts before a reset.
     pub fn has_decided(&self) -> bool {
         self.state.as_ref().is_some_and(|state| state.verdict() != Verdict::Undecided)
     }
 
-    /// How many touches were not counted because the model was not trained for them, since power-up.
+    /// Number of touches, since power-up, that were not counted because the model was not trained for them.
     pub const fn refused(&self) -> u32 {
         self.refused
     }

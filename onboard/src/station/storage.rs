@@ -1,4 +1,4 @@
-//! What a station keeps through resets and power cuts, wherever that is.
+//! State that a station keeps through resets and power cuts, wherever that is.
 
 use palpate_shared::link::NotStored;
 
@@ -11,7 +11,7 @@ pub enum Place {
     Second,
 }
 
-/// What a station keeps through resets and power cuts: [`Memory`](super::Memory) in RAM or FRAM,
+/// State that a station keeps through resets and power cuts: [`Memory`](super::Memory) in RAM or FRAM,
 /// [`FlashStorage`](super::FlashStorage) in flash, or [`NoStorage`].
 ///
 /// The power may go at any moment of any call; what was there before the call has to be there after it, or what the call

@@ -34,7 +34,7 @@ macro_rules! codes {
 }
 
 codes! {
-    /// How the trees are laid out.
+    /// Layout of the trees.
     Layout {
         /// Splits in preorder, three bytes each, leaves in order: the smallest for lopsided trees.
         Compact = 0, "compact";
@@ -50,7 +50,7 @@ codes! {
 }
 
 codes! {
-    /// What a leaf's value is stored as.
+    /// Type that a leaf's value is stored as.
     LeafType {
         /// One byte.
         I8 = 0, "i8";
@@ -70,7 +70,7 @@ impl LeafType {
 }
 
 codes! {
-    /// What features are compared as.
+    /// Type that features are compared as.
     Key {
         /// Whole numbers, as the descriptors give them.
         Whole = 0, "whole";
@@ -80,7 +80,7 @@ codes! {
 }
 
 codes! {
-    /// Which approaches count as evidence.
+    /// Approaches that count as evidence.
     Counted {
         /// Full touches: all three fingers.
         Full = 0, "full";
@@ -103,11 +103,11 @@ impl Counted {
 }
 
 codes! {
-    /// How long a name is held back from what may be an object that the model does not know.
+    /// Rule for holding a name back from what may be an object that the model does not know.
     Held {
         /// Only while the touches do not fit it.
         Likely = 1, "likely";
-        /// Until an object that the model does not know would very probably have been found out.
+        /// Until an object that the model does not know would very probably have been detected.
         Certain = 2, "certain";
     }
 }
@@ -126,7 +126,7 @@ codes! {
 }
 
 codes! {
-    /// What a probe's lengths are measured in.
+    /// Unit of a probe's lengths.
     Length {
         /// A tenth of the object's longest side, as objects are scaled in the paper.
         Tenth = 0, "unit";

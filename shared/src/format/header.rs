@@ -1,6 +1,6 @@
 //! The fixed part at the start of a model: fields at fixed places.
 
-/// How many bytes the header has.
+/// Length of the header, in bytes.
 pub const HEADER_LENGTH: usize = 96;
 /// The first four bytes of every model.
 pub const MAGIC: [u8; 4] = *b"PLPT";

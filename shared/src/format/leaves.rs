@@ -1,11 +1,11 @@
-//! Leaves that are numbers of a table in which each leaf's values stand once.
+//! Leaves as indices into a table in which each leaf's values are stored once.
 
 /// The table of a model whose leaves are shared, and how long a number is that stands for a leaf.
 ///
 /// Only for trees that are walked; tables of margins have no leaves to share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SharedLeaves<'a> {
-    /// Whether a number has two bytes, and not one.
+    /// True if a number has two bytes, and not one.
     is_wide: bool,
     /// The values of leaf 0, then of leaf 1, and so on.
     values: &'a [u8],
@@ -21,7 +21,7 @@ impl<'a> SharedLeaves<'a> {
         matches!(width, 1 | 2).then_some(Self { is_wide: width == 2, values })
     }
 
-    /// What stands before the values, where numbers have two bytes or one.
+    /// Bytes in front of the values, where numbers have two bytes or one.
     pub const fn header(is_wide: bool) -> [u8; BEFORE_VALUES] {
         [1 + is_wide as u8, 0, 0, 0]
     }

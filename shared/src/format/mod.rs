@@ -25,7 +25,7 @@ pub use plan::Plan;
 pub use prediction::{Link, Prediction, Sentinel};
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
-pub use strangers::{FitTerms, FitTest, ObjectFit, Strangers};
+pub use strangers::{MisfitTerms, MisfitTest, ObjectMisfit, Strangers};
 pub use trained::{
     Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedCapture,
     TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section, write_section,

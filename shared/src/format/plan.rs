@@ -1,10 +1,10 @@
-//! A plan of approaches: how far every pose of the probe tells every two objects apart.
+//! A plan of approaches: how well every pose of the probe distinguishes every pair of objects.
 
 use crate::poses::Poses;
 
 /// A plan of approaches, read in place: for each pose of the probe and each two objects their *separation*, 1 − the mean
 /// of e^(−evidence/2) of an approach in this pose, evidence being that for the object that is touched against the other
-/// one, in nats; of the two objects, the one with the smaller separation counts. It is one less the Bhattacharyya
+/// one, in nats; of the two objects, the one with the smaller separation counts. It is 1 minus the Bhattacharyya
 /// coefficient (Bhattacharyya 1943) as far as the model knows the distributions: 0 where an approach says nothing, 1 where
 /// it says everything.
 ///
@@ -24,7 +24,7 @@ impl<'a> Plan<'a> {
     /// Stored where no approach touches anything.
     pub const UNTOUCHED: i8 = i8::MIN;
 
-    /// What stands before the separations.
+    /// Bytes in front of the separations.
     pub const fn header(poses: Poses) -> [u8; 4] {
         [0, poses.rolls(), 0, 0]
     }
@@ -43,7 +43,7 @@ impl<'a> Plan<'a> {
         Some(Self { poses, separations })
     }
 
-    /// How many pairs this many objects make.
+    /// Number of pairs of this many objects.
     pub const fn pairs(objects: usize) -> usize {
         // No model has more than 256, so nothing here needs 64 bits.
         let objects = if objects < 1 << 16 { objects } else { (1 << 16) - 1 };
@@ -71,7 +71,7 @@ impl<'a> Plan<'a> {
         self.separations.get(start..start.saturating_add(poses)).unwrap_or_default()
     }
 
-    /// Whether an approach in the pose with this number may touch something.
+    /// True if an approach in the pose with this number may touch something.
     ///
     /// Cost: a few instructions. Cannot fail.
     pub fn may_touch(&self, pose: u16) -> bool {

@@ -1,10 +1,10 @@
-//! What a model over rows predicts: how a margin becomes a value, which class wins a tie, and which numbers stand for a
+//! Prediction of a model over rows: how a margin becomes a value, which class wins a tie, and which numbers stand for a
 //! missing value.
 
 use crate::MISSING_FEATURE;
 
 codes! {
-    /// What turns the margin of a regression into the value that its library predicts.
+    /// Function that turns the margin of a regression into the value that its library predicts.
     Link {
         /// The margin itself.
         Identity = 0, "identity";
@@ -19,15 +19,15 @@ codes! {
     }
 }
 
-/// How margins of a model over rows become a class or a value: 8 bytes. A model without this section has the
-/// [default](Prediction::default).
+/// Rule that turns margins of a model over rows into a class or a value: 8 bytes. A model without this section has
+/// the [default](Prediction::default).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
-    /// What turns a scaled margin into a value.
+    /// Function that turns a scaled margin into a value.
     pub link: Link,
-    /// Whether the last of several largest margins names the class, and not the first.
+    /// True if the last of several largest margins names the class, and not the first.
     pub last_of_ties: bool,
-    /// What a margin is multiplied by to be the library's: positive and finite.
+    /// Factor that turns a margin into the library's: positive and finite.
     pub scale: f32,
 }
 

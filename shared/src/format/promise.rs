@@ -1,4 +1,4 @@
-//! What a model promises about its verdicts, and the sections that hold it.
+//! Promises of a model about its verdicts, and the sections that hold them.
 
 use super::codes::Per;
 use super::trained::TrainedNoise;
@@ -19,7 +19,7 @@ impl<'a> OddsByObject<'a> {
         Self(bytes)
     }
 
-    /// What the weights of all other objects may come to, this one's being 1, for it to be recognized: in Q56. `None`
+    /// Largest sum of the weights of all other objects, this one's being 1, with which it is recognized: in Q56. `None`
     /// beyond the objects that there are.
     ///
     /// Cost: a few instructions. Cannot fail.
@@ -34,7 +34,7 @@ impl<'a> OddsByObject<'a> {
     }
 }
 
-/// What a model promises about its verdicts, and how that was found out: 48 bytes, and 36 more if the touches had more
+/// Promise of a model about its verdicts, and how it was determined: 48 bytes, and 36 more if the touches had more
 /// noise than [`TrainedNoise`] can say. Nothing on the chip uses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promise {
@@ -44,9 +44,9 @@ pub struct Promise {
     pub confidence: f64,
     /// Of what the rate is promised.
     pub per: Per,
-    /// Whether sequences were of approaches, of which some are no evidence, or of touches only.
+    /// True if sequences were of approaches, of which some are no evidence, or of touches only.
     pub approaches: bool,
-    /// Whether each approach was in the pose that the model's plan proposed.
+    /// True if each approach was in the pose that the model's plan proposed.
     pub active: bool,
     /// Sequences that it rests on.
     pub sequences: u32,
@@ -58,22 +58,22 @@ pub struct Promise {
     pub mean_thousandths: u32,
     /// The limit of touches.
     pub max_touches: u32,
-    /// What was added to the touches.
+    /// Noise that was added to the touches.
     pub noise: PromisedNoise,
 }
 
-/// What was added to the touches that a promise was made on.
+/// Noise that was added to the touches that a promise was made on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PromisedNoise {
     /// Noise of contact times, timer, and noise of the pose (without the bias).
     pub touch: TrainedNoise,
     /// Bouncing of up to this, in microseconds.
     pub debounce: u32,
-    /// How much earlier each finger touches than it should, in microseconds.
+    /// Time by which each finger touches too early, in microseconds.
     pub bent: [i32; 3],
     /// The probability that a contact of each finger is missed, in parts of a billion.
     pub missed: [u32; 3],
-    /// How far the speed of a touch may be off, in parts of a billion.
+    /// Largest error of the speed of a touch, in parts of a billion.
     pub speed_error: u32,
     /// The same for a robot, through all of its touches.
     pub speed_bias: u32,
@@ -84,12 +84,12 @@ pub struct PromisedNoise {
 }
 
 impl PromisedNoise {
-    /// Whether [`TrainedNoise`] says all of it.
+    /// True if [`TrainedNoise`] can state all of it.
     fn is_short(&self) -> bool {
         *self == Self { touch: self.touch, ..Self::default() }
     }
 
-    /// How much more often the middle and the third finger miss a contact than the first.
+    /// Excess of the missed contacts of the middle and the third finger over those of the first.
     fn missed_more(&self) -> [i32; 2] {
         let [first, middle, third] = self.missed;
         // Shares of at most a billion: their differences fit.
@@ -184,7 +184,7 @@ impl Promise {
     }
 }
 
-/// What evidence is divided by before it becomes a posterior that is shown: 4 bytes. Thresholds are of evidence as it is.
+/// Divisor of the evidence before it becomes a posterior that is shown: 4 bytes. Thresholds are of evidence as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Temperature {
     /// One over the temperature, in Q16.

@@ -9,11 +9,11 @@
 pub struct Axis {
     /// The feature's index.
     pub feature: u8,
-    /// Which columns there are.
+    /// The columns present.
     pub columns: Columns,
     /// Bytes per threshold: 1 to 4, little endian, signed.
     pub width: u8,
-    /// How many thresholds.
+    /// Number of thresholds.
     pub count: u8,
 }
 
@@ -29,7 +29,7 @@ pub enum Columns {
 }
 
 impl Columns {
-    /// How many.
+    /// Number of columns.
     pub const fn count(self) -> u16 {
         match self {
             Self::Both => 2,
@@ -78,7 +78,7 @@ pub struct Group {
     pub shift: u8,
     /// The object that a leaf's only value is for; `None` when a leaf has a value for each object.
     pub object: Option<u8>,
-    /// How many trees.
+    /// Number of trees.
     pub trees: u32,
 }
 

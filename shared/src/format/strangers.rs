@@ -1,4 +1,4 @@
-//! What a model knows about objects that it does not know: a background, and a test of fit.
+//! Statements of a model about objects that it does not know: a background, and a test of fit.
 //!
 //! The test compares the evidence so far with what touches of the leading object give. With r the evidence of *rivals*
 //! (other objects, and the background) against the leader, less its mean, summed over n touches, the misfit is
@@ -15,18 +15,19 @@ use super::codes::Held;
 /// The optional section: whether the last object is a background, and how to test whether touches fit the leading object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strangers<'a> {
-    /// The last of the model's objects stands for all that the model does not know: it is a rival and never named.
+    /// The last of the model's objects stands for everything that the model does not know: it is a rival and never
+    /// named.
     pub background: bool,
     /// The test, if there is one.
-    pub test: Option<FitTest<'a>>,
+    pub test: Option<MisfitTest<'a>>,
 }
 
 /// The numbers of a test that are the same for all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FitTerms {
+pub struct MisfitTerms {
     /// How long names are held back.
     pub held: Held,
-    /// Rivals of each object: 1 to [`FitTest::MOST_RIVALS`].
+    /// Rivals of each object: 1 to [`MisfitTest::MOST_RIVALS`].
     pub rivals: u8,
     /// Touches from which on the test is made; no name is given before.
     pub first: u32,
@@ -34,7 +35,7 @@ pub struct FitTerms {
     pub least: u32,
     /// The misfit above which an object is a stranger, after many touches; in 2^-16 nats, as the next two.
     pub threshold: i32,
-    /// How much higher it is at first.
+    /// Amount by which it is higher at first.
     pub early: u32,
     /// The misfit above which no name is given yet, after many touches; at most `threshold`.
     pub doubt: i32,
@@ -50,16 +51,16 @@ pub struct FitTerms {
 
 /// A test of fit, read in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FitTest<'a> {
+pub struct MisfitTest<'a> {
     /// What is the same for all objects.
-    pub terms: FitTerms,
+    pub terms: MisfitTerms,
     /// One after the other, one for each object but the background, and what has grown after them.
     records: &'a [u8],
 }
 
-/// What touches of one object give.
+/// Expected evidence of touches of one object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ObjectFit<'a> {
+pub struct ObjectMisfit<'a> {
     /// Means are multiples of 2^this units.
     pub mean_shift: u8,
     /// Rows of the matrix times r (in units) are shifted right by this, to 2^-8 √nats.
@@ -78,7 +79,7 @@ impl<'a> Strangers<'a> {
     /// Bytes before the test.
     pub const HEADER: usize = 4;
 
-    /// The section's first bytes; a test follows with [`FitTerms::to_bytes`] and [`ObjectFit::write`] for each object.
+    /// The section's first bytes; a test follows with [`MisfitTerms::to_bytes`] and [`ObjectMisfit::write`] for each object.
     pub const fn header(background: bool, has_test: bool) -> [u8; 4] {
         [background as u8, has_test as u8, 0, 0]
     }
@@ -91,7 +92,7 @@ impl<'a> Strangers<'a> {
         let (&[background, test, _, _], rest) = bytes.split_first_chunk::<4>()?;
         let background = flag(background)?;
         let known = objects.checked_sub(usize::from(background)).filter(|&known| known > 0)?;
-        let test = if flag(test)? { Some(FitTest::from_bytes(rest)?) } else { None };
+        let test = if flag(test)? { Some(MisfitTest::from_bytes(rest)?) } else { None };
         let makes_sense = test.is_none_or(|test| test.makes_sense(known, objects));
         makes_sense.then_some(Self { background, test })
     }
@@ -101,7 +102,7 @@ impl<'a> Strangers<'a> {
     /// Cost: that of reading the terms. Cannot fail otherwise.
     pub fn opened(bytes: &'a [u8]) -> Option<Self> {
         let (&[background, test, _, _], rest) = bytes.split_first_chunk::<4>()?;
-        Some(Self { background: background == 1, test: if test == 1 { FitTest::from_bytes(rest) } else { None } })
+        Some(Self { background: background == 1, test: if test == 1 { MisfitTest::from_bytes(rest) } else { None } })
     }
 }
 
@@ -113,11 +114,11 @@ const fn flag(byte: u8) -> Option<bool> {
     }
 }
 
-impl FitTerms {
+impl MisfitTerms {
     /// Bytes in the section.
     pub const LENGTH: usize = 40;
 
-    /// What stands in the section.
+    /// Returns the bytes of the section.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
         let Self { held, rivals, first, least, threshold, early, doubt, halving, alarms, sequences, confidence } =
             *self;
@@ -135,7 +136,7 @@ impl FitTerms {
         let numbers = numbers.as_chunks::<4>().0.first_chunk::<9>()?.map(u32::from_le_bytes);
         let [first, least, threshold, early, doubt, halving, alarms, sequences, confidence] = numbers;
         let (threshold, doubt) = (threshold.cast_signed(), doubt.cast_signed());
-        let makes_sense = (1..=FitTest::MOST_RIVALS).contains(&usize::from(rivals))
+        let makes_sense = (1..=MisfitTest::MOST_RIVALS).contains(&usize::from(rivals))
             && first > 0
             && least >= first
             && doubt <= threshold
@@ -157,7 +158,7 @@ impl FitTerms {
     }
 }
 
-impl<'a> FitTest<'a> {
+impl<'a> MisfitTest<'a> {
     /// The most rivals of an object: what a test costs on the chip does not grow beyond.
     pub const MOST_RIVALS: usize = 16;
 
@@ -169,25 +170,25 @@ impl<'a> FitTest<'a> {
     }
 
     fn from_bytes(bytes: &'a [u8]) -> Option<Self> {
-        let (terms, records) = bytes.split_first_chunk::<{ FitTerms::LENGTH }>()?;
-        Some(Self { terms: FitTerms::from_bytes(terms)?, records })
+        let (terms, records) = bytes.split_first_chunk::<{ MisfitTerms::LENGTH }>()?;
+        Some(Self { terms: MisfitTerms::from_bytes(terms)?, records })
     }
 
-    /// Whether there are records of `known` objects, with rivals that exist among `objects`.
+    /// True if there are records of `known` objects, with rivals that exist among `objects`.
     fn makes_sense(&self, known: usize, objects: usize) -> bool {
         (0..known).all(|object| {
             self.object(object).is_some_and(|record| {
                 let shifts = [record.mean_shift, record.weight_shift, record.slope_shift];
                 record.rivals.iter().all(|&rival| usize::from(rival) < objects)
-                    && shifts.iter().all(|&shift| shift <= ObjectFit::MOST_SHIFT)
+                    && shifts.iter().all(|&shift| shift <= ObjectMisfit::MOST_SHIFT)
             })
         })
     }
 
-    /// What touches of an object give; `None` for one that has no record.
+    /// Expected evidence of touches of an object; `None` for one that has no record.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
-    pub fn object(&self, object: usize) -> Option<ObjectFit<'a>> {
+    pub fn object(&self, object: usize) -> Option<ObjectMisfit<'a>> {
         let count = usize::from(self.terms.rivals);
         let length = Self::record_length(count);
         let start = object.checked_mul(length)?;
@@ -196,11 +197,11 @@ impl<'a> FitTest<'a> {
         let rivals = rest.get(..count)?;
         let numbers = rest.get(count.next_multiple_of(2)..)?.as_chunks().0;
         let constant = i32::from_le_bytes([a, b, c, d]);
-        Some(ObjectFit { mean_shift, weight_shift, slope_shift, constant, rivals, numbers })
+        Some(ObjectMisfit { mean_shift, weight_shift, slope_shift, constant, rivals, numbers })
     }
 }
 
-impl ObjectFit<'_> {
+impl ObjectMisfit<'_> {
     /// The largest shift.
     pub const MOST_SHIFT: u8 = 40;
 
@@ -254,7 +255,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    const TERMS: FitTerms = FitTerms {
+    const TERMS: MisfitTerms = MisfitTerms {
         held: Held::Certain,
         rivals: 3,
         first: 5,
@@ -275,7 +276,7 @@ mod tests {
         for object in 0..3_u8 {
             let rivals: Vec<u8> = (0..4).filter(|&rival| rival != object).collect();
             let numbers = (0..12).map(|number| 100 * i16::from(object) + number);
-            ObjectFit::write([1, 2, 3], -7, &rivals, numbers, &mut |part| bytes.extend_from_slice(part));
+            ObjectMisfit::write([1, 2, 3], -7, &rivals, numbers, &mut |part| bytes.extend_from_slice(part));
         }
         bytes
     }
@@ -283,7 +284,7 @@ mod tests {
     #[test]
     fn a_test_is_read_back_as_written() {
         let bytes = section();
-        assert_eq!(bytes.len(), 4 + 40 + 3 * FitTest::record_length(3));
+        assert_eq!(bytes.len(), 4 + 40 + 3 * MisfitTest::record_length(3));
         let strangers = Strangers::from_bytes(&bytes, 4).unwrap();
         assert!(strangers.background);
         let test = strangers.test.unwrap();
@@ -310,7 +311,7 @@ mod tests {
         assert_eq!(Strangers::from_bytes(&bytes, 5), None);
         assert_eq!(Strangers::from_bytes(&bytes, 3), None);
         assert_eq!(Strangers::from_bytes(&Strangers::header(true, false), 1), None);
-        let record = 4 + FitTerms::LENGTH;
+        let record = 4 + MisfitTerms::LENGTH;
         let wrong: [(usize, &[u8]); 12] = [
             (0, &[2]),
             (1, &[2]),
@@ -334,13 +335,13 @@ mod tests {
 
     #[test]
     fn records_are_as_long_as_stated() {
-        for rivals in 1..=FitTest::MOST_RIVALS {
+        for rivals in 1..=MisfitTest::MOST_RIVALS {
             let mut length = 0;
             let numbers = (0..2 * rivals + rivals * (rivals + 1) / 2).map(|_| 0);
             let all: Vec<u8> = (0..rivals as u8).collect();
-            ObjectFit::write([0; 3], 0, &all, numbers, &mut |part| length += part.len());
-            assert_eq!(length, FitTest::record_length(rivals));
+            ObjectMisfit::write([0; 3], 0, &all, numbers, &mut |part| length += part.len());
+            assert_eq!(length, MisfitTest::record_length(rivals));
         }
-        assert_eq!(FitTest::record_length(9), 144);
+        assert_eq!(MisfitTest::record_length(9), 144);
     }
 }

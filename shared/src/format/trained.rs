@@ -1,4 +1,4 @@
-//! What a model states about its training, and the optional sections that hold it.
+//! Statements of a model about its training, and the optional sections that hold it.
 
 use super::codes::{Counted, Length};
 use crate::pattern::Patterns;
@@ -33,7 +33,7 @@ pub enum Tag {
     Temperature,
     /// The values of leaves that stand for many: [`SharedLeaves`](super::SharedLeaves).
     SharedLeaves,
-    /// How margins of rows become a class or a value: [`Prediction`](super::Prediction).
+    /// Rule that turns margins of rows into a class or a value: [`Prediction`](super::Prediction).
     Prediction,
     /// Features that stand for a missing value: [`Sentinel`](super::Sentinel).
     Sentinel,
@@ -81,7 +81,7 @@ pub struct TrainedProbe {
     pub spacing: f32,
     /// Nominal speed, in lengths per second.
     pub speed: f32,
-    /// What a length is.
+    /// Unit of a length.
     pub length: Length,
 }
 
@@ -122,9 +122,9 @@ impl TrainedProbe {
 pub struct TrainedTouches {
     /// The contact patterns that occurred.
     pub patterns: Patterns,
-    /// Which approaches count as evidence.
+    /// Approaches that count as evidence.
     pub counted: Counted,
-    /// Whether a touch has to have a pose.
+    /// True if a touch must have a pose.
     pub needs_pose: bool,
     /// The largest time between the first and the last contact of a touch, in microseconds; `u32::MAX` if it is not
     /// known. An effector that waits for less turns full touches into partial ones.
@@ -192,7 +192,7 @@ impl TrainedNoise {
     }
 }
 
-/// How often each contact pattern occurred among the approaches of the training: 12 bytes. Nothing on the chip uses it.
+/// Frequency of each contact pattern among the approaches of the training: 12 bytes. Nothing on the chip uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PatternShares(
     /// For each pattern, in the order of the codes, its share in units of 1/65535.
@@ -217,7 +217,7 @@ impl PatternShares {
     }
 }
 
-/// Which touches a model was trained on, for whoever tests it on others: 12 bytes, and 2 for each object.
+/// Kind of touches that a model was trained on, for whoever tests it on others: 12 bytes, and 2 for each object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrainedCapture<'a> {
     /// 16 bits of a checksum of the capture's seed and settings; 0 if no capture is known.
@@ -260,10 +260,10 @@ impl<'a> TrainedCapture<'a> {
     }
 }
 
-/// What a model over rows states about one of its features.
+/// Statement of a model over rows about one of its features.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feature<'a> {
-    /// What a value is multiplied by, to be rounded to the nearest whole number; 1 where f32 values are compared.
+    /// Factor applied to a value, which is then rounded to the nearest whole number; 1 where f32 values are compared.
     pub scale: f32,
     /// Its name.
     pub name: &'a str,
@@ -345,7 +345,7 @@ pub fn write_section(tag: Tag, must_understand: bool, content: &[u8], put: &mut 
 pub struct Section<'a> {
     /// The tag without [`MUST_UNDERSTAND`].
     pub tag: u16,
-    /// Whether a reader that does not know the tag has to refuse the model.
+    /// True if a reader that does not know the tag must refuse the model.
     pub must_understand: bool,
     /// The content, without the zeros after it.
     pub content: &'a [u8],

@@ -9,7 +9,7 @@ use crate::Touch;
 use embedded_io::{Read, Write};
 use serde::{Deserialize, Serialize};
 
-/// What the link drives: a recognizer, and a place for models.
+/// Target of the link: a recognizer, and a place for models.
 pub trait Device {
     /// Takes a touch into account; [`Outcome::Verdict`], with a detail if asked for.
     fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome;
@@ -55,7 +55,7 @@ pub trait Device {
         ""
     }
 
-    /// How many touches were not counted because the model was not trained for them, since power-up.
+    /// Number of touches, since power-up, that were not counted because the model was not trained for them.
     fn refused(&self) -> u32 {
         0
     }
@@ -102,7 +102,7 @@ impl Progress {
         self.session
     }
 
-    /// How many commands of this session have been executed.
+    /// Number of commands of this session that have been executed.
     pub const fn executed(&self) -> u32 {
         self.next
     }

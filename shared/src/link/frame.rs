@@ -23,11 +23,11 @@ pub const FRAME_MAX: usize = DECODED_MAX + 3;
 pub struct Frame<'a> {
     /// The session's number; 0 before one is open.
     pub session: u32,
-    /// What is said.
+    /// The message.
     pub message: Message<'a>,
 }
 
-/// Why the bytes between two 0x00 are no frame.
+/// Reason why the bytes between two 0x00 are no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FrameError {

@@ -6,7 +6,7 @@ use super::message::{Answer, Command, Event, Message, Outcome, Query};
 use core::fmt;
 use embedded_io::{Read, ReadReady, Write};
 
-/// How long the host waits.
+/// Waiting times of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HostSettings {
     /// Microseconds after which an unanswered frame is sent again; doubles with each attempt, up to 16 times.
@@ -22,7 +22,7 @@ impl Default for HostSettings {
     }
 }
 
-/// What the host's end has counted.
+/// Counts kept by the host's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HostStatistics {
     /// Frames sent for the first time.
@@ -50,16 +50,16 @@ pub enum Incoming<'a> {
     Outcome {
         /// The command's number.
         sequence: u32,
-        /// What the result was.
+        /// The result.
         outcome: Outcome,
     },
     /// The answer to the question.
     Answer(Answer<'a>),
     /// Something happened on the chip that was not a command.
     Event {
-        /// What happened.
+        /// The event.
         event: Event,
-        /// How many events before it were lost on the way.
+        /// Number of events before it that were lost on the way.
         missed: u32,
         /// The boot number of the start in which it happened: another one than [`HostEnd::boot`] if a start before the
         /// current one was cut off in telling it.
@@ -67,7 +67,7 @@ pub enum Incoming<'a> {
     },
 }
 
-/// Why the session cannot go on.
+/// Reason why the session cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LinkError {
@@ -239,18 +239,18 @@ impl HostEnd {
         self.put_question(Query::Hello, now, &mut send);
     }
 
-    /// Whether the session is open, and no command or question is in flight.
+    /// True if the session is open, and no command or question is in flight.
     pub fn is_idle(&self) -> bool {
         self.phase == Phase::Open && self.question.is_none() && self.oldest == self.next
     }
 
-    /// Whether [`HostEnd::submit`] would take a command.
+    /// True if [`HostEnd::submit`] would take a command.
     pub fn has_room(&self) -> bool {
         let open = matches!(self.phase, Phase::Open | Phase::Doubting);
         open && usize::try_from(self.next.wrapping_sub(self.oldest)).is_ok_and(|under_way| under_way < WINDOW)
     }
 
-    /// Whether [`HostEnd::ask`] would take a question.
+    /// True if [`HostEnd::ask`] would take a question.
     pub const fn can_ask(&self) -> bool {
         matches!(self.phase, Phase::Open) && self.question.is_none()
     }

@@ -31,7 +31,7 @@ pub enum Message<'a> {
     Command {
         /// Counts commands from 0 in a session.
         sequence: u32,
-        /// What to do.
+        /// The command.
         #[serde(borrow)]
         command: Command<'a>,
     },
@@ -39,7 +39,7 @@ pub enum Message<'a> {
     Outcome {
         /// The command's number.
         sequence: u32,
-        /// What the result was.
+        /// The result.
         outcome: Outcome,
     },
     /// Chip: a command came that is not the next one, or not of the session that this frame is of.
@@ -54,7 +54,7 @@ pub enum Message<'a> {
         boot: u32,
         /// Counts events from 0 since that start.
         sequence: u32,
-        /// What happened.
+        /// The event.
         event: Event,
     },
 }
@@ -63,7 +63,7 @@ pub enum Message<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Query {
-    /// Which session is current?
+    /// Asks for the current session.
     Hello,
     /// Open the session of this frame if the current one is `previous`.
     Open {
@@ -72,16 +72,16 @@ pub enum Query {
         /// The chip's boot number as the host knows it: a late copy opens nothing after a reset.
         boot: u32,
     },
-    /// Which model is in use?
+    /// Asks for the model in use.
     Model,
-    /// What is the name of an object?
+    /// Asks for the name of an object.
     Name {
         /// The object's index in the model.
         object: u8,
     },
-    /// What has happened on the link?
+    /// Asks for the counts of the link.
     Statistics,
-    /// What are the posteriors of up to [`POSTERIORS`](super::POSTERIORS) objects?
+    /// Asks for the posteriors of up to [`POSTERIORS`](super::POSTERIORS) objects.
     Posteriors {
         /// From this object on.
         first: u8,
@@ -96,7 +96,7 @@ pub enum Query {
         /// Poses that the robot cannot reach: pose n is bit n % 8 of byte n / 8. Zeros: it can reach all.
         without: [u8; POSE_BYTES],
     },
-    /// Which program does the chip run? A chip whose program is older than this question does not answer it.
+    /// Asks for the program that the chip runs. A chip whose program is older than this question does not answer it.
     Program,
 }
 
@@ -142,14 +142,14 @@ pub enum Command<'a> {
     Touch {
         /// The touch.
         touch: TouchMessage,
-        /// Whether the outcome should have a [`Detail`].
+        /// True if the outcome should have a [`Detail`].
         detail: bool,
     },
     /// Forget all touches: another object comes.
     Reset,
     /// A model or a snapshot is about to come, in chunks.
     Begin {
-        /// What comes.
+        /// The kind of data that follows.
         payload: Payload,
         /// Its bytes in all.
         length: u32,
@@ -167,7 +167,7 @@ pub enum Command<'a> {
     Commit,
 }
 
-/// What comes in chunks.
+/// Kind of data that arrives in chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Payload {
@@ -189,7 +189,7 @@ pub enum Outcome {
     Refused(Refusal),
 }
 
-/// Why the chip refused.
+/// Reason why the chip refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -200,9 +200,9 @@ pub enum Refusal {
     TooLong,
     /// A chunk came without a beginning, or not in order.
     OutOfOrder,
-    /// What arrived is not what was announced.
+    /// The data that arrived differ from the announcement.
     Checksum,
-    /// What arrived is no model or snapshot that this chip can use.
+    /// The data that arrived are no model or snapshot that this chip can use.
     Invalid,
     /// The chip's program does not do that.
     Unsupported,
@@ -216,14 +216,14 @@ pub enum Refusal {
     NoPose,
     /// The model is over rows of features, not touches: not counted.
     Features,
-    /// What arrived could not be written, or was being written when the power was cut.
+    /// The data that arrived could not be written, or was being written when the power was cut.
     Unwritable,
     /// The model has no plan of approaches, or none for a pose that can be reached.
     NoPlan,
 }
 
 impl Refusal {
-    /// Whether it is a touch that was not counted because the model was not trained for it.
+    /// True if this refuses a touch that was not counted because the model was not trained for it.
     pub const fn is_of_a_touch(self) -> bool {
         matches!(self, Self::Pattern | Self::Spread | Self::NoPose | Self::Features)
     }
@@ -261,12 +261,12 @@ pub enum Event {
         touch: TouchMessage,
         /// Microseconds between the announcement of its pose and its first contact.
         pose_age: Option<u32>,
-        /// What is known after it.
+        /// The verdict after it.
         verdict: VerdictMessage,
     },
     /// One of the chip's own fingers is faulty.
     Fault {
-        /// What is wrong.
+        /// Kind of the fault.
         kind: FaultKind,
         /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
@@ -277,12 +277,12 @@ pub enum Event {
     Refused {
         /// The touch.
         touch: TouchMessage,
-        /// Why.
+        /// The reason.
         refusal: Refusal,
     },
 }
 
-/// What can go wrong with a chip's own fingers.
+/// Faults of a chip's own fingers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -354,17 +354,17 @@ fn pose_of([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> Pose {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VerdictMessage {
-    /// What is known.
+    /// The decision so far.
     pub decision: Decision,
     /// The object with the most evidence.
     pub best: u8,
     /// Touches since the last reset.
     pub touches: u32,
-    /// What to compare with another recognizer, if it was asked for.
+    /// Data for comparison with another recognizer, if it was asked for.
     pub detail: Option<Detail>,
 }
 
-/// What is known after a touch.
+/// Decision after a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -440,18 +440,18 @@ pub struct ModelInfo {
 }
 
 impl ModelInfo {
-    /// How many objects the model knows.
+    /// Number of objects that the model knows.
     pub fn objects(&self) -> usize {
         usize::from(self.last_object) + 1
     }
 
-    /// What it takes touches as.
+    /// Descriptor of the model's touches.
     pub fn descriptor(&self) -> Option<Descriptor> {
         Descriptor::from_code(self.descriptor)
     }
 }
 
-/// What the chip's end of the link has counted since power-up.
+/// Counts kept by the chip's end of the link since power-up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Whole frames.

@@ -64,6 +64,4 @@ pub const POSE_BYTES: usize = crate::MOST_POSES.div_ceil(8);
 pub const POSTERIORS: usize = CHUNK / 8;
 
 #[cfg(test)]
-mod state_machine;
-#[cfg(test)]
 mod tests;

@@ -125,10 +125,10 @@ impl obvhs::Boundable for Inflated {
     }
 }
 
-/// How far rounding in f32 moves a box or a ray.
+/// Distance by which rounding in f32 moves a box or a ray.
 const SLACK: f64 = 1e-5;
 
-/// What anyone would write first: the binary tree of obvhs over inflated boxes, up to eight triangles in a leaf, its own
+/// The obvious implementation: the binary tree of obvhs over inflated boxes, up to eight triangles in a leaf, its own
 /// loop, and the exact test of every triangle in the leaves that it comes to.
 fn plain<'a>(scene: &Scene, casts: &'a [Cast]) -> Engine<'a> {
     let triangles: Vec<Triangle> = scene.triangles().collect();
@@ -221,8 +221,8 @@ fn engines(name: &str, mesh: &Mesh) {
     }
 }
 
-/// What is right: ours where all agree on whether and, to 1e-9, when (parry3d f32 only on whether); else the earliest
-/// contact over all triangles.
+/// The correct results: ours where all agree on contact or none and, to 1e-9, on its time (parry3d f32 only on
+/// contact); else the earliest contact over all triangles.
 fn truth(scene: &Scene, casts: &[Cast], engines: [&[Option<f64>]; 4]) -> Vec<Option<f64>> {
     let triangles: Vec<Triangle> = scene.triangles().collect();
     let brute = |cast: &Cast| {

@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 use std::time::Instant;
 
-/// Whether this run only shows that everything works.
+/// True if this run only shows that everything works.
 pub static QUICK: LazyLock<bool> = LazyLock::new(|| std::env::args().any(|argument| argument == "--quick"));
 
 /// The processor time that this thread has had, in seconds; elsewhere than on Linux the time of day. Linux may count it only
@@ -21,8 +21,8 @@ pub fn clock() -> f64 {
 pub struct Paired {
     /// Seconds per item: the median of each contestant's rounds.
     pub seconds: Vec<f64>,
-    /// How many times as long as the first contestant each takes: the median over the rounds, in each of which all take
-    /// turns. What disturbs a round disturbs all of them.
+    /// Time of each contestant, relative to the first: the median over the rounds, in each of which all take turns.
+    /// What disturbs a round disturbs all of them.
     pub ratios: Vec<f64>,
 }
 

@@ -1,11 +1,11 @@
-//! Touches as a crooked probe would make them, for where no recorded ones are: for `.ci/probe`.
+//! Touches as an imperfect probe would make them, where there are no recorded ones: for `.ci/probe`.
 //!
 //! ```sh
 //! crooked DIR     # DIR/known, DIR/test, DIR/plate.txt, DIR/meshes
 //! ```
 //!
 //! What is wrong with the probe stands in [`CROOKED`]. None of this is shared with what fits a probe: it goes from the
-//! simulated contact times to those of the probe by a few lines of its own.
+//! simulated contact times to those of the probe by its own few lines.
 
 use palpate::capture;
 use palpate::mesh::{builtin, obj};
@@ -19,17 +19,17 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// What is wrong with a probe; times in seconds.
+/// Faults of a probe; times in seconds.
 struct Crooked {
     /// The speed over the nominal one.
     factor: f64,
-    /// How much later each finger touches.
+    /// Delay of each finger.
     late: [f64; 3],
     /// The standard deviation of the noise of each contact.
     noise: f64,
     /// The share of contacts that each finger misses.
     missed: [f64; 3],
-    /// How far the plate is out of square, in seconds from one finger to the next.
+    /// Error of the plate's squareness, in seconds from one finger to the next.
     slope: f64,
 }
 

@@ -1,4 +1,4 @@
-//! How many strangers a model finds out, each object being left out in turn.
+//! Number of strangers that a model detects, each object being left out in turn.
 //!
 //! ```text
 //! palpate capture DIR -o train --touches 21000 --pose
@@ -45,7 +45,7 @@ fn main() -> palpate::Result<()> {
 fn line(name: &str, found: &[LeftOut]) {
     let mean = |of: &dyn Fn(&LeftOut) -> f64| found.iter().map(of).sum::<f64>() / found.len() as f64;
     let at = |touches: usize| mean(&|one: &LeftOut| one.strangers.detected[&touches]);
-    let term = |of: fn(&palpate::shared::format::FitTerms) -> f64| {
+    let term = |of: fn(&palpate::shared::format::MisfitTerms) -> f64| {
         mean(&|one: &LeftOut| one.calibrated.as_ref().map_or(0.0, |calibrated| of(&calibrated.terms)))
     };
     println!(

@@ -97,7 +97,7 @@ fn sweep(rounds: usize) -> Result<()> {
     Ok(())
 }
 
-/// What a compiled model costs and how far it is off.
+/// Cost of a compiled model, and its distance from the ensemble.
 fn models(rounds: usize, models: &[(String, &Ensemble, Compiled)], test: &Dataset) -> Result<()> {
     let touches: Vec<&Touch> = test.objects.iter().flat_map(|object| object.touches().iter().take(1000)).collect();
     let opened: Vec<Model<'_>> =
@@ -129,7 +129,7 @@ fn models(rounds: usize, models: &[(String, &Ensemble, Compiled)], test: &Datase
     Ok(())
 }
 
-/// What leaves are stored as.
+/// Types of leaves compared.
 fn leaves(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
     let ensemble = train(trained, &train::Settings { leaf_bits: None, ..train::Settings::compact() }, &())?;
     let compiled = [Leaf::F32, Leaf::I16, Leaf::I8].map(|leaf| {
@@ -139,7 +139,7 @@ fn leaves(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
     models(rounds, &compiled.into_iter().collect::<Result<Vec<_>>>()?, test)
 }
 
-/// How fine a table is.
+/// Sizes of tables compared.
 fn tables(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
     let ensembles = [16, 32, 64, 128, 256].map(|bins| {
         let settings =

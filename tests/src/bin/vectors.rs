@@ -2,7 +2,7 @@
 //! `cargo run -p palpate-tests --bin vectors > shared/vectors/vectors.txt`.
 //!
 //! They are committed, and stay as they are: models that earlier releases made have to give the same. Write them again
-//! only where something is to be added.
+//! only where something must be added.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
@@ -30,7 +30,7 @@ fn main() {
     print!("{text}");
 }
 
-/// What is the same in every model.
+/// Functions that are the same for every model.
 fn functions(text: &mut String) {
     let mut put = |line: String| *text += &format!("{line}\n");
     for bytes in [&b"123456789"[..], b"PLPT", &[0], &[0xff; 32]] {
@@ -111,7 +111,7 @@ fn play(text: &mut String, name: &str, bytes: &[u8], touches: &[Touch]) {
     }
 }
 
-/// What is known after a touch or a row.
+/// State after a touch or a row.
 fn known(text: &mut String, model: &Model<'_>, recognizer: &Recognizer<'_, 256>, features: &[i32], verdict: Verdict) {
     let mut sums = vec![0.0; model.object_count()];
     *text += &format!("features {}\n", numbers(features));
@@ -207,7 +207,7 @@ fn descriptors(text: &mut String) {
     }
 }
 
-/// What models state, and what they refuse.
+/// Statements of models, and what they refuse.
 fn sections(text: &mut String) {
     let plain = |descriptor| compiled(Shape { descriptor, ..SHAPE }, 13, Leaf::I16, Layout::Compact);
     let contacts = plain(Descriptor::ContactsCurvature);

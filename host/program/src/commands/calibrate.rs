@@ -10,8 +10,8 @@ use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::strangers::{self, Found};
-use palpate::touches::noise::Noise;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -10,7 +10,7 @@ use palpate::error::Error;
 use palpate::mesh::Object;
 use palpate::output;
 use palpate::probe::approach::Aim;
-use palpate::touches::noise::Noise;
+use palpate::probe::noise::Noise;
 use palpate::tune::probe::{Design, Settings, Trial, design};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;

@@ -4,10 +4,10 @@ use super::numbers::count;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::{Global, remark};
-use palpate::error::TuneProblem;
+use palpate::error::FitProblem;
+use palpate::fit::{Estimate, Fit, Settings, between, fit};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
-use palpate::tune::fit::{Estimate, Fit, Settings, between, fit};
 use palpate::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
         output::print_about(&arguments.output, &table(&found))?;
     }
     if !suspects.is_empty() && !arguments.force {
-        return Err(Error::from(TuneProblem::Suspects { suspects }).in_file(&arguments.recorded));
+        return Err(Error::from(FitProblem::Suspects { suspects }).in_file(&arguments.recorded));
     }
     for suspect in suspects {
         remark(&format!("palpate: warning: {suspect}."));

@@ -6,8 +6,8 @@ use super::progress::Bar;
 use palpate::compile::CompiledModel;
 use palpate::evaluate::{self, Planned};
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
-use palpate::touches::noise::Noise;
 use palpate::{Error, Result};
 
 #[derive(serde::Serialize)]

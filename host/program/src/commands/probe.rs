@@ -5,7 +5,7 @@ use palpate::ensemble::StatedProbe;
 use palpate::error::ProbeProblem;
 use palpate::mesh::{BACKGROUND, Object, builtin, source};
 use palpate::probe::file::ProbeFile;
-use palpate::touches::noise::Noise;
+use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
 use palpate::{Error, Result};
 use palpate_shared::format::Length;

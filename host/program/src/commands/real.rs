@@ -2,7 +2,7 @@
 
 use palpate::Result;
 use palpate::probe::file::ProbeFile;
-use palpate::touches::noise::{Noise, PartialNoise};
+use palpate::probe::noise::{Noise, PartialNoise};
 use std::path::{Path, PathBuf};
 
 /// What disturbs touches.
@@ -56,9 +56,7 @@ fn real(text: &str) -> Result<Real, String> {
     let is_file = path.extension().is_some_and(|extension| extension == "toml") || path.is_file();
     let given = match is_file {
         true => Given::File(path.into()),
-        false => {
-            Given::Settings(text.parse().map_err(|problem: palpate::touches::noise::BadNoise| problem.to_string())?)
-        }
+        false => Given::Settings(text.parse().map_err(|problem: palpate::probe::noise::BadNoise| problem.to_string())?),
     };
     Ok(Real { text: text.into(), given })
 }

@@ -57,7 +57,7 @@ const RENAMED: &[Renamed] = &[
     option("train", "--leaf-bits", "--trees leaf_bits=16"),
     option("train", "--different-leaves", "--trees different_leaves=128"),
     option("train", "--threshold-cost", "--trees different_leaves=128,threshold_cost=2e-5"),
-    option("train", "--trainer", "--trees trainer=hessboost or trainer=xgboost"),
+    option("train", "--trainer", "--trees trainer=palpate or trainer=xgboost"),
     option("export", "--for", "--layout balanced, speed, size, m4f or m0+"),
     option("export", "--fit-scales", "--scale ROWS.csv"),
     option("evaluate", "--strangers", "--unknown DIR"),

@@ -4,8 +4,8 @@ use super::real::RealArguments;
 use super::{Global, shell};
 use palpate::Result;
 use palpate::output::{print, print_json, refuse_stdout};
+use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::touches::noise::Noise;
 use palpate_report::{self, Existing, Settings};
 use std::path::PathBuf;
 

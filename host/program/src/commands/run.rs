@@ -5,8 +5,8 @@ use super::{Global, shell};
 use crate::run;
 use palpate::Result;
 use palpate::output;
+use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::touches::noise::Noise;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

@@ -31,7 +31,7 @@ const KEYS: [(&str, &str); 10] = [
     ("leaf_bits", "a number of bits such as 16, or 0 to leave leaves as they are"),
     ("different_leaves", "a number such as 128"),
     ("threshold_cost", "a number such as 2e-5, with different_leaves"),
-    ("trainer", "hessboost or xgboost"),
+    ("trainer", "palpate or xgboost"),
 ];
 
 impl FromStr for Trees {
@@ -76,7 +76,7 @@ impl Trees {
             "leaf_bits" => self.leaf_bits = Some(value.parse().ok()?),
             "different_leaves" => self.different_leaves = Some(value.parse().ok()?),
             "threshold_cost" => self.threshold_cost = Some(value.parse().ok()?),
-            _ => self.trainer = Some(choice(value, [("hessboost", Engine::Hessboost), ("xgboost", Engine::Xgboost)])?),
+            _ => self.trainer = Some(choice(value, [("palpate", Engine::Palpate), ("xgboost", Engine::Xgboost)])?),
         }
         Some(())
     }
@@ -137,7 +137,7 @@ mod tests {
             ("gamma=1", "\"gamma=1\" is no setting of trees"),
             ("depth=3,depth=4", "depth is given twice"),
             ("threshold_cost=1", "threshold_cost is given; use it with different_leaves"),
-            ("trainer=lightgbm", "trainer is \"lightgbm\"; use hessboost or xgboost"),
+            ("trainer=lightgbm", "trainer is \"lightgbm\"; use palpate or xgboost"),
         ] {
             let error = text.parse::<Trees>().unwrap_err();
             assert!(error.starts_with(expected), "{text}: {error}");

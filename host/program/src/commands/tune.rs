@@ -7,7 +7,7 @@ use super::real::RealArguments;
 use palpate::Result;
 use palpate::compile::Core;
 use palpate::output;
-use palpate::touches::noise::Noise;
+use palpate::probe::noise::Noise;
 use palpate::tune::{self, Row, Settings, Tuned};
 use palpate_shared::Descriptor;
 use std::fmt::Write as _;

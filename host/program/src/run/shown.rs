@@ -1,4 +1,4 @@
-//! What a run prints and shows on its page.
+//! Output of a run: the text that it prints, and its page.
 
 use super::{AT_APPROACHES, Method, PICTURE, PLAY, Recognition, Summary, TABLE_AT, Trial};
 use palpate::capture;
@@ -117,7 +117,7 @@ pub(super) fn table(summary: &Summary) -> Records {
     table
 }
 
-/// What the test touches had, and what a missing accuracy means, if one is missing.
+/// Note about the test touches, and about a missing accuracy, if one is missing.
 pub(super) fn note(summary: &Summary) -> String {
     let noise = &summary.noise;
     let noise = match noise.is_none() {
@@ -131,7 +131,7 @@ pub(super) fn note(summary: &Summary) -> String {
         .join(" ")
 }
 
-/// What the promises rest on, or why there are none.
+/// Basis of the promises, or the reason why there are none.
 fn calibration(summary: &Summary) -> String {
     let ours = &summary.ours;
     let promise = match (&ours.calibration, &ours.uncalibrated) {
@@ -149,15 +149,15 @@ fn calibration(summary: &Summary) -> String {
     promise + &others.into_iter().filter_map(why).collect::<String>()
 }
 
-/// What a missing accuracy means, if one is missing.
+/// Meaning of a missing accuracy, if one is missing.
 fn missing(summary: &Summary) -> String {
     let missing = |method: &Method| TABLE_AT.iter().any(|at| !method.evaluation.accuracy.contains_key(at));
     if ![&summary.paper, &summary.full, &summary.ours].into_iter().any(missing) {
         return String::new();
     }
     format!(
-        "– stands for an accuracy that would rest on fewer than {LEAST_GROUPS} distinct groups of test touches; capture \
-         more touches to measure it."
+        "A dash (–) replaces an accuracy that would rest on fewer than {LEAST_GROUPS} distinct groups of test touches; \
+         capture more touches to measure it."
     )
 }
 

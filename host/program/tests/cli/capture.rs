@@ -334,7 +334,7 @@ fn numbers_in_another_notation_are_refused_with_a_hint() {
         assert!(error.contains("write the number out: 1000000"), "{error}");
     }
     let error = stderr(capture(directory.path(), "out", &["--format", "csv"]).output().unwrap(), 2);
-    assert!(error.contains("\"csv\" is no format of touches. Use text or parquet."), "{error}");
+    assert!(error.contains("\"csv\" is not a format of touches. Use text or parquet."), "{error}");
     let error = stderr(capture(directory.path(), "out", &["--shard", "3/2"]).output().unwrap(), 2);
     assert!(error.contains("Give K/N with K from 1 to N, like 2/5."), "{error}");
     assert!(!directory.path().join("out").exists());

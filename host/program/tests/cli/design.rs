@@ -35,7 +35,7 @@ fn a_probe_is_designed_for_two_objects_and_written_with_a_page() {
         assert_eq!(stated(key).parse::<f64>().unwrap(), found["best"][key].as_f64().unwrap());
     }
     let page = std::fs::read_to_string(at.join("one/design.html")).unwrap();
-    assert!(page.contains("<svg") && page.contains("Which probe to build") && page.contains("mouse"));
+    assert!(page.contains("<svg") && page.contains("The best probe to build") && page.contains("mouse"));
 }
 
 #[test]

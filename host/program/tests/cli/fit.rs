@@ -4,7 +4,7 @@ use crate::{json, listing, run, stderr, stdout};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// A crooked probe.
+/// An imperfect probe.
 const CROOKED: &str = "radius = 0.15\nspacing = 1.5\nspeed = 10.0\n[real]\nspeed_factor = 0.9\n\
                        offsets = [0.0, -0.04, 0.0]\nnoise = \"2ms\"\ntimer = \"1ms\"\nmissed = [\"0%\", \"4%\", \"0%\"]\n";
 
@@ -13,7 +13,7 @@ macro_rules! arguments {
     ($($argument:expr),* $(,)?) => { [$(std::ffi::OsStr::new($argument)),*] };
 }
 
-/// Approaches by the crooked probe, as a robot's: without a listing.
+/// Approaches by the imperfect probe, as a robot's: without a listing.
 fn recorded(directory: &Path, name: &str, approaches: &str) -> PathBuf {
     let (probe, data) = (directory.join("true.toml"), directory.join(name));
     std::fs::write(&probe, CROOKED).unwrap();

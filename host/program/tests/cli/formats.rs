@@ -93,7 +93,7 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
         "The mesh is open: 3 edges belong to one triangle only, in 1 of 2 parts",
         "The mesh is partly inside out: 1 of 2 parts is (120 triangles around (9.00e6, -7949, 0))",
         "The mesh has stray parts: 1 piece floats apart from the rest",
-        "The mesh has a size that can be neither meters nor millimeters",
+        "The mesh has an implausible size, in meters as well as in millimeters",
     ] {
         assert!(said.contains(expected), "{said}");
         assert!(shown.contains(expected), "the page lacks: {expected}");

@@ -1,4 +1,4 @@
-//! What the program says about itself: help and completions.
+//! The program's own texts: help and completions.
 
 use crate::{command, run, stderr, stdout};
 

@@ -342,7 +342,8 @@ fn a_compiled_model_knows_the_capture_that_it_was_trained_on_and_no_promise_is_m
         assert_eq!(trained_on("fewer"), r#"["fork","mouse"]"#, "{model}");
         assert_eq!(trained_on("unseen"), "[]", "{model}");
     }
-    let said = "the model was trained on these touches of bowl, fork, mouse: a promise that they keep would not hold";
+    let said =
+        "the model was trained on these touches of bowl, fork, mouse: a promise calibrated on them would not hold";
     fails(at, &["calibrate", "model.palpate", "more", "-o", "sure.palpate"], 1, said);
     assert!(!at.join("sure.palpate").exists());
     // Others are too few here, which is another problem.

@@ -1,11 +1,11 @@
-//! What someone is told who uses the program for the first time.
+//! Guidance for someone who uses the program for the first time.
 
 use crate::{command, globe, stderr, stdout};
 use serde_json::Value;
 use std::path::Path;
 
 /// Data sets of three objects with `count` approaches each: a third of them misses the last finger, unless only `full`
-/// touches are wanted. How the rest is bent tells the objects apart, often.
+/// touches are wanted. The curvature of the rest often distinguishes the objects.
 fn approaches(directory: &Path, count: u64, first: u64, full: bool) {
     std::fs::create_dir_all(directory).unwrap();
     for (name, bend) in [("bowl", 100_000), ("cup", 160_000), ("jug", 260_000)] {

@@ -96,9 +96,9 @@ fn what_is_no_touch_is_refused_with_its_line_and_nothing_is_written() {
     assert!(error.contains("standard input: no touches in it"), "{error}");
     assert!(!data.exists());
     let error = stderr(record(LINES, &data, "bowl", &["--pose"]), 1);
-    assert!(error.contains("no pose, and it is to be recorded with one. Give direction and alignment"), "{error}");
+    assert!(error.contains("no pose, but this data set is recorded with one. Give direction and alignment"), "{error}");
     let error = stderr(record(LINES, &data, "../bowl", &[]), 1);
-    assert!(error.contains("no file can be called after the object \"../bowl\""), "{error}");
+    assert!(error.contains("no file can be named after the object \"../bowl\""), "{error}");
     let error = stderr(run(["data", "record", "no-such-file", "--object", "bowl", "-o", data.to_str().unwrap()]), 1);
     assert!(error.contains("no-such-file: cannot read the touches"), "{error}");
     assert_eq!(listing(&data), [".lock"]);
@@ -133,7 +133,7 @@ fn recorded_and_simulated_touches_are_never_mixed() {
 
 /// A chip without a model whose fingers touch when this test says so.
 struct Fingers {
-    /// Whether the host has asked for the model, the last of what it asks.
+    /// True once the host has asked for the model, its last question.
     greeted: Cell<bool>,
 }
 
@@ -186,7 +186,7 @@ fn touch(number: u32) -> Touch {
     )
 }
 
-/// What the chip reports about a touch: counted or not, it was one.
+/// The chip's report of a touch, counted or not.
 fn event(number: u32) -> Event {
     let touch = TouchMessage::from(&touch(number));
     let verdict = VerdictMessage { decision: Decision::Undecided, best: 0, touches: number, detail: None };

@@ -18,7 +18,7 @@ fn place() -> (TempDir, impl Fn(&str) -> String) {
     (directory, move |name: &str| root.join(name).to_str().unwrap().to_owned())
 }
 
-/// Kinds that are told by their content.
+/// Kinds that are recognized by their content.
 const MODELS: [&str; 8] = [
     "xgboost-1.6-binary.json",
     "xgboost-3.4-softprob.ubj",
@@ -249,7 +249,7 @@ fn what_cannot_be_taken_over_is_refused_by_name_with_the_way_round() {
         (b"PLPT....", "the model is truncated: 8 bytes", "foreign"),
         (b"binf....", "XGBoost's old binary format", "model.json"),
         (b"\x1f\x8b....", "compressed", "Unpack"),
-        (b"<?xml version=\"1.0\"?>", "no ensemble in a format", "ONNX"),
+        (b"<?xml version=\"1.0\"?>", "not an ensemble in a readable format", "ONNX"),
         (b"{\"name\": \"tree\", \"tree_info\": []}", "LightGBM's dump_model", "model.txt"),
         (b"{\"learner\": {\"gradient_booster\": {\"name\": \"gblinear\"}}}", "gblinear, which has no trees", "gbtree"),
     ] {
@@ -334,7 +334,7 @@ fn equal_leaves_of_a_forest_stand_once_and_that_is_said_everywhere() {
     let different = shared["shared_leaves"].as_u64().unwrap();
     assert!(different >= 2 && different <= shared["leaves"].as_u64().unwrap(), "{shared}");
     assert_eq!((&plain["shared_leaves"], &plain["margin_error"]), (&Value::Null, &shared["margin_error"]));
-    // What is wrong with no tree of it is found out in both.
+    // A fault that is not in a tree is found in both.
     for model in ["yes", "no"] {
         let verified = json(run(["verify", &path(model), &forest, &rows, "--json"]));
         assert_eq!(verified["class_differs"], 0, "{verified}");
@@ -397,9 +397,9 @@ fn what_a_file_does_not_say_is_said_at_export_and_can_be_stated() {
         stdout(run([&["export", &data(model), "-o", &path("m"), "--leaf", "f32"], more].concat()))
     };
     let missing = "xgboost-3.2-missing-0.json";
-    assert!(export(missing, &[]).contains("which number stood for a missing value in training"));
+    assert!(export(missing, &[]).contains("the number that stood for a missing value in training"));
     let text = export(missing, &["--missing", "0"]);
-    assert!(!text.contains("which number stood for"), "{text}");
+    assert!(!text.contains("the number that stood for"), "{text}");
     assert!(text.contains("0 stands for a missing value") && text.contains("f32-leaves, sentinel"), "{text}");
     let verify = |model: &str, more: &[&str], code: i32| {
         let name = model.rsplit_once('.').unwrap().0;

@@ -123,7 +123,7 @@ def _refusal(model: object) -> InputError:
             f"{_INSIDE.get(library, '')}Of {library} these are taken: {known}."
         )
     return InputError(
-        f"{what} is no model whose trees can be read. Give a model of XGBoost, LightGBM, CatBoost, scikit-learn or ONNX, an "
+        f"{what} is not a model whose trees can be read. Give a model of XGBoost, LightGBM, CatBoost, scikit-learn or ONNX, an "
         "Ensemble, or a file."
     )
 

@@ -169,7 +169,7 @@ class Ensemble:
         An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
         leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
         a leaf), the right child, the feature, the threshold, whether a missing value goes left, and the values. `base` is
-        what margins start from; an empty name stands for a feature that has none. `link` is "identity", "logistic",
+        where margins start; an empty name stands for a feature that has none. `link` is "identity", "logistic",
         "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
         largest margins names the class, otherwise the first.
         """

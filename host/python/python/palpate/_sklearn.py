@@ -41,7 +41,7 @@ def read(model: Any, names: list[str] | None) -> Ensemble:
     if not hasattr(model, "n_features_in_"):
         raise InputError(f"the {kind} is not fitted. Call its `fit` first.")
     if getattr(model, "n_outputs_", 1) > 1:
-        raise InputError(f"the {kind} has several targets, which are no classes of one object. Train a model for each target.")
+        raise InputError(f"the {kind} has several targets, which are not classes of one object. Train a model for each target.")
     parts = KNOWN[kind](model)
     features = [str(name) for name in getattr(model, "feature_names_in_", [""] * model.n_features_in_)]
     return Ensemble.from_trees(

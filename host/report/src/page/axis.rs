@@ -11,9 +11,9 @@ pub(crate) struct Axis {
     logarithmic: bool,
     /// Values that get a tick, with its label.
     pub(crate) ticks: Vec<(f64, String)>,
-    /// Whether lines are drawn across the chart at the ticks.
+    /// True if lines are drawn across the chart at the ticks.
     pub(crate) grid: bool,
-    /// Whether ticks are names, of which none may be left out.
+    /// True if ticks are names, of which none may be left out.
     pub(crate) is_names: bool,
 }
 
@@ -148,7 +148,7 @@ fn nice_step(step: f64) -> f64 {
         .unwrap_or(step)
 }
 
-/// How many decimals a multiple of `step` needs.
+/// Number of decimals that a multiple of `step` needs.
 fn decimals_of(step: f64) -> usize {
     (0..9)
         .find(|&decimals| {

@@ -17,9 +17,9 @@ pub const STYLE: &str = include_str!("page.css");
 pub struct Figure {
     /// Its anchor, and its files' stem.
     pub id: String,
-    /// What it shows.
+    /// Title of the figure.
     pub title: String,
-    /// What to see in it, and how it was made.
+    /// Caption: how to read it, and how it was made.
     pub caption: String,
     /// The command that remakes it.
     pub command: String,
@@ -49,7 +49,7 @@ impl Figure {
     }
 }
 
-/// What a section is made of.
+/// Part of a section.
 #[derive(Clone, Debug)]
 pub enum Block {
     /// A paragraph.
@@ -69,7 +69,7 @@ pub enum Block {
 /// A small picture in the page.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// What it shows.
+    /// Heading of the section.
     pub name: String,
     /// The bytes of a PNG file.
     pub png: Vec<u8>,
@@ -84,7 +84,7 @@ pub struct Section {
     pub id: String,
     /// Its heading.
     pub title: String,
-    /// What it holds.
+    /// Contents of the section.
     pub blocks: Vec<Block>,
 }
 
@@ -130,7 +130,7 @@ pub struct Page {
     pub sections: Vec<Section>,
     /// The footer: settings and version, as name and value.
     pub facts: Vec<(String, String)>,
-    /// Whether the files of figures and tables are written next to the page and linked.
+    /// True if the files of figures and tables are written next to the page and linked.
     pub files: bool,
 }
 
@@ -237,7 +237,7 @@ impl Page {
         }
     }
 
-    /// How to remake a figure or table, and where its numbers are.
+    /// The command that remakes a figure or table, and links to its numbers.
     fn origin(&self, id: &str, command: &str, drawn: bool) -> Markup {
         html! {
             div.origin {

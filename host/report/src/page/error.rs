@@ -1,4 +1,4 @@
-//! What can be wrong with drawing.
+//! Problems with drawing.
 
 use palpate::error::Problem;
 
@@ -11,19 +11,19 @@ pub enum PageProblem {
     Chart {
         /// The chart's title; may be empty.
         title: String,
-        /// What the library said.
+        /// The library's message.
         reason: String,
     },
     /// The CSV library refused a table.
     #[error("cannot write CSV: {reason}")]
     Csv {
-        /// What the library said.
+        /// The library's message.
         reason: String,
     },
     /// A scene cannot be written as JSON.
     #[error("cannot write the scene as JSON: {reason}")]
     Scene {
-        /// What the JSON library said.
+        /// The JSON library's message.
         reason: String,
     },
 }

@@ -1,4 +1,5 @@
-//! What every HTML file here has: its head, and a policy under which the browser refuses to ask the network for anything.
+//! Common parts of all HTML files: the head, and a policy under which the browser refuses to ask the network for
+//! anything.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

@@ -39,7 +39,7 @@ impl Cell {
         value.try_into().map_or(Self::Missing, |value| Self::Number(value as f64, 0))
     }
 
-    /// What the page shows.
+    /// Text on the page.
     pub fn shown(&self) -> String {
         match *self {
             Self::Text(ref text) => text.clone(),
@@ -58,7 +58,7 @@ impl Cell {
         }
     }
 
-    /// What the column sorts by, if this is a number.
+    /// Number that the column is sorted by, if this is one.
     pub fn value(&self) -> Option<f64> {
         match *self {
             Self::Number(value, _)
@@ -161,9 +161,9 @@ impl Records {
 pub struct Table {
     /// Its anchor, and its file's stem.
     pub id: String,
-    /// What it shows.
+    /// Title of the table.
     pub title: String,
-    /// What to see in it, and how it was made.
+    /// Caption: how to read it, and how it was made.
     pub caption: String,
     /// The command that remakes it.
     pub command: String,

@@ -1,6 +1,6 @@
 //! A page on which objects can be touched, with the simulator and the recognizer inside.
 //!
-//! The page holds all that it needs and asks the network for nothing: the objects' surfaces, the compiled models, and the
+//! The page is self-contained and asks the network for nothing: the objects' surfaces, the compiled models, and the
 //! lines of Rust that touch the one and read the other ([`palpate::play`], compiled to WebAssembly by `host/web`). What a
 //! page says is what the program says; [`trace()`] writes that down, to compare.
 
@@ -24,8 +24,8 @@ use palpate::evaluate::ApproachSequential;
 use palpate::mesh::Object;
 use palpate::play::compress;
 use palpate::probe::approach::Aim;
+use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::touches::noise::Noise;
 use palpate_onboard::Model;
 use palpate_shared::format::{Counted, Length};
 use std::path::PathBuf;
@@ -33,10 +33,10 @@ use std::path::PathBuf;
 /// The game, compiled to WebAssembly.
 const WASM: &[u8] = include_bytes!("../../assets/play/palpate.wasm");
 
-/// What a page is made for.
+/// Settings of a page.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// How objects are touched: unit, probe and aim count.
+    /// Origin of the touches: unit, probe and aim count.
     pub origin: Origin,
     /// The noise that the page begins with.
     pub noise: Noise,
@@ -47,15 +47,15 @@ pub struct Settings {
 /// A model that plays.
 #[derive(Clone, Debug)]
 pub struct Contender {
-    /// What the page calls it.
+    /// Its name on the page.
     pub name: String,
     /// The model.
     pub model: CompiledModel,
-    /// What it costs on average, measured on many more approaches than anybody plays; none if that is not known.
+    /// Its average cost, measured on many more approaches than anybody plays; none if that is not known.
     pub expected: Option<Expected>,
 }
 
-/// What a model costs on average.
+/// Average cost of a model.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Expected {
     /// Approaches to its verdict, also where it gave up.
@@ -138,7 +138,7 @@ pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -
     Ok(html::file_with_wasm("Touch it yourself – Palpate", &[scene::STYLE, include_str!("page.css")], &body))
 }
 
-/// What the page's script needs, safe inside a script element.
+/// Data for the page's script, safe inside a script element.
 fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> Result<String> {
     let Settings { origin, noise, .. } = settings;
     let data = serde_json::json!({
@@ -176,9 +176,9 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
         header {
             h1 { "Touch it yourself" }
             p.lead {
-                "Three fingers in a row approach an object; each says when it makes contact. From these times alone a \
-                 model of a few kilobytes tells " (surfaces.len()) " objects apart. The simulator and the recognizer in \
-                 this page are the program's own, compiled to WebAssembly."
+                "Three fingers in a row approach an object; each reports when it makes contact. From these times alone \
+                 a model of a few kilobytes distinguishes " (surfaces.len()) " objects. The simulator and the recognizer in this \
+                 page are the program's own, compiled to WebAssembly."
             }
             p id="failure" role="alert" {}
             noscript { p { "This page needs JavaScript, which this browser does not run." } }
@@ -224,7 +224,7 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
                 }
                 p id="verdict" role="status" {}
                 table id="bars" {
-                    caption { "Posterior of each object. At the line the model is sure." }
+                    caption { "Posterior of each object. The line marks the threshold of a verdict." }
                     thead { tr { th scope="col" { "object" } th scope="col" { "posterior" } th.number scope="col" { "in %" } } }
                     tbody {}
                 }
@@ -297,7 +297,7 @@ fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
                 p id="rounds" role="status" {}
             }
             fieldset {
-                legend { "What the sensor adds" }
+                legend { "Noise of the sensor" }
                 @for (id, label, least, largest, value) in [
                     ("noise", "Noise: up to", 0.0, 20.0, ms(settings.noise.deviation.largest)),
                     ("bent1", "Finger 1 bent: early by", -20.0, 20.0, ms(bent[0])),
@@ -329,15 +329,15 @@ fn notes(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) ->
         section.notes {
             h2 { "What is what" }
             p {
-                "An approach at random is one of a capture: from any direction, at any point of the bounding box. A click \
-                 is an approach that you aimed, which the models were not trained for: they may be surer or less sure than \
-                 they should be. An approach costs a robot the same whether or not it is evidence."
+                "A random approach is one of a capture: from any direction, at any point of the bounding box. A click \
+                 is an approach that you aimed, which the models were not trained for: their confidence may be too \
+                 high or too low. An approach costs a robot the same whether or not it is evidence."
             }
             p {
-                "The picture and the fingers have the same surface: the mesh with its corners rounded to a 65,536th of its \
-                 longest side"
+                "The picture and the simulator use the same surface: the mesh with its corners rounded to a 65,536th \
+                 of its longest side"
                 @if simplified.is_empty() { "." } @else { ", and simplified where that is needed: " (simplified.join(", ")) "." }
-                @if !instances.is_empty() { " Of objects with several meshes, the first is here: " (instances.join(", ")) "." }
+                @if !instances.is_empty() { " Of objects with several meshes, the first is shown: " (instances.join(", ")) "." }
             }
             p {
                 "The deviation of a touch's noise is drawn between " (settings.noise.deviation.least / 1e3) " ms and what the \

@@ -9,9 +9,9 @@ use palpate::ensemble::train::{self as trainer, Settings};
 use palpate::error::{CalibrateProblem, Error, Result};
 use palpate::evaluate::{self, Candidate, Margins, SequentialSettings};
 use palpate::mesh::Object;
+use palpate::probe::noise::Noise;
 use palpate::probe::scene::Scene;
 use palpate::progress::{self, Progress};
-use palpate::touches::noise::Noise;
 use palpate::touches::{Dataset, ObjectTouches, Origin};
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
@@ -27,12 +27,12 @@ const SEQUENCES: usize = 3_000;
 /// The promised error rate.
 const ERROR_RATE: f64 = 0.01;
 
-/// How models are trained for a page.
+/// Training settings of a page's models.
 #[derive(Clone, Debug)]
 pub struct Training {
-    /// How objects are touched: full touches of each object, and the seed.
+    /// Origin of the touches: number of full touches of each object, and the seed.
     pub origin: Origin,
-    /// What a real sensor adds: what all but the published method are trained for.
+    /// Noise that a real sensor adds: all methods but the published one are trained for it.
     pub noise: Noise,
 }
 

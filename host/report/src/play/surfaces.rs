@@ -7,7 +7,7 @@ use palpate::play::{pack, unpack};
 use palpate::touches::Origin;
 use rayon::prelude::*;
 
-/// What all packed meshes of a page may take, in bytes. As text a third more.
+/// Largest size of all packed meshes of a page, in bytes. As text a third more.
 const MOST_BYTES: usize = 1_300_000;
 
 /// The most triangles of an object to begin with.
@@ -26,7 +26,7 @@ pub struct Surface {
     pub triangles: usize,
     /// Those of the object's own mesh.
     pub of: usize,
-    /// How many meshes the object has; this is the first.
+    /// Number of meshes of the object; this is the first.
     pub instances: usize,
 }
 

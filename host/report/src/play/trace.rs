@@ -1,4 +1,4 @@
-//! What a page has to compute, computed by the program.
+//! Expected results of the page's computations, computed by the program.
 
 use super::{Contender, Settings, Surface};
 use palpate::capture::touches;

@@ -1,6 +1,6 @@
 //! A page on which a mesh can be turned and looked at, with some approaches of the probe.
 //!
-//! The page holds all that it needs and asks the network for nothing. It answers what a user should know about a mesh
+//! The page is self-contained and asks the network for nothing. It answers what a user should know about a mesh
 //! before capturing millions of touches: is it right side out and closed, does its scale suit the fingers, where do the
 //! fingers touch it.
 
@@ -15,18 +15,18 @@ use palpate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
 use palpate::probe::scene::Scene;
 use palpate::random::{self, Purpose};
 
-/// What a page shows.
+/// Settings of a page.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// How many full touches.
+    /// Number of full touches.
     pub touches: usize,
-    /// How many approaches that not all fingers touched.
+    /// Number of approaches that not all fingers touched.
     pub misses: usize,
     /// The seed from which approaches are drawn.
     pub seed: u64,
     /// The longest side of the object's bounding box, in units.
     pub length: f64,
-    /// How far outside the sphere about the bounding box approaches start, in units.
+    /// Distance from the sphere about the bounding box at which approaches start, in units.
     pub clearance: f64,
     /// The probe.
     pub probe: Probe,
@@ -39,13 +39,13 @@ impl Default for Settings {
     }
 }
 
-/// Whether a mesh can be touched as it is, in words, if its longest side has this length and the probe these fingers.
+/// Says in words if a mesh can be touched as it is, if its longest side has this length and the probe these fingers.
 pub fn verdict(facts: &Facts, length: f64, probe: &Probe) -> String {
     let unit = f64::from((facts.high - facts.low).max_element()) / length;
     facts.verdict(2.0 * probe.radius * unit)
 }
 
-/// How many approaches are drawn at most to find the touches.
+/// Largest number of approaches drawn to find the touches.
 const MOST_APPROACHES: u64 = 200_000;
 
 /// The page for an object, as HTML: at most 6 MB, whatever the mesh's size, since no more than 120,000 triangles are
@@ -78,7 +78,7 @@ struct Drawn {
     /// Where each finger starts.
     starts: [[f64; 3]; FINGERS],
     direction: [f64; 3],
-    /// How far each finger goes to its contact, in units; null if it misses.
+    /// Distance of each finger to its contact, in units; null if it misses.
     distances: [Option<f64>; FINGERS],
     /// When each finger touches, in seconds after the first; null if it misses.
     times: [Option<f64>; FINGERS],

@@ -1,10 +1,10 @@
 //! What a compiled model states about itself: its features, its training, what it promises.
 
 use crate::rows::{Encoder, feature_names};
-use crate::{calibrate, compile, evaluate, touches};
+use crate::{calibrate, compile, evaluate};
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::ContactPattern;
-use palpate_shared::format::{FitTerms, Length, TrainedNoise, TrainedProbe};
+use palpate_shared::format::{Length, MisfitTerms, TrainedNoise, TrainedProbe};
 use std::collections::BTreeMap;
 
 /// A feature of a model over rows.
@@ -51,7 +51,7 @@ pub struct Promised {
     /// The touches after which they give up.
     pub max_touches: u32,
     /// What was added to the touches.
-    pub noise: touches::noise::Noise,
+    pub noise: crate::probe::noise::Noise,
     /// Nats by which an object has to be ahead of all others for its name to be given.
     pub margins: BTreeMap<String, f64>,
     /// What the error rate is at most by theory, with any priors.
@@ -77,7 +77,7 @@ pub struct Tested {
     pub threshold: f64,
 }
 
-pub(super) fn tested(terms: &FitTerms) -> Tested {
+pub(super) fn tested(terms: &MisfitTerms) -> Tested {
     Tested {
         held: terms.held.name(),
         promised: f64::from(terms.alarms) / 1e6,
@@ -203,7 +203,7 @@ pub(super) fn promised(model: &Model<'_>) -> Option<Promised> {
         undecided: 1.0 - f64::from(promise.given) / f64::from(promise.sequences.max(1)),
         mean: f64::from(promise.mean_thousandths) / 1e3,
         max_touches: promise.max_touches,
-        noise: touches::noise::Noise::of_promise(&promise.noise),
+        noise: crate::probe::noise::Noise::of_promise(&promise.noise),
         margins: compile::names(model)
             .into_iter()
             .take(model.known_count())

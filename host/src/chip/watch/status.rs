@@ -1,4 +1,4 @@
-//! What is known of a chip that is watched.
+//! Status of a chip that is watched.
 
 use crate::chip::Entry;
 use std::collections::VecDeque;
@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 /// Touches that are kept to be shown.
 const KEPT: usize = 200;
 
-/// What is known of a chip that is watched.
+/// Status of a chip that is watched.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Status {
     /// Where it comes from.
@@ -33,7 +33,7 @@ pub struct Status {
     pub garbled: u64,
     /// The chip's own events that were lost.
     pub missed: u64,
-    /// Whether nothing more will come.
+    /// True if nothing more will come.
     pub ended: bool,
     /// Times of recent touches, for the rate.
     recent: VecDeque<f64>,

@@ -1,7 +1,7 @@
 //! From touches to an ensemble.
 //!
-//! The trainer is gradient boosting with softmax loss over histograms, XGBoost's algorithm and parameters. Two presets:
-//! the published method, and a compact one, whose trees hold one leaf value for each object, so that one walk through a
+//! The trainer ([`palpate_trees::train`]) is gradient boosting with softmax loss over histograms, XGBoost's algorithm and parameters. Two
+//! presets: the published method, and a compact one, whose trees hold one leaf value for each object, so that one walk through a
 //! tree serves all objects.
 //!
 //! Every object is weighted equally, however many touches it has: touches are weighted by the inverse of their object's
@@ -9,20 +9,16 @@
 //! once per touch instead of once.
 
 use crate::ensemble::{
-    Ensemble, MAX_OBJECTS, Node, Origin, Output, StatedProbe, TouchOrigin, Trained, Tree, check_names, feature_row,
+    Ensemble, MAX_OBJECTS, Node, Origin, StatedProbe, TouchOrigin, Trained, check_names, feature_row,
 };
 use crate::error::{EnsembleProblem, Error, Result};
 use crate::mesh::BACKGROUND;
+use crate::probe::noise::Noise;
 use crate::progress::Progress;
-use crate::touches::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
-use hessboost::config::MultiStrategy;
-use hessboost::data::DMatrix;
-use hessboost::model::BoostedModel;
-use hessboost::objective::Multiclass;
-use hessboost::prelude::{HessboostError, Objective, Trainer, TrainingParams, TreeMethod};
 use palpate_shared::format::{Counted, TrainedTouches};
 use palpate_shared::{Descriptor, Patterns, Touch};
+use palpate_trees::train as boost;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
@@ -34,29 +30,30 @@ mod xgboost;
 pub use small::Small;
 pub(crate) use small::train_each as train_small;
 
-/// What every margin starts from; the same for all objects, so it changes no verdict. XGBoost's default.
+/// Starting value of every margin; the same for all objects, so it changes no verdict. XGBoost's default.
 pub const BASE_MARGIN: f32 = 0.5;
 
-/// The library that trains.
+/// The trainer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Engine {
-    /// hessboost, in Rust.
+    /// Palpate's own.
     #[default]
-    Hessboost,
+    Palpate,
     /// XGBoost 1.6.2, if the cargo feature `xgboost` built it in. It has no multi-output trees.
     Xgboost,
 }
 
-/// How an ensemble is trained. Parameters have XGBoost's names and meanings.
+/// Settings of training. Parameters have XGBoost's names and meanings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Which features a touch is turned into. With partial touches its form for those is used
+    /// Features that a touch is turned into. With partial touches its form for those is used
     /// ([`Descriptor::for_contacts`]), without them its form for full touches.
     pub descriptor: Descriptor,
-    /// Which touches are trained on, and so evidence; `None` takes those with a contact from a data set of approaches,
+    /// Touches that are trained on, and so evidence; `None` takes those with a contact from a data set of approaches,
     /// full ones from others.
     pub counted: Option<Counted>,
-    /// Whether a leaf holds one value for each object (one tree per round) or one value (one tree per object and round).
+    /// True if a leaf holds one value for each object (one tree per round) or one value (one tree per object and
+    /// round).
     pub multi_output: bool,
     /// Boosting rounds.
     pub rounds: usize,
@@ -80,14 +77,14 @@ pub struct Settings {
     /// Needs [`multi_output`](Self::multi_output). With [`leaf_bits`](Self::leaf_bits) of 8 a model with leaves of one byte is
     /// exact.
     pub small: Option<Small>,
-    /// What is added to the touches before training, every touch made by a robot of its own; on top of what the data set
+    /// Noise added to the touches before training, every touch made by a robot of its own; on top of what the data set
     /// states that they have already ([`Dataset::real`]).
     pub noise: Noise,
     /// Seed of the noise.
     pub seed: u64,
     /// Threads, or all of the machine's; the ensemble is the same for any number.
     pub threads: Option<usize>,
-    /// The library that trains.
+    /// The trainer.
     pub trainer: Engine,
     /// The probe that made the touches, to be stated by the ensemble and every model compiled from it; changes no tree.
     pub probe: Option<StatedProbe>,
@@ -111,7 +108,7 @@ impl Settings {
             noise: Noise::default(),
             seed: 1,
             threads: None,
-            trainer: Engine::Hessboost,
+            trainer: Engine::Palpate,
             probe: None,
         }
     }
@@ -169,11 +166,11 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     }
     check(dataset, settings.descriptor)?;
     let settings = &settings.resolved(dataset);
-    let parameters = parameters(settings, dataset.objects.len())?;
+    let parameters = parameters(settings)?;
     let evidence = Evidence::new(dataset, settings)?;
     let rows = Rows::new(&evidence, settings);
     let mut ensemble = match settings.trainer {
-        Engine::Hessboost => with_hessboost(rows, settings, &parameters, dataset.names(), progress)?,
+        Engine::Palpate => with_palpate(&rows, settings, &parameters, dataset.names(), progress)?,
         Engine::Xgboost => with_xgboost(&rows, settings, dataset.names(), progress)?,
     };
     if let Some(bits) = settings.leaf_bits {
@@ -183,7 +180,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     Ok(ensemble)
 }
 
-/// What an ensemble states that was trained so.
+/// Origin stated by an ensemble that was trained so.
 fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Origin {
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
@@ -191,7 +188,7 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Or
 }
 
 /// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,
-/// which are to be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
+/// which should be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
 /// ensemble does not know, and is called [`BACKGROUND`].
 ///
 /// # Errors
@@ -247,24 +244,24 @@ pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     }
 }
 
-fn with_hessboost(
-    rows: Rows,
+fn with_palpate(
+    rows: &Rows,
     settings: &Settings,
-    parameters: &TrainingParams,
+    parameters: &boost::Parameters,
     objects: Vec<String>,
     progress: &dyn Progress,
 ) -> Result<Ensemble> {
-    let data = rows.matrix().map_err(|error| refused(&error))?;
     progress.begin("training", u64::try_from(settings.rounds).ok());
-    let result = Trainer::new(parameters, &data, settings.rounds)
-        .on_round(|_| {
-            progress.advance(1);
-            if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })
-        .train()
-        .map_err(|error| refused(&error))?;
-    crate::progress::check(progress)?;
-    Ok(ensemble(&result.model, settings.descriptor, objects))
+    let on_round = || {
+        progress.advance(1);
+        if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let trained = boost::train(rows.lent(), objects.len(), parameters, settings.threads, &on_round);
+    let (base_margins, trees) = trained.map_err(|failure| match failure {
+        boost::Failure::Cancelled => Error::Cancelled,
+        refused => EnsembleProblem::Trainer { trainer: "palpate", detail: refused.to_string() }.into(),
+    })?;
+    Ok(Ensemble { inputs: settings.descriptor.into(), objects, base_margins, trees, origin: Origin::default() })
 }
 
 #[cfg(feature = "xgboost")]
@@ -281,12 +278,12 @@ fn with_xgboost(rows: &Rows, settings: &Settings, objects: Vec<String>, progress
 
 #[cfg(not(feature = "xgboost"))]
 fn with_xgboost(_: &Rows, _: &Settings, _: Vec<String>, _: &dyn Progress) -> Result<Ensemble> {
-    let allowed = "hessboost; XGBoost is not built in, which needs cmake, g++, libclang and: cargo build --release \
+    let allowed = "palpate; XGBoost is not built in, which needs cmake, g++, libclang and: cargo build --release \
                    --features xgboost";
     Err(Error::setting("trainer", "xgboost", allowed))
 }
 
-/// Whether there is something to learn from.
+/// Returns an error if there is nothing to learn from.
 fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
     let objects = &dataset.objects;
     match objects.len() {
@@ -305,8 +302,8 @@ fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
     Ok(())
 }
 
-/// The trainer's parameters for `objects` classes.
-fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
+/// The trainer's parameters.
+fn parameters(settings: &Settings) -> Result<boost::Parameters> {
     let Settings { rounds, depth, eta, min_child_weight, bins, .. } = *settings;
     let bins_allowed = 2..=65_536;
     if !(1..=10_000).contains(&rounds) {
@@ -337,28 +334,15 @@ fn parameters(settings: &Settings, objects: usize) -> Result<TrainingParams> {
     if settings.threads == Some(0) {
         return Err(Error::setting("threads", 0, "at least 1"));
     }
-    let strategy = if settings.multi_output { MultiStrategy::MultiOutputTree } else { MultiStrategy::OneOutputPerTree };
-    let builder = Multiclass::new(objects).map(|classes| {
-        TrainingParams::builder()
-            .objective(Objective::Softprob(classes))
-            .tree_method(TreeMethod::Hist)
-            .multi_strategy(strategy)
-            .max_depth(settings.depth)
-            .eta(settings.eta)
-            .min_child_weight(settings.min_child_weight)
-            .max_bin(settings.bins)
-            .base_score(f64::from(BASE_MARGIN))
-            .seed(settings.seed)
-    });
-    let built = builder.and_then(|builder| match settings.threads {
-        Some(threads) => builder.nthread(threads).build(),
-        None => builder.global_pool().build(),
-    });
-    built.map_err(|error| refused(&error))
-}
-
-fn refused(error: &HessboostError) -> Error {
-    EnsembleProblem::Trainer { trainer: "hessboost", detail: error.to_string() }.into()
+    Ok(boost::Parameters {
+        multi_output: settings.multi_output,
+        rounds,
+        depth,
+        eta: eta as f32,
+        min_child_weight: min_child_weight as f32,
+        bins,
+        base_margin: BASE_MARGIN,
+    })
 }
 
 /// The touches of a data set that are evidence, noise added.
@@ -395,7 +379,7 @@ impl<'d> Evidence<'d> {
         Ok(Self { objects: objects.collect::<Result<_>>()?, counted, needs_pose })
     }
 
-    /// What the ensemble states of them.
+    /// Statement of the ensemble about them.
     fn trained(&self) -> TrainedTouches {
         let touches = || self.objects.iter().flat_map(|touches| touches.iter());
         TrainedTouches {
@@ -410,7 +394,7 @@ impl<'d> Evidence<'d> {
 /// The training data as a trainer wants it: one row of features per touch, its object's position as label.
 pub(crate) struct Rows {
     pub(crate) features: Vec<f32>,
-    pub(crate) labels: Vec<f32>,
+    pub(crate) labels: Vec<u32>,
     /// One weight per touch, or none where all objects have equally many touches.
     pub(crate) weights: Option<Vec<f32>>,
     pub(crate) columns: usize,
@@ -419,7 +403,7 @@ pub(crate) struct Rows {
 impl Rows {
     fn new(evidence: &Evidence<'_>, settings: &Settings) -> Self {
         let objects = &evidence.objects;
-        let total = objects.iter().map(|touches| touches.len()).sum();
+        let total: usize = objects.iter().map(|touches| touches.len()).sum();
         let descriptor = settings.descriptor;
         let features = objects.iter().flat_map(|touches| {
             let rows: Vec<Vec<f32>> = touches.par_iter().map(|touch| feature_row(descriptor, touch)).collect();
@@ -429,27 +413,20 @@ impl Rows {
         for (column, &bins) in settings.feature_bins.iter().flatten().enumerate() {
             round_down(&mut features, column, descriptor.feature_count(), bins);
         }
-        let per_touch = |value: fn(usize, usize, usize) -> f32| {
-            let classes = objects.len();
-            let share = |(label, count)| std::iter::repeat_n(value(label, count * classes, total), count);
-            objects.iter().map(|touches| touches.len()).enumerate().flat_map(share).collect::<Vec<f32>>()
-        };
+        let counts = || objects.iter().map(|touches| touches.len());
         let equal = objects.windows(2).all(|pair| pair[0].len() == pair[1].len());
+        let weight = |count: usize| (total as f64 / (count * objects.len()) as f64) as f32;
         Self {
             features,
-            labels: per_touch(|label, _, _| label as f32),
-            weights: (!equal).then(|| per_touch(|_, expected, total| (total as f64 / expected as f64) as f32)),
+            labels: (0..).zip(counts()).flat_map(|(label, count)| std::iter::repeat_n(label, count)).collect(),
+            weights: (!equal).then(|| counts().flat_map(|count| std::iter::repeat_n(weight(count), count)).collect()),
             columns: descriptor.feature_count(),
         }
     }
 
-    fn matrix(self) -> hessboost::error::Result<DMatrix> {
-        let rows = self.labels.len();
-        let matrix = DMatrix::from_dense_vec(self.features, rows, self.columns)?.with_labels(&self.labels)?;
-        match self.weights {
-            Some(weights) => matrix.with_weights(&weights),
-            None => Ok(matrix),
-        }
+    fn lent(&self) -> boost::Rows<'_> {
+        let Self { features, labels, weights, columns } = self;
+        boost::Rows { features, columns: *columns, labels, weights: weights.as_deref() }
     }
 }
 
@@ -464,28 +441,6 @@ fn round_down(features: &mut [f32], column: usize, columns: usize, bins: usize) 
         // The first edge is the smallest value, so there is always one at or below.
         *value = edges[edges.partition_point(|edge| *edge <= *value).max(1) - 1];
     }
-}
-
-/// The trainer's model as an ensemble; its trees add up in the same order.
-fn ensemble(model: &BoostedModel, descriptor: Descriptor, objects: Vec<String>) -> Ensemble {
-    let trees = model.trees().iter().zip(model.tree_outputs()).map(|(tree, outputs)| Tree {
-        output: if tree.is_vector_leaf() { Output::Each } else { Output::One(outputs.start) },
-        nodes: (tree.nodes().iter().enumerate())
-            .map(|(index, node)| match (usize::try_from(node.left), usize::try_from(node.right)) {
-                (Ok(left), Ok(right)) => Node::Split {
-                    // Lossless: a descriptor has at most eight features.
-                    feature: node.split_feature as usize,
-                    threshold: node.split_cond,
-                    missing_left: node.default_left,
-                    left,
-                    right,
-                },
-                _ => Node::Leaf(tree.leaf_vector(index).to_vec()),
-            })
-            .collect(),
-    });
-    let (base_margins, trees) = (model.base_scores().to_vec(), trees.collect());
-    Ensemble { inputs: descriptor.into(), objects, base_margins, trees, origin: Origin::default() }
 }
 
 #[cfg(test)]

@@ -1,27 +1,12 @@
 use super::*;
 use crate::compile;
 use crate::error::{NameProblem, Setting};
-use crate::touches::{ObjectTouches, Source, synthetic};
+use crate::tests::synthetic;
+use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
 
 fn quick() -> Settings {
     Settings { rounds: 8, depth: 3, counted: Some(Counted::Full), ..Settings::compact() }
-}
-
-#[test]
-fn an_ensemble_predicts_what_its_trainer_predicts_bit_for_bit() {
-    let dataset = synthetic::dataset(&[400, 300, 500], 1);
-    for settings in [quick(), Settings { rounds: 5, ..Settings::paper() }] {
-        let rows = Rows::new(&Evidence::new(&dataset, &settings).unwrap(), &settings);
-        let features = rows.features.clone();
-        let data = rows.matrix().unwrap();
-        let model = hessboost::training::train(&parameters(&settings, 3).unwrap(), &data, settings.rounds).unwrap();
-        let ensemble = ensemble(&model, settings.descriptor, dataset.names());
-        let margins = model.predict_margin(&data, hessboost::model::Iterations::Best).unwrap();
-        for (row, features) in features.chunks(settings.descriptor.feature_count()).enumerate() {
-            assert_eq!(ensemble.margins_of_features(features), margins.row(row).unwrap());
-        }
-    }
 }
 
 #[test]
@@ -180,9 +165,9 @@ mod xgboost {
     use super::*;
     use crate::evaluate::{Candidate, Margins};
 
-    /// What each trainer makes of the same touches.
+    /// Ensembles of both trainers from the same touches.
     fn both(dataset: &Dataset, settings: &Settings) -> [Ensemble; 2] {
-        [Engine::Hessboost, Engine::Xgboost]
+        [Engine::Palpate, Engine::Xgboost]
             .map(|trainer| train(dataset, &Settings { trainer, threads: Some(1), ..settings.clone() }, &()).unwrap())
     }
 
@@ -193,7 +178,7 @@ mod xgboost {
         let settings = Settings { rounds: 30, feature_bins: Some(vec![40; 3]), ..Settings::paper() };
         for counts in [[2_000, 2_000, 2_000], [2_000, 500, 1_000]] {
             let mut dataset = synthetic::dataset(&counts, 10);
-            // XGBoost 1.6 has no threshold that tells a missing value from all others; hessboost has.
+            // XGBoost 1.6 has no threshold that tells a missing value from all others; ours has.
             dataset.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
             let [ours, theirs] = both(&dataset, &settings);
             assert_eq!(ours, theirs);
@@ -211,7 +196,7 @@ mod xgboost {
                     let margins = Margins::new(Candidate::Full(&ensemble), &unseen).unwrap();
                     margins.curve(10, 1_000, 1).unwrap().accuracy(10).value
                 });
-            eprintln!("{counts:?}: accuracy at 10 touches {ours:.3} with hessboost, {theirs:.3} with XGBoost");
+            eprintln!("{counts:?}: accuracy at 10 touches {ours:.3} with ours, {theirs:.3} with XGBoost");
             // Bins at other values: other thresholds, and a percent or so either way.
             assert!((ours - theirs).abs() < 0.02, "{ours} {theirs}");
         }

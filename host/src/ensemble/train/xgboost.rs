@@ -57,7 +57,9 @@ fn matrix(rows: &Rows, settings: &Settings) -> Result<DMatrix, XGBError> {
     let (row_stride, column_stride) = (columns * value, value);
     let mut matrix =
         DMatrix::from_col_major_f32(&rows.features, row_stride, column_stride, count, columns, threads, f32::NAN)?;
-    matrix.set_labels(&rows.labels)?;
+    // There are at most 256 objects.
+    let labels: Vec<f32> = rows.labels.iter().map(|&label| label as f32).collect();
+    matrix.set_labels(&labels)?;
     if let Some(weights) = &rows.weights {
         matrix.set_weights(weights)?;
     }

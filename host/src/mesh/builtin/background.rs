@@ -1,8 +1,8 @@
 //! Shapes of no kind: what a background column is trained on.
 //!
-//! Each is drawn from one of ten families (lumps, carved lumps, turned solids, vessels, wires, rings, plates, bars with a
-//! head, combs, stars) with random parts, lengths and angles. Together they are to be as varied as what a robot may meet;
-//! none is made after one of the ten built-in objects.
+//! Each is drawn from one of ten families (lumps, carved lumps, turned solids, vessels, wires, rings, plates, bars with
+//! a head, combs, stars) with random parts, lengths and angles. Together they should be as varied as the objects that a
+//! robot may meet; none is made after one of the ten built-in objects.
 
 use super::contour::Form;
 use super::shape::{Shape, bar, below, cuboid, curve, cylinder, disc, ellipse, ellipsoid, rectangle, rod, torus};
@@ -122,7 +122,7 @@ fn profile(dice: &mut Dice) -> Tree {
     curve(&Tree::z(), &knots)
 }
 
-/// What is within `radius` of the z axis, from `bottom` to `top`.
+/// Solid within `radius` of the z axis, from `bottom` to `top`.
 fn turned_solid(radius: Tree, bottom: f32, top: f32) -> Shape {
     let (x, y, _) = Tree::axes();
     let side = Shape((x.square() + y.square() + 1e-9).sqrt() - radius);

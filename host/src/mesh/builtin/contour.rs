@@ -13,7 +13,7 @@ pub(super) struct Form {
     pub(super) shape: Shape,
     /// The corners of a box that holds it, in centimeters.
     pub(super) bounds: [Vec3; 2],
-    /// How many of the smallest cells go along the longest side of `bounds`: enough for the thinnest feature to be three
+    /// Number of the smallest cells along the longest side of `bounds`: enough for the thinnest feature to be three
     /// cells thick.
     pub(super) cells: f32,
 }
@@ -31,7 +31,7 @@ pub(super) fn mesh(form: &Form) -> Option<Mesh> {
     (0..ATTEMPTS).map(|attempt| contour(form, form.cells * (1.0 - 0.0117 * f32::from(attempt)))).find(is_closed)
 }
 
-/// Whether there are edges, and each is used once in each direction.
+/// True if there are edges, and each is used once in each direction.
 fn is_closed(mesh: &Mesh) -> bool {
     let mut edges: Vec<(u32, u32)> = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
     let mut opposites: Vec<(u32, u32)> = edges.iter().map(|&(a, b)| (b, a)).collect();

@@ -107,7 +107,7 @@ pub fn instances(name: &str, count: usize, seed: u64) -> Result<Object> {
     Ok(Object { millimeters: Some(MILLIMETERS), ..object })
 }
 
-/// How many shapes [`background`] makes unless told otherwise.
+/// Default number of shapes made by [`background`].
 pub const BACKGROUND_SHAPES: usize = 200;
 
 /// One object of `count` instances that have nothing in common: lumps, wires, plates, vessels and so on, each a shape of

@@ -5,7 +5,7 @@ use super::{contour::Form, proportions::Proportions};
 use fidget_core::context::Tree;
 use glam::{Vec2, Vec3};
 
-/// What one half is made of, in centimeters.
+/// Parts of one half, in centimeters.
 struct Half {
     blade: f32,
     width: f32,

@@ -173,7 +173,7 @@ impl Shape {
         Self(self.0.clone() - by)
     }
 
-    /// What is in both.
+    /// Intersection of both.
     pub(super) fn and(&self, other: &Self) -> Self {
         Self(self.0.max(other.0.clone()))
     }
@@ -191,7 +191,7 @@ impl Shape {
         Self(-inverse.joined(other, round).0)
     }
 
-    /// What is in both, the new edge rounded with about `round`.
+    /// Intersection of both, the new edge rounded with about `round`.
     pub(super) fn cut(&self, other: &Self, round: f32) -> Self {
         self.carved(&Self(-other.0.clone()), round)
     }

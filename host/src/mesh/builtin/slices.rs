@@ -106,7 +106,7 @@ type Lanes = [f32; LANES];
 /// Evaluates a tape at many points.
 #[derive(Default)]
 pub(super) struct Slices {
-    /// What the tape's registers and memory hold.
+    /// Values of the tape's registers and memory.
     slots: Vec<Lanes>,
     /// One list of values for each output of the tape.
     outputs: Vec<Vec<f32>>,

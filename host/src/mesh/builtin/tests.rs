@@ -13,7 +13,7 @@ fn volume(mesh: &Mesh) -> f64 {
     mesh.triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c))) / 6.0).sum()
 }
 
-/// How often every directed edge occurs.
+/// Number of times that every directed edge occurs.
 fn edges(mesh: &Mesh) -> HashMap<(u32, u32), usize> {
     let mut count = HashMap::new();
     for &[a, b, c] in &mesh.triangles {
@@ -24,7 +24,7 @@ fn edges(mesh: &Mesh) -> HashMap<(u32, u32), usize> {
     count
 }
 
-/// How many separate pieces the surface has.
+/// Number of separate pieces of the surface.
 fn pieces(mesh: &Mesh) -> usize {
     fn root(parents: &mut [u32], mut i: u32) -> u32 {
         while parents[i as usize] != i {

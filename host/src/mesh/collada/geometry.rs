@@ -149,7 +149,7 @@ impl Geometry {
     }
 }
 
-/// How a primitive's corners make triangles. Lines are no surface.
+/// Rule that turns a primitive's corners into triangles. Lines are no surface.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Triangles,
@@ -204,12 +204,12 @@ impl Lists {
     }
 }
 
-/// How the vertices of a primitive stand among its indices.
+/// Position of the vertices among a primitive's indices.
 struct Corners<'a, 'input> {
     primitive: Node<'a, 'input>,
-    /// How many indices a corner has.
+    /// Number of indices of a corner.
     stride: usize,
-    /// Which of them is the vertex.
+    /// Position of the vertex among them.
     offset: usize,
     /// The first of the vertices, and how many they are.
     base: u32,
@@ -253,7 +253,7 @@ impl Corners<'_, '_> {
     }
 }
 
-/// How many indices a primitive's corner has, which of them is its vertex, and the `<vertices>`.
+/// Number of indices of a primitive's corner, position of the vertex among them, and the `<vertices>`.
 fn vertex_input<'a, 'input>(
     primitive: Node<'a, 'input>,
     find: Find<'_, 'a, 'input>,
@@ -276,7 +276,7 @@ fn vertex_input<'a, 'input>(
     Ok((stride, offset, vertices))
 }
 
-/// Which numbers of an element are x, y and z: those that are named so, or the first three.
+/// Positions of x, y and z among the numbers of an element: those that are named so, or the first three.
 fn axes(accessor: Node<'_, '_>) -> [usize; 3] {
     let names: Vec<Option<&str>> =
         accessor.children().filter(|&child| named(child, "param")).map(|child| child.attribute("name")).collect();

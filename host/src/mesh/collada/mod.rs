@@ -76,7 +76,7 @@ fn damaged(what: String) -> MeshProblem {
     MeshProblem::Damaged { format: "COLLADA", what }
 }
 
-/// Whether an element has this name, in whichever namespace: versions differ in it.
+/// True if an element has this name, in whichever namespace: versions differ in it.
 fn named(node: Node<'_, '_>, name: &str) -> bool {
     node.is_element() && node.tag_name().name() == name
 }
@@ -86,12 +86,12 @@ fn children<'a, 'input>(node: Node<'a, 'input>, name: &'a str) -> impl Iterator<
     node.children().filter(move |&child| named(child, name))
 }
 
-/// What the file says about itself as a whole.
+/// Element in which the file describes itself as a whole.
 fn stated<'a, 'input>(root: Node<'a, 'input>, name: &'a str) -> Option<Node<'a, 'input>> {
     children(root, "asset").flat_map(|asset| children(asset, name)).next()
 }
 
-/// How many millimeters the unit is, where the file says.
+/// Number of millimeters in the unit, where the file states it.
 fn millimeters(root: Node<'_, '_>) -> Result<Option<f64>, Wrong> {
     let Some(unit) = stated(root, "unit") else { return Ok(None) };
     let text = unit.attribute("meter").unwrap_or("1.0").trim();
@@ -108,12 +108,12 @@ fn upright(root: Node<'_, '_>) -> Result<DAffine3, Wrong> {
         "X_UP" => DMat3::from_cols(DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y),
         "Y_UP" => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
         "Z_UP" => DMat3::IDENTITY,
-        other => return Err(wrong(axis, damaged(format!("{:?} is no upward axis", shown(other.as_bytes()))))),
+        other => return Err(wrong(axis, damaged(format!("{:?} is not an up axis", shown(other.as_bytes()))))),
     };
     Ok(DAffine3::from_mat3(turn))
 }
 
-/// Whether an element is an instance of something that may have a surface.
+/// True if an element is an instance of something that may have a surface.
 fn is_instance(node: Node<'_, '_>) -> bool {
     ["instance_node", "instance_geometry", "instance_controller"].iter().any(|name| named(node, name))
 }
@@ -122,7 +122,7 @@ fn is_instance(node: Node<'_, '_>) -> bool {
 #[derive(Debug)]
 struct Wrong {
     node: NodeId,
-    /// How many lines after the element's first.
+    /// Number of lines after the element's first.
     line: u64,
     problem: MeshProblem,
 }
@@ -141,9 +141,9 @@ struct Scene<'a, 'input> {
     ids: HashMap<&'a str, Node<'a, 'input>>,
     geometries: HashMap<NodeId, Geometry>,
     placed: Placed,
-    /// How many more nodes may be placed: instances of instances multiply, and a circle of them has no end.
+    /// Number of further nodes that may be placed: instances of instances multiply, and a circle of them has no end.
     steps: u64,
-    /// How many more numbers may be read: several geometries may share one list.
+    /// Number of further numbers that may be read: several geometries may share one list.
     numbers: u64,
 }
 

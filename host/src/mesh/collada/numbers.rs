@@ -7,7 +7,7 @@ use roxmltree::Node;
 
 /// A number of a COLLADA file.
 pub(super) trait Number: std::str::FromStr {
-    /// What is wrong with it, if something is.
+    /// Problem with it, if there is one.
     fn problem(&self, word: &str) -> Option<MeshProblem>;
 }
 

@@ -1,6 +1,6 @@
 use super::*;
 use crate::mesh::Mesh;
-use crate::mesh::samples::{self, corners};
+use crate::mesh::tests::samples::{self, corners};
 
 fn parse_text(text: &str) -> Result<(Mesh, Option<f64>)> {
     parse(text.as_bytes(), Path::new("cup.dae")).map(|((mesh, _), unit)| (mesh, unit))

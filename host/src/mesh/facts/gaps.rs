@@ -4,7 +4,7 @@ use super::parts::Sets;
 use crate::mesh::Mesh;
 use glam::DVec3;
 
-/// What is known of the open edges that hang together.
+/// Open edges that are connected.
 #[derive(Clone, Copy, Default)]
 struct Gap {
     /// Twice the area that they run about, as a vector.

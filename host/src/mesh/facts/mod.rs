@@ -14,11 +14,11 @@ pub use stray::Piece;
 use crate::mesh::Mesh;
 use glam::Vec3;
 
-/// What can be said about a mesh, in the units of its file. Vertices at the same place count as one.
+/// Facts about a mesh, in the units of its file. Vertices at the same place count as one.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Facts {
-    /// How many triangles it has.
+    /// Number of triangles.
     pub triangles: usize,
     /// The lowest corner of its bounding box.
     pub low: Vec3,
@@ -66,12 +66,12 @@ impl Facts {
         }
     }
 
-    /// Whether each edge belongs to exactly two triangles.
+    /// True if each edge belongs to exactly two triangles.
     pub fn is_closed(&self) -> bool {
         self.open_edges == 0 && self.branching_edges == 0
     }
 
-    /// Whether it is closed and each triangle is anticlockwise when seen from outside, in every part.
+    /// True if it is closed and each triangle is anticlockwise when seen from outside, in every part.
     pub fn is_right_side_out(&self) -> bool {
         self.is_closed() && self.contrary_edges == 0 && self.volume > 0.0 && self.inside_out().next().is_none()
     }
@@ -81,7 +81,7 @@ impl Facts {
         self.parts.iter().filter(|part| part.is_inside_out)
     }
 
-    /// Whether the mesh is closed, in words: "yes", or what is not.
+    /// Says in words if the mesh is closed: "yes", or what is not.
     pub fn closed(&self) -> String {
         match (self.open_edges, self.branching_edges) {
             (0, 0) => "yes".into(),
@@ -93,7 +93,7 @@ impl Facts {
         }
     }
 
-    /// Whether the mesh is right side out, in words: "yes", or what is not.
+    /// Says in words if the mesh is right side out: "yes", or what is not.
     pub fn side(&self) -> String {
         let turned = self.inside_out().count();
         if turned > 0 && turned == self.parts.len() {
@@ -111,17 +111,17 @@ impl Facts {
         }
     }
 
-    /// What a user should know before touching the mesh, as sentences: that it is open, inside out in all or some of its
-    /// parts, not a manifold, in pieces, or of a size that cannot be. `millimeters` is how many its unit is, if that is
-    /// known. None if nothing is wrong.
+    /// Warnings before touching the mesh, as sentences: that it is open, inside out in all or some of its parts, not a
+    /// manifold, in pieces, or of a size that cannot be. `millimeters` is how many its unit is, if that is known. None
+    /// if nothing is wrong.
     pub fn complaints(&self, millimeters: Option<f64>) -> Vec<String> {
         let sentences =
             [self.open(), self.turned(), self.contrary(), self.branching(), self.apart(), self.size(millimeters)];
         sentences.into_iter().flatten().collect()
     }
 
-    /// Whether the mesh can be touched as it is by fingers of a diameter (in the units of its file), in words: "usable", or
-    /// "repair first" and why. What is wrong and makes no difference to touches is no reason.
+    /// Says if the mesh can be touched as it is by fingers of a diameter (in the units of its file), in words:
+    /// "usable", or "repair first" and why. What is wrong and makes no difference to touches is no reason.
     pub fn verdict(&self, diameter: f64) -> String {
         let gap = (self.widest_gap >= diameter).then(|| {
             format!(
@@ -131,7 +131,7 @@ impl Facts {
             )
         });
         let apart = (!self.stray.is_empty()).then(|| {
-            "what floats apart counts as part of the object, which becomes so much smaller compared with the probe"
+            "pieces that float apart count as parts of the object, which makes the rest smaller compared with the probe"
                 .to_owned()
         });
         let reasons: Vec<String> = gap.into_iter().chain(apart).collect();
@@ -203,17 +203,17 @@ impl Facts {
         match millimeters {
             Some(unit) if SIZES.contains(&(length * unit)) => None,
             Some(unit) => Some(format!(
-                "The mesh has a size that cannot be: its longest side is {} mm, by the unit that it states.",
+                "The mesh has an implausible size: its longest side is {} mm, by the unit that it states.",
                 short(length * unit)
             )),
             None if SIZES.contains(&length) || SIZES.contains(&(length * 1_000.0)) => None,
             None => Some(format!(
-                "The mesh has a size that can be neither meters nor millimeters: its longest side is {shown}."
+                "The mesh has an implausible size, in meters as well as in millimeters: its longest side is {shown}."
             )),
         }
     }
 
-    /// Which of the parts, in words, where there are several; nothing where there is one, or where it is all of them.
+    /// Names the parts, in words, where there are several; nothing where there is one, or where it is all of them.
     fn among(&self, some: &[&Part]) -> String {
         if self.parts.len() < 2 || some.len() == self.parts.len() {
             return String::new();

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Part {
-    /// How many triangles it has.
+    /// Number of triangles.
     pub triangles: usize,
     /// The lowest corner of its bounding box, in the units of the file.
     pub low: Vec3,
@@ -17,11 +17,11 @@ pub struct Part {
     pub open_edges: usize,
     /// Edges whose two triangles face opposite sides.
     pub contrary_edges: usize,
-    /// Whether each edge belongs to an even number of its triangles.
+    /// True if each edge belongs to an even number of its triangles.
     pub is_closed: bool,
     /// The volume that it encloses, negative if its triangles face inward; meaningless if it is open.
     pub volume: f64,
-    /// Whether it is closed and its triangles face inward, although it is no cavity of another part.
+    /// True if it is closed and its triangles face inward, although it is no cavity of another part.
     pub is_inside_out: bool,
 }
 
@@ -38,7 +38,7 @@ impl Part {
         format!("{triangles} triangle{plural} around ({x}, {y}, {z})")
     }
 
-    /// Whether it encloses something, its triangles all facing one side.
+    /// True if it encloses something, its triangles all facing one side.
     fn is_solid(&self) -> bool {
         // Less is a sheet with two sides, or the rounding of one.
         let size = f64::from((self.high - self.low).max_element());
@@ -46,11 +46,12 @@ impl Part {
     }
 }
 
-/// How many rays against triangles are tried at most to tell cavities from parts that are inside out: a second or so. A
-/// mesh with so many parts that this does not suffice is said to be right side out where the boxes of parts allow it.
+/// Largest number of tests of rays against triangles that distinguish cavities from parts that are inside out: a second
+/// or so. A mesh with so many parts that this does not suffice is said to be right side out where the boxes of parts
+/// allow it.
 const MOST_TRIES: usize = 100_000_000;
 
-/// How many vertices of a part must be inside another part for it to be a cavity.
+/// Number of vertices of a part that must be inside another part for it to be a cavity.
 const SAMPLES: usize = 64;
 
 /// The parts of a welded mesh, the largest first, and how many edges three or more of its triangles share.
@@ -152,7 +153,7 @@ fn samples(number: usize, numbers: &[usize], mesh: &Mesh) -> Vec<DVec3> {
     own.into_iter().step_by(step).map(|&[a, ..]| Vec3::from(mesh.vertices[a as usize]).as_dvec3()).collect()
 }
 
-/// Whether a point is inside a closed part: a ray leaves it more often than it enters it.
+/// True if a point is inside a closed part: a ray leaves it more often than it enters it.
 fn is_inside(point: DVec3, part: usize, numbers: &[usize], mesh: &Mesh) -> bool {
     // A direction in which no one models.
     let direction = DVec3::new(0.836_516_303_737_8, 0.482_962_913_144_5, 0.258_819_045_102_5);

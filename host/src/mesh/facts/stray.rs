@@ -4,18 +4,18 @@ use super::Part;
 use crate::mesh::Mesh;
 use glam::{DVec3, IVec3, Vec3};
 
-/// How many cells the longest side of the box is divided into: a piece floats if a layer of cells around it is empty.
+/// Number of cells along the longest side of the box: a piece floats if a layer of cells around it is empty.
 const CELLS: i32 = 64;
 
-/// How many places on triangles are looked at: enough for a surface some hundred times as large as that of its box. In a
-/// larger one nothing is said to float.
+/// Largest number of places on triangles that are examined: enough for a surface some hundred times as large as that of
+/// its box. In a larger one nothing is said to float.
 const MOST_PLACES: usize = 30_000_000;
 
 /// A piece that floats.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Piece {
-    /// How many triangles it has.
+    /// Number of triangles.
     pub triangles: usize,
     /// The lowest corner of its bounding box, in the units of the file.
     pub low: Vec3,

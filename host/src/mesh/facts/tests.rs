@@ -138,7 +138,7 @@ fn a_size_that_is_neither_one_in_meters_nor_in_millimeters_is_said() {
     }
     for (size, millimeters) in [(0.000_9, None), (20_000.0, None), (200.0, Some(1_000.0)), (0.2, Some(1.0))] {
         let said = said(size, millimeters);
-        assert!(said.len() == 1 && said[0].contains("a size that can"), "{size} {millimeters:?}: {said:?}");
+        assert!(said.len() == 1 && said[0].contains("an implausible size"), "{size} {millimeters:?}: {said:?}");
     }
 }
 

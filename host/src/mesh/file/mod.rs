@@ -57,18 +57,18 @@ impl Format {
     }
 }
 
-/// What a file holds.
+/// Contents of a file.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Contents {
     /// Its mesh, in the units of the file. A COLLADA file that states its upward axis is turned so that z is up.
     pub mesh: Mesh,
-    /// What was subtracted from its coordinates: the center of a mesh that is so far from the origin (more than 16 times its
-    /// longest side) that f32 would damage it; else zeros.
+    /// Offset subtracted from its coordinates: the center of a mesh that is so far from the origin (more than 16 times
+    /// its longest side) that f32 would damage it; else zeros.
     pub moved: [f64; 3],
-    /// How many millimeters its unit is, where the file says: COLLADA with a unit, glTF (meters, by its standard).
+    /// Number of millimeters in its unit, where the file says: COLLADA with a unit, glTF (meters, by its standard).
     pub millimeters: Option<f64>,
-    /// Which kind of file it was.
+    /// Format of the file.
     pub format: Format,
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::samples::{self, corners};
+use crate::mesh::tests::samples::{self, corners};
 use crate::probe::scene::Scene;
 use crate::touches::Origin;
 

@@ -5,7 +5,7 @@ use super::extension::{COMPRESSED, QUANTIZED};
 use crate::error::MeshProblem;
 use std::borrow::Cow;
 
-/// What accessors read from.
+/// Data that accessors read from.
 pub(super) struct Data<'a> {
     pub(super) document: &'a Document,
     pub(super) buffers: Vec<Option<Cow<'a, [u8]>>>,
@@ -119,7 +119,7 @@ impl<'a> Data<'a> {
             .map(move |i| bytes.get(offset + i * stride..).and_then(|rest| rest.get(..size)).unwrap_or_default()))
     }
 
-    /// Why there are no elements: an extension that compresses them, or damage.
+    /// Reason why there are no elements: an extension that compresses them, or damage.
     fn without_data(&self, name: &str, extensions: &Extensions) -> MeshProblem {
         let own = extensions.iter().flat_map(|extensions| extensions.keys());
         let known = |name: &&String| COMPRESSED.contains(&name.as_str());

@@ -50,7 +50,7 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
             (0x4E4F_534A, None) => json = Some((chunk, start as u64)),
             (_, None) => return Err(wrong(offset, "its first chunk is not JSON".into())),
             (0x004E_4942, Some(_)) if binary.is_none() => binary = Some(chunk),
-            // Chunks of kinds that are not known are to be skipped.
+            // Chunks of unknown kinds must be skipped.
             _ => {}
         }
         offset = end;
@@ -99,7 +99,7 @@ fn outside(uri: &str, index: usize, buffer: &Buffer, path: &Path, folder: Option
         let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
         let encoded = encoded.ok_or_else(|| damaged(path, format!("buffers[{index}] is a data URI without base64")))?;
         let decoded = base64::engine::general_purpose::STANDARD.decode(encoded.trim_ascii());
-        return decoded.map_err(|error| damaged(path, format!("buffers[{index}] is no base64: {error}")));
+        return decoded.map_err(|error| damaged(path, format!("buffers[{index}] is not valid base64: {error}")));
     }
     let unsupported =
         |what: String, instead| Err(Error::at(Place::file(path), MeshProblem::Unsupported { what, instead }));

@@ -1,4 +1,4 @@
-//! What a glTF document says, as far as it shapes a mesh. Everything else is skipped.
+//! Parts of a glTF document that shape a mesh. Everything else is skipped.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;

@@ -8,7 +8,7 @@ pub(super) const QUANTIZED: &str = "KHR_mesh_quantization";
 pub(super) const COMPRESSED: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// How the names of extensions begin that a surface does not depend on: materials, textures, lights, remarks.
+/// Prefixes of the names of extensions that a surface does not depend on: materials, textures, lights, remarks.
 const HARMLESS: [&str; 14] = [
     "KHR_materials_",
     "EXT_materials_",

@@ -212,7 +212,7 @@ fn is_still(weights: &Option<Vec<f64>>) -> Result<(), MeshProblem> {
     Err(MeshProblem::Unsupported { what, instead: "Apply the morph to the mesh, then export it" })
 }
 
-/// How indices make triangles.
+/// Rule that turns indices into triangles.
 enum Faces {
     Each,
     Strip,
@@ -227,11 +227,11 @@ impl Faces {
             Some(5) => Ok(Some(Self::Strip)),
             Some(6) => Ok(Some(Self::Fan)),
             Some(0..4) => Ok(None),
-            Some(other) => Err(accessor::damaged(format!("{other} is no mode of a primitive"))),
+            Some(other) => Err(accessor::damaged(format!("{other} is not a primitive mode"))),
         }
     }
 
-    /// How many triangles so many indices make.
+    /// Number of triangles of this many indices.
     fn count(&self, indices: usize) -> usize {
         match self {
             Self::Each => indices / 3,

@@ -1,6 +1,6 @@
 use super::*;
 use crate::mesh::Mesh;
-use crate::mesh::samples::{corners, document, glb_of};
+use crate::mesh::tests::samples::{corners, document, glb_of};
 use serde_json::{Value, json};
 
 /// A square of two triangles, as a GLB file whose document was changed.
@@ -120,7 +120,7 @@ fn numbers_that_cannot_be_are_refused_by_their_place() {
         ("/buffers/0/uri", json!("cup.bin"), "in another file"),
         ("/buffers/0/uri", json!("data:,plain"), "without base64"),
         ("/meshes/0/primitives/0/attributes/POSITION", json!(7), "accessors[7] is missing"),
-        ("/meshes/0/primitives/0/mode", json!(7), "7 is no mode"),
+        ("/meshes/0/primitives/0/mode", json!(7), "7 is not a primitive mode"),
         ("/meshes/0/primitives/0/attributes", json!({}), "without positions"),
         ("/nodes/1/mesh", json!(5), "meshes[5] is missing"),
         ("/nodes/0/children", json!([9]), "nodes[9] is missing"),
@@ -200,7 +200,7 @@ fn buffers_beside_the_file_are_read_also_with_escaped_names_and_never_more_than_
 
 #[test]
 fn chunks_that_do_not_fit_are_refused_with_their_byte() {
-    let whole = crate::mesh::samples::glb(&square());
+    let whole = crate::mesh::tests::samples::glb(&square());
     let complaint = |bytes: &[u8]| parse(bytes, Path::new("cup.glb"), None).unwrap_err().to_string();
     assert!(
         complaint(&whole[..whole.len() - 4]).contains("cup.glb: byte 8: the GLB file is damaged: it states a length")

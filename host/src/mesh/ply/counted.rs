@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::io::{BufRead, Read, Result};
 
-/// How far a file was read.
+/// Position up to which a file was read.
 #[derive(Debug, Default)]
 pub(super) struct Counts {
     /// The byte after the last one that was read, from 0.

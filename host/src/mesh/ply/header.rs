@@ -14,7 +14,7 @@ pub(super) struct Header {
     pub(super) format: PlyFormat,
     /// The header without comments, for the parser. A text has its coordinates to all digits, whatever kind is stated.
     pub(super) text: String,
-    /// How many bytes and lines it has in the file.
+    /// Its number of bytes and lines in the file.
     pub(super) bytes: u64,
     pub(super) lines: u64,
 }
@@ -30,7 +30,7 @@ struct Property {
     name: String,
     /// As it stands in the file: a kind of number, or a list of them.
     kind: String,
-    /// Whether it is a list of whole numbers, or of any.
+    /// True if it is a list of whole numbers, false if of any.
     list: Option<bool>,
 }
 
@@ -68,11 +68,11 @@ impl Header {
                         b"ascii" => PlyFormat::Ascii,
                         b"binary_little_endian" => PlyFormat::BinaryLittleEndian,
                         b"binary_big_endian" => PlyFormat::BinaryBigEndian,
-                        other => return Err(damaged(format!("{:?} is no format of PLY", shown(other)))),
+                        other => return Err(damaged(format!("{:?} is not a PLY format", shown(other)))),
                     });
                 }
                 [b"element", name, count] => {
-                    let count = number(count).ok_or_else(|| damaged(format!("{:?} is no count", shown(count))))?;
+                    let count = number(count).ok_or_else(|| damaged(format!("{:?} is not a count", shown(count))))?;
                     let name = shown(name);
                     if elements.iter().any(|element| element.name == name) {
                         return Err(damaged(format!("there are two elements {name:?}")));
@@ -87,7 +87,7 @@ impl Header {
                     }
                     element.properties.push(property);
                 }
-                _ => return Err(damaged(format!("{:?} is no line of a header", shown(raw.trim_ascii())))),
+                _ => return Err(damaged(format!("{:?} is not a header line", shown(raw.trim_ascii())))),
             }
         }
         let whole = |line: u64, what: &str| {
@@ -110,7 +110,7 @@ impl Property {
             b"float" | b"double" | b"float32" | b"float64" => Some(false),
             _ => None,
         };
-        let unknown = |kind: &[u8]| format!("{:?} is no kind of number", shown(kind));
+        let unknown = |kind: &[u8]| format!("{:?} is not a number type", shown(kind));
         let list = match kind {
             [kind] => {
                 is_number(kind).ok_or_else(|| unknown(kind))?;

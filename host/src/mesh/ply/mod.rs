@@ -71,7 +71,7 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
     Ok((mesh.usable().map_err(here)?, offset))
 }
 
-/// What takes the rows of an element, one by one.
+/// Receiver of the rows of an element, one by one.
 trait Collect: Default {
     type Row: for<'de> Deserialize<'de>;
 
@@ -138,7 +138,7 @@ impl Collect for Vertices {
 #[derive(Default)]
 struct Corners {
     indices: Vec<i64>,
-    /// How many indices each face has.
+    /// Number of indices of each face.
     arities: Vec<u32>,
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::samples;
+use crate::mesh::tests::samples;
 
 fn parse_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
     parse(bytes.as_ref(), Path::new("cup.ply")).map(|(mesh, _)| mesh)
@@ -55,11 +55,11 @@ fn damage_is_named_with_its_line_or_byte() {
         ),
         (text("element face 1\nproperty list int float vertex_indices\n", ""), "has no list of whole numbers"),
         (text("element face 1\nproperty int vertex_indices\n", ""), "has no list of whole numbers"),
-        (text("element face x\n", ""), "cup.ply:7: the PLY file is damaged: \"x\" is no count"),
+        (text("element face x\n", ""), "cup.ply:7: the PLY file is damaged: \"x\" is not a count"),
         (text("element vertex 1\n", ""), "there are two elements \"vertex\""),
-        (text("proprety int a\n", ""), "cup.ply:7: the PLY file is damaged: \"proprety int a\" is no line"),
+        (text("proprety int a\n", ""), "cup.ply:7: the PLY file is damaged: \"proprety int a\" is not a header line"),
         (text("property float x\n", ""), "vertex has two properties \"x\""),
-        (text("property half w\n", ""), "\"half\" is no kind of number"),
+        (text("property half w\n", ""), "\"half\" is not a number type"),
         (text(FACES, "3 0 1 4"), "cup.ply: vertex 4 of a face is missing: there are 4 vertices"),
         (text(FACES, "3 0 1 -2"), "vertex -2 of a face is missing"),
         (

@@ -1,4 +1,4 @@
-//! How data sets of meshes lay out their folders.
+//! Layouts of the folders of mesh data sets.
 
 use super::search::{Found, lossy, rank};
 use std::collections::BTreeMap;

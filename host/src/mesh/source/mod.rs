@@ -62,7 +62,7 @@ pub enum Source {
         name: String,
         /// Its mesh file.
         path: PathBuf,
-        /// Which other files were passed over for it.
+        /// Notes on other files that were passed over for it.
         notes: Vec<String>,
     },
     /// An object with a file for each instance.
@@ -71,7 +71,7 @@ pub enum Source {
         name: String,
         /// The instances' names and mesh files.
         files: Vec<(String, PathBuf)>,
-        /// Which other files were passed over for them.
+        /// Notes on other files that were passed over for them.
         notes: Vec<String>,
     },
 }

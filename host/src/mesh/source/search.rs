@@ -25,10 +25,10 @@ impl Found {
     }
 }
 
-/// How many levels of subdirectories are searched.
+/// Number of levels of subdirectories that are searched.
 pub(super) const LEVELS: usize = 8;
 
-/// How early a file's extension stands among those of meshes; none if it is no mesh's.
+/// Position of a file's extension among those of meshes; none if it is no mesh's.
 pub(super) fn rank(path: &Path) -> Option<usize> {
     let extension = path.extension()?;
     EXTENSIONS.iter().position(|known| extension.eq_ignore_ascii_case(known))

@@ -153,7 +153,7 @@ fn data_sets_of_meshes_give_the_names_of_their_objects() {
 fn instances_whose_files_state_their_units_are_brought_to_one() {
     let directory = tempfile::tempdir().unwrap();
     let globe = crate::mesh::Mesh::globe(3);
-    let dae = crate::mesh::samples::collada(&globe);
+    let dae = crate::mesh::tests::samples::collada(&globe);
     std::fs::create_dir(directory.path().join("cup")).unwrap();
     std::fs::write(directory.path().join("cup/a.dae"), &dae).unwrap();
     std::fs::write(directory.path().join("cup/b.dae"), dae.replace("0.0254", "0.0508")).unwrap();

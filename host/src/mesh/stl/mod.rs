@@ -17,12 +17,13 @@ const HEADER: usize = 84;
 /// The bytes of a triangle: normal, three corners, two bytes of attributes.
 const TRIANGLE: usize = 50;
 
-/// Whether a file of `length` bytes that starts with `head` is a binary STL file: it has as many triangles as it counts.
+/// True if a file of `length` bytes that starts with `head` is a binary STL file: it has as many triangles as it
+/// counts.
 pub(super) fn is_binary(head: &[u8], length: u64) -> bool {
     stated(head).is_some_and(|count| length == bytes_of(count))
 }
 
-/// How many triangles the header states.
+/// Number of triangles that the header states.
 fn stated(head: &[u8]) -> Option<u32> {
     head.get(HEADER - 4..HEADER)?.try_into().ok().map(u32::from_le_bytes)
 }
@@ -130,7 +131,7 @@ enum State {
 }
 
 impl State {
-    /// What must stand next, for an error.
+    /// Description of the element expected next, for an error.
     fn expected(self) -> &'static str {
         match self {
             Self::Outside => "\"solid\" or the end of the file",

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::samples;
+use crate::mesh::tests::samples;
 
 fn parse_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
     let bytes = bytes.as_ref();

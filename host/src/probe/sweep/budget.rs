@@ -18,7 +18,7 @@ pub struct Allowance {
     pub error: f64,
     /// In what unit, or as a share of what.
     pub of: &'static str,
-    /// Why it is not larger, and why it does no harm.
+    /// Reason why it is not larger, and why it does no harm.
     pub reason: &'static str,
 }
 

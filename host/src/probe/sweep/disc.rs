@@ -13,13 +13,13 @@ use glam::{BVec4A, DVec3, Vec4};
 pub(super) struct Discs {
     /// Unit vectors, axis by axis.
     normal: [Vec4; 3],
-    /// How far the surface extends from the center along the normal, to either side.
+    /// Extent of the surface from the center along the normal, to either side.
     thickness: Vec4,
-    /// How far it extends perpendicular to the normal.
+    /// Extent perpendicular to the normal.
     spread: Vec4,
 }
 
-/// How far the sphere travels until it may touch the discs.
+/// Distances that the sphere travels before it may touch the discs.
 pub(super) struct ContactBounds {
     /// No contact before this; infinite for never.
     pub(super) near: Vec4,
@@ -84,8 +84,8 @@ impl Discs {
         ContactBounds { near: Vec4::select(never, Vec4::INFINITY, near), expected }
     }
 
-    /// Which discs the sphere has not reached when it has traveled as far as `limit`: as for boxes, all of the disc lies
-    /// beyond the radius in a direction that points forward.
+    /// The discs that the sphere has not reached when it has traveled as far as `limit`: as for boxes, all of the disc
+    /// lies beyond the radius in a direction that points forward.
     #[inline]
     pub(super) fn passed(&self, center: &[Vec4; 3], ray: &Ray, limit: f32) -> BVec4A {
         let direction = ray.direction().to_array().map(Vec4::splat);

@@ -23,7 +23,7 @@ use tree::Tree;
 pub struct Surface {
     /// The center of the mesh's box.
     center: DVec3,
-    /// How many of the mesh's units are one unit in the frame of the casts, where the box's longest side is between 1 and
+    /// Number of the mesh's units in one unit in the frame of the casts, where the box's longest side is between 1 and
     /// 2. A power of two, so that scaling is exact; it keeps meshes of any size in the range of f32.
     unit: f64,
     /// One over it, which is exact, too.
@@ -104,15 +104,15 @@ impl Surface {
         Some(Start { motion, skipped, length: if moves { length } else { f64::INFINITY } })
     }
 
-    /// Whether the sphere's path meets the mesh's box: a cheap necessary condition for a contact.
+    /// True if the sphere's path meets the mesh's box: a cheap necessary condition for a contact.
     pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
         let motion =
             Motion { origin: (origin - self.center) * self.per_unit, direction, radius: radius * self.per_unit };
         self.entry(&motion).is_some()
     }
 
-    /// How far the sphere can move toward the mesh's box without any contact; none when it never gets there. This saves
-    /// the digits that a start from far away would cost.
+    /// Distance that the sphere can move toward the mesh's box without any contact; none when it never gets there. This
+    /// saves the digits that a start from far away would cost.
     fn entry(&self, motion: &Motion) -> Option<f64> {
         // Rounding moves a point that is far away by this much at most.
         let slack = budget::ENTRY + budget::ENTRY_FAR * motion.origin.abs().max_element();
@@ -137,7 +137,7 @@ impl Surface {
 /// A cast in the frame of the casts, with its start at the mesh's box.
 struct Start {
     motion: Motion,
-    /// How far the start was moved.
+    /// Distance that the start was moved.
     skipped: f64,
     /// The length of the direction that was given; infinite for a sphere that does not move.
     length: f64,

@@ -9,10 +9,10 @@ use super::budget::BOX;
 use super::narrow::{Motion, Triangle};
 use glam::{DVec3, Vec3, Vec4};
 
-/// How many triangles a pack holds.
+/// Number of triangles in a pack.
 pub(super) const LANES: usize = 2 * WIDTH;
 
-/// How many lanes a register of the baseline instruction sets has; `glam` keeps a [`Vec4`] in one.
+/// Number of lanes in a register of the baseline instruction sets; `glam` keeps a [`Vec4`] in one.
 pub(super) const WIDTH: usize = 4;
 
 /// Up to eight triangles, in two halves of four: corner by corner, axis by axis. Unused lanes repeat the first triangle.
@@ -21,7 +21,7 @@ pub(super) struct Pack {
     halves: [[[Vec4; 3]; 3]; 2],
     /// Index of the first triangle; the others follow it.
     pub(super) first: u32,
-    /// How many lanes are in use.
+    /// Number of lanes in use.
     pub(super) count: u32,
 }
 

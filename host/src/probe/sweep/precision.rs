@@ -11,7 +11,7 @@ use glam::DVec3;
 
 /// A way to decide which triangle of a pack the sphere touches first.
 pub trait Precision {
-    /// Whether triangles are rejected in f32 first, eight at a time.
+    /// True if triangles are rejected in f32 first, eight at a time.
     const REJECT: bool;
 
     /// The distance that the sphere travels until it touches the triangle, if that is less than `limit`.

@@ -44,7 +44,7 @@ pub(super) struct Tree {
     grain: f32,
 }
 
-/// How large the sphere is compared with the packs, and so what is worth looking at before a box is opened.
+/// Classes of the sphere's size relative to the packs, which decide the tests before a box is opened.
 pub(super) mod scale {
     /// The sphere is small: it hardly touches a box without touching what is inside, so boxes alone do.
     pub(in super::super) const COARSE: u8 = 0;
@@ -89,7 +89,7 @@ impl Tree {
         (flattened.ordered, flattened.tree)
     }
 
-    /// How fine the mesh is for the sphere: one of [`scale`].
+    /// Class of the sphere's size relative to the mesh: one of [`scale`].
     #[inline]
     pub(super) fn scale_for(&self, ray: &Ray) -> u8 {
         if ray.margin > FINE_FROM * self.grain {
@@ -195,7 +195,7 @@ impl Tree {
         }
     }
 
-    /// Which children the sphere has not reached when it has traveled as far as `limit`: a bit for each.
+    /// The children that the sphere has not reached when it has traveled as far as `limit`: a bit for each.
     #[inline]
     fn passed<const SCALE: u8>(&self, index: u32, ray: &Ray, limit: f32) -> u32 {
         if SCALE == scale::COARSE || limit == f32::INFINITY {
@@ -237,8 +237,8 @@ impl Node {
         (near, near.cmple(far) & reach.cmpge(Vec4::ZERO))
     }
 
-    /// Which boxes the sphere has not reached when it has traveled as far as `limit`: from there, all of the box lies beyond
-    /// the radius in a direction that points forward, and so from everywhere before it.
+    /// The boxes that the sphere has not reached when it has traveled as far as `limit`: from there, all of the box
+    /// lies beyond the radius in a direction that points forward, and so from everywhere before it.
     #[inline]
     fn passed(&self, ray: &Ray, limit: f32) -> BVec4A {
         let end = ray.origin + ray.direction() * limit;
@@ -274,7 +274,7 @@ fn build(bounds: &[Bounded]) -> Bvh2 {
     bvh
 }
 
-/// What a step down costs, compared with testing one triangle of a pack: high, so that packs are few and full.
+/// Cost of a step down, relative to testing one triangle of a pack: high, so that packs are few and full.
 const STEP: f32 = 8.0;
 
 /// For each node of the binary tree how many triangles a pack of all that is below it has; 0 where that is no pack. Decided

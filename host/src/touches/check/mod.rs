@@ -1,4 +1,4 @@
-//! What is wrong with a data set, line by line, and what it holds.
+//! Check of a data set, line by line, and its summary.
 //!
 //! [`Dataset::read`](super::Dataset::read) stops at the first error; a check reads on, and also looks for what reads well
 //! and would train badly: files appended to themselves, an object under two names, times in other units than seconds.
@@ -19,13 +19,13 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// What a check found.
+/// Results of a check.
 #[derive(Clone, Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct Check {
-    /// What is wrong, or may be, in the order of the files and their lines.
+    /// Findings, certain or possible, in the order of the files and their lines.
     pub findings: Vec<Finding>,
-    /// What the data set holds, as far as it can be read.
+    /// Contents of the data set, as far as they can be read.
     pub summary: Summary,
 }
 
@@ -33,21 +33,21 @@ pub struct Check {
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct Finding {
-    /// Whether training would be wrong, or fail; otherwise it may be meant.
+    /// True if training would be wrong, or fail; otherwise it may be meant.
     pub is_wrong: bool,
     /// Where and what, as a line without a full stop: `data/fork.txt:3: the time -1 is negative`.
     pub what: String,
-    /// What to do about it, as a sentence.
+    /// Remedy, as a sentence.
     pub fix: String,
 }
 
-/// How many wrong lines of a file are shown; the others are counted.
+/// Largest number of wrong lines of a file that are shown; the others are counted.
 const MOST_LINES: usize = 20;
 /// So many touches must be there before something is said about their sum.
 const ENOUGH: usize = 20;
 
 impl Check {
-    /// How many findings make training wrong.
+    /// Number of findings that make training wrong.
     pub fn wrong(&self) -> usize {
         self.findings.iter().filter(|finding| finding.is_wrong).count()
     }
@@ -83,7 +83,7 @@ impl Check {
         Ok(Self::of_objects(directory, &objects, origin, is_recorded, findings))
     }
 
-    /// What is wrong with objects beside what was when they were read.
+    /// Finds problems with objects other than those found when they were read.
     fn of_objects(
         directory: &Path,
         objects: &[Read],
@@ -108,13 +108,13 @@ impl Check {
     }
 }
 
-/// What could be read of an object.
+/// Contents of an object, as far as they could be read.
 struct Read {
     name: String,
     path: PathBuf,
     touches: Vec<Touch>,
     approaches: Option<u64>,
-    /// Whether a log has them.
+    /// True if a log has them.
     is_logged: bool,
 }
 
@@ -284,7 +284,7 @@ impl Findings {
         self.0.push(Finding { is_wrong: true, what, fix });
     }
 
-    /// What is wrong with all touches of an object together.
+    /// Finds problems with all touches of an object together.
     fn object(&mut self, object: &Read, origin: Option<&Origin>) {
         let Read { path, touches, .. } = object;
         let count = touches.len();
@@ -309,8 +309,8 @@ impl Findings {
         } else if count >= ENOUGH && touches.iter().all(|touch| touch == &touches[0]) {
             self.wrong(path, "all touches are the same", "Check that the probe moves and its clock runs.");
         } else if count >= ENOUGH && is_repeated(touches) {
-            let fix = "Remove the repetition: what was trained on would be tested on too.";
-            self.wrong(path, "every touch stands in it twice or more, as if it was appended to itself", fix);
+            let fix = "Remove the repetition: training touches would also be tested on.";
+            self.wrong(path, "it holds every touch at least twice, as if it was appended to itself", fix);
         } else if count < 100 {
             self.note(path, &format!("only {count} touches"), "Capture some thousand of each object.");
         }
@@ -318,13 +318,13 @@ impl Findings {
         let long = touches.iter().filter(|touch| last(touch) > longest).count();
         let what = format!("{} last longer than the {longest:.2} s in which the probe passes the object", of(long));
         if 2 * long > count {
-            self.wrong(path, what + ": the times are no seconds", "Give times in seconds.");
+            self.wrong(path, what + ": the times are not in seconds", "Give times in seconds.");
         } else if long > 0 {
             self.note(path, &what, "Check those lines.");
         }
     }
 
-    /// What is wrong with objects beside each other.
+    /// Finds problems with objects compared with each other.
     fn together(&mut self, directory: &Path, objects: &[Read]) {
         let with_pose = |object: &Read| object.touches.iter().filter(|touch| touch.pose().is_some()).count();
         let (posed, all) =
@@ -345,12 +345,16 @@ impl Findings {
             && most > 10 * least
         {
             let what = format!("one object has {least} touches and another {most}");
-            self.note(directory, &what, "Capture as many of each: training weights touches, not objects.");
+            self.note(
+                directory,
+                &what,
+                "Capture as many of each: training weights each touch equally, not each object.",
+            );
         }
     }
 }
 
-/// Whether each touch is there at least twice. Coarse clocks repeat touches too, but not every one.
+/// True if each touch is there at least twice. Coarse clocks repeat touches too, but not every one.
 fn is_repeated(touches: &[Touch]) -> bool {
     let mut counts: HashMap<Key, usize> = HashMap::new();
     touches.iter().for_each(|touch| *counts.entry(key(touch)).or_default() += 1);

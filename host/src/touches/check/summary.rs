@@ -1,36 +1,36 @@
-//! What a data set holds: counts, patterns, ranges, quantiles of features.
+//! Summary of a data set: counts, patterns, ranges, quantiles of features.
 
 use super::{Key, Read, key};
 use crate::touches::Origin;
 use palpate_shared::{Descriptor, Touch};
 use std::collections::HashSet;
 
-/// What a data set holds, as far as it can be read.
+/// Contents of a data set, as far as they can be read.
 #[derive(Clone, Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct Summary {
     /// The objects, in the order of their names.
     pub objects: Vec<ObjectSummary>,
-    /// How the touches were made, where the data set says so: the probe among other things.
+    /// Origin of the touches, where the data set says so: the probe among other things.
     pub origin: Option<Origin>,
 }
 
-/// What there is of one object.
+/// Summary of one object.
 #[derive(Clone, Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct ObjectSummary {
     /// The object's name.
     pub name: String,
-    /// How many touches it has.
+    /// Number of touches.
     pub touches: u64,
-    /// How many approaches they took, where the data set says so.
+    /// Number of approaches they took, where the data set says so.
     pub approaches: Option<u64>,
-    /// How many touches there are of each contact pattern, in the order of the patterns' codes: none, outer, middle, outer
-    /// and middle, both outer, all.
+    /// Number of touches of each contact pattern, in the order of the patterns' codes: none, outer, middle, outer and
+    /// middle, both outer, all.
     pub patterns: [u64; 6],
-    /// How many touches equal an earlier one of the same object, to the microsecond.
+    /// Number of touches that equal an earlier one of the same object, to the microsecond.
     pub duplicates: u64,
-    /// How many have the probe's pose.
+    /// Number of touches with the probe's pose.
     pub posed: u64,
     /// The longest time between two contacts, in seconds.
     pub longest: f64,
@@ -48,7 +48,7 @@ impl Summary {
         Self { objects: objects.iter().map(ObjectSummary::of).collect(), origin }
     }
 
-    /// How many touches there are in all.
+    /// Number of touches in all.
     pub fn touches(&self) -> u64 {
         self.objects.iter().map(|object| object.touches).sum()
     }

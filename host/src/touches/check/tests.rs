@@ -32,7 +32,7 @@ fn change(directory: &Path, listing: impl FnOnce(&mut Listing)) {
     read.write(directory).unwrap();
 }
 
-/// What is wrong, and what is only noted.
+/// Messages of findings that are wrong, and of those that are only noted.
 fn said(directory: &Path) -> (Vec<String>, Vec<String>) {
     let (wrong, notes): (Vec<_>, Vec<_>) =
         Check::of(directory).unwrap().findings.into_iter().partition(|finding| finding.is_wrong);
@@ -113,7 +113,7 @@ fn what_reads_well_and_trains_badly_is_wrong() {
         directory
     };
     let spoon = touches(1);
-    wrong(with(&[spoon.clone(), spoon.clone()].concat(), false).path(), "every touch stands in it twice or more");
+    wrong(with(&[spoon.clone(), spoon.clone()].concat(), false).path(), "it holds every touch at least twice");
     wrong(with(&touches(0), false).path(), "fork and spoon hold the same touches");
     wrong(with(&vec![spoon[3]; 40], false).path(), "all touches are the same");
     let missing = crate::touches::parse_touch("- - -").unwrap();

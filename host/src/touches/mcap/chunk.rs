@@ -1,4 +1,4 @@
-//! What is in a chunk: decompressed without C, no further than it says.
+//! Contents of a chunk: decompressed without C, no further than it says.
 
 use super::LARGEST;
 use super::records::Chunk;
@@ -9,7 +9,7 @@ use ruzstd::decoding::StreamingDecoder;
 use std::borrow::Cow;
 use std::io::Read;
 
-/// How far back what a compressor wrote may refer, at least: as far as those of level 19 and below do.
+/// Smallest window of a compressor's back references: as far as those of level 19 and below do.
 const WINDOW: u64 = 16 << 20;
 
 /// The records of a chunk, with the checksum that it states, if it states one.

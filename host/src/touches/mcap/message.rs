@@ -10,7 +10,7 @@ use palpate_shared::{Q15_ONE, Touch};
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 
-/// How messages are encoded.
+/// Encoding of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Json,
@@ -85,7 +85,7 @@ struct CdrVerdict {
 }
 
 impl Encoding {
-    /// What a message says.
+    /// Decodes a message.
     pub(super) fn read(self, kind: Kind, data: &[u8]) -> Result<Said, TouchesProblem> {
         match (self, kind) {
             (Self::Json, Kind::Touch) => touch(json(data, "touch in JSON")?),
@@ -169,7 +169,7 @@ fn checked(verdict: LoggedVerdict) -> Result<Said, TouchesProblem> {
     Ok(Said::Verdict(verdict))
 }
 
-/// What a definition in ROS 2 comes to: its lines without comments and needless spaces, up to those of other messages.
+/// Essence of a definition in ROS 2: its lines without comments and needless spaces, up to those of other messages.
 pub(super) fn essence(definition: &[u8]) -> String {
     let text = String::from_utf8_lossy(definition);
     let lines = text.lines().take_while(|line| !line.starts_with("===="));

@@ -23,7 +23,7 @@ pub const TOUCH: &str = include_str!("../../../msg/Touch.msg");
 /// The definition of a verdict in ROS 2.
 pub const VERDICT: &str = include_str!("../../../msg/Verdict.msg");
 
-/// What the messages of a channel are.
+/// Kind of a channel's messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Touch,

@@ -12,9 +12,9 @@ use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// How many bytes are asked for at a time.
+/// Number of bytes requested at a time.
 const STEP: usize = 1 << 16;
-/// How many bytes the names and definitions of a file's channels may take.
+/// Largest size of the names and definitions of a file's channels, in bytes.
 const NAMES: usize = 16 << 20;
 /// An opcode and a length.
 const HEAD: usize = 9;
@@ -75,13 +75,13 @@ pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Resu
     log.finish()
 }
 
-/// What is known about the file so far.
+/// State of reading a file.
 struct Reading<'p, F> {
     path: &'p Path,
     each: F,
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, Channel>,
-    /// How many bytes the two take.
+    /// Number of bytes of the two.
     names: usize,
 }
 
@@ -89,7 +89,7 @@ struct Reading<'p, F> {
 struct Schema {
     name: String,
     encoding: String,
-    /// What a definition comes to, where it counts.
+    /// Essence of a definition, where it counts.
     definition: Option<String>,
 }
 

@@ -74,7 +74,7 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// What is left of a record, and what it is.
+/// Rest of a record, and the record's kind.
 struct Fields<'a>(&'a [u8], &'static str);
 
 impl<'a> Fields<'a> {

@@ -13,7 +13,7 @@ use std::io::{Seek, Write};
 
 /// A second, in the nanoseconds of log times.
 const SECOND: u64 = 1_000_000_000;
-/// How long after its touch a verdict is logged.
+/// Time from a touch to its verdict in the log.
 const AFTER: u64 = 1_000;
 
 /// Writes a log: touches on `/touch` and verdicts on `/verdict`, as JSON.

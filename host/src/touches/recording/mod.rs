@@ -22,7 +22,7 @@ use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How often the listing is written while touches come.
+/// Time between two writes of the listing while touches come.
 const CHECKPOINT: Duration = Duration::from_millis(500);
 
 /// A recording of one object: when, from where and by what its touches came.
@@ -30,7 +30,7 @@ const CHECKPOINT: Duration = Duration::from_millis(500);
 pub struct Recorded {
     /// The object's name.
     pub object: String,
-    /// How many touches the recording added.
+    /// Number of touches that the recording added.
     pub touches: u64,
     /// When it began, in UTC: `2026-11-22T11:00:00Z`.
     pub began: String,
@@ -52,7 +52,7 @@ pub struct Recording {
     directory: PathBuf,
     path: PathBuf,
     listing: Listing,
-    /// What this recording says about itself; among the listed ones once it has a touch.
+    /// Statement of this recording about itself; among the listed ones once it has a touch.
     recorded: Recorded,
     open: Option<Open>,
     /// Touches of the object that earlier recordings added.
@@ -147,7 +147,7 @@ impl Recording {
         Ok(touches)
     }
 
-    /// How the touches are made.
+    /// Origin of the touches.
     pub fn origin(&self) -> &Origin {
         &self.listing.origin
     }
@@ -157,17 +157,17 @@ impl Recording {
         &self.recorded.object
     }
 
-    /// What looked wrong about the object's touches when they were added to.
+    /// Warnings about the touches that the object had before.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
-    /// How many touches were added since this was opened.
+    /// Number of touches added since this was opened.
     pub fn touches(&self) -> u64 {
         self.added
     }
 
-    /// How many touches of the object there are now.
+    /// Number of touches of the object there are now.
     pub fn all_touches(&self) -> u64 {
         self.before + self.recorded.touches
     }
@@ -191,7 +191,7 @@ impl Recording {
         Ok(other)
     }
 
-    /// Whether the touch lacks the pose that the touches of this data set are recorded with.
+    /// True if the touch lacks the pose that the touches of this data set are recorded with.
     pub fn lacks_pose(&self, touch: &Touch) -> bool {
         self.listing.origin.pose && touch.pose().is_none()
     }
@@ -307,7 +307,7 @@ fn admit(listing: Listing, origin: Option<&Origin>) -> Result<Listing, TouchesPr
     }
 }
 
-/// What differs between the ways in which touches were and are recorded, and how.
+/// Differences between the ways in which touches were and are recorded.
 fn differences(there: &Origin, here: &Origin) -> Vec<String> {
     let numbers = |origin: &Origin| {
         let probe = origin.probe;

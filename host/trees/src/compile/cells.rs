@@ -24,7 +24,7 @@ pub(super) struct Cells {
     pub(super) dimensions: Vec<(u8, Vec<i32>)>,
     /// Boxes of places; a touch falls into one of them.
     planes: Vec<Vec<Range<usize>>>,
-    /// Whether each plane is of a contact pattern, in the order of their codes, and the dimensions are all of the
+    /// True if each plane is of a contact pattern, in the order of their codes, and the dimensions are all of the
     /// features of contacts-curvature.
     by_pattern: bool,
 }
@@ -76,18 +76,18 @@ impl Cells {
         (count.checked_mul(trees)? <= MAX_WORK).then_some(cells)
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     pub(super) fn count(&self) -> Option<usize> {
         let lengths = self.planes.iter().map(|plane| plane.iter().try_fold(1_usize, |n, r| n.checked_mul(r.len())));
         lengths.sum()
     }
 
-    /// Whether all cells make up one table of two dimensions.
+    /// True if all cells form one table of two dimensions.
     pub(super) fn is_table(&self) -> bool {
         self.dimensions.len() == 2
     }
 
-    /// Whether there is a table for each contact pattern.
+    /// True if there is a table for each contact pattern.
     pub(super) fn is_by_pattern(&self) -> bool {
         self.by_pattern
     }

@@ -1,4 +1,4 @@
-//! What a compiled model costs on a chip: instructions, flash, RAM and stack, estimated.
+//! Cost of a compiled model on a chip: instructions, flash, RAM and stack, estimated.
 //!
 //! Instructions are those of one touch, from contact times to margins, by a model of the evaluator. The firmware's
 //! `evaluator` prints the Cortex-M4F figure beside what the emulated chip counts, for ensembles of all shapes, and fails
@@ -31,7 +31,7 @@ pub struct Instructions {
     pub m0_plus: Option<u64>,
 }
 
-/// What a model takes on a chip, in bytes.
+/// Memory that a model takes on a chip, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Memory {
     /// Flash of the model.
@@ -56,7 +56,7 @@ impl Core {
 }
 
 impl Instructions {
-    /// What a touch costs in a compiled model.
+    /// Instructions of a touch in a compiled model.
     pub fn of_model(model: &Model<'_>) -> Self {
         let objects = model.object_count();
         let axes = usize::from(model.header().axes());
@@ -81,7 +81,7 @@ impl Instructions {
 }
 
 impl Memory {
-    /// What a compiled model takes on a processor.
+    /// Memory of a compiled model on a processor.
     pub fn of_model(model: &Model<'_>, core: Core) -> Self {
         let objects = model.object_count();
         // A recognizer: 8 bytes per object and 40; an opened model: 64.
@@ -119,7 +119,7 @@ fn code_flash(core: Core, model: &Model<'_>) -> usize {
     }
 }
 
-/// What the cost of a touch depends on.
+/// Properties of a model that the cost of a touch depends on.
 pub(super) struct Shape<'a> {
     pub(super) layout: Layout,
     pub(super) leaf: LeafType,
@@ -128,7 +128,7 @@ pub(super) struct Shape<'a> {
     pub(super) groups: &'a [Group],
     /// The splits, as the model has them.
     pub(super) nodes: &'a [u8],
-    /// Whether leaves are numbers of a table.
+    /// True if leaves are indices into a table.
     pub(super) is_shared: bool,
 }
 
@@ -158,7 +158,7 @@ struct Costs {
     /// A table; then for each object. By its thresholds it is 310 to 380 for ten objects on a Cortex-M4F, 346 to 434 on a
     /// Cortex-M0+: 63 take least, and 31 most.
     grid: (usize, usize),
-    /// What tables by pattern take more, for one axis and two features that a grid does not have.
+    /// Additional instructions of tables by pattern, for one axis and two features that a grid does not have.
     patterns: usize,
 }
 
@@ -287,7 +287,7 @@ mod tests {
     /// Trees, their depth, the object of a leaf if it has one value, leaf type, axes, and instructions on each processor.
     type Counted = (u32, u8, Option<u8>, LeafType, usize, [u64; 2]);
 
-    /// What `onboard/README.md` states that emulation counts.
+    /// Counts from emulation, as `onboard/README.md` states them.
     const COUNTED: [Counted; 5] = [
         (1_000, 6, Some(0), LeafType::I16, 3, [62_372, 80_699]),
         (100, 6, None, LeafType::I16, 2, [9_461, 13_780]),

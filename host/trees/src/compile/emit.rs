@@ -24,7 +24,7 @@ impl Language {
         }
     }
 
-    /// What the names of its files end with.
+    /// Extension of its files.
     pub const fn extension(self) -> &'static str {
         match self {
             Self::C => "h",
@@ -77,7 +77,8 @@ fn c(model: &Model<'_>, name: &str) -> String {
     )
 }
 
-/// What says, where another model or the program itself has left out what this one needs, which line makes room for all.
+/// Compile-time check that names the line that makes room for all models, where another model or the program itself has
+/// left out what this one needs.
 fn checks(name: &str, layout: &str, leaf: &str, [strangers, shared, sentinel]: [u8; 3], objects: usize) -> String {
     let several =
         |all: &str, own: &str| (format!("({all} & {own}) == 0"), format!("{all} ({own} | those of the others)"));
@@ -114,7 +115,7 @@ fn rust(model: &Model<'_>, name: &str) -> String {
     )
 }
 
-/// What the model is, in one line.
+/// Description of the model, in one line.
 fn about(model: &Model<'_>) -> String {
     let names: Vec<&str> = (0..model.object_count()).map(|object| model.object_name(object)).collect();
     let text = format!("{} objects: {}; checksum {:08x}.", names.len(), names.join(", "), model.checksum());

@@ -1,11 +1,11 @@
-//! What can be wrong with compiling, and compiled models.
+//! Problems with compiling, and compiled models.
 
 use crate::error::Problem;
 use crate::error::TreeProblem;
 use palpate_onboard::ModelError;
 use palpate_shared::format::Layout;
 
-/// What can be wrong with compiling, and compiled models.
+/// Problems with compiling, and compiled models.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompileProblem {
@@ -25,7 +25,7 @@ pub enum CompileProblem {
     Tree {
         /// The tree, counted from 0.
         tree: usize,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: TreeProblem,
     },
     /// Leaves or base margins are too large.
@@ -35,7 +35,7 @@ pub enum CompileProblem {
     MarginRange {
         /// The object or class, by name.
         of: String,
-        /// How far from 0 its margin can be.
+        /// Largest distance of its margin from 0.
         range: f64,
         /// The largest single value.
         largest: f32,
@@ -83,7 +83,7 @@ pub enum CompileProblem {
     #[error("the ensemble is too large for the model format")]
     TooLarge,
     /// There is no room for the model.
-    #[error("the model has {bytes} bytes at least, more than the {most} that there is room for")]
+    #[error("the model has {bytes} bytes at least, more than the {most} that fit")]
     OverBudget {
         /// The fewest bytes that were found.
         bytes: usize,
@@ -117,7 +117,7 @@ impl Problem for CompileProblem {
             Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",
             Self::Tree { .. } => "Train it again, or check the program that wrote it.",
             Self::MarginRange { .. } => {
-                "Margins are logarithms of probabilities, of which a few dozen are sure enough: train it again, or check the program that wrote it."
+                "Margins are log-probabilities, and a few dozen nats already mean certainty: train it again, or check the program that wrote it."
             }
             Self::Features { .. } => "Train on the features that matter, at most 256.",
             Self::Thresholds { .. } => {

@@ -119,7 +119,7 @@ impl<'a> Forest<'a> {
         leaves.flatten().copied()
     }
 
-    /// How far an object's margin can be from 0.
+    /// Largest distance of an object's margin from 0.
     pub(super) fn range(&self, object: usize) -> f64 {
         let base = f64::from(self.base[object].abs());
         self.trees_of(object).map(|tree| f64::from(tree.largest)).sum::<f64>() + base
@@ -145,7 +145,7 @@ impl<'a> Forest<'a> {
 }
 
 impl Branches<'_> {
-    /// Whether the tree adds to an object's margin.
+    /// True if the tree adds to an object's margin.
     pub(super) fn values_for(&self, object: usize) -> bool {
         match self.output {
             Output::One(own) => own == object,
@@ -153,7 +153,7 @@ impl Branches<'_> {
         }
     }
 
-    /// Which of a leaf's values is an object's.
+    /// Value of a leaf for an object.
     pub(super) fn value_of(&self, object: usize, leaf: &[f32]) -> f32 {
         match self.output {
             Output::One(_) => leaf[0],
@@ -214,7 +214,7 @@ impl<'a> Reader<'a, '_> {
     }
 }
 
-/// How thresholds become integers.
+/// Rule that turns thresholds into integers.
 #[derive(Clone, Copy)]
 pub(super) enum Thresholds<'a> {
     /// Features are whole numbers.
@@ -247,7 +247,7 @@ impl<'a> Thresholds<'a> {
         }
     }
 
-    /// Whether whole thresholds fit 32 bits: beyond, all values would be the same.
+    /// Returns an error unless whole thresholds fit 32 bits: beyond, all values would be the same.
     fn check_range(self, ensemble: &Ensemble) -> Result<()> {
         let Self::Scaled(scales) = self else { return Ok(()) };
         for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
@@ -317,7 +317,8 @@ fn check_thresholds(ensemble: &Ensemble, descriptor: Descriptor) -> Result<()> {
     Ok(())
 }
 
-/// Whether no trainer puts a threshold here in whole numbers, but for rounding in f32.
+/// True if the threshold shows that values are no whole numbers: between those, trainers put thresholds at whole or
+/// half numbers, but for rounding in f32.
 fn is_fraction(threshold: f32) -> bool {
     let from_whole = |number: f64| (number - number.round()).abs();
     let value = f64::from(threshold);

@@ -14,7 +14,7 @@ use crate::error::{CompileProblem, Result};
 use palpate_shared::format::{Layout, LeafType};
 use std::cell::OnceCell;
 
-/// What the layouts make of a forest: the one that was asked for, or all that fit.
+/// Layouts of a forest: the one that was asked for, or all that fit.
 pub(super) fn candidates(
     forest: &Forest<'_>,
     axes: &Axes,
@@ -101,7 +101,7 @@ fn walked(
     Some(parts)
 }
 
-/// What a touch costs in a layout that walks trees.
+/// Instructions of a touch in a layout that walks trees.
 fn instructions(layout: Layout, leaf: LeafType, objects: usize, parts: &Parts) -> Instructions {
     let Parts { axes, groups, nodes, shared, .. } = parts;
     let is_shared = shared.is_some();

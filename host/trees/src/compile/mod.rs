@@ -36,11 +36,11 @@
 //! ```
 
 mod axes;
+mod budget;
 mod cells;
 mod cost;
 mod emit;
 mod error;
-mod fit;
 mod forest;
 mod groups;
 mod layout;
@@ -57,10 +57,10 @@ mod tests;
 mod trees;
 mod write;
 
+pub use budget::compile_within;
 pub use cost::{Core, Instructions, Memory};
 pub use emit::{Language, emit};
 pub use error::CompileProblem;
-pub use fit::compile_within;
 pub use groups::leaves_of_trees;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
@@ -75,23 +75,23 @@ use forest::Forest;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{TrainedNoise, TrainedProbe};
 
-/// How to compile an ensemble.
+/// Settings of compilation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// What leaves are stored as.
+    /// Type that leaves are stored as.
     pub leaf: Leaf,
-    /// How trees are laid out; `None` takes the layout that is best for `goal`.
+    /// Layout of the trees; `None` takes the layout that is best for `goal`.
     pub layout: Option<Layout>,
-    /// What a layout is chosen for, where none is asked for; and whether its equal leaves stand once.
+    /// Goal of the choice of a layout, where none is asked for, and of the choice of a table of leaves.
     pub goal: Goal,
-    /// Whether equal leaves stand once, in a table: `Some(true)` wherever they can, `None` where that makes a model smaller,
-    /// if it is better for `goal`.
+    /// True to store equal leaves once, in a table: `Some(true)` wherever that is possible, `None` where that makes a
+    /// model smaller, if it is better for `goal`.
     pub shared_leaves: Option<bool>,
     /// The error rate that recognizers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
     /// The touches after which they give up.
     pub max_touches: u32,
-    /// How likely each object is before any touch, in any common unit; `None` makes all equal.
+    /// Prior probability of each object, in any common unit; `None` makes all equal.
     pub priors: Option<Vec<f64>>,
     /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
     /// feature's scale; `None` compares f32 values.
@@ -151,7 +151,7 @@ impl Settings {
 /// has what that saves and what it costs.
 pub const MANY: usize = 50;
 
-/// What a layout is chosen for.
+/// Goal of the choice of a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
     /// The fewest instructions of those layouts that have at most three times the bytes of the smallest.
@@ -162,13 +162,13 @@ pub enum Goal {
     Size,
 }
 
-/// What a layout comes to.
+/// Properties of a layout.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Candidate {
     /// The layout.
     #[serde(serialize_with = "name_of")]
     pub layout: Layout,
-    /// Whether equal leaves stand once.
+    /// True if equal leaves are stored once.
     pub shared_leaves: bool,
     /// Bytes of the model.
     pub bytes: usize,
@@ -182,10 +182,10 @@ fn name_of<S: serde::Serializer>(layout: &Layout, serializer: S) -> Result<S::Ok
     serializer.serialize_str(layout.name())
 }
 
-/// What [`compile`] made.
+/// Result of [`compile`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compiled {
-    /// What the chip reads.
+    /// Bytes of the model, as the chip reads them.
     pub bytes: Vec<u8>,
     /// Splits of the ensemble.
     pub splits: usize,
@@ -194,9 +194,9 @@ pub struct Compiled {
     /// The farthest that a margin can be from the ensemble's, and from that of the library that trained it: in nats, or
     /// the value's own unit.
     pub margin_error: f32,
-    /// How the trees are laid out.
+    /// Layout of the trees.
     pub layout: Layout,
-    /// How many different leaves stand in a table, if equal ones stand once.
+    /// Number of different leaves in the table, if equal ones are stored once.
     pub shared_leaves: Option<usize>,
     /// About how many instructions a touch takes.
     pub instructions: Instructions,

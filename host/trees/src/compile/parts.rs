@@ -3,7 +3,7 @@
 use super::cost::Instructions;
 use palpate_shared::format::{Axis, Group, HEADER_LENGTH, Tag, write_section};
 
-/// What a layout makes of a forest.
+/// Parts of a layout of a forest.
 #[derive(Clone)]
 pub(super) struct Parts {
     pub(super) axes: Vec<Axis>,
@@ -13,7 +13,7 @@ pub(super) struct Parts {
     pub(super) leaves: Vec<u8>,
     /// The section with the leaves' values, where leaves are numbers.
     pub(super) shared: Option<Vec<u8>>,
-    /// What margins start from: in units, or f32 bits.
+    /// Starting values of the margins: in units, or f32 bits.
     pub(super) base: Vec<i32>,
     pub(super) unit: f32,
     pub(super) margin_error: f32,

@@ -12,10 +12,10 @@ const MAX_UNIT: f64 = 0.5;
 const MIN_UNIT: f64 = 1.0 / (1 << 24) as f64;
 /// A unit that is fine enough for priors.
 const PRIOR_UNIT: f32 = 1.0 / 1024.0;
-/// What a group's margins may come to, with room for base margins and rounding.
+/// Largest margin of a group, with room for base margins and rounding.
 const RANGE: f64 = MARGIN_LIMIT as f64 / 2.0;
 
-/// How values become integers.
+/// Rule that turns values into integers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scale {
     /// Nats in a unit.
@@ -90,7 +90,8 @@ fn finest(unit: f32, fits: impl Fn(f32) -> bool) -> Option<f32> {
     finer.take_while(|&unit| fits(unit)).last()
 }
 
-/// How many times a tree's unit may be doubled: bytes need it to be exact, for two bytes it would only make groups.
+/// Number of times that a tree's unit may be doubled: bytes need it to be exact, for two bytes it would only make
+/// groups.
 fn max_shift(leaf: LeafType) -> u32 {
     if leaf == LeafType::I8 { 2 } else { 0 }
 }

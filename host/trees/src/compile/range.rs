@@ -31,7 +31,7 @@ pub(super) fn scaled(ensemble: &Ensemble) -> Cow<'_, Ensemble> {
     Cow::Owned(scaled)
 }
 
-/// How far from 0 a margin can be.
+/// Largest distance of a margin from 0.
 fn range(ensemble: &Ensemble) -> f64 {
     let largest =
         |node: &Node| node.leaf().unwrap_or_default().iter().fold(0.0_f32, |most, value| most.max(value.abs()));

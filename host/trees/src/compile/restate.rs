@@ -4,7 +4,7 @@ use crate::error::{CompileProblem, Result};
 use palpate_onboard::Model;
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, HeaderBuilder, Section, Tag, checksum};
 
-/// What to state instead of what a model states; by default nothing changes.
+/// Statements that replace those of a model; by default nothing changes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Restated {
     /// The threshold in the header: error rate / (1 − error rate) in Q56.

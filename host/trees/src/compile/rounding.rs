@@ -1,4 +1,4 @@
-//! How far margins are from the ensemble's once leaves are rounded.
+//! Distance of margins from the ensemble's once leaves are rounded.
 
 use super::cells::Cells;
 use super::forest::{Branches, Forest, each_leaf};

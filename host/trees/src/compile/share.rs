@@ -84,7 +84,7 @@ pub fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
     Ok(Some(all))
 }
 
-/// How many leaves stand in a model's table; `None` if its leaves are where they belong. Where some have one value and some
+/// Number of leaves in a model's table; `None` if its leaves are where they belong. Where some have one value and some
 /// one for each object, how many values.
 pub fn different_leaves(model: &Model<'_>) -> Option<usize> {
     let values = model.shared_leaves()?.values().len() / model.leaf_type().size();

@@ -49,7 +49,7 @@ fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
     error.problem::<CompileProblem>().unwrap_or_else(|| panic!("{error}")).clone()
 }
 
-/// What setting was refused.
+/// Name of the setting that was refused.
 fn setting(settings: &Settings) -> &'static str {
     let error = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), settings).unwrap_err();
     assert_eq!(error.exit_code(), 2);

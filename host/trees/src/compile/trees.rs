@@ -7,7 +7,7 @@ use crate::ensemble::Output;
 use palpate_shared::format::{Axis, Group, LeafType, MAX_COMPLETE_DEPTH};
 use std::collections::BTreeSet;
 
-/// How leaves are written.
+/// Rule for writing leaves.
 pub(super) struct Leaves<'a> {
     leaf: LeafType,
     scale: &'a Scale,
@@ -50,8 +50,8 @@ pub(super) struct Run {
     trees: Vec<usize>,
 }
 
-/// Which trees go together. Integers add up in any order, so trees are sorted by shift, object and depth; f32 leaves
-/// keep the order in which each object's margin adds them.
+/// Groups of trees. Integers add up in any order, so trees are sorted by shift, object and depth; f32 leaves keep the
+/// order in which each object's margin adds them.
 pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale) -> Vec<Run> {
     let object = |tree: usize| match forest.trees[tree].output {
         // There are at most 256 objects.
@@ -130,7 +130,7 @@ fn fill(
     }
 }
 
-/// Whether splits fit three bytes: columns and left subtrees are numbered in a byte.
+/// True if splits fit three bytes: columns and left subtrees are numbered in a byte.
 pub(super) fn fits_narrow(forest: &Forest<'_>, axes: &Axes) -> bool {
     let mut narrow = axes.columns <= 256;
     for tree in &forest.trees {

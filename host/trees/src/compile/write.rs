@@ -92,7 +92,7 @@ pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest
     Ok(text(ensemble)?.len().next_multiple_of(4) + sections + CHECKSUM_LENGTH)
 }
 
-/// What the model states about its training.
+/// Statements of the model about its training.
 fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let origin = &ensemble.origin;
@@ -125,7 +125,7 @@ fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
     Ok(bytes)
 }
 
-/// What a model over rows predicts, and which features stand for a missing value.
+/// Prediction of a model over rows, and the features that stand for a missing value.
 fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
     let mut bytes = Vec::new();
     let Some(imported) = ensemble.origin.imported.as_ref().filter(|_| ensemble.descriptor().is_none()) else {
@@ -158,8 +158,8 @@ fn captured(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
     bytes
 }
 
-/// Whether the features that stand for a missing value are the same whole numbers for every feature: a model states one
-/// range of them.
+/// Returns an error unless the features that stand for a missing value are the same whole numbers for every feature: a
+/// model states one range of them.
 pub(super) fn check_sentinel(ensemble: &Ensemble, settings: &Settings) -> Result<()> {
     let sentinel = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);
     let (Some(sentinel), Some(scales)) = (sentinel, &settings.scales) else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! Whether an ensemble is sound: for what was not read from a file, which checks while it reads.
+//! Checks of an ensemble that was not read from a file: a reader checks while it reads.
 
 use super::{Ensemble, Inputs, Node, Output, Tree};
 use crate::error::{EnsembleProblem, NameProblem, TreeProblem};
@@ -88,7 +88,7 @@ impl Tree {
     }
 }
 
-/// Whether a leaf has as many values as wanted, all of them finite.
+/// Returns an error unless a leaf has as many values as wanted, all of them finite.
 pub(crate) fn check_leaf(node: usize, values: &[f32], wanted: usize) -> Result<(), TreeProblem> {
     if values.len() != wanted {
         return Err(TreeProblem::LeafValues { node, found: values.len(), wanted });
@@ -99,7 +99,7 @@ pub(crate) fn check_leaf(node: usize, values: &[f32], wanted: usize) -> Result<(
     }
 }
 
-/// Whether these can be the names of an ensemble's features.
+/// Returns an error unless these can be the names of an ensemble's features.
 fn check_features(names: &[String], ensemble: &Ensemble) -> Result<(), EnsembleProblem> {
     if !(1..=MAX_FEATURES).contains(&names.len()) {
         let splits = ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| match node {

@@ -1,17 +1,17 @@
-//! What can be wrong with ensembles, their files and their training.
+//! Problems with ensembles, their files and their training.
 
 use crate::error::Problem;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
-/// What can be wrong with ensembles, their files and their training.
+/// Problems with ensembles, their files and their training.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnsembleProblem {
     /// The file is of a kind, or has something in it, that cannot be read.
     #[error("{what}")]
     Unsupported {
-        /// What.
+        /// Description of the file's kind or content.
         what: String,
         /// The way round, as a sentence.
         way: String,
@@ -21,11 +21,11 @@ pub enum EnsembleProblem {
     Damaged {
         /// The format.
         kind: &'static str,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
     /// There are too few or too many features.
-    #[error("it has {count} features, of which its trees use {used}, and not 1 to {most}")]
+    #[error("its trees use {used} of its {count} features, and not 1 to {most}")]
     FeatureCount {
         /// Features.
         count: usize,
@@ -51,19 +51,19 @@ pub enum EnsembleProblem {
     /// A file is not JSON, or not of XGBoost's schema.
     #[error("not an ensemble in XGBoost's JSON format: {detail}")]
     NotJson {
-        /// What the parser said.
+        /// The parser's message.
         detail: String,
     },
     /// The objective is not one whose margins are known.
     #[error("its objective is {found}")]
     Objective {
-        /// What it is.
+        /// The objective found.
         found: String,
     },
     /// The booster has no trees.
     #[error("its booster is {found}, which has no trees")]
     Booster {
-        /// What it is.
+        /// The booster found.
         found: String,
     },
     /// An attribute is missing.
@@ -79,9 +79,9 @@ pub enum EnsembleProblem {
     Attribute {
         /// Its name.
         name: &'static str,
-        /// What it should hold.
+        /// Content that was expected.
         expected: &'static str,
-        /// What the parser said.
+        /// The parser's message.
         detail: String,
     },
     /// The descriptor's name is unknown.
@@ -93,7 +93,7 @@ pub enum EnsembleProblem {
     /// Too few objects, or too many.
     #[error("it names {count} objects")]
     ObjectCount {
-        /// How many.
+        /// Number of objects.
         count: usize,
     },
     /// A name that no object can have.
@@ -101,7 +101,7 @@ pub enum EnsembleProblem {
     ObjectName {
         /// The name.
         name: String,
-        /// Why it cannot be one.
+        /// The reason.
         why: NameProblem,
     },
     /// There are other classes than objects.
@@ -128,7 +128,7 @@ pub enum EnsembleProblem {
     BaseScore {
         /// The base score.
         text: String,
-        /// How many objects there are.
+        /// Number of objects.
         objects: usize,
     },
     /// There is no margin to start from for each object.
@@ -163,7 +163,7 @@ pub enum EnsembleProblem {
     Count {
         /// The field.
         name: &'static str,
-        /// What it holds.
+        /// Text that it holds.
         text: String,
     },
     /// A tree contradicts itself.
@@ -171,7 +171,7 @@ pub enum EnsembleProblem {
     Tree {
         /// The tree, counted from 0.
         tree: usize,
-        /// What is wrong with it.
+        /// Description of the fault.
         problem: TreeProblem,
     },
     /// One object cannot be distinguished from anything.
@@ -190,9 +190,9 @@ pub enum EnsembleProblem {
         object: String,
     },
     /// A background does not go with a data set.
-    #[error("the background does not go with the data set: {detail}")]
+    #[error("the background does not match the data set: {detail}")]
     Background {
-        /// Why not.
+        /// The reason.
         detail: &'static str,
     },
     /// An object has no touch of those that were asked for.
@@ -200,7 +200,7 @@ pub enum EnsembleProblem {
     NothingCounts {
         /// Its name.
         object: String,
-        /// Which touches were to be evidence.
+        /// Touches that were to be evidence.
         counted: Counted,
     },
     /// The descriptor needs the probe's pose.
@@ -214,12 +214,12 @@ pub enum EnsembleProblem {
     Trainer {
         /// Its name.
         trainer: &'static str,
-        /// What it said.
+        /// Its message.
         detail: String,
     },
 }
 
-/// Why a name cannot be an object's.
+/// Reason why a name cannot be an object's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NameProblem {
@@ -233,7 +233,7 @@ pub enum NameProblem {
     Twice,
 }
 
-/// What can be wrong with a tree. Nodes are counted from 0.
+/// Problems with a tree. Nodes are counted from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TreeProblem {
@@ -255,7 +255,7 @@ pub enum TreeProblem {
     Count {
         /// The field.
         name: &'static str,
-        /// What it holds.
+        /// Text that it holds.
         text: String,
     },
     /// Splits by category.
@@ -329,7 +329,7 @@ pub enum TreeProblem {
         node: usize,
         /// Where they should be.
         column: &'static str,
-        /// How many there should be.
+        /// Number of values there should be.
         values: usize,
     },
     /// A leaf has another number of values than the tree's others.
@@ -339,7 +339,7 @@ pub enum TreeProblem {
         node: usize,
         /// Its values.
         found: usize,
-        /// What the tree's output asks for.
+        /// Output that the tree asks for.
         wanted: usize,
     },
     /// A leaf's value cannot be added.

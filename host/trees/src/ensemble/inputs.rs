@@ -1,8 +1,8 @@
-//! What an ensemble's features are.
+//! Features of an ensemble.
 
 use palpate_shared::Descriptor;
 
-/// What an ensemble's features are.
+/// Features of an ensemble.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Inputs {
     /// Those that a descriptor turns touches into: whole numbers.
@@ -30,7 +30,7 @@ impl Inputs {
         }
     }
 
-    /// How many features there are.
+    /// Number of features.
     pub fn count(&self) -> usize {
         match self {
             Self::Touches(descriptor) => descriptor.feature_count(),
@@ -46,7 +46,7 @@ impl Inputs {
         }
     }
 
-    /// Whether features have names of their own.
+    /// True if features have names.
     pub fn are_named(&self) -> bool {
         match self {
             Self::Touches(_) => true,

@@ -1,4 +1,4 @@
-//! What readers of other libraries' trees share.
+//! Code shared by the readers of other libraries' trees.
 
 use super::Node;
 use crate::error::TreeProblem;
@@ -8,7 +8,7 @@ use crate::error::TreeProblem;
 pub struct Threshold {
     /// The number that values are compared with.
     pub value: f64,
-    /// Whether a value that equals it goes left.
+    /// True if a value that equals it goes left.
     pub inclusive: bool,
 }
 

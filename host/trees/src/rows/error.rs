@@ -1,19 +1,18 @@
-//! What can be wrong with rows of features, and with comparing models on them.
+//! Problems with rows of features, and with comparing models on them.
 
 use crate::error::Problem;
-use crate::verify::ClassDiffers;
 
-/// What `verify` compares with.
+/// Advice on the margins that `verify` compares with.
 const RAW_SCORES: &str = "Give the library's raw scores, before the softmax or the logistic function: one column per output, or one for a binary model (its second class), in the order of the classes. XGBoost: `output_margin=True`; LightGBM: `raw_score=True`; CatBoost: `prediction_type=\"RawFormulaVal\"`; scikit-learn: `decision_function`, of forests `predict_proba`; onnxruntime: a model converted with `options={id(model): {\"raw_scores\": True}}`, of forests its probabilities.";
 
-/// What can be wrong with rows of features, and with comparing models on them.
+/// Problems with rows of features, and with comparing models on them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RowsProblem {
     /// The file is not a table.
     #[error("not rows of features as CSV: {detail}")]
     NotRows {
-        /// What the parser said.
+        /// The parser's message.
         detail: String,
     },
     /// There is no row.
@@ -79,9 +78,9 @@ pub enum RowsProblem {
         whose: &'static str,
         /// The largest difference.
         error: f64,
-        /// What the model states.
+        /// Bound that the model states.
         bound: f64,
-        /// Which tree is the first to differ.
+        /// The first tree that differs.
         tree: Option<String>,
     },
     /// The library's margins are something else.
@@ -93,7 +92,7 @@ pub enum RowsProblem {
         first.row, first.classes[0], first.classes[1], first.gap
     )]
     Class {
-        /// How many.
+        /// Number of rows.
         rows: usize,
         /// The first of them.
         first: ClassDiffers,
@@ -115,7 +114,7 @@ fn of([features, outputs, trees]: [usize; 3]) -> String {
 }
 
 impl RowsProblem {
-    /// Whether the file of the library's margins is what is wrong.
+    /// True if the file of the library's margins is at fault.
     pub fn is_about_margins(&self) -> bool {
         matches!(self, Self::MarginRows { .. } | Self::MarginColumns { .. } | Self::Probabilities)
     }
@@ -148,4 +147,15 @@ impl Problem for RowsProblem {
         }
         .into()
     }
+}
+
+/// A row that the library puts into another class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassDiffers {
+    /// The row, counted from 1.
+    pub row: usize,
+    /// The model's class and the library's.
+    pub classes: [String; 2],
+    /// How far apart their margins are by the library.
+    pub gap: f64,
 }

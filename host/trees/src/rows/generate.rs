@@ -62,7 +62,7 @@ pub fn generate(
     }
 }
 
-/// Which values of a feature lead to a node: from `first` to `last`.
+/// Values of a feature that lead to a node: from `first` to `last`.
 #[derive(Clone, Copy)]
 struct Bounds {
     first: f64,

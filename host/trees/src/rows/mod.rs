@@ -4,7 +4,7 @@ mod error;
 mod generate;
 pub mod scales;
 
-pub use error::RowsProblem;
+pub use error::{ClassDiffers, RowsProblem};
 pub use generate::generate;
 
 use crate::error::{Error, Place, Result};
@@ -22,11 +22,11 @@ pub struct Rows {
     pub values: Vec<f64>,
     /// The label of each row, if a column of them was asked for.
     pub labels: Vec<String>,
-    /// Whether columns were taken by their position, since the header does not hold all of the features' names.
+    /// True if columns were taken by their position, since the header does not hold all of the features' names.
     pub by_position: bool,
 }
 
-/// How a value becomes what a model compares: see `FORMAT.md`.
+/// Rule that turns a value into the number that a model compares: see `FORMAT.md`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Encoder {
     /// The key of an f32 value.
@@ -83,12 +83,12 @@ impl Rows {
         Ok(Self { features: features.len(), values, labels, by_position })
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.values.len() / self.features.max(1)
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -138,7 +138,7 @@ fn not_rows(path: &Path, error: &csv::Error) -> Error {
 }
 
 impl Encoder {
-    /// What a model compares. A model over touches compares whole numbers as they are.
+    /// Encoder of a model. A model over touches compares whole numbers as they are.
     pub fn of(model: &Model<'_>) -> Self {
         if model.key() == Key::Real {
             return Self::Real;
@@ -147,7 +147,7 @@ impl Encoder {
         Self::Scaled(stated.chain(std::iter::repeat(1.0)).take(model.feature_count()).collect())
     }
 
-    /// What the model compares of a row.
+    /// Encodes a row into the numbers that the model compares.
     pub fn row<V: Copy + Into<f64>>(&self, row: &[V]) -> Vec<i32> {
         match self {
             Self::Real => row.iter().map(|&value| f32_key(value.into() as f32)).collect(),

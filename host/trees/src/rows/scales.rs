@@ -4,7 +4,7 @@ use super::Rows;
 use crate::ensemble::{Ensemble, Node, Threshold};
 use std::collections::BTreeSet;
 
-/// What whole numbers do to a feature.
+/// Effect of whole numbers on a feature.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Effect {
     /// The feature's name.
@@ -18,7 +18,7 @@ pub struct Effect {
     /// The farthest that a value can be from a threshold and still go the other way: half a unit for its rounding, and
     /// nothing where each threshold lies right between two whole units.
     pub largest_step: f64,
-    /// Whether every value of the rows that the scales were fitted to is a whole number of units, but for the digits of
+    /// True if every value of the rows that the scales were fitted to is a whole number of units, but for the digits of
     /// f32, so that none of them goes another way; `None` without such rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub values_are_whole: Option<bool>,
@@ -74,7 +74,7 @@ pub fn fraction(ensemble: &Ensemble, feature: usize) -> Option<f64> {
     thresholds(ensemble, feature).into_iter().map(|(threshold, _)| threshold.value).find(|&value| is_fraction(value))
 }
 
-/// What scales do to each feature that the ensemble uses, and to the values of `rows` if they were fitted to some.
+/// Effects of scales on each feature that the ensemble uses, and on the values of `rows` if they were fitted to some.
 pub fn effects(ensemble: &Ensemble, scales: &[f32], rows: Option<&Rows>) -> Vec<Effect> {
     let names = ensemble.inputs.names();
     let effect = |(feature, (name, &scale)): (usize, (&str, &f32))| {
@@ -95,7 +95,7 @@ pub fn effects(ensemble: &Ensemble, scales: &[f32], rows: Option<&Rows>) -> Vec<
     all.filter(|effect| effect.thresholds > 0).collect()
 }
 
-/// Whether a value is a whole number of units, but for the digits of f32, in which decimals are not exact. What is
+/// True if a value is a whole number of units, but for the digits of f32, in which decimals are not exact. What is
 /// missing or infinite is one.
 fn is_whole(value: f64, scale: f64) -> bool {
     let units = value * scale;

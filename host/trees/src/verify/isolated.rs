@@ -1,5 +1,5 @@
-//! Which tree of a compiled model adds another leaf than the ensemble's: trees are tried one by one, in copies of the model
-//! in which all other leaves are 0.
+//! Search for the tree of a compiled model that adds another leaf than the ensemble's: trees are tried one by one, in
+//! copies of the model in which all other leaves are 0.
 
 use super::reference::{self, Reference};
 use crate::compile;

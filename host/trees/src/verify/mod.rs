@@ -9,6 +9,7 @@ mod reference;
 mod score;
 pub mod together;
 
+pub use crate::rows::ClassDiffers;
 pub use candidate::Candidate;
 pub use estimate::Estimate;
 pub use reference::{bound, margins, unit};
@@ -26,7 +27,7 @@ use rayon::prelude::*;
 use reference::Reference;
 use together::margins_of_rows;
 
-/// How far a model is from what it was made of.
+/// Distance between a model and its source.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Verified {
     /// Rows that were given.
@@ -49,7 +50,7 @@ pub struct Verified {
     /// The first of these.
     #[serde(skip)]
     pub first_class: Option<ClassDiffers>,
-    /// Whether the library's margins look like probabilities.
+    /// True if the library's margins look like probabilities.
     #[serde(skip)]
     pub are_probabilities: bool,
     /// The first tree of which another leaf is added, where margins differ by more than is stated.
@@ -62,7 +63,7 @@ pub struct Verified {
 }
 
 impl Verified {
-    /// What is wrong, if differences are larger than the model states.
+    /// Returns an error if differences are larger than the model states.
     ///
     /// # Errors
     /// [`RowsProblem::Beyond`].
@@ -81,17 +82,6 @@ impl Verified {
             },
         }
     }
-}
-
-/// A row that the library puts into another class.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ClassDiffers {
-    /// The row, counted from 1.
-    pub row: usize,
-    /// The model's class and the library's.
-    pub classes: [String; 2],
-    /// How far apart their margins are by the library.
-    pub gap: f64,
 }
 
 /// What comparing rows comes to.
@@ -234,7 +224,7 @@ fn largest_difference(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
 }
 
-/// How far a model is from the library itself.
+/// Distance between a model and the library itself.
 #[derive(Default)]
 struct OfLibrary {
     margin_error: Option<f64>,
@@ -301,7 +291,7 @@ fn compare_library(
     Ok(found)
 }
 
-/// Whether numbers look like probabilities: of two classes or more, from 0 to 1, and together 1.
+/// True if numbers look like probabilities: of two classes or more, from 0 to 1, and together 1.
 fn are_probabilities(library: &[Vec<f64>], outputs: usize) -> bool {
     let is_share = |value: &f64| (0.0..=1.0).contains(value);
     outputs > 1
@@ -310,7 +300,7 @@ fn are_probabilities(library: &[Vec<f64>], outputs: usize) -> bool {
             .all(|row| row.iter().all(is_share) && (row.len() == 1 || (row.iter().sum::<f64>() - 1.0).abs() < 1e-4))
 }
 
-/// What measuring in whole numbers changes on the given rows.
+/// Effect of measuring in whole numbers on the given rows.
 fn scaling(reference: &Reference<'_>, rows: &Rows) -> Option<(f64, usize)> {
     if reference.encoder == Encoder::Real {
         return None;

@@ -7,7 +7,7 @@ use crate::rows::Encoder;
 use palpate_onboard::inverse_link;
 use rayon::prelude::*;
 
-/// What a model makes of rows.
+/// Predictions of a model for rows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Predicted {
     /// The class of each row, as its position among the model's.

@@ -20,7 +20,7 @@ impl<'a> Reference<'a> {
         Self { ensemble, encoder: Encoder::of(model), sentinel: model.sentinel() }
     }
 
-    /// Whether the first of two classes has what the second one's leaves of 1, as in a vote.
+    /// True if the first of two classes has the remainder to 1 of the second one's leaves, as in a vote.
     pub(super) fn is_share(&self) -> bool {
         self.ensemble.trees.iter().any(|tree| tree.output != Output::One(1))
     }
@@ -85,7 +85,7 @@ pub fn margins(model: &Model<'_>, encoded: &[i32]) -> Vec<f64> {
     margins.into_iter().map(|margin| f64::from(margin) * unit).collect()
 }
 
-/// What one unit of a margin is to the library, in nats: the model's unit times the scale that it states.
+/// Size of one unit of a margin in the library, in nats: the model's unit times the scale that it states.
 pub fn unit(model: &Model<'_>) -> f64 {
     f64::from(model.unit()) * f64::from(model.prediction().scale)
 }

@@ -1,4 +1,4 @@
-//! How often a model over rows is right, row by row, or how far a regression is off.
+//! Accuracy of a model over rows, row by row, or the error of a regression.
 
 use super::Candidate;
 use super::estimate::Estimate;
@@ -7,20 +7,20 @@ use crate::error::{Result, RowsProblem};
 use crate::rows::Rows;
 use std::collections::BTreeMap;
 
-/// What a model makes of labeled rows.
+/// Results of a model on labeled rows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct RowsEvaluation {
     /// Rows.
     pub rows: usize,
-    /// What a model of classes comes to.
+    /// Results of a model of classes.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub classes: Option<Classes>,
-    /// What a model with one output comes to.
+    /// Results of a model with one output.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub regression: Option<Regression>,
 }
 
-/// What a model of classes comes to, each row taken alone.
+/// Results of a model of classes, each row taken alone.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Classes {
     /// Share of the rows whose class is the predicted one.
@@ -31,11 +31,11 @@ pub struct Classes {
     pub per_class: BTreeMap<String, f64>,
     /// The classes, in the model's order.
     pub names: Vec<String>,
-    /// How many rows of each class (outer) were taken for each (inner).
+    /// Confusion matrix: number of rows of each class (outer) recognized as each (inner).
     pub confusion: Vec<Vec<usize>>,
 }
 
-/// How far a regression is off: its values after the inverse link, as the library predicts them.
+/// Error of a regression: its values after the inverse link, as the library predicts them.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Regression {
     /// The mean of the absolute differences.

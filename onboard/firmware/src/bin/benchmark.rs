@@ -1,4 +1,4 @@
-//! What a touch costs on this chip from the switches to the host: instructions, stack, flash and RAM.
+//! Cost of a touch on this chip, from the switches to the host: instructions, stack, flash and RAM.
 //!
 //! The `evaluator` image measures the evaluator alone, layout by layout, next to other evaluators.
 #![no_std]

@@ -1,6 +1,6 @@
-//! What the evaluator costs on this chip, layout by layout: instructions and stack a touch, margins alone, as the
-//! exporter states them (on a Cortex-M4F within 15 %), and with evidence and stopping; and, next to the first
-//! model, the same trees in irithyll-core and as a plain array of eight-byte nodes with f32 compares.
+//! Cost of the evaluator on this chip, layout by layout: instructions and stack a touch, margins alone, as the exporter
+//! states them (on a Cortex-M4F within 15 %), and with evidence and stopping; and, next to the first model, the same
+//! trees in irithyll-core and as a plain array of eight-byte nodes with f32 compares.
 #![no_std]
 #![no_main]
 
@@ -13,7 +13,7 @@ use palpate_shared::Touch;
 /// Touches that are averaged over.
 const TOUCHES: usize = 50;
 
-/// What the exporter states (for a Cortex-M4F) may be off by this many percent.
+/// Percentage by which the exporter's statement (for a Cortex-M4F) may be off.
 const STATED_WITHIN: u64 = 15;
 
 macro_rules! models {

@@ -16,7 +16,7 @@ use palpate_onboard::effector::Sensed;
 use palpate_onboard::station::{Board, ProbeSettings, ProbeStation, record_length};
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
-/// What it is called on the link.
+/// Name of the program on the link.
 const PROGRAM: &str = concat!("palpate-firmware gpio ", env!("CARGO_PKG_VERSION"));
 /// Objects that a model may have.
 const OBJECTS: usize = 16;

@@ -5,7 +5,7 @@ use crate::commands::numbers::sequences;
 use crate::commands::train::descriptor;
 use palpate::Result;
 use palpate::error::{Error, Place, TouchesProblem};
-use palpate::evaluate::compare::Settings;
+use palpate::evaluate::recorded::Settings;
 use palpate::output;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
 use palpate_shared::Descriptor;

@@ -4,7 +4,7 @@ use super::check::Arguments;
 use crate::commands::progress::Bar;
 use crate::commands::{Global, checked, dataset, remark};
 use palpate::Result;
-use palpate::evaluate::compare::{Comparison, Cost, Settings, Share, compare};
+use palpate::evaluate::recorded::{Comparison, Cost, Settings, Share, compare};
 use palpate::output;
 use palpate::touches::{Captured, Dataset};
 use std::fmt::Write as _;

@@ -1,4 +1,4 @@
-//! How a chart becomes lines, shapes and text.
+//! Drawing of a chart: lines, shapes and text.
 //!
 //! Everything is drawn four times as large as it is shown, since the plotting library rounds to whole pixels. Texts are
 //! written here, at the places that the layout gave them: the library's own depend on the fonts of this machine.

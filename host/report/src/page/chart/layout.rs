@@ -43,7 +43,7 @@ impl Rect {
     }
 }
 
-/// Which part of a text is at its place.
+/// The part of a text that is at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -61,7 +61,7 @@ pub(super) struct Text {
     /// Of the baseline.
     pub(super) y: f64,
     pub(super) anchor: Anchor,
-    /// Whether it reads from below upwards.
+    /// True if it reads from below upwards.
     pub(super) upright: bool,
     pub(super) bold: bool,
     pub(super) color: RGBColor,
@@ -72,7 +72,7 @@ impl Text {
         Self { text: text.into(), whole: None, x, y, anchor, upright: false, bold: false, color }
     }
 
-    /// What it covers at most.
+    /// Rectangle that covers the text.
     pub(super) fn rect(&self) -> Rect {
         let length = width(&self.text, self.bold);
         let before = match self.anchor {
@@ -103,7 +103,7 @@ pub(super) struct Layout {
     pub(super) samples: Vec<((f64, f64), Key)>,
 }
 
-/// What is left of a text of at most `room`.
+/// The part of a text that fits into `room`.
 fn fitted(text: &str, room: f64) -> (String, Option<String>) {
     let short = shortened(text, room, false);
     let whole = (short != text).then(|| text.to_owned());
@@ -347,7 +347,7 @@ impl Layout {
         }
     }
 
-    /// What overlaps, and what is cut off by the edge: nothing, ever.
+    /// Texts that overlap or are cut off by the edge: there must be none.
     #[cfg(test)]
     fn faults(&self) -> Vec<String> {
         let whole = Rect { left: 0.0, top: 0.0, right: self.width, bottom: self.height };

@@ -1,4 +1,4 @@
-//! What a chart is made of: plain data.
+//! Parts of a chart: plain data.
 
 use crate::page::axis::Axis;
 use plotters::style::RGBColor;
@@ -71,7 +71,7 @@ pub(crate) enum Mark {
     Note {
         /// The point.
         at: (f64, f64),
-        /// What.
+        /// The text.
         text: String,
         /// Its color.
         color: RGBColor,
@@ -80,14 +80,14 @@ pub(crate) enum Mark {
     Cell {
         /// The cell's middle.
         at: (f64, f64),
-        /// What.
+        /// The text.
         text: String,
     },
     /// A thin line across the chart at an x.
     Vertical(f64),
 }
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stroke {
     /// Unbroken.
@@ -98,7 +98,7 @@ pub(crate) enum Stroke {
     Thin,
 }
 
-/// What a point looks like, so that series differ without color too.
+/// Shape of a point, so that series differ without color too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
     /// A filled circle.
@@ -111,23 +111,23 @@ pub(crate) enum Shape {
     Square,
 }
 
-/// What a series looks like: the sample beside its name.
+/// Style of a series: the sample beside its name.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Key {
     /// Its color.
     pub(crate) color: RGBColor,
-    /// How its line is drawn, if it has one.
+    /// Style of its line, if it has one.
     pub(crate) stroke: Option<Stroke>,
-    /// What its points look like, if it has some.
+    /// Shape of its points, if it has some.
     pub(crate) shape: Option<Shape>,
 }
 
 /// The name of a series: at the right end of its line, or in a legend below the chart.
 #[derive(Clone, Debug)]
 pub(crate) struct Label {
-    /// What the series is.
+    /// Name of the series.
     pub(crate) text: String,
-    /// What it looks like.
+    /// Its style.
     pub(crate) key: Key,
     /// The y of the line's right end, and its mean y, which decides the order of labels whose lines end together; without it the name
     /// belongs into the legend.
@@ -154,15 +154,15 @@ pub(crate) struct Chart {
     pub(crate) height: u32,
     /// The horizontal axis.
     pub(crate) x: Axis,
-    /// What it shows, with its unit; may be empty.
+    /// Its quantity, with the unit; may be empty.
     pub(crate) x_name: String,
     /// The vertical axis.
     pub(crate) y: Axis,
-    /// What it shows, with its unit; may be empty.
+    /// Its quantity, with the unit; may be empty.
     pub(crate) y_name: String,
-    /// Whether the horizontal axis's labels are vertical, for names.
+    /// True if the horizontal axis's labels are vertical, for names.
     pub(crate) upright_names: bool,
-    /// What is drawn, in order.
+    /// Marks in drawing order.
     pub(crate) marks: Vec<Mark>,
     /// Names of series: at the right ends of lines, moved apart where they would collide, or in a legend below the chart
     /// where they would take too much of it.

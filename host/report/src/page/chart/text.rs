@@ -2,11 +2,11 @@
 
 /// The height of text, in shown pixels.
 pub(super) const SIZE: f64 = 13.0;
-/// How far text reaches above its baseline.
+/// Height of text above its baseline.
 pub(super) const ASCENT: f64 = 0.93 * SIZE;
-/// How far it reaches below.
+/// Depth of text below its baseline.
 pub(super) const DESCENT: f64 = 0.24 * SIZE;
-/// How far below the middle of a line of text its baseline is.
+/// Distance from the middle of a line of text down to its baseline.
 pub(super) const MIDDLE: f64 = 0.36 * SIZE;
 /// The distance of the baselines of two lines.
 pub(super) const LINE: f64 = 16.0;

@@ -129,7 +129,7 @@ fn shade(normal: Vec3) -> f32 {
     0.1 + 0.62 * diffuse + 0.14 * normal.dot(fill).max(0.0) + 0.2 * gloss
 }
 
-/// How much of the sky a sample sees, judged from the depths around it: dark in grooves and at the foot of steps.
+/// Share of the sky that a sample sees, judged from the depths around it: dark in grooves and at the foot of steps.
 fn openness(nearest: &[(f32, Vec3)], wide: u32, x: u32, y: u32, depth: f32) -> f32 {
     let mut hidden = 0.0;
     let mut count = 0.0;

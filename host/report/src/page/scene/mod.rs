@@ -26,7 +26,7 @@ pub(crate) const STYLE: &str = include_str!("scene.css");
 /// The library that draws.
 pub(crate) const LIBRARY: &str = include_str!("../../../assets/three/three.min.js");
 
-/// What is drawn.
+/// A scene to draw.
 #[derive(Clone, Debug)]
 pub(crate) struct Scene {
     /// The mesh.
@@ -44,7 +44,7 @@ pub(crate) struct Scene {
 /// A straight line.
 #[derive(Clone, Debug, serde::Serialize)]
 pub(crate) struct Line {
-    /// Which lines belong together: they are shown, pointed at and chosen as one.
+    /// Group of lines that are shown, pointed at and chosen as one.
     pub(crate) group: usize,
     /// Where it starts.
     pub(crate) start: [f64; 3],
@@ -52,7 +52,7 @@ pub(crate) struct Line {
     pub(crate) end: [f64; 3],
     /// The style's custom property that holds its color.
     pub(crate) color: &'static str,
-    /// Whether there is a ball at its end.
+    /// True if there is a ball at its end.
     pub(crate) ball: bool,
 }
 

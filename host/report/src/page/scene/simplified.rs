@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use palpate::mesh::Mesh;
 use std::collections::HashMap;
 
-/// How many triangles a page holds at most.
+/// Largest number of triangles on a page.
 pub(crate) const MOST_TRIANGLES: usize = 120_000;
 
 /// A mesh with at most [`MOST_TRIANGLES`] triangles, its corners on a grid of 2¹⁶ steps along the longest side.
@@ -85,7 +85,7 @@ impl SimplifiedMesh {
         Self { points: sums.into_iter().map(mean).collect(), triangles, ..*self }
     }
 
-    /// Whether indices need four bytes instead of two.
+    /// True if indices need four bytes instead of two.
     pub(crate) fn is_wide(&self) -> bool {
         self.points.len() > usize::from(u16::MAX)
     }

@@ -50,7 +50,7 @@ impl Cases {
         cases
     }
 
-    /// How many there are.
+    /// Number of cases.
     pub(super) fn len(&self) -> usize {
         self.counts.len() / self.objects
     }

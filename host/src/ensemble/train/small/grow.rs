@@ -28,7 +28,7 @@ pub(super) struct Growth<'c> {
     depth: usize,
     eta: f64,
     min_child_weight: f64,
-    /// What a new threshold costs, as gain.
+    /// Cost of a new threshold, as gain.
     price: f64,
     /// For each feature and threshold whether some tree has it.
     used: Vec<Vec<bool>>,

@@ -31,7 +31,7 @@ const LARGEST: f64 = 0.5;
 pub(super) struct Fitted {
     /// For each tree and leaf.
     pub(super) leaves: Vec<Vec<Vec<f32>>>,
-    /// What margins start from.
+    /// Starting values of the margins.
     pub(super) base: Vec<f32>,
 }
 
@@ -60,7 +60,7 @@ pub(super) fn fit(cases: &Cases, trees: &[Grown], count: usize, bits: Option<u32
     lists.fitted()
 }
 
-/// What values are whole multiples of, and how many of it they may be.
+/// Unit that values are whole multiples of, and the largest multiple.
 #[derive(Clone, Copy)]
 struct Unit {
     size: f64,
@@ -161,7 +161,7 @@ impl Lists {
         (0..self.expected.len() / objects).for_each(|case| self.expect(case));
     }
 
-    /// What a case's margins expect.
+    /// Computes the counts that a case's margins predict.
     fn expect(&mut self, case: usize) {
         let range = case * self.objects..(case + 1) * self.objects;
         let (margins, expected) = (&self.margins[range.clone()], &mut self.expected[range.clone()]);

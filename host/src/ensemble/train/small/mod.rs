@@ -23,12 +23,12 @@ use cases::Cases;
 use grow::{Grown, Growth};
 use rayon::prelude::*;
 
-/// How little flash the trees are to take.
+/// Limits on the flash of the trees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Small {
     /// The most different leaves: 1 to 65,536. Up to 256 a leaf takes one byte.
     pub leaves: usize,
-    /// What a threshold that no tree had before has to save: loss of a touch on average, in nats. At least 0.
+    /// Loss of a touch on average, in nats, that a threshold must save if no tree had it before. At least 0.
     pub threshold_cost: f64,
 }
 
@@ -53,7 +53,7 @@ impl Small {
         if !settings.multi_output {
             return Err(Error::setting("leaves", "one", "each: few different leaves hold a value for each object"));
         }
-        if settings.trainer != Engine::Hessboost {
+        if settings.trainer != Engine::Palpate {
             return Err(Error::setting(
                 "trainer",
                 "xgboost",
@@ -75,7 +75,7 @@ pub(crate) fn train_each(
 ) -> Result<Vec<Ensemble>> {
     super::check(dataset, settings.descriptor)?;
     let settings = &settings.resolved(dataset);
-    super::parameters(settings, dataset.objects.len())?;
+    super::parameters(settings)?;
     stops.iter().try_for_each(|&(_, leaves)| Small { leaves, threshold_cost }.check(settings))?;
     let evidence = Evidence::new(dataset, settings)?;
     let origin = origin(dataset, settings, &evidence);

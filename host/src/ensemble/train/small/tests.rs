@@ -2,7 +2,7 @@ use super::super::train;
 use super::*;
 use crate::compile::{self, Layout, Leaf, compile};
 use crate::error::Setting;
-use crate::touches::synthetic;
+use crate::tests::synthetic;
 use palpate_shared::{Descriptor, Touch};
 use std::collections::BTreeSet;
 

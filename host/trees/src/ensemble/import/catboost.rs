@@ -136,7 +136,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     let is_multiclass = matches!(loss, "MultiClass" | "MultiClassOneVsAll") || (loss.is_empty() && classes.len() > 2);
     if values > 1 && !is_multiclass {
         return Err(unsupported(
-            format!("it has {values} targets, which are no classes of one object (its loss is {loss})"),
+            format!("it has {values} targets, which are not classes of one object (its loss is {loss})"),
             "Train a model for each target.",
         ));
     }

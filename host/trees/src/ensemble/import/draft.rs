@@ -14,14 +14,14 @@ pub(super) struct Draft {
     pub(super) features: Vec<String>,
     /// The outputs' names; empty for default names.
     pub(super) names: Vec<String>,
-    /// What margins start from, in f64.
+    /// Starting values of the margins, in f64.
     pub(super) base: Vec<f64>,
     pub(super) trees: Vec<DraftTree>,
     pub(super) kind: String,
     pub(super) notes: Vec<String>,
-    /// Whether the library adds f32 too, in an order of its own.
+    /// True if the library, too, adds in f32, in another order.
     pub(super) f32_sums: bool,
-    /// How the library's `predict` makes a class or a value of margins.
+    /// Rule by which the library's `predict` turns margins into a class or a value.
     pub(super) prediction: Prediction,
     /// The numbers that stand for a missing value, beside NaN.
     pub(super) sentinel: Option<[f32; 2]>,

@@ -10,7 +10,7 @@ use crate::error::EnsembleProblem;
 use palpate_shared::format::Link;
 use std::collections::BTreeMap;
 
-/// Why a file was refused, and the line.
+/// Reason why a file was refused, and the line.
 pub(super) struct Refused {
     pub(super) line: Option<u64>,
     pub(super) problem: EnsembleProblem,
@@ -105,8 +105,8 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if head.values.contains_key("average_output") {
         let rounds = (blocks.len() / outputs).max(1);
         draft.notes.push(format!(
-            "A random forest: margins are the library's raw scores, which are sums. Its probabilities are those of averages: \
-             posteriors here are as if margins were {rounds} times as large."
+            "A random forest: margins are the library's raw scores, which are sums. Its probabilities are computed \
+             from averages: the posteriors here use margins {rounds} times as large."
         ));
     }
     Ok(draft.finish(names)?)
@@ -143,9 +143,9 @@ fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<us
         return Err(EnsembleProblem::Objective { found: name.into() }.into());
     }
     if matches!(name, "binary" | "multiclassova") && sigmoid.parse() != Ok(1.0) {
-        draft
-            .notes
-            .push(format!("Posteriors take margins as log-odds, but the model's are to be multiplied by {sigmoid}."));
+        draft.notes.push(format!(
+            "Posteriors take margins as log-odds, but the model's must be multiplied by {sigmoid} first."
+        ));
     }
     if name == "multiclassova" {
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
@@ -229,7 +229,7 @@ fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> 
     Ok((read, values))
 }
 
-/// Whether every split and every leaf is reached once at most.
+/// Returns an error unless every split and every leaf is reached at most once.
 fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result<()> {
     let (mut of_splits, mut of_leaves) = (vec![false; splits.len()], vec![false; leaves]);
     let mut waiting: Vec<(&str, i64)> = vec![("num_leaves", if splits.is_empty() { -1 } else { 0 })];
@@ -254,7 +254,7 @@ fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result
 struct Grower<'a> {
     splits: &'a [Split],
     values: &'a [f64],
-    /// Whether zeros are missing wherever they are, so that no split has to tell them apart.
+    /// True if zeros are missing wherever they are, so that no split has to distinguish them.
     zero_is_missing: bool,
     nodes: Vec<DraftNode>,
 }

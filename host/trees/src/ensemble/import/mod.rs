@@ -1,4 +1,4 @@
-//! Ensembles that other libraries trained, told apart by the content of their files.
+//! Ensembles that other libraries trained, distinguished by the content of their files.
 //!
 //! | library | file | exactness of margins |
 //! |---|---|---|
@@ -29,12 +29,12 @@ use super::{Ensemble, Imported, xgboost};
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use std::path::Path;
 
-/// What a file of another library does not say, or a user wants otherwise.
+/// Facts that a file of another library does not state, or that a user wants otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options<'a> {
     /// Other names for the objects: one for each class, or for the one output of a regression.
     pub names: Option<&'a [String]>,
-    /// Whether all trees are taken where the file says that training stopped early, and not those up to the best iteration.
+    /// True to take all trees where the file says that training stopped early, and not those up to the best iteration.
     pub all_trees: bool,
     /// The number that stood for a missing value in training, beside NaN: XGBoost's `missing`, which no file holds. NaN if
     /// there was none.
@@ -44,7 +44,7 @@ pub struct Options<'a> {
 impl Ensemble {
     /// Reads an ensemble: XGBoost's JSON, which [`Ensemble::save`] and `palpate train` write, over features of touches
     /// if it has the attribute `palpate_descriptor`; else a file of XGBoost, LightGBM, CatBoost or an ONNX file, over
-    /// rows of features: see [`import`](self). The kind is told by the content.
+    /// rows of features: see [`import`](self). The content determines the kind.
     ///
     /// # Errors
     /// If the file cannot be read, is of no such kind, or has something in it that no compiled model can do
@@ -101,7 +101,7 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
     }
     if let Some(missing) = options.missing.filter(|missing| !missing.is_nan()) {
         let Some(imported) = ensemble.origin.imported.as_mut() else {
-            let what = "it is over touches, whose missing contacts no number stands for";
+            let what = "it is over touches, where no number stands for a missing contact";
             return Err(Error::at(Place::file(path), unsupported(what, "Leave the missing value out.")));
         };
         imported.sentinel = Some([missing; 2]);
@@ -109,9 +109,10 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
     Ok(ensemble)
 }
 
-/// What every file of XGBoost leaves open.
-pub(super) const MISSING_UNKNOWN: &str = "The file does not say which number stood for a missing value in training (XGBoost's \
-                                          `missing=`): only NaN is taken for one. State it if there was another.";
+/// Note about every file of XGBoost.
+pub(super) const MISSING_UNKNOWN: &str = "The file does not state the number that stood for a missing value in \
+                                          training (XGBoost's `missing=`): only NaN counts as missing. State the \
+                                          number if there was another.";
 
 fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let names = options.names;
@@ -124,7 +125,7 @@ fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
                 "Save the model with `booster.save_model(\"model.txt\")`.",
             ))),
             JsonKind::XgBoostDump => Err(wrong(unsupported(
-                "it is a list, such as XGBoost's dump_model writes, which lacks what margins start from",
+                "it is a list, as XGBoost's dump_model writes it, which lacks the starting values of the margins",
                 "Save the model with `booster.save_model(\"model.json\")`.",
             ))),
             JsonKind::XgBoost => xgboost::from_json(path, bytes, options),
@@ -133,7 +134,7 @@ fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
             Ok(value) => xgboost::from_ubjson(path, value, options),
             Err(at) => Err(Error::at(
                 Place::byte(path, at),
-                EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "no UBJSON from here on".into() },
+                EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "not UBJSON from here on".into() },
             )),
         },
         Kind::LightGbm => lightgbm::read(bytes, names).map_err(|refused| {
@@ -150,7 +151,7 @@ enum Kind {
     Onnx,
 }
 
-/// What a file is, by its first bytes.
+/// Returns the kind of a file, by its first bytes.
 fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
     let text = bytes.trim_ascii_start();
     let starts = |prefix: &[u8]| bytes.starts_with(prefix);
@@ -183,11 +184,11 @@ fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
         }
         _ if onnx::is_onnx(bytes) => Ok(Kind::Onnx),
         [] => refused("it is empty", KINDS),
-        _ => refused("it is no ensemble in a format that can be read", KINDS),
+        _ => refused("it is not an ensemble in a readable format", KINDS),
     }
 }
 
-/// What can be read.
+/// Advice on the kinds of files that can be read.
 const KINDS: &str = "Give what `palpate train` wrote, XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or an \
                      ONNX file of trees.";
 

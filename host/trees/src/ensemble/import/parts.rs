@@ -14,13 +14,13 @@ pub struct Parts {
     pub features: Vec<String>,
     /// The classes' names; empty for default names.
     pub names: Vec<String>,
-    /// What margins start from, one for each output.
+    /// Starting values of the margins, one for each output.
     pub base: Vec<f64>,
     /// The trees, in the order in which they are added.
     pub trees: Vec<PartTree>,
-    /// What a user should know about it, each a sentence.
+    /// Notes for the user, each a sentence.
     pub notes: Vec<String>,
-    /// How the library's `predict` makes a class or a value of margins.
+    /// Rule by which the library's `predict` turns margins into a class or a value.
     pub prediction: Prediction,
 }
 
@@ -37,7 +37,7 @@ pub struct PartTree {
     pub feature: Vec<i64>,
     /// The threshold, in f64.
     pub threshold: Vec<f64>,
-    /// Whether a missing value goes left.
+    /// True if a missing value goes left.
     pub missing_left: Vec<bool>,
     /// Values, of each node as many as a leaf has.
     pub values: Vec<f64>,

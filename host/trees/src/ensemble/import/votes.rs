@@ -6,13 +6,14 @@ use crate::ensemble::Output;
 
 /// Sums of all trees stay at most this: far enough below 2^24 that sums that differ still differ as shares in f32.
 const LIMIT: f64 = 4_194_304.0;
-/// How far a share may be from a fraction that it is taken for: files hold shares in f32, divided by the number of trees.
+/// Largest distance of a share from the fraction that it stands for: files hold shares in f32, divided by the number of
+/// trees.
 const SLACK: f64 = 2e-7;
 /// The largest denominator of a fraction that is told from others by a share in f32.
 const LARGEST: u64 = 1000;
 
-/// If every leaf of the draft holds shares of the classes that are 1 together over all trees, makes them whole numbers of
-/// votes times a power of two. Returns what their sums have to be multiplied by to be shares again.
+/// Turns the shares into whole numbers of votes times a power of two if every leaf of the draft holds shares of the
+/// classes whose sum over all trees is 1. Returns what their sums have to be multiplied by to be shares again.
 ///
 /// The number of votes of a tree is the least common denominator of all shares, where the sums still fit; otherwise shares
 /// are rounded to a power of two of them.

@@ -51,7 +51,7 @@ pub(super) fn from_ubjson(path: &Path, value: serde_json::Value, options: &Optio
     document.into_ensemble(options, "UBJSON").map_err(wrong)
 }
 
-/// What is looked at before the rest: a booster without trees has another schema.
+/// The part of a document that is read first: a booster without trees has another schema.
 #[derive(Default, serde::Deserialize)]
 struct Peek {
     #[serde(default)]
@@ -116,9 +116,9 @@ impl Ensemble {
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be
     /// [loaded](Self::load) again.
     ///
-    /// XGBoost predicts the same margins with it, bit for bit, for all that it takes (it refuses infinite values). Over
-    /// rows, one output is a regression, and two of which the first one's margin is 0 are `binary:logistic`, or
-    /// `binary:logitraw` where no probability in f32 stands for the base margin.
+    /// XGBoost predicts the same margins with it, bit for bit, for every input that it takes (it refuses infinite
+    /// values). Over rows, one output is a regression, and two of which the first one's margin is 0 are
+    /// `binary:logistic`, or `binary:logitraw` where no probability in f32 stands for the base margin.
     ///
     /// # Errors
     /// [`Error::Io`] naming `path`; [`EnsembleProblem`] for an ensemble that [`check`](Self::check) refuses, which none
@@ -134,7 +134,7 @@ impl Ensemble {
     }
 }
 
-/// What the parser said, at its line.
+/// The parser's message, with its line.
 pub(super) fn not_json(path: &Path, error: &serde_json::Error) -> Error {
     let place = match u64::try_from(error.line()) {
         Ok(line) if line > 0 => Place::line(path, line),

@@ -1,4 +1,4 @@
-//! What XGBoost's objectives say about margins.
+//! Meaning of margins under XGBoost's objectives.
 
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Link as Inverse;
@@ -8,11 +8,11 @@ use palpate_shared::format::Link as Inverse;
 pub(super) struct Objective {
     pub(super) kind: Kind,
     pub(super) link: Link,
-    /// What makes a prediction of a margin.
+    /// Function that turns a margin into a prediction.
     pub(super) inverse: Inverse,
 }
 
-/// What the outputs are.
+/// Kind of the outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A margin for each class.
@@ -23,7 +23,7 @@ pub(super) enum Kind {
     One,
 }
 
-/// How the base score, which is in the space of predictions, becomes a margin.
+/// Function that turns the base score, which is in the space of predictions, into a margin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Link {
     Identity,

@@ -4,7 +4,7 @@ use super::objective::Link;
 use super::schema::{LossParameters, Objective, SoftmaxParameters};
 use crate::ensemble::{Ensemble, Output};
 
-/// What is written about the outputs of an ensemble.
+/// Outputs of an ensemble, as its file states them.
 pub(super) struct Outputs {
     /// Groups of trees, or values in a leaf that has several.
     pub(super) groups: usize,

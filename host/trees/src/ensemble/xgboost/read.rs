@@ -28,7 +28,7 @@ impl Document {
             Kind::Classes => classes,
             Kind::Binary | Kind::One if targets > 1 => {
                 return Err(EnsembleProblem::Unsupported {
-                    what: format!("it has {targets} targets, which are no classes of one object"),
+                    what: format!("it has {targets} targets, which are not classes of one object"),
                     way: "Train a model for each target.".into(),
                 });
             }
@@ -112,7 +112,7 @@ impl Document {
     }
 }
 
-/// How many of the trees are taken: those up to the best iteration, if training stopped early and not all are asked for.
+/// Number of trees that are taken: those up to the best iteration, if training stopped early and not all are asked for.
 fn taken(
     forest: &Forest,
     attributes: &Attributes,
@@ -144,7 +144,7 @@ fn taken(
     Ok(wanted)
 }
 
-/// What an ensemble over rows predicts, and what stands for a missing value in it.
+/// Prediction of an ensemble over rows, and the numbers that stand for a missing value.
 #[derive(serde::Serialize, serde::Deserialize)]
 pub(super) struct StatedRows {
     pub(super) link: String,
@@ -161,7 +161,7 @@ struct Rows {
     sentinel: Option<[f32; 2]>,
 }
 
-/// What the attribute says, or the objective.
+/// Prediction stated by the attribute or the objective.
 fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProblem> {
     let name = "palpate_prediction";
     let expected = "a JSON object of link, last_of_ties and scale";
@@ -180,7 +180,7 @@ fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProbl
     let sentinel = match sentinel {
         None => None,
         Some([Some(low), Some(high)]) if low <= high => Some([low, high]),
-        Some(_) => return Err(wrong("the sentinel is no range of numbers".into())),
+        Some(_) => return Err(wrong("the sentinel is not a range of numbers".into())),
     };
     let prediction = Prediction { link, last_of_ties: stated.last_of_ties, scale: stated.scale };
     Ok(Rows { prediction, sentinel })
@@ -238,7 +238,7 @@ fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, Ensemble
     Ok(Some(names))
 }
 
-/// What the optional attributes say about the training touches.
+/// Facts about the training touches from the optional attributes.
 fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
     let trained = attributes.get("palpate_trained").map(|text| {
         let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";

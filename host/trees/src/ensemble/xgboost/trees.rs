@@ -5,7 +5,7 @@ use crate::ensemble::nodes::reachable;
 use crate::ensemble::{Node, Output, Tree};
 use crate::error::TreeProblem;
 
-/// What a document says about all of its trees.
+/// Facts of a document about all of its trees.
 pub(super) struct Shape {
     /// The features' names.
     pub(super) features: Vec<String>,
@@ -13,7 +13,7 @@ pub(super) struct Shape {
     pub(super) groups: usize,
     /// The object of the first group: 1 for a binary model, whose trees are for the second class.
     pub(super) first: usize,
-    /// Whether a threshold may be infinite.
+    /// True if a threshold may be infinite.
     pub(super) infinite: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What of the board runs anywhere, and so is tested on the machine that builds it:
+//! The parts of the board's program that run anywhere, and so are tested on the machine that builds it:
 //! `cargo test --lib --target "$(rustc -vV | sed -n 's/^host: //p')"`.
 #![no_std]
 

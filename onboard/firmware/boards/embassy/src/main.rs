@@ -15,7 +15,7 @@ use palpate_onboard::station::{Board, NoStorage, ProbeSettings, ProbeStation};
 use panic_halt as _;
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
-/// What it is called on the link.
+/// Name of the program on the link.
 const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 /// Objects that the model may have.
 const OBJECTS: usize = 16;

@@ -6,7 +6,7 @@ use palpate_onboard::station::MappedFlash;
 
 /// Where the program's part ends; memory.x says the same.
 const START: u32 = 512 << 10;
-/// What is left of 2 MB.
+/// The part of the 2 MB that the program leaves.
 const LENGTH: usize = 1536 << 10;
 /// Where the chip's bus sees the flash.
 const MAPPED: usize = 0x1000_0000;

@@ -24,7 +24,7 @@ use panic_halt as _;
 use rp2040_hal as hal;
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
-/// What it is called on the link.
+/// Name of the program on the link.
 const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 /// Objects that the model may have.
 const OBJECTS: usize = 16;
@@ -44,7 +44,7 @@ const PROBE: Geometry = MODEL_PROBE;
 #[used]
 static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;
 
-/// What is left for the main loop.
+/// The parts that remain with the main loop.
 struct Pico(Writer<pac::UART0, shared::Wires>);
 
 impl Board for Pico {

@@ -1,4 +1,4 @@
-//! What interrupts and the main loop share: the switches, what the UART has received, the alarm that wakes.
+//! State that interrupts and the main loop share: the switches, what the UART has received, the alarm that wakes.
 
 use core::cell::RefCell;
 use critical_section::{CriticalSection, Mutex};
@@ -20,7 +20,7 @@ pub type Switches = (Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>);
 /// The link's wires.
 pub type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
 
-/// Bytes that may wait for the main loop: all that a host sends without an answer, 8 commands and a question.
+/// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
 const WAITING: usize = 2048;
 
 /// The chip's microsecond timer.
@@ -72,12 +72,12 @@ pub fn start(switches: Switches, mut reader: Reader<UART0, Wires>, mut alarm: Al
     }
 }
 
-/// What the switches have to say.
+/// Returns the messages of the switches.
 pub fn sense() -> Sensed {
     with(|shared| shared.watcher.sense(&shared.clock)).unwrap_or(Sensed::Nothing(0))
 }
 
-/// What the UART has received; how many bytes.
+/// Reads bytes that the UART has received; returns their number.
 pub fn receive(buffer: &mut [u8]) -> usize {
     let mut count = 0;
     for slot in buffer {

@@ -1,4 +1,5 @@
-//! What the harness calls: `PEER_MODEL` names the file that is built in, `PEER_FEATURES` and `PEER_CLASSES` are numbers.
+//! Entry points for the harness: `PEER_MODEL` names the file that is built in, `PEER_FEATURES` and `PEER_CLASSES` are
+//! numbers.
 #![no_std]
 
 const FEATURES: usize = number_in(env!("PEER_FEATURES"));

@@ -74,9 +74,9 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
 /// Leaves' values by tree and node, for the outputs of the draft.
 struct Weights {
     of: HashMap<(i64, i64), Vec<(usize, f64)>>,
-    /// Whether leaves hold shares of votes for the second of two classes.
+    /// True if leaves hold shares of votes for the second of two classes.
     votes: bool,
-    /// What a tree's votes for both classes come to, where leaves are to have those for the first one too.
+    /// Sum of a tree's votes for both classes, where leaves are to have those for the first one too.
     all: Option<f64>,
 }
 
@@ -99,7 +99,7 @@ impl Weights {
                 outputs(node.attributes.get("n_targets").and_then(|attribute| attribute.integer).unwrap_or(1))?;
             if wanted > 1 {
                 return Err(unsupported(
-                    format!("it has {wanted} targets, which are no classes of one object"),
+                    format!("it has {wanted} targets, which are not classes of one object"),
                     "Train a model for each target.",
                 ));
             }
@@ -148,7 +148,7 @@ impl Weights {
         }
     }
 
-    /// What a leaf adds to each output that it names.
+    /// Values that a leaf adds to each output that it names.
     fn leaf(&mut self, tree: i64, node: i64) -> Vec<(usize, f64)> {
         let mut values = self.of.remove(&(tree, node)).unwrap_or_default();
         if self.votes {
@@ -164,7 +164,7 @@ impl Weights {
     }
 }
 
-/// Which output a leaf's value is for.
+/// Assignment of a leaf's value to an output.
 #[derive(Clone, Copy)]
 enum Map {
     /// The one that it names.

@@ -19,7 +19,7 @@ type Result<T, E = EnsembleProblem> = std::result::Result<T, E>;
 /// Operations around an ensemble that change no margin.
 const HARMLESS: [&str; 5] = ["Identity", "Cast", "Reshape", "ZipMap", "Flatten"];
 
-/// Whether bytes may be an ONNX file: an `ir_version`, and then a field that a model has.
+/// True if bytes may be an ONNX file: an `ir_version`, and then a field that a model has.
 pub(super) fn is_onnx(bytes: &[u8]) -> bool {
     matches!(bytes, [0x08, 1..=40, 0x12 | 0x1a | 0x22 | 0x28 | 0x32 | 0x3a | 0x42, ..])
 }
@@ -40,18 +40,18 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if others > 0 {
         return Err(unsupported(
             format!(
-                "it has {} tree ensembles, whose answers are put together by something else: weights, votes, probabilities",
+                "it has {} tree ensembles, whose outputs are combined by other operators: weights, votes, probabilities",
                 others + 1
             ),
-            "Of AdaBoost, Bagging, Voting, Stacking, OneVsRest or a calibrated classifier, give a forest or boosted trees \
-             trained in its place. A single model that onnxmltools split has to be converted without `split`.",
+            "In place of AdaBoost, Bagging, Voting, Stacking, OneVsRest or a calibrated classifier, train and give a \
+             forest or boosted trees. A single model that onnxmltools split has to be converted without `split`.",
         ));
     }
     let harmless = |node: &&Node<'_>| !is_ensemble(node) && !HARMLESS.contains(&node.operation);
     if let Some(node) = model.graph.nodes.iter().find(harmless) {
         return Err(unsupported(
             format!("beside the trees it computes with {}", node.operation),
-            "Convert the trees alone, and do what is before or behind them yourself.",
+            "Convert the trees alone, and compute the steps before and after them yourself.",
         ));
     }
     let columns = columns(&model.graph, node)?;
@@ -149,13 +149,13 @@ fn index(number: i64, what: &str) -> Result<usize> {
     usize::try_from(number).map_err(|_| damaged(format!("{what} is {number}")))
 }
 
-/// How many outputs a file says there are.
+/// Number of outputs stated by a file.
 fn outputs(count: i64) -> Result<usize> {
     let count = index(count, "n_targets")?;
     if (1..=MAX_OBJECTS).contains(&count) { Ok(count) } else { Err(EnsembleProblem::ObjectCount { count }) }
 }
 
-/// What the leaves' values are divided by.
+/// Divisor of the leaves' values.
 fn divisor(aggregate: &str, trees: usize) -> Result<f64> {
     match aggregate {
         "SUM" => Ok(1.0),

@@ -1,0 +1,323 @@
+//! Distance between recorded and simulated touches, feature by feature and as a whole.
+//!
+//! The one figure is how often a classifier tells a recorded touch of an object from a simulated one: trees are trained to
+//! do just that, and tested on touches that they were not trained on (cross-validation). Half of the time is guessing. It
+//! is a test of two samples by a classifier: Lopez-Paz and Oquab, Revisiting Classifier Two-Sample Tests, 1610.06545. Each
+//! feature is compared by itself too, by the largest difference of its two distributions (Kolmogorov and Smirnov).
+//!
+//! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
+//! recorded ones, and how many more approaches it takes there to be right as often as on simulated ones.
+
+mod cost;
+mod features;
+
+pub use cost::Cost;
+pub use features::FeatureComparison;
+
+use super::Estimate;
+use crate::ensemble::{feature_row, train};
+use crate::error::{Error, EvaluateProblem, Result};
+use crate::progress::{self, Progress};
+use crate::touches::{Dataset, ObjectTouches, folds};
+use palpate_shared::format::Counted;
+use palpate_shared::{ContactPattern, Descriptor, Touch};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Settings of a comparison of data sets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The features that touches are compared by, and that the model is trained on.
+    pub descriptor: Descriptor,
+    /// Folds of the cross-validation.
+    pub folds: usize,
+    /// Groups of approaches drawn for each object.
+    pub groups: usize,
+    /// Seed of the folds and of the drawing.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { descriptor: Descriptor::Curvature, folds: 5, groups: 1_000, seed: 1 }
+    }
+}
+
+/// The most simulated touches for each recorded one: more say no more.
+const MOST: usize = 5;
+/// The fewest recorded touches of an object that are compared.
+pub const LEAST: usize = 30;
+/// Standard errors to either side of an interval of 95 %.
+const QUANTILE: f64 = 1.96;
+/// A share and its 95 % interval, by the normal approximation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Share {
+    /// The share.
+    pub value: f64,
+    /// The lower end of the interval.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+}
+
+impl Share {
+    fn of(estimate: Estimate) -> Self {
+        let Estimate { value, standard_error } = estimate;
+        let end = |sign: f64| (value + sign * QUANTILE * standard_error).clamp(0.0, 1.0);
+        Self { value, low: end(-1.0), high: end(1.0) }
+    }
+}
+
+/// Comparison of recorded and simulated touches.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// The features that they were compared by.
+    pub descriptor: String,
+    /// Accuracy of a classifier that distinguishes recorded from simulated touches of the same object: 0.5 is guessing.
+    /// Each object weighted equally.
+    pub told_apart: Share,
+    /// The objects that both data sets hold, by name.
+    pub objects: Vec<ObjectComparison>,
+    /// Cost of the difference; none for fewer than two objects.
+    pub cost: Option<Cost>,
+}
+
+/// Comparison of recorded and simulated touches of an object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectComparison {
+    /// The object's name.
+    pub name: String,
+    /// Recorded touches, and the simulated ones that they are compared with.
+    pub touches: [usize; 2],
+    /// Accuracy of a classifier that distinguishes the two: 0.5 is guessing.
+    pub told_apart: Share,
+    /// The share of each contact pattern among recorded and among simulated touches.
+    pub patterns: BTreeMap<String, [f64; 2]>,
+    /// Every other feature.
+    pub features: Vec<FeatureComparison>,
+}
+
+impl Comparison {
+    /// Meaning of the figure, in a sentence.
+    pub fn verdict(&self) -> &'static str {
+        match self.told_apart {
+            Share { low, .. } if low <= 0.5 => "No difference was found: the simulation agrees with the recordings.",
+            Share { value, .. } if value < 0.55 => "They differ slightly: the simulation is nearly correct.",
+            Share { value, .. } if value < 0.65 => {
+                "They differ: fit the probe to recorded touches, or record more of them."
+            }
+            _ => "They differ strongly: the simulated probe, a mesh or its size is wrong.",
+        }
+    }
+}
+
+/// Compares recorded touches with simulated ones of the same objects. Where approaches that touched nothing were not
+/// recorded, simulated ones are left out, and where only full touches were, partial ones.
+///
+/// The same touches and settings give the same comparison on any number of threads.
+///
+/// # Errors
+/// [`EvaluateProblem::Incomparable`] if the data sets share no object, if one holds approaches and the other full touches
+/// only, or if an object has fewer than [`LEAST`] touches; as [`train::train`]; [`Error::Cancelled`].
+pub fn compare(
+    recorded: &Dataset,
+    simulated: &Dataset,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Comparison> {
+    let refuse = |detail: String| Err(Error::from(EvaluateProblem::Incomparable { detail }));
+    if settings.folds < 2 {
+        return Err(Error::setting("folds", settings.folds, "2 or more"));
+    }
+    let any = |dataset: &Dataset, is: fn(&Touch) -> bool| dataset.touches().any(is);
+    if any(recorded, |touch| !touch.is_full()) && !any(simulated, |touch| !touch.is_full()) {
+        return refuse("the recorded touches are of approaches, the simulated ones full touches only".into());
+    }
+    let empties = any(recorded, Touch::is_empty);
+    let partial = any(recorded, |touch| !touch.is_full());
+    let alike = |touch: &Touch| touch.is_full() || partial && (empties || !touch.is_empty());
+    let simulated = simulated.each(|own| own.filtered(alike));
+    let find = |name: &str| simulated.objects.iter().find(|own| own.name == name);
+    let pairs: Vec<(&ObjectTouches, &ObjectTouches)> =
+        recorded.objects.iter().filter_map(|own| Some((own, find(&own.name)?))).collect();
+    if pairs.is_empty() {
+        return refuse("no object is in both".into());
+    }
+    for (own, other) in &pairs {
+        let fewest = own.len().min(other.len());
+        if fewest < LEAST {
+            return refuse(format!("{} has {fewest} touches to compare, of at least {LEAST}", own.name));
+        }
+    }
+    let counted = if partial { Counted::All } else { Counted::Full };
+    let descriptor = match counted {
+        Counted::Full => settings.descriptor.for_full_touches(),
+        _ => settings.descriptor.for_contacts().unwrap_or(settings.descriptor),
+    };
+    progress.begin("telling apart", Some(pairs.len() as u64));
+    let one = |(own, other): &(&ObjectTouches, &ObjectTouches)| {
+        let compared = object(own, other, descriptor, counted, settings)?;
+        progress::advance(progress, 1)?;
+        Ok(compared)
+    };
+    let compared: Vec<(ObjectComparison, Estimate)> = pairs.par_iter().map(one).collect::<Result<_>>()?;
+    let told_apart = Share::of(Estimate::mean_of(compared.iter().map(|(_, told)| *told)));
+    let recorded = recorded.only(|name| find(name).is_some());
+    Ok(Comparison {
+        descriptor: descriptor.name().into(),
+        told_apart,
+        objects: compared.into_iter().map(|(object, _)| object).collect(),
+        cost: cost::cost(&recorded, &simulated, settings, progress)?,
+    })
+}
+
+fn object(
+    recorded: &ObjectTouches,
+    simulated: &ObjectTouches,
+    descriptor: Descriptor,
+    counted: Counted,
+    settings: &Settings,
+) -> Result<(ObjectComparison, Estimate)> {
+    let most = (MOST * recorded.len()).max(1_000).min(simulated.len());
+    let simulated = &first(simulated, most);
+    let told = told_apart([recorded, simulated], counted, settings)?;
+    let both = [recorded.touches(), simulated.touches()];
+    let share = |pattern: ContactPattern| {
+        both.map(|touches| {
+            touches.iter().filter(|touch| touch.pattern() == pattern).count() as f64 / touches.len() as f64
+        })
+    };
+    let patterns = ContactPattern::ALL.iter().map(|pattern| (pattern.name().to_owned(), share(*pattern))).collect();
+    let rows =
+        both.map(|touches| -> Vec<Vec<f32>> { touches.iter().map(|touch| feature_row(descriptor, touch)).collect() });
+    let features = (descriptor.feature_names().iter().enumerate()).filter(|(_, name)| **name != "pattern").filter_map(
+        |(column, name)| features::feature(name, rows.each_ref().map(|rows| features::values(rows, column))),
+    );
+    let comparison = ObjectComparison {
+        name: recorded.name.clone(),
+        touches: both.map(<[Touch]>::len),
+        told_apart: Share::of(told),
+        patterns,
+        features: features.collect(),
+    };
+    Ok((comparison, told))
+}
+
+/// The first touches of an object, equally many of each of its sources, as far as there are.
+fn first(object: &ObjectTouches, count: usize) -> ObjectTouches {
+    if count >= object.len() {
+        return object.clone();
+    }
+    let mut order: Vec<(usize, usize, usize)> = Vec::new();
+    for (source, touches) in object.by_source().into_iter().enumerate() {
+        order.extend(touches.into_iter().enumerate().map(|(rank, touch)| (rank, source, touch)));
+    }
+    order.sort_unstable();
+    let mut chosen: Vec<usize> = order.into_iter().take(count).map(|(.., touch)| touch).collect();
+    chosen.sort_unstable();
+    object.select(chosen)
+}
+
+/// How often trees tell touches of two samples apart that they were not trained on; the two samples weigh equally.
+fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, settings: &Settings) -> Result<Estimate> {
+    let samples = [("recorded", recorded), ("simulated", simulated)].map(|(name, object)| object.clone().renamed(name));
+    let both = Dataset::new(samples.into());
+    let recipe = train::Settings {
+        descriptor: settings.descriptor,
+        counted: Some(counted),
+        rounds: 40,
+        depth: 3,
+        eta: 0.1,
+        min_child_weight: 4.0,
+        bins: 64,
+        leaf_bits: None,
+        threads: Some(1),
+        ..train::Settings::compact()
+    };
+    let mut right = [0; 2];
+    for fold in 0..settings.folds {
+        let split = folds::fold(&both, fold, settings.folds, settings.seed)?;
+        let trees = train::train(&split.train, &recipe, &())?;
+        for (class, object) in split.test.objects.iter().enumerate() {
+            let is_right = |touch: &&Touch| {
+                let margins = trees.margins(touch);
+                margins[class] > margins[1 - class]
+            };
+            right[class] += object.touches().iter().filter(is_right).count();
+        }
+    }
+    let counts = [recorded.len(), simulated.len()];
+    Ok(Estimate::mean_of([0, 1].map(|class: usize| Estimate::share(right[class], counts[class])).into_iter()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use crate::probe::noise::Noise;
+    use crate::tests::synthetic;
+
+    fn shifted(dataset: &Dataset, noise: &Noise) -> Dataset {
+        dataset.each(|own| own.noisy(noise, 3, 1))
+    }
+
+    fn quick() -> Settings {
+        Settings { groups: 100, ..Settings::default() }
+    }
+
+    #[test]
+    fn touches_of_one_simulator_are_told_apart_no_better_than_by_guessing() {
+        let [one, other] = [1, 2].map(|seed| synthetic::dataset(&[300, 300, 300], seed));
+        let compared = compare(&one, &other, &quick(), &()).unwrap();
+        assert!(compared.told_apart.low < 0.5 + 0.02 && compared.told_apart.high > 0.48, "{:?}", compared.told_apart);
+        assert!(compared.told_apart.value < 0.55, "{:?}", compared.told_apart);
+        let alike = compared.objects.iter().flat_map(|own| &own.features).filter(|own| own.words() == "alike").count();
+        assert!(alike >= 4, "{compared:?}");
+        let cost = compared.cost.unwrap();
+        let needed = cost.needed.unwrap();
+        assert!(needed < 1.8 * cost.after as f64, "{cost:?}");
+        assert_eq!(compare(&one, &other, &quick(), &()).unwrap().told_apart, compared.told_apart);
+    }
+
+    #[test]
+    fn a_bent_finger_is_told_apart_and_costs_approaches() {
+        let [one, other] = [1, 2].map(|seed| synthetic::dataset(&[300, 300, 300], seed));
+        let bent = shifted(&one, &Noise { bent: [0.0, 40_000.0, 0.0], ..Noise::default() });
+        let compared = compare(&bent, &other, &quick(), &()).unwrap();
+        assert!(compared.told_apart.low > 0.6, "{:?}", compared.told_apart);
+        let worst = |own: &ObjectComparison| own.features.iter().any(|own| own.words().contains("larger"));
+        assert!(compared.objects.iter().any(worst), "{compared:?}");
+        let cost = compared.cost.unwrap();
+        assert!(cost.recorded[&20].value < cost.simulated[&20].value - 0.05, "{cost:?}");
+        assert!(cost.needed.is_none_or(|needed| needed > 1.2 * cost.after as f64), "{cost:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_refused_with_the_reason() {
+        let dataset = synthetic::dataset(&[300, 300], 1);
+        let refused = |one: &Dataset, other: &Dataset| match compare(one, other, &quick(), &()).unwrap_err().problem() {
+            Some(EvaluateProblem::Incomparable { detail }) => detail.clone(),
+            other => panic!("{other:?}"),
+        };
+        let mut other = dataset.clone();
+        other.objects.iter_mut().for_each(|own| own.name += "-other");
+        assert!(refused(&dataset, &other).contains("no object"));
+        let mut few = dataset.clone();
+        few.objects[0] = few.objects[0].select(0..LEAST - 1);
+        assert!(refused(&few, &dataset).contains("29 touches"));
+        let mut full = dataset.clone();
+        full.objects.iter_mut().for_each(|own| *own = own.filtered(Touch::is_full));
+        assert!(refused(&dataset, &full).contains("full touches only"));
+        let compared = compare(&full, &dataset, &quick(), &()).unwrap();
+        assert_eq!(compared.objects[0].patterns["all"], [1.0, 1.0], "partial ones are left out");
+    }
+
+    #[test]
+    fn one_object_is_compared_without_a_cost() {
+        let dataset = synthetic::dataset(&[300, 300], 1);
+        let one = dataset.only(|name| name == "object0");
+        let noisy = one.each(|own| own.noisy(&Noise::gaussian(1_000.0), 1, 1));
+        assert_eq!(compare(&one, &noisy, &quick(), &()).unwrap().cost, None);
+    }
+}

@@ -1,0 +1,46 @@
+//! What can be wrong with fitting a probe to recordings.
+
+use crate::error::Problem;
+
+/// What can be wrong with fitting a probe to recordings.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitProblem {
+    /// A recorded object has no mesh.
+    #[error("{name} was recorded, and is none of the objects: {}", known.join(", "))]
+    NotRecorded {
+        /// The recorded object.
+        name: String,
+        /// The objects that there are.
+        known: Vec<String>,
+    },
+    /// There are too few recorded touches to fit a probe to.
+    #[error("only {touches} recorded touches with two or three contacts, and a fit needs at least {least}")]
+    FewRecorded {
+        /// Number of touches.
+        touches: usize,
+        /// Number of touches needed.
+        least: usize,
+    },
+    /// Recordings look wrong.
+    #[error("recordings look wrong:\n  {}\nNothing was written", suspects.join("\n  "))]
+    Suspects {
+        /// Suspicious findings, each a sentence or two.
+        suspects: Vec<String>,
+    },
+}
+
+impl Problem for FitProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::NotRecorded { .. } => {
+                "Give its mesh as well, under the recording's name, or leave the recording out."
+            }
+            Self::FewRecorded { .. } => {
+                "Record a few hundred approaches to objects whose meshes you have; 60 presses on a plate help too."
+            }
+            Self::Suspects { .. } => "Record again, or leave the recording out.",
+        }
+        .into()
+    }
+}

@@ -1,0 +1,148 @@
+//! Likelihood of recorded touches under a candidate probe.
+
+use super::candidate::{Candidate, Kept};
+use super::density::{Densities, FULL, OUTER, Observed};
+use std::f64::consts::TAU;
+
+/// The share of touches that come from nowhere: so that one odd touch cannot decide a fit.
+const ODD: f64 = 0.004;
+/// Spread of the times of odd touches, in milliseconds.
+const ODD_SPREAD: f64 = 150.0;
+
+/// Likelihood of one object's touches under a candidate.
+pub(super) struct Explained<'a> {
+    candidate: Candidate,
+    smoothed: super::density::Smoothed<'a>,
+    shares: [f64; 8],
+    /// The logarithm of the share of approaches that were recorded.
+    recorded: f64,
+    kept: Kept,
+}
+
+impl<'a> Explained<'a> {
+    pub(super) fn new(candidate: &Candidate, object: &'a Densities, kept: Kept) -> Self {
+        let touched = |fingers: u8| -> f64 { object.shares[usize::from(fingers)] };
+        // An approach is not recorded if every finger that touched missed its contact.
+        let nothing: f64 = (0..8).map(|fingers| touched(fingers) * product(fingers, 0, &candidate.missed)).sum();
+        let recorded = match kept {
+            Kept::All | Kept::Full => 0.0,
+            Kept::Contacts => (1.0 - nothing).max(1e-9).ln(),
+        };
+        Self {
+            candidate: *candidate,
+            smoothed: object.under(candidate.noise / candidate.factor),
+            shares: object.shares,
+            recorded,
+            kept,
+        }
+    }
+
+    pub(super) fn candidate(&self) -> &Candidate {
+        &self.candidate
+    }
+
+    pub(super) fn kept(&self) -> Kept {
+        self.kept
+    }
+
+    /// The logarithm of the share of approaches that were recorded.
+    pub(super) fn recorded(&self) -> f64 {
+        self.recorded
+    }
+
+    /// The logarithm of the density of a touch in any pose.
+    pub(super) fn log_density(&self, observed: &Observed) -> f64 {
+        let Candidate { factor, late: [first, middle, third], missed, .. } = self.candidate;
+        let Observed { fingers, first: x, second: y } = *observed;
+        let (times, odd) = match fingers {
+            FULL => {
+                let curvature = (x - (first - 2.0 * middle + third)) / factor;
+                let slope = (y - (third - first)) / factor;
+                ([0.0, self.smoothed.full(curvature, slope) / (factor * factor)], wide(x) * wide(y))
+            }
+            0b011 => (self.smoothed.neighbors((x - (middle - first)) / factor).map(|d| d / factor), wide(x)),
+            0b110 => (self.smoothed.neighbors((third - middle - x) / factor).map(|d| d / factor), wide(x)),
+            OUTER => (self.smoothed.outer((x - (third - first)) / factor).map(|d| d / factor), wide(x)),
+            _ => ([1.0; 2], 1.0),
+        };
+        if self.kept == Kept::Full {
+            return (times[1] * (1.0 - ODD) + ODD * odd).ln();
+        }
+        // What was touched may be more than what was recorded.
+        let mut density = 0.0;
+        for touched in (0..8).filter(|touched| touched & fingers == fingers) {
+            let share = self.shares[usize::from(touched)] * product(touched, fingers, &missed);
+            density += share * times[usize::from(touched == FULL)];
+        }
+        (density * (1.0 - ODD) + ODD * odd / 8.0).ln() - self.recorded
+    }
+
+    /// The logarithm of the likelihood of touches in any pose.
+    pub(super) fn log_likelihood(&self, touches: &[Observed]) -> f64 {
+        touches.iter().map(|touch| self.log_density(touch)).sum()
+    }
+}
+
+/// The probability that of the `touched` fingers these are `recorded` and the others missed their contact.
+pub(super) fn product(touched: u8, recorded: u8, missed: &[f64; 3]) -> f64 {
+    let of = |(finger, missed): (u8, &f64)| match (touched >> finger & 1, recorded >> finger & 1) {
+        (0, _) => 1.0,
+        (_, 0) => *missed,
+        _ => 1.0 - missed,
+    };
+    (0..).zip(missed).map(of).product()
+}
+
+/// A density that is nowhere small: Cauchy's.
+fn wide(x: f64) -> f64 {
+    2.0 / (TAU * ODD_SPREAD * (1.0 + (x / ODD_SPREAD).powi(2)))
+}
+
+/// Presses on a flat plate: curvature is 0 but for the probe, and the slope is the plate's, with the other sign after each
+/// half turn.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plate {
+    /// Full touches of presses in one direction of the row, and in the other.
+    pub(super) presses: Vec<(f64, Observed)>,
+    /// Number of presses, and the number of them that each finger missed.
+    pub(super) count: usize,
+    pub(super) missed: [usize; 3],
+}
+
+impl Plate {
+    pub(super) fn new(touches: impl IntoIterator<Item = Observed>) -> Self {
+        let mut plate = Self::default();
+        for (turn, observed) in [1.0, -1.0].into_iter().cycle().zip(touches) {
+            plate.count += 1;
+            for (finger, missed) in plate.missed.iter_mut().enumerate() {
+                *missed += usize::from(observed.fingers >> finger & 1 == 0);
+            }
+            if observed.fingers == FULL {
+                plate.presses.push((turn, observed));
+            }
+        }
+        plate
+    }
+
+    /// Their log-likelihood, at the slope of the plate that suits them best.
+    pub(super) fn log_likelihood(&self, candidate: &Candidate) -> f64 {
+        let Candidate { late: [first, middle, third], noise, missed, .. } = *candidate;
+        let [curvature, slope] = [first - 2.0 * middle + third, third - first];
+        let count = self.presses.len().max(1) as f64;
+        let tilt: f64 = self.presses.iter().map(|(turn, press)| turn * (press.second - slope)).sum::<f64>() / count;
+        let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt());
+        let [root6, root2] = [6.0_f64.sqrt() * noise, 2.0_f64.sqrt() * noise];
+        let of = |(turn, press): &(f64, Observed)| {
+            let times = normal(press.first - curvature, root6) * normal(press.second - slope - turn * tilt, root2);
+            ((1.0 - ODD) * times + ODD * wide(press.first) * wide(press.second)).ln()
+        };
+        let all = self.count as f64;
+        let contacts: f64 = (self.missed.iter().zip(missed))
+            .map(|(&count, missed)| {
+                let (count, share) = (count as f64, missed.clamp(1e-6, 1.0 - 1e-6));
+                count * share.ln() + (all - count) * (1.0 - share).ln()
+            })
+            .sum();
+        self.presses.iter().map(of).sum::<f64>() + contacts
+    }
+}

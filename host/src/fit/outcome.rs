@@ -1,0 +1,215 @@
+//! Results of a fit, and the probe file that states it.
+
+use super::candidate::{Candidate, Kept};
+use super::search::{Best, Ends};
+use super::suspects::Suspect;
+use super::{Evidence, Settings, Timer};
+use crate::probe::approach::{FINGERS, Probe};
+use crate::probe::noise::Noise;
+use palpate_shared::format::Length;
+use serde::Serialize;
+use std::fmt::{self, Write as _};
+
+/// A value and its interval, which holds the true one in about 95 of 100 fits, if probe and objects are as they are
+/// simulated; an end is none where the recordings do not tell it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The likeliest value.
+    pub value: f64,
+    /// The lower end of the interval.
+    pub low: Option<f64>,
+    /// The upper end.
+    pub high: Option<f64>,
+}
+
+impl Estimate {
+    /// The width of the interval; none if it has no end.
+    pub fn width(&self) -> Option<f64> {
+        Some(self.high? - self.low?)
+    }
+
+    /// True if the interval holds a value.
+    pub fn holds(&self, value: f64) -> bool {
+        self.low.is_none_or(|low| low <= value) && self.high.is_none_or(|high| value <= high)
+    }
+}
+
+/// Something that the recordings tell badly or not at all.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Warning {
+    /// Name of the parameter: "the speed's factor".
+    pub what: String,
+    /// Its interval: "0.90 to 1.12".
+    pub told: String,
+    /// Advice on what to record, as a sentence.
+    pub record: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}). {}", self.what, self.told, self.record)
+    }
+}
+
+/// The probe that recorded touches came from. Times are in milliseconds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fit {
+    /// The probe as it should be.
+    pub probe: Probe,
+    /// What its lengths are measured in.
+    #[serde(with = "crate::probe::unit")]
+    pub unit: Length,
+    /// Its speed over the nominal one.
+    pub speed_factor: Estimate,
+    /// Delay of the second and the third finger, relative to the first.
+    pub late: [Estimate; 2],
+    /// Standard deviation of each contact time, without what the timer adds.
+    pub noise: Estimate,
+    /// The share of contacts that each finger misses; none where only full touches were recorded.
+    pub missed: Option<[Estimate; FINGERS]>,
+    /// The timer's resolution; none if it is finer than 0.02 ms, or there are too few times to tell.
+    pub timer: Option<f64>,
+    /// Recorded touches and approaches.
+    pub recorded: usize,
+    /// Those of them with three contacts, and with two.
+    pub contacts: [usize; 2],
+    /// Presses on a flat plate.
+    pub presses: usize,
+    /// Names of the recorded objects.
+    pub objects: Vec<String>,
+    /// Warnings about what the recordings cannot determine, and what to record next.
+    pub warnings: Vec<Warning>,
+    /// Recordings that look wrong.
+    pub suspects: Vec<Suspect>,
+}
+
+/// Gathers what was found; warnings are still to come.
+pub(super) fn outcome(
+    evidence: &Evidence<'_>,
+    best: &Best,
+    ends: &[Ends],
+    timer: Timer,
+    suspects: Vec<Suspect>,
+    settings: &Settings,
+) -> Fit {
+    let resolution = match timer {
+        Timer::Found(micros) => Some(micros / 1e3),
+        Timer::Fine | Timer::Unknown => None,
+    };
+    // The ends of the interval of a number, or of what falls where the number rises.
+    let estimate = |number: usize, falls: bool, of: &dyn Fn(&Candidate) -> f64| {
+        let at = |end: usize| ends.get(number).and_then(|ends| ends.ends[end].as_ref()).map(of);
+        let (value, [low, high]) = (of(&best.candidate), if falls { [at(1), at(0)] } else { [at(0), at(1)] });
+        // An end that falls short of the value, by rounding, is the value.
+        Estimate { value, low: low.map(|low| low.min(value)), high: high.map(|high| high.max(value)) }
+    };
+    // A time that is rounded down to ticks of a clock of any phase is off by as much as a uniform number.
+    let ticks = resolution.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let noise = |candidate: &Candidate| (candidate.noise.powi(2) - ticks.powi(2)).max(0.0).sqrt();
+    let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Kept::Full);
+    let missed =
+        [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
+    Fit {
+        probe: settings.origin.probe,
+        unit: settings.origin.unit,
+        speed_factor: estimate(0, true, &|candidate: &Candidate| 1.0 / candidate.factor),
+        late: [1, 2].map(|finger: usize| estimate(finger, false, &|candidate: &Candidate| candidate.late[finger])),
+        noise: estimate(3, false, &noise),
+        missed: (!only_full).then_some(missed),
+        timer: resolution,
+        recorded: evidence.recordings.iter().map(|own| own.touches.len()).sum(),
+        contacts: super::counts(evidence),
+        presses: evidence.plate.as_ref().map_or(0, |plate| plate.count),
+        objects: evidence.recordings.iter().map(|own| own.name.to_owned()).collect(),
+        warnings: Vec::new(),
+        suspects,
+    }
+}
+
+impl Fit {
+    /// Noise that the real probe adds to touches: the likeliest values.
+    pub fn real(&self) -> Noise {
+        let [middle, third] = self.late.map(|late| -1e3 * late.value);
+        Noise {
+            deviation: (1e3 * self.noise.value).into(),
+            timer: 1e3 * self.timer.unwrap_or(0.0),
+            missed: self.missed.map_or([0.0; FINGERS], |missed| missed.map(|share| share.value)),
+            bent: [0.0, middle, third],
+            speed: self.speed_factor.value,
+            ..Noise::default()
+        }
+    }
+
+    /// The probe as the text of a `probe.toml`, with the intervals as comments.
+    pub fn toml(&self) -> String {
+        let Probe { radius, spacing, speed, tilt } = self.probe;
+        let unit = match self.unit {
+            Length::Tenth => "# A unit is a tenth of the object's longest side.\nunit = \"unit\"\n",
+            Length::Millimeter => "unit = \"mm\"\n",
+        };
+        let offset = |late: &Estimate| -late.value / 1e3 * speed;
+        let presses =
+            if self.presses > 0 { format!(" and {} presses on a plate", self.presses) } else { String::new() };
+        let mut text = format!(
+            "# Found by `palpate probe fit` from {} approaches to {}{presses}.\n\
+             # Behind each value its 95 % interval, which supposes that probe and objects are as they are simulated.\n",
+            self.recorded,
+            self.objects.join(", "),
+        );
+        // Writing to a string cannot fail.
+        for warning in &self.warnings {
+            _ = writeln!(text, "# Not told well: {warning}");
+        }
+        for suspect in &self.suspects {
+            _ = writeln!(text, "# LOOKS WRONG: {suspect}");
+        }
+        _ = write!(
+            text,
+            "{unit}radius = {radius:?}\nspacing = {spacing:?}\nspeed = {speed:?}\ntilt = {tilt:?}\n\n[real]\n\
+             speed_factor = {:.4}  # {}\n\
+             # How far each finger stands out, relative to the first one. Late: {} ms and {} ms.\n\
+             offsets = [0.0, {:.5}, {:.5}]\n\
+             noise = \"{:.3}ms\"  # {} ms\n",
+            self.speed_factor.value,
+            between(&self.speed_factor, 1.0, 3),
+            with_interval(&self.late[0]),
+            with_interval(&self.late[1]),
+            offset(&self.late[0]),
+            offset(&self.late[1]),
+            self.noise.value,
+            between(&self.noise, 1.0, 2),
+        );
+        if let Some(missed) = &self.missed {
+            let [a, b, c] = missed.map(|share| format!("\"{:.2}%\"", 100.0 * share.value));
+            let [d, e, f] = missed.map(|share| format!("{} %", between(&share, 100.0, 1)));
+            _ = writeln!(text, "missed = [{a}, {b}, {c}]  # {d}; {e}; {f}");
+        }
+        if let Some(timer) = self.timer {
+            _ = writeln!(text, "timer = \"{timer}ms\"");
+        }
+        text
+    }
+}
+
+fn with_interval(estimate: &Estimate) -> String {
+    format!("{:.2} ({})", estimate.value, between(estimate, 1.0, 2))
+}
+
+/// An interval in words: "1.0 to 1.2", "at most 3".
+pub fn between(estimate: &Estimate, scale: f64, digits: usize) -> String {
+    let number = |value: f64| {
+        let text = format!("{:.digits$}", scale * value);
+        // No minus before a zero.
+        if text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.')) {
+            text.trim_start_matches('-').to_owned()
+        } else {
+            text
+        }
+    };
+    match (estimate.low, estimate.high) {
+        (Some(low), Some(high)) => format!("{} to {}", number(low), number(high)),
+        (Some(low), None) => format!("at least {}", number(low)),
+        (None, Some(high)) => format!("at most {}", number(high)),
+        (None, None) => "not told".into(),
+    }
+}

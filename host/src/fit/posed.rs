@@ -1,0 +1,141 @@
+//! Likelihood from the pose of a recorded touch: simulated approaches in the very pose, aimed anywhere.
+//!
+//! A touch whose pose is known is compared with approaches to its object in that pose, instead of in all. A flat face is
+//! then touched at a known slope, which tells offsets and speed far better. Poses are never exact and such approaches few,
+//! so a share of the density stays that of all poses.
+
+use super::Settings;
+use super::candidate::{Candidate, Kept};
+use super::density::{FULL, Observed};
+use super::likelihood::{Explained, product};
+use crate::probe::approach::Approach;
+use crate::probe::scene::Scene;
+use crate::random::{self, Purpose};
+use glam::DVec3;
+use palpate_shared::{Pose, Q15_ONE, Touch};
+use rand::{Rng, RngExt};
+use rayon::prelude::*;
+
+/// Simulated approaches in the pose of each recorded touch.
+const APPROACHES: usize = 160;
+/// The share of a touch's density that comes from approaches in its pose.
+const TRUSTED: f64 = 0.8;
+/// By how much of their distance from 0 simulated times are smoothed: poses are not exact.
+const SMOOTHING: f64 = 0.06;
+/// Number of the neighbor that an approach is smoothed toward: there are few, and gaps between them must not be taken
+/// for noise.
+const NEIGHBOR: usize = 3;
+
+/// Approaches in the pose of one recorded touch.
+#[derive(Debug)]
+pub(super) struct InPose(Vec<Simulated>);
+
+#[derive(Clone, Copy, Debug)]
+struct Simulated {
+    /// Set of the fingers that touched.
+    touched: u8,
+    /// Contact times in milliseconds.
+    times: [f32; 3],
+    /// Width by which the differences of times are smoothed, in milliseconds: half the way to its third neighbor with
+    /// the same contacts. Method: Breiman, Meisel and Purcell, Variable kernel estimates of multivariate densities,
+    /// Technometrics 19 (1977).
+    gap: f32,
+}
+
+/// For each recorded touch of an object, approaches in its pose; none for a touch without a pose. Nothing if no touch has
+/// one.
+pub(super) fn in_poses(name: &str, touches: &[Touch], scenes: &[Scene], settings: &Settings) -> Vec<Option<InPose>> {
+    if touches.iter().all(|touch| touch.pose().is_none()) || scenes.is_empty() {
+        return Vec::new();
+    }
+    let one = |(index, touch): (usize, &Touch)| {
+        let mut random = random::generator(settings.seed, Purpose::Fitted, name, 1 + index as u64);
+        let pose = touch.pose()?;
+        let approaches = (0..APPROACHES).map(|turn| {
+            let scene = &scenes[turn % scenes.len()];
+            let approach = aimed(&mut random, &pose, scene, settings);
+            let touch = approach.touch(approach.distances(scene, &settings.origin.probe), &settings.origin.probe);
+            let times = touch.times().map(|time| time.micros().map_or(0.0, |micros| micros as f32 / 1e3));
+            Simulated { touched: Observed::of(&touch).fingers, times, gap: 0.0 }
+        });
+        let mut approaches: Vec<Simulated> = approaches.collect();
+        let gaps: Vec<f32> = approaches.iter().map(|approach| gap(approach, &approaches)).collect();
+        approaches.iter_mut().zip(gaps).for_each(|(approach, gap)| approach.gap = gap);
+        Some(InPose(approaches))
+    };
+    touches.par_iter().enumerate().map(one).collect()
+}
+
+/// Half the way to the third neighbor with the same contacts; 0 where there are not as many.
+fn gap(one: &Simulated, all: &[Simulated]) -> f32 {
+    // Times of fingers that did not touch are 0, and so are what they add here.
+    let away = |other: &Simulated| {
+        let [a, b, c]: [f32; 3] = std::array::from_fn(|finger| other.times[finger] - one.times[finger]);
+        let touched = |fingers: u8| one.touched & fingers == fingers;
+        let differences = [(0b011, b - a), (0b110, c - b), (0b101, c - a)];
+        differences.iter().map(|(fingers, away)| if touched(*fingers) { away.abs() } else { 0.0 }).fold(0.0, f32::max)
+    };
+    let mut neighbors: Vec<f32> = all.iter().filter(|other| other.touched == one.touched).map(away).collect();
+    // The nearest is the approach itself.
+    if neighbors.len() <= NEIGHBOR {
+        return 0.0;
+    }
+    *neighbors.select_nth_unstable_by(NEIGHBOR, f32::total_cmp).1 / 2.0
+}
+
+/// An approach in this pose, aimed as the robot aims.
+fn aimed(random: &mut impl Rng, pose: &Pose, scene: &Scene, settings: &Settings) -> Approach {
+    let vector = |cosines: [i16; 3]| {
+        DVec3::from_array(cosines.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE))).normalize_or(DVec3::Z)
+    };
+    let [low, high] = settings.origin.aim.target(scene);
+    let shares = DVec3::new(random.random(), random.random(), random.random());
+    let [bottom, top] = scene.bounds();
+    let away = (top - bottom).length() + settings.origin.clearance([bottom, top]);
+    let direction = vector(pose.direction);
+    // Farther away than the robot starts, which changes no difference of times.
+    Approach { start: low + (high - low) * shares - direction * away, direction, alignment: vector(pose.alignment) }
+}
+
+/// The logarithm of the density of a recorded touch, given approaches in its pose.
+pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pose: &InPose) -> f64 {
+    let all = explained.log_density(observed);
+    let Some(density) = density(explained.candidate(), explained.kept(), observed, in_pose) else { return all };
+    let posed = density.ln() - explained.recorded();
+    let most = posed.max(all);
+    most + (TRUSTED * (posed - most).exp() + (1.0 - TRUSTED) * (all - most).exp()).ln()
+}
+
+/// The density among the approaches in its pose; none if none of them says anything.
+fn density(candidate: &Candidate, kept: Kept, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
+    let Candidate { factor, late, noise, missed } = candidate;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for Simulated { touched, times, gap } in approaches {
+        let weight = match kept {
+            Kept::Full => f64::from(u8::from(*touched == FULL)),
+            Kept::All | Kept::Contacts => product(*touched, observed.fingers, missed),
+        };
+        weights += if kept == Kept::Full { weight } else { 1.0 };
+        if touched & observed.fingers != observed.fingers || weight <= 0.0 {
+            continue;
+        }
+        let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];
+        let kernel = |expected: f64, found: f64, variance: f64, of: f64| {
+            let variance = variance * noise * noise + (SMOOTHING * of).powi(2) + (factor * f64::from(*gap)).powi(2);
+            (-0.5 * (found - expected).powi(2) / variance).exp() / (std::f64::consts::TAU * variance).sqrt()
+        };
+        sum += weight
+            * match observed.fingers {
+                FULL => {
+                    let [a, b, c] = [seen(0), seen(1), seen(2)];
+                    let (curvature, slope) = (a - 2.0 * b + c, c - a);
+                    kernel(curvature, observed.first, 6.0, curvature) * kernel(slope, observed.second, 2.0, slope)
+                }
+                0b011 => kernel(seen(1) - seen(0), observed.first, 2.0, seen(1) - seen(0)),
+                0b110 => kernel(seen(2) - seen(1), observed.first, 2.0, seen(2) - seen(1)),
+                0b101 => kernel(seen(2) - seen(0), observed.first, 2.0, seen(2) - seen(0)),
+                _ => 1.0,
+            };
+    }
+    (weights > 0.0 && sum > 0.0).then(|| sum / weights)
+}

@@ -1,0 +1,314 @@
+//! A simulator of imperfect probes that shares no code with the fit, and the parameters fitted to its touches.
+
+use super::*;
+
+use crate::mesh::builtin;
+use crate::touches::{ObjectTouches, Source};
+use palpate_shared::ContactTime;
+use std::sync::LazyLock;
+
+/// Faults of a probe. Times are in milliseconds.
+#[derive(Clone, Copy)]
+struct Crooked {
+    /// Times are this many times as long.
+    longer: f64,
+    late: [f64; 3],
+    noise: f64,
+    missed: [f64; 3],
+    /// Ticks of the timer.
+    tick: f64,
+}
+
+const STRAIGHT: Crooked = Crooked { longer: 1.0, late: [0.0; 3], noise: 0.0, missed: [0.0; 3], tick: 1.0 };
+const BENT: Crooked =
+    Crooked { longer: 0.92, late: [0.0, 3.0, -4.0], noise: 3.0, missed: [0.01, 0.03, 0.0], ..STRAIGHT };
+
+/// A generator of its own: that of Numerical Recipes, and sums of twelve uniform numbers for normal ones.
+struct Numbers(u64);
+
+impl Numbers {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// A touch as the imperfect probe records it, from times in milliseconds.
+fn record(times: [Option<f64>; 3], probe: &Crooked, numbers: &mut Numbers) -> Touch {
+    let mut ticks = [None; 3];
+    let phase = numbers.uniform();
+    for finger in 0..3 {
+        let (chance, normal) = (numbers.uniform(), numbers.normal());
+        if let Some(time) = times[finger].filter(|_| chance >= probe.missed[finger]) {
+            let seen = time * probe.longer + probe.late[finger] + probe.noise * normal + 1e3;
+            ticks[finger] = Some((seen / probe.tick + phase).floor() * probe.tick * 1e3);
+        }
+    }
+    Touch::new(ticks.map(|tick| tick.map_or(ContactTime::MISSING, |tick| ContactTime::from_micros(tick as u32))))
+}
+
+/// The objects that were recorded, and two others; made only once.
+static OBJECTS: LazyLock<[Object; 5]> =
+    LazyLock::new(|| ["bowl", "mouse", "wristwatch", "fork", "spoon"].map(|name| builtin::one(name).unwrap()));
+
+/// The objects that were recorded.
+fn objects() -> Vec<Object> {
+    OBJECTS[..3].to_vec()
+}
+
+fn other(name: &str) -> Object {
+    OBJECTS.iter().find(|object| object.name == name).unwrap().clone()
+}
+
+/// Approaches to an object, with what is wrong with the probe.
+fn approaches(object: &Object, count: usize, seed: u64, probe: &Crooked) -> Vec<Touch> {
+    let origin = Origin { approaches: true, seed: 1_000 + seed, ..Origin::default() };
+    let scenes = capture::scenes(&[object], &origin, &()).unwrap();
+    let touches = capture::touches(&scenes[0], &object.name, &origin, 0..count as u64).unwrap();
+    let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ object.name.len() as u64);
+    let times = |touch: &Touch| touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3));
+    touches.touches().iter().map(|touch| record(times(touch), probe, &mut numbers)).collect()
+}
+
+fn recorded(objects: &[Object], count: usize, seed: u64, probe: &Crooked) -> Dataset {
+    let one =
+        |object: &Object| ObjectTouches::new(&object.name, approaches(object, count, seed, probe), Source::Object);
+    Dataset::new(objects.iter().map(one).collect())
+}
+
+/// Presses on a plate that is not quite square to the motion, with half a turn after each.
+fn plate(count: usize, probe: &Crooked) -> Vec<Touch> {
+    let mut numbers = Numbers(7);
+    let press = |index: usize| {
+        let slope = if index.is_multiple_of(2) { 2.5 } else { -2.5 };
+        record([Some(10.0 - slope), Some(10.0), Some(10.0 + slope)], probe, &mut numbers)
+    };
+    (0..count).map(press).collect()
+}
+
+fn settings() -> Settings {
+    Settings { approaches: 20_000, ..Settings::default() }
+}
+
+fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
+    fit(recorded, &objects(), plate, &settings(), &()).unwrap()
+}
+
+/// That the values are near those of the probe, and the intervals hold them but for an error of the simulation.
+fn near(fit: &Fit, probe: &Crooked, [factor, offset, noise]: [f64; 3]) {
+    let told = format!("{:?} {:?} {:?} {:?}", fit.speed_factor, fit.late, fit.noise, fit.missed);
+    assert!((fit.speed_factor.value * probe.longer - 1.0).abs() < factor, "{told}");
+    for (late, finger) in fit.late.iter().zip([1, 2]) {
+        assert!((late.value - probe.late[finger] + probe.late[0]).abs() < offset, "finger {finger}: {told}");
+    }
+    assert!((fit.noise.value / probe.noise.max(0.3)).ln().abs() < noise, "{told}");
+    for (missed, share) in fit.missed.iter().flatten().zip(probe.missed) {
+        assert!((missed.value - share).abs() < 0.03, "{told}");
+    }
+    assert!(fit.suspects.is_empty(), "{:?}", fit.suspects);
+}
+
+#[test]
+fn a_crooked_probe_is_found_from_touches_and_a_plate() {
+    let found = fitted(&recorded(&objects(), 400, 1, &BENT), Some(&plate(60, &BENT)));
+    near(&found, &BENT, [0.04, 1.2, 0.25]);
+    assert_eq!((found.timer, found.presses, found.recorded), (Some(1.0), 60, 1_200));
+    assert!(found.speed_factor.holds(1.0 / BENT.longer) && !found.speed_factor.holds(1.0), "{:?}", found.speed_factor);
+    assert!(!found.late[0].holds(0.0) && !found.late[1].holds(0.0), "{:?}", found.late);
+    assert!(found.late.iter().all(|late| late.width().unwrap() < 3.0), "{:?}", found.late);
+}
+
+#[test]
+fn without_a_plate_curvature_is_told_and_the_slope_hardly() {
+    let found = fitted(&recorded(&objects(), 400, 2, &BENT), None);
+    near(&found, &BENT, [0.05, 12.0, 0.5]);
+    // κ is what the trees use: late by −2 × the middle finger's and the third one's.
+    let curvature = found.late[1].value - 2.0 * found.late[0].value;
+    assert!((curvature - (-4.0 - 2.0 * 3.0)).abs() < 2.5, "{curvature}");
+    let asked = found.warnings.iter().find(|warning| warning.what.contains("offset")).expect("a warning");
+    assert!(asked.record.contains("flat plate"), "{asked}");
+}
+
+#[test]
+fn recorded_poses_tell_the_slope_as_well() {
+    let mut posed = recorded(&objects(), 250, 2, &BENT);
+    let plain = fitted(&posed, None);
+    let origin = Origin { approaches: true, seed: 1_002, ..Origin::default() };
+    for (own, object) in posed.objects.iter_mut().zip(&objects()) {
+        let scenes = capture::scenes(&[object], &origin, &()).unwrap();
+        let poses = capture::touches(&scenes[0], &object.name, &origin, 0..250).unwrap();
+        let with = |(touch, posed): (&Touch, &Touch)| touch.with_pose(posed.pose().unwrap());
+        own.edit(|touches| *touches = touches.iter().zip(poses.touches()).map(with).collect());
+    }
+    let found = fitted(&posed, None);
+    near(&found, &BENT, [0.06, 3.0, 0.5]);
+    let width = |fit: &Fit| fit.late[1].width().unwrap();
+    assert!(width(&found) < 0.6 * width(&plain), "{:?} {:?}", found.late, plain.late);
+}
+
+#[test]
+fn a_slow_arm_and_a_bent_outer_finger_are_told_apart() {
+    let slow = Crooked { longer: 1.13, noise: 2.0, ..STRAIGHT };
+    let found = fitted(&recorded(&objects(), 400, 3, &slow), Some(&plate(60, &slow)));
+    near(&found, &slow, [0.04, 1.0, 0.3]);
+    let bent = Crooked { late: [0.0, 0.0, -7.0], noise: 2.0, ..STRAIGHT };
+    let found = fitted(&recorded(&objects(), 400, 4, &bent), Some(&plate(60, &bent)));
+    near(&found, &bent, [0.04, 1.0, 0.3]);
+    // A first finger that is bent is the other two bent the other way.
+    let first = Crooked { late: [5.0, 0.0, 0.0], noise: 2.0, ..STRAIGHT };
+    near(&fitted(&recorded(&objects(), 400, 5, &first), Some(&plate(60, &first))), &first, [0.04, 1.0, 0.3]);
+}
+
+#[test]
+fn what_each_finger_misses_is_told_apart() {
+    let chatter = Crooked { noise: 1.5, missed: [0.0, 0.12, 0.05], ..STRAIGHT };
+    let found = fitted(&recorded(&objects(), 600, 6, &chatter), None);
+    let missed = found.missed.unwrap();
+    assert!(missed[0].value < 0.03 && (missed[1].value - 0.12).abs() < 0.03, "{missed:?}");
+    assert!((missed[2].value - 0.05).abs() < 0.03, "{missed:?}");
+}
+
+#[test]
+fn a_coarse_timer_is_found_and_hides_noise() {
+    let coarse = Crooked { noise: 1.0, tick: 10.0, ..STRAIGHT };
+    let found = fitted(&recorded(&objects(), 400, 7, &coarse), None);
+    assert_eq!(found.timer, Some(10.0));
+    assert!(found.noise.value < 4.0, "{:?}", found.noise);
+    let fine = Crooked { noise: 2.0, tick: 0.001, ..STRAIGHT };
+    assert_eq!(fitted(&recorded(&objects(), 300, 8, &fine), None).timer, None);
+}
+
+#[test]
+fn one_object_is_enough_for_a_fit_with_wider_intervals() {
+    let all = objects();
+    let found = fitted(&recorded(&all[..1], 400, 9, &BENT), Some(&plate(60, &BENT)));
+    near(&found, &BENT, [0.08, 1.5, 0.4]);
+}
+
+#[test]
+fn full_touches_alone_do_not_tell_what_is_missed() {
+    let mut full = recorded(&objects(), 900, 10, &BENT);
+    full.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
+    let found = fitted(&full, None);
+    assert_eq!(found.missed, None);
+    assert!(
+        found.warnings.iter().any(|warning| warning.record.contains("Record every approach")),
+        "{:?}",
+        found.warnings
+    );
+    assert!((found.speed_factor.value * BENT.longer - 1.0).abs() < 0.06, "{:?}", found.speed_factor);
+    assert_eq!(found.real().missed, [0.0; 3]);
+}
+
+#[test]
+fn approaches_that_touched_nothing_need_not_be_recorded() {
+    let mut contacts = recorded(&objects(), 500, 11, &BENT);
+    contacts.objects.iter_mut().for_each(|object| *object = object.filtered(|touch| !touch.is_empty()));
+    near(&fitted(&contacts, Some(&plate(60, &BENT))), &BENT, [0.05, 1.2, 0.3]);
+}
+
+#[test]
+fn a_few_touches_give_warnings_and_too_few_an_error() {
+    let found = fitted(&recorded(&objects(), 25, 12, &BENT), None);
+    assert!(found.warnings.len() >= 3, "{:?}", found.warnings);
+    assert!(found.warnings.iter().any(|warning| warning.record.contains("approaches")), "{:?}", found.warnings);
+    let few = recorded(&objects()[..1], 12, 12, &BENT);
+    let error = fit(&few, &objects(), None, &settings(), &()).unwrap_err();
+    assert!(matches!(error.problem::<FitProblem>(), Some(FitProblem::FewRecorded { .. })), "{error}");
+}
+
+#[test]
+fn a_recorded_object_without_a_mesh_is_named() {
+    let error = fit(&recorded(&objects(), 30, 13, &BENT), &objects()[..2], None, &settings(), &()).unwrap_err();
+    assert!(error.to_string().contains("wristwatch was recorded, and is none of the objects: bowl, mouse"), "{error}");
+}
+
+#[test]
+fn a_recording_under_a_wrong_name_is_named_with_the_right_one() {
+    let mut wrong = recorded(&objects(), 300, 14, &BENT);
+    let fork = other("fork");
+    wrong.objects[1].edit(|touches| *touches = approaches(&fork, 300, 14, &BENT));
+    let all = [objects(), vec![fork]].concat();
+    let found = fit(&wrong, &all, None, &settings(), &()).unwrap();
+    let expected = Suspect::OtherObject { object: "mouse".into(), looks_like: "fork".into() };
+    assert_eq!(found.suspects, [expected]);
+    // Also where it is the only recording.
+    let only = Dataset::new(vec![wrong.objects[1].clone()]);
+    let found = fit(&only, &all, None, &settings(), &()).unwrap();
+    assert!(
+        matches!(&found.suspects[..], [Suspect::OtherObject { looks_like, .. }] if looks_like == "fork"),
+        "{:?}",
+        found.suspects
+    );
+}
+
+#[test]
+fn two_objects_in_one_recording_are_named_with_the_place() {
+    let mut two = recorded(&objects(), 300, 15, &BENT);
+    let watch = two.objects[2].touches().to_vec();
+    two.objects[0].edit(|touches| _ = touches.splice(180.., watch[..120].iter().copied()));
+    let found = fitted(&two, None);
+    let [Suspect::TwoObjects { object, other, from: Some(from), to: Some(to), .. }] = &found.suspects[..] else {
+        panic!("{:?}", found.suspects)
+    };
+    assert_eq!((object.as_str(), other.as_str()), ("bowl", "wristwatch"));
+    assert!(from.abs_diff(181) < 15 && *to > 290, "{from} to {to}");
+    // And if they are mixed.
+    let mut mixed = recorded(&objects(), 300, 15, &BENT);
+    mixed.objects[0].edit(|touches| (0..300).step_by(3).for_each(|index| touches[index] = watch[index]));
+    let found = fitted(&mixed, None);
+    assert!(
+        matches!(&found.suspects[..], [Suspect::TwoObjects { object, other, .. }] if object == "bowl" && other == "wristwatch"),
+        "{:?}",
+        found.suspects
+    );
+}
+
+#[test]
+fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
+    let mut moved = recorded(&objects(), 300, 16, &BENT);
+    let after = Crooked { late: [0.0, -12.0, 6.0], ..BENT };
+    let changed = approaches(&objects()[0], 400, 17, &after);
+    moved.objects[0].edit(|touches| _ = touches.splice(150.., changed[..250].iter().copied()));
+    let found = fitted(&moved, None);
+    let suspect = found.suspects.iter().find(|suspect| matches!(suspect, Suspect::Changed { .. }));
+    let Some(Suspect::Changed { object, from, what }) = suspect else { panic!("{:?}", found.suspects) };
+    assert_eq!(object, "bowl");
+    assert!(from.abs_diff(151) < 40 && what.contains("second finger"), "{from}: {what}");
+}
+
+#[test]
+fn a_mesh_of_another_shape_is_like_no_recording() {
+    let mut other = recorded(&objects(), 300, 18, &BENT);
+    other.objects[1].edit(|touches| *touches = approaches(&self::other("spoon"), 300, 18, &BENT));
+    let found = fitted(&other, None);
+    assert!(found.suspects.iter().any(|suspect| suspect.to_string().starts_with("mouse: ")), "{:?}", found.suspects);
+}
+
+#[test]
+fn a_fit_is_the_same_on_any_number_of_threads_and_read_back_as_written() {
+    let (recorded, plate) = (recorded(&objects(), 150, 19, &BENT), plate(30, &BENT));
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| fitted(&recorded, Some(&plate)))
+    };
+    let found = with(1);
+    assert_eq!(found, with(3));
+    {
+        let file = crate::probe::file::ProbeFile::parse(&found.toml(), "probe.toml".as_ref()).unwrap();
+        let (written, real) = (file.real, found.real());
+        assert_eq!(file.probe, found.probe);
+        assert!(
+            (written.speed - real.speed).abs() < 1e-4 && (written.deviation.least - real.deviation.least).abs() < 1.0
+        );
+        for finger in 0..3 {
+            assert!((written.bent[finger] - real.bent[finger]).abs() < 2.0, "{written:?} {real:?}");
+            assert!((written.missed[finger] - real.missed[finger]).abs() < 1e-4, "{written:?} {real:?}");
+        }
+        assert_eq!(written.timer, real.timer);
+    }
+}

@@ -1,0 +1,95 @@
+//! The resolution of the timer that recorded touches, found from their times.
+
+use palpate_shared::Touch;
+
+/// Resolutions that are looked for, in microseconds.
+const RANGE: [f64; 2] = [20.0, 60_000.0];
+/// Times are used up to so many ticks: the farther, the more exactly must the resolution be known.
+const TICKS: f64 = 40.0;
+/// Mean resultant length of the times' phases within a tick, above which there is a timer.
+const CLOSE: f64 = 0.93;
+/// Times that it takes to tell.
+const LEAST: usize = 24;
+
+/// Evidence of the times about the timer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Timer {
+    /// Its resolution in microseconds.
+    Found(f64),
+    /// Finer than what is looked for.
+    Fine,
+    /// There are too few times to tell.
+    Unknown,
+}
+
+/// The largest resolution of which nearly all times are multiples. Rayleigh's test: on whole ticks the unit vectors at
+/// 2π · time / resolution all point the same way.
+pub(super) fn timer<'a>(touches: impl IntoIterator<Item = &'a Touch>) -> Timer {
+    let times = touches.into_iter().flat_map(|touch| touch.times()).filter_map(|time| time.micros());
+    let mut times: Vec<f64> = times.filter(|micros| *micros > 0).map(f64::from).collect();
+    times.sort_by(f64::total_cmp);
+    let mut resolution = RANGE[1];
+    let mut enough = false;
+    while resolution >= RANGE[0] {
+        let near = &times[..times.partition_point(|time| *time <= TICKS * resolution)];
+        // Times of less than a tick say nothing: where all of them are, none is a multiple.
+        if near.len() >= LEAST {
+            enough = true;
+            if closeness(near, resolution) > CLOSE {
+                // Coming from above, and with times of few ticks, this is the side of the peak.
+                let finer = (-600..=20).map(|step| resolution * (1.0 + 2e-4 * f64::from(step)));
+                let best = finer.max_by(|a, b| closeness(near, *a).total_cmp(&closeness(near, *b)));
+                return Timer::Found(usual(best.unwrap_or(resolution)));
+            }
+        }
+        resolution /= 1.0 + 0.2 / TICKS;
+    }
+    if enough { Timer::Fine } else { Timer::Unknown }
+}
+
+fn closeness(times: &[f64], resolution: f64) -> f64 {
+    let angles = times.iter().map(|time| std::f64::consts::TAU * time / resolution);
+    let (cos, sin) = angles.fold((0.0, 0.0), |(cos, sin), angle| {
+        let (s, c) = libm::sincos(angle);
+        (cos + c, sin + s)
+    });
+    f64::hypot(cos, sin) / times.len().max(1) as f64
+}
+
+/// The nearest number of two digits, if it is within what the search can tell.
+fn usual(resolution: f64) -> f64 {
+    let power = 10.0_f64.powf(resolution.log10().floor() - 1.0);
+    let rounded = (resolution / power).round() * power;
+    if (rounded / resolution - 1.0).abs() < 6e-3 { rounded } else { resolution }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::noise::Noise;
+
+    /// Touches whose times are spread over some hundred milliseconds.
+    fn touches(count: u32, timer: f64) -> Vec<Touch> {
+        let spread = |index: u32| Touch::from_micros([0, 7_919 * index % 90_001, 104_729 * index % 210_011]);
+        let touches: Vec<Touch> = (1..=count).map(spread).collect();
+        Noise { timer, ..Noise::gaussian(1_500.0) }.add("plate", &touches, 1)
+    }
+
+    #[test]
+    fn the_resolution_is_that_of_the_timer_and_not_a_part_of_it() {
+        // The finer the timer, the fewer times are so short that a whole number of its ticks is exact enough.
+        let cases = [(100.0, 3_000), (976.5625, 300), (1_000.0, 300), (2_500.0, 300), (10_000.0, 300), (20_000.0, 300)];
+        for (resolution, count) in cases {
+            let Timer::Found(found) = timer(&touches(count, resolution)) else { panic!("{resolution}: not found") };
+            assert!((found / resolution - 1.0).abs() < 6e-3, "{resolution}: {found}");
+        }
+        assert_eq!(timer(&touches(300, 1_000.0)), Timer::Found(1_000.0));
+    }
+
+    #[test]
+    fn times_without_a_timer_have_none_and_few_times_say_nothing() {
+        assert_eq!(timer(&touches(300, 0.0)), Timer::Fine);
+        assert_eq!(timer(&touches(9, 1_000.0)), Timer::Unknown);
+        assert_eq!(timer(&[]), Timer::Unknown);
+    }
+}

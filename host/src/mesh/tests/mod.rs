@@ -1,0 +1,3 @@
+//! Meshes and files for the tests of all formats.
+
+pub(super) mod samples;

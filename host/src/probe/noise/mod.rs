@@ -1,0 +1,457 @@
+//! Noise that a real sensor, timer and robot add to touches.
+//!
+//! [`Noise`] describes it, for training as well as for testing. What differs from touch to touch is noise; what is the
+//! same for all touches of one robot is a bias.
+//!
+//! ```
+//! use palpate::probe::noise::{Deviation, Noise};
+//! use palpate_shared::Touch;
+//!
+//! let noise = Noise { deviation: "0..10ms".parse()?, timer: 1_000.0, ..Noise::default() };
+//! let noisy = noise.add("fork", &[Touch::from_micros([0, 12_345, 30_000])], 1);
+//! // The first contact is 0 again, and the timer counts whole milliseconds.
+//! assert!(noisy[0].times().iter().all(|time| time.micros().is_some_and(|micros| micros % 1_000 == 0)));
+//! assert_eq!(Deviation::from(5_000.0).largest, 5_000.0);
+//! # Ok::<_, palpate::error::ProbeProblem>(())
+//! ```
+
+mod partial;
+pub mod quantity;
+#[cfg(test)]
+mod tests;
+
+pub use partial::{BadNoise, PartialNoise};
+
+use crate::error::{Error, ProbeProblem, Result};
+use crate::probe::approach::{FINGERS, to_q15};
+use crate::random::{self, Purpose};
+use glam::DVec3;
+use palpate_shared::format::{PromisedNoise, TrainedNoise};
+use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
+use rand::RngExt;
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::fmt;
+use std::str::FromStr;
+
+/// Noise that is added to touches. Times are in microseconds, angles in degrees, shares between 0 and 1. The default
+/// adds nothing.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Noise {
+    /// Gaussian noise of every contact time: its standard deviation, or a range that each touch draws it from.
+    pub deviation: Deviation,
+    /// The timer's resolution: times are rounded down to multiples of it, counted from a phase of the touch's own. 0 for
+    /// none.
+    pub timer: f64,
+    /// Delay that a bouncing switch adds to every contact time: uniform from 0 to this.
+    pub debounce: f64,
+    /// The probability that a contact of each finger is missed. In files one number, if it is the same for all fingers.
+    #[serde(with = "missed_shares")]
+    pub missed: [f64; FINGERS],
+    /// Time by which each finger touches too early: a bent finger.
+    pub bent: [f64; FINGERS],
+    /// The probe's speed over the nominal one.
+    pub speed: f64,
+    /// Largest error of the speed of a touch, as a share of it, to either side.
+    pub speed_error: f64,
+    /// Largest error of the speed of a robot, the same through all of its touches.
+    pub speed_bias: f64,
+    /// The standard deviation of the angle by which the pose of a touch is turned about a random axis.
+    pub pose: f64,
+    /// The same for a robot: every pose of its touches is turned alike.
+    pub pose_bias: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self {
+            deviation: Deviation::default(),
+            timer: 0.0,
+            debounce: 0.0,
+            missed: [0.0; FINGERS],
+            bent: [0.0; FINGERS],
+            speed: 1.0,
+            speed_error: 0.0,
+            speed_bias: 0.0,
+            pose: 0.0,
+            pose_bias: 0.0,
+        }
+    }
+}
+
+/// A standard deviation in microseconds, or a range of them that each touch draws one from: its place in the range is a
+/// uniform number to the power of 3/2. Small deviations are drawn more often, since a millisecond more makes the greatest
+/// difference there: a model trained on 0 to 10 ms is then nowhere far behind one trained for the very level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Deviation {
+    /// The least.
+    pub least: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+impl From<f64> for Deviation {
+    fn from(deviation: f64) -> Self {
+        Self { least: deviation, largest: deviation }
+    }
+}
+
+/// `5ms`, or a range as `0..10ms`.
+impl FromStr for Deviation {
+    type Err = ProbeProblem;
+
+    fn from_str(text: &str) -> Result<Self, ProbeProblem> {
+        let problem = || ProbeProblem::BadQuantity {
+            text: text.into(),
+            example: "a duration with its unit such as 5ms, or a range such as 0..10ms",
+        };
+        let Some((least, largest)) = text.split_once("..") else {
+            return quantity::duration(text).map(Self::from).map_err(|_| problem());
+        };
+        // The first number may go without a unit: it has that of the second.
+        let unit = largest.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
+        let least = quantity::duration(least).or_else(|_| quantity::duration(&format!("{least}{unit}")));
+        match (least, quantity::duration(largest)) {
+            (Ok(least), Ok(largest)) if least <= largest => Ok(Self { least, largest }),
+            _ => Err(problem()),
+        }
+    }
+}
+
+/// Describes the noise in words: "noise of 0 to 10 ms, a timer of 1 ms".
+impl fmt::Display for Noise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ms = |micros: f64| micros / 1e3;
+        let percent = |share: f64| (1e6 * share).round() / 1e4;
+        let Deviation { least, largest } = self.deviation;
+        let mut parts = Vec::new();
+        if largest > 0.0 {
+            let range = if least == largest { String::new() } else { format!("{} to ", ms(least)) };
+            parts.push(format!("noise of {range}{} ms", ms(largest)));
+        }
+        let mut say = |is_there: bool, text: String| parts.extend(is_there.then_some(text));
+        say(self.timer > 0.0, format!("a timer of {} ms", ms(self.timer)));
+        say(self.debounce > 0.0, format!("bouncing of up to {} ms", ms(self.debounce)));
+        let [missed, others @ ..] = self.missed;
+        if others.iter().all(|other| *other == missed) {
+            say(missed > 0.0, format!("{} % of contacts missed", percent(missed)));
+        } else {
+            for (finger, missed) in (1..).zip(self.missed) {
+                say(missed > 0.0, format!("{} % of finger {finger}'s contacts missed", percent(missed)));
+            }
+        }
+        for (finger, early) in (1..).zip(self.bent) {
+            let side = if early > 0.0 { "early" } else { "late" };
+            say(early != 0.0, format!("finger {finger} {side} by {} ms", ms(early.abs())));
+        }
+        say(self.speed != 1.0, format!("a speed of {} times the nominal one", self.speed));
+        say(self.speed_error > 0.0, format!("speed off by up to {} % per touch", percent(self.speed_error)));
+        say(self.speed_bias > 0.0, format!("speed off by up to {} % per robot", percent(self.speed_bias)));
+        say(self.pose > 0.0, format!("a pose turned by {}° per touch", self.pose));
+        say(self.pose_bias > 0.0, format!("a pose turned by {}° per robot", self.pose_bias));
+        f.write_str(&if parts.is_empty() { "no noise".into() } else { parts.join(", ") })
+    }
+}
+
+impl Noise {
+    /// Gaussian noise of one standard deviation, in microseconds, and nothing else.
+    pub fn gaussian(deviation: f64) -> Self {
+        Self { deviation: deviation.into(), ..Self::default() }
+    }
+
+    /// Noise of a usual switch: its contact closes up to 5 ms off, how much differs from touch to touch and switch to
+    /// switch, and a program that polls it every millisecond counts whole ones.
+    pub fn switch() -> Self {
+        Self { deviation: Deviation { least: 0.0, largest: 5_000.0 }, timer: 1_000.0, ..Self::default() }
+    }
+
+    /// True if it changes no touch.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// True if something is the same through all touches of a robot, so that touches of several robots must not be
+    /// mixed in a sequence.
+    pub fn has_bias(&self) -> bool {
+        self.speed_bias > 0.0 || self.pose_bias > 0.0
+    }
+
+    /// True if it can turn a contact into a missing one.
+    pub fn misses(&self) -> bool {
+        self.missed.iter().any(|share| *share > 0.0)
+    }
+
+    /// Statement of a compiled model about it. A robot's bias counts as noise of the pose: in training, every touch is
+    /// made by a robot of its own.
+    pub fn trained(&self) -> TrainedNoise {
+        let whole = |number: f64| number.round().clamp(0.0, f64::from(u32::MAX)) as u32;
+        TrainedNoise {
+            least: whole(self.deviation.least),
+            largest: whole(self.deviation.largest),
+            timer: whole(self.timer),
+            pose: whole(1e3 * self.pose.hypot(self.pose_bias)),
+        }
+    }
+
+    /// Statement of a compiled model's promise about it.
+    pub fn promised(&self) -> PromisedNoise {
+        let whole = |number: f64| number.round().clamp(0.0, f64::from(u32::MAX)) as u32;
+        let billionths = |share: f64| whole(1e9 * share);
+        PromisedNoise {
+            touch: Self { pose_bias: 0.0, ..*self }.trained(),
+            debounce: whole(self.debounce),
+            bent: self.bent.map(|early| early.round() as i32),
+            missed: self.missed.map(billionths),
+            speed_error: billionths(self.speed_error),
+            speed_bias: billionths(self.speed_bias),
+            speed: (1e9 * (self.speed - 1.0)).round() as i32,
+            pose_bias: whole(1e3 * self.pose_bias),
+        }
+    }
+
+    /// Noise of which a promise states this.
+    pub fn of_promise(promised: &PromisedNoise) -> Self {
+        let share = |billionths: u32| f64::from(billionths) / 1e9;
+        let TrainedNoise { least, largest, timer, pose } = promised.touch;
+        Self {
+            deviation: Deviation { least: least.into(), largest: largest.into() },
+            timer: timer.into(),
+            debounce: promised.debounce.into(),
+            missed: promised.missed.map(share),
+            bent: promised.bent.map(f64::from),
+            speed: 1.0 + f64::from(promised.speed) / 1e9,
+            speed_error: share(promised.speed_error),
+            speed_bias: share(promised.speed_bias),
+            pose: f64::from(pose) / 1e3,
+            pose_bias: f64::from(promised.pose_bias) / 1e3,
+        }
+    }
+
+    /// Refuses noise that cannot be.
+    ///
+    /// # Errors
+    /// [`Setting`](crate::error::Setting) that names the field, `noise` for the deviation.
+    pub fn check(&self) -> Result<()> {
+        let Deviation { least, largest } = self.deviation;
+        if !(0.0 <= least && least <= largest && largest.is_finite()) {
+            let value = if least == largest { least.to_string() } else { format!("{least}..{largest}") };
+            return Err(Error::setting("noise", value, "a duration of at least 0"));
+        }
+        for (name, value) in [("timer", self.timer), ("debounce", self.debounce)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::setting(name, value, "a duration of at least 0"));
+            }
+        }
+        if let Some(bent) = self.bent.iter().find(|bent| !bent.is_finite()) {
+            return Err(Error::setting("bent", bent, "a duration"));
+        }
+        if let Some(missed) = self.missed.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+            return Err(Error::setting("missed", missed, "a share from 0 to 1"));
+        }
+        if !(self.speed > 0.0 && self.speed.is_finite()) {
+            return Err(Error::setting("speed", self.speed, "a number greater than 0"));
+        }
+        for (name, value) in [("speed_error", self.speed_error), ("speed_bias", self.speed_bias)] {
+            if !(0.0..=0.9).contains(&value) {
+                return Err(Error::setting(name, value, "a share from 0 to 0.9"));
+            }
+        }
+        for (name, value) in [("pose_noise", self.pose), ("pose_bias", self.pose_bias)] {
+            if !(0.0..=180.0).contains(&value) {
+                return Err(Error::setting(name, value, "degrees from 0 to 180"));
+            }
+        }
+        Ok(())
+    }
+
+    /// `touches` of the object `name` with this noise, every touch made by a robot of its own: for training, and for
+    /// noise without a bias.
+    ///
+    /// Then the earliest time is subtracted, so that the first contact is 0 again, and times are rounded to whole
+    /// microseconds, as in the published evaluation. What is missing stays missing. The result is a pure function of
+    /// noise, seed, name, and each touch with its position. Noise that [`check`](Self::check) refuses gives touches
+    /// without meaning.
+    pub fn add(&self, name: &str, touches: &[Touch], seed: u64) -> Vec<Touch> {
+        self.add_by(name, touches, seed, |index| index)
+    }
+
+    /// The same with touches of `robots` robots in turn: touch i is made by robot i modulo `robots`, and a robot's bias
+    /// is the same for every object. 0 is taken as 1.
+    pub fn add_by_robots(&self, name: &str, touches: &[Touch], seed: u64, robots: usize) -> Vec<Touch> {
+        self.add_by(name, touches, seed, |index| index % robots.max(1) as u64)
+    }
+
+    /// A touch with this noise, whose random numbers come from `random`; made by a robot of its own. For touches that are
+    /// made one at a time, such as those of a capture.
+    pub(crate) fn add_to(&self, touch: &Touch, random: &mut ChaCha8Rng) -> Touch {
+        let normal = std::array::from_fn(|_| StandardNormal.sample(random));
+        let [own, robot] = [Draw::new(random), Draw::new(random)];
+        self.one(touch, normal, &own, &robot)
+    }
+
+    /// This noise and `more` added after it, as far as one noise can say it: variances and shares of missed contacts add
+    /// up, times of fingers add up, speeds are multiplied; of two timers the coarser one counts.
+    #[must_use]
+    pub fn and(&self, more: &Self) -> Self {
+        let Deviation { least, largest } = self.deviation;
+        let deviation =
+            Deviation { least: least.hypot(more.deviation.least), largest: largest.hypot(more.deviation.largest) };
+        Self {
+            deviation,
+            timer: self.timer.max(more.timer),
+            debounce: self.debounce + more.debounce,
+            missed: std::array::from_fn(|finger| {
+                let [one, other] = [self.missed[finger], more.missed[finger]];
+                one + other - one * other
+            }),
+            bent: std::array::from_fn(|finger| self.bent[finger] / more.speed + more.bent[finger]),
+            speed: self.speed * more.speed,
+            speed_error: (self.speed_error + more.speed_error).min(0.9),
+            speed_bias: (self.speed_bias + more.speed_bias).min(0.9),
+            pose: self.pose.hypot(more.pose),
+            pose_bias: self.pose_bias.hypot(more.pose_bias),
+        }
+    }
+
+    /// The same with touch i made by robot `robot(i)`.
+    pub(crate) fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
+        // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
+        // version 0.1.0, and no other setting changes it.
+        let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
+        let is_gaussian = Self { deviation: self.deviation.least.into(), ..Self::default() } == *self;
+        let one = |(touch, index): (&Touch, u64)| {
+            let normal: [f64; FINGERS] = std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
+            if is_gaussian {
+                return timed(touch, |finger, time| time + self.deviation.least * normal[finger]);
+            }
+            let own = Draw::new(&mut random::generator(seed, Purpose::Sensor, name, index));
+            let robot =
+                self.has_bias().then(|| Draw::new(&mut random::generator(seed, Purpose::Robot, "", robot(index))));
+            self.one(touch, normal, &own, &robot.unwrap_or_default())
+        };
+        touches.iter().zip(0..).map(one).collect()
+    }
+
+    fn one(&self, touch: &Touch, normal: [f64; FINGERS], own: &Draw, robot: &Draw) -> Touch {
+        let Deviation { least, largest } = self.deviation;
+        let deviation = least + (largest - least) * own.level * own.level.sqrt();
+        let speed = self.speed * (1.0 + self.speed_error * own.speed) * (1.0 + self.speed_bias * robot.speed);
+        let missing = std::array::from_fn(|finger| own.missed[finger] < self.missed[finger]);
+        let noisy = missed(touch, missing);
+        let noisy = timed(&noisy, |finger, time| {
+            let sensed =
+                time / speed - self.bent[finger] + deviation * normal[finger] + self.debounce * own.debounce[finger];
+            if self.timer > 0.0 { ((sensed / self.timer + own.phase).floor()) * self.timer } else { sensed }
+        });
+        match noisy.pose() {
+            Some(pose) if self.pose > 0.0 || self.pose_bias > 0.0 => {
+                let angle = |degrees: f64| degrees.to_radians();
+                let turn = |vector| robot.turn(own.turn(vector, angle(self.pose)), angle(self.pose_bias));
+                noisy.with_pose(Pose {
+                    direction: turned(pose.direction, turn),
+                    alignment: turned(pose.alignment, turn),
+                })
+            }
+            _ => noisy,
+        }
+    }
+}
+
+/// Shares of the fingers: one number in files, if it is the same for all of them.
+mod missed_shares {
+    use super::FINGERS;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Shares {
+        One(f64),
+        Each([f64; FINGERS]),
+    }
+
+    pub(super) fn serialize<S: Serializer>(shares: &[f64; FINGERS], serializer: S) -> Result<S::Ok, S::Error> {
+        let [first, others @ ..] = shares;
+        if others.iter().all(|other| other == first) {
+            first.serialize(serializer)
+        } else {
+            shares.serialize(serializer)
+        }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], D::Error> {
+        Ok(match Shares::deserialize(deserializer)? {
+            Shares::One(share) => [share; FINGERS],
+            Shares::Each(shares) => shares,
+        })
+    }
+}
+
+/// The random numbers of one touch, or of one robot. All of them are drawn, whichever are used, so that no setting
+/// changes what another one does.
+#[derive(Default)]
+struct Draw {
+    /// Uniform from 0 to 1: where in the range of deviations.
+    level: f64,
+    /// Uniform from −1 to 1.
+    speed: f64,
+    /// Uniform from 0 to 1: of a step of the timer.
+    phase: f64,
+    debounce: [f64; FINGERS],
+    missed: [f64; FINGERS],
+    /// The axis of the turn, a unit vector, and its angle as a standard normal number.
+    axis: DVec3,
+    angle: f64,
+}
+
+impl Draw {
+    fn new(random: &mut ChaCha8Rng) -> Self {
+        let level = random.random();
+        let speed = 2.0 * random.random::<f64>() - 1.0;
+        let phase = random.random();
+        let (debounce, missed) = (random.random(), random.random());
+        let [x, y, z, angle]: [f64; 4] = std::array::from_fn(|_| StandardNormal.sample(random));
+        Self { level, speed, phase, debounce, missed, axis: DVec3::new(x, y, z).normalize_or(DVec3::Z), angle }
+    }
+
+    /// The vector, turned about the axis by an angle of this standard deviation, in radians.
+    fn turn(&self, vector: DVec3, deviation: f64) -> DVec3 {
+        let (sin, cos) = libm::sincos(self.angle * deviation);
+        let along = self.axis * self.axis.dot(vector);
+        along + (vector - along) * cos + self.axis.cross(vector) * sin
+    }
+}
+
+fn turned(vector: [i16; 3], turn: impl Fn(DVec3) -> DVec3) -> [i16; 3] {
+    let vector = DVec3::from_array(vector.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE)));
+    turn(vector).to_array().map(to_q15)
+}
+
+/// The touch without the contacts of these fingers.
+fn missed(touch: &Touch, missed: [bool; FINGERS]) -> Touch {
+    let mut times = touch.times();
+    times.iter_mut().zip(missed).filter(|(_, missed)| *missed).for_each(|(time, _)| *time = ContactTime::MISSING);
+    let left = Touch::new(times);
+    touch.pose().map_or(left, |pose| left.with_pose(pose))
+}
+
+/// The touch with other contact times, in microseconds: the earliest becomes 0.
+fn timed(touch: &Touch, change: impl Fn(usize, f64) -> f64) -> Touch {
+    let times = touch.times();
+    let changed: [Option<f64>; FINGERS] =
+        std::array::from_fn(|finger| times[finger].micros().map(|micros| change(finger, f64::from(micros))));
+    let earliest = changed.into_iter().flatten().fold(f64::INFINITY, f64::min);
+    // A difference of two times fits: u32::MAX itself is the missing contact, so the largest time is one less.
+    let shifted = changed.map(|time| match time {
+        Some(time) => ContactTime::from_micros((time - earliest).round().min(f64::from(u32::MAX - 1)) as u32),
+        None => ContactTime::MISSING,
+    });
+    let noisy = Touch::new(shifted);
+    touch.pose().map_or(noisy, |pose| noisy.with_pose(pose))
+}
+
+/// `touches` with Gaussian noise of `deviation` microseconds: [`Noise::gaussian`].
+pub fn noisy(name: &str, touches: &[Touch], deviation: f64, seed: u64) -> Vec<Touch> {
+    Noise::gaussian(deviation).add(name, touches, seed)
+}

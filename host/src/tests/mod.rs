@@ -1,0 +1,6 @@
+//! Tests of several rooms together, and helpers of all rooms' tests.
+
+pub(crate) mod repetitions;
+#[cfg(feature = "objects")]
+mod several_meshes;
+pub(crate) mod synthetic;

@@ -1,0 +1,927 @@
+mod state_machine;
+
+use super::*;
+use crate::{ContactTime, Pose, Touch};
+use proptest::prelude::*;
+use rand::rngs::ChaCha8Rng;
+use rand::{Rng, RngExt, SeedableRng};
+use std::collections::VecDeque;
+use std::{vec, vec::Vec};
+
+fn touch(number: u32) -> Touch {
+    let touch = Touch::new([
+        ContactTime::FIRST,
+        ContactTime::from_micros(number),
+        if number.is_multiple_of(7) { ContactTime::MISSING } else { ContactTime::from_micros(2 * number) },
+    ]);
+    match number % 3 {
+        0 => touch,
+        _ => touch.with_pose(Pose { direction: [-1, i16::MIN, i16::MAX], alignment: [256, 0, -32767] }),
+    }
+}
+
+/// A chip that records every command and puts its number of touches into the verdict.
+#[derive(Default)]
+struct Notebook {
+    touches: Vec<Touch>,
+    staged: Vec<u8>,
+    announced: (u32, u32),
+    model: Vec<u8>,
+    stored: Option<(Vec<Touch>, Progress)>,
+    /// Nothing more can be stored.
+    full: bool,
+}
+
+impl Device for Notebook {
+    fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome {
+        self.touches.push(*touch);
+        let touches = self.touches.len() as u32;
+        let detail = detail.then(|| Detail::new(u64::from(touches) << 40, &[-1, i64::MAX]));
+        Outcome::Verdict(VerdictMessage { decision: Decision::Undecided, best: 3, touches, detail })
+    }
+
+    fn reset(&mut self) -> Outcome {
+        self.touches.clear();
+        Outcome::Done
+    }
+
+    fn begin(&mut self, _: Payload, length: u32, checksum: u32) -> Outcome {
+        self.announced = (length, checksum);
+        self.staged.clear();
+        Outcome::Done
+    }
+
+    fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Outcome {
+        if offset as usize != self.staged.len() {
+            return Outcome::Refused(Refusal::OutOfOrder);
+        }
+        self.staged.extend_from_slice(bytes);
+        Outcome::Done
+    }
+
+    fn commit(&mut self) -> Outcome {
+        let checksum = crate::format::checksum(&self.staged);
+        if (self.staged.len() as u32, checksum) != self.announced {
+            return Outcome::Refused(Refusal::Checksum);
+        }
+        self.model = self.staged.clone();
+        Outcome::Done
+    }
+
+    fn model(&self) -> Option<ModelInfo> {
+        let length = self.model.len() as u32;
+        (length > 0).then_some(ModelInfo { checksum: self.announced.1, length, last_object: 9, descriptor: 1 })
+    }
+
+    fn name(&self, object: u8) -> Option<&str> {
+        ["bowl", "wristwatch"].get(usize::from(object)).copied()
+    }
+
+    fn program(&self) -> &str {
+        "notebook 1.0"
+    }
+
+    fn posterior(&self, object: u8) -> Option<u64> {
+        (object < 20).then_some(u64::from(object) << 50)
+    }
+
+    fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal> {
+        let rest = self.model.get(offset as usize..).ok_or(Refusal::OutOfOrder)?;
+        let count = rest.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&rest[..count]);
+        Ok((self.model.len() as u32, count))
+    }
+
+    fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
+        if self.full {
+            return Err(NotStored);
+        }
+        self.stored = Some((self.touches.clone(), progress.clone()));
+        Ok(())
+    }
+}
+
+/// Faults of a line; probabilities are for a byte, or for a frame.
+#[derive(Clone, Copy, Debug)]
+struct Faults {
+    byte_lost: f64,
+    byte_changed: f64,
+    frame_lost: f64,
+    frame_doubled: f64,
+    /// At most this many microseconds; frames may overtake each other.
+    delay: u64,
+}
+
+const CLEAN: Faults = Faults { byte_lost: 0.0, byte_changed: 0.0, frame_lost: 0.0, frame_doubled: 0.0, delay: 0 };
+
+/// One direction of a line: what was sent and when it arrives.
+struct Line {
+    faults: Faults,
+    rng: ChaCha8Rng,
+    under_way: VecDeque<(u64, Vec<u8>)>,
+}
+
+impl Line {
+    fn new(faults: Faults, seed: u64) -> Self {
+        Self { faults, rng: ChaCha8Rng::seed_from_u64(seed), under_way: VecDeque::new() }
+    }
+
+    fn send(&mut self, frame: &[u8], now: u64) {
+        let Faults { byte_lost, byte_changed, frame_lost, frame_doubled, delay } = self.faults;
+        let rng = &mut self.rng;
+        for _ in 0..if rng.random_bool(frame_doubled) { 2 } else { 1 } {
+            if rng.random_bool(frame_lost) {
+                continue;
+            }
+            let mut bytes = frame.to_vec();
+            bytes.retain(|_| !rng.random_bool(byte_lost));
+            for byte in &mut bytes {
+                if rng.random_bool(byte_changed) {
+                    *byte ^= 1 << rng.random_range(0..8);
+                }
+            }
+            self.under_way.push_back((now + rng.random_range(0..=delay), bytes));
+        }
+    }
+
+    /// Portions that have arrived, split anywhere.
+    fn arrived(&mut self, now: u64) -> Vec<Vec<u8>> {
+        let (arrived, rest): (Vec<_>, Vec<_>) = self.under_way.drain(..).partition(|(at, _)| *at <= now);
+        self.under_way = rest.into();
+        let mut portions = Vec::new();
+        for (_, bytes) in arrived {
+            let at = self.rng.next_u32() as usize % (bytes.len() + 1);
+            let (left, right) = bytes.split_at(at);
+            portions.extend([left.to_vec(), right.to_vec()]);
+        }
+        portions
+    }
+}
+
+/// Both ends and the lines between them.
+struct Rig {
+    host: HostEnd,
+    chip: DeviceEnd,
+    notebook: Notebook,
+    down: Line,
+    up: Line,
+    now: u64,
+    outcomes: Vec<(u32, Outcome)>,
+    answers: Vec<std::string::String>,
+    events: Vec<(Event, u32)>,
+    opened: bool,
+    boot: u32,
+}
+
+impl Rig {
+    fn new(faults: Faults, seed: u64) -> Self {
+        Self::with_attempts(1_000, faults, seed)
+    }
+
+    fn with_attempts(attempts: u32, faults: Faults, seed: u64) -> Self {
+        let mut rig = Self {
+            host: HostEnd::new(HostSettings { retry: 20_000, attempts }),
+            chip: DeviceEnd::new(Progress::NONE, 1),
+            notebook: Notebook::default(),
+            down: Line::new(faults, seed),
+            up: Line::new(faults, seed ^ 0x5555),
+            now: 0,
+            outcomes: Vec::new(),
+            answers: Vec::new(),
+            events: Vec::new(),
+            opened: false,
+            boot: 1,
+        };
+        rig.host.connect(1, 0, |frame| rig.down.send(frame, 0));
+        rig.until(|rig| rig.opened);
+        rig
+    }
+
+    fn step(&mut self) -> Result<(), LinkError> {
+        let Self { host, chip, notebook, down, up, now, outcomes, answers, events, opened, .. } = self;
+        *now += 1_000;
+        for bytes in down.arrived(*now) {
+            chip.receive(&bytes, notebook, |frame| up.send(frame, *now));
+        }
+        for bytes in up.arrived(*now) {
+            host.receive(
+                &bytes,
+                *now,
+                |frame| down.send(frame, *now),
+                |incoming| match incoming {
+                    Incoming::Opened => *opened = true,
+                    Incoming::Outcome { sequence, outcome } => outcomes.push((sequence, outcome)),
+                    Incoming::Answer(answer) => answers.push(std::format!("{answer:?}")),
+                    Incoming::Event { event, missed, .. } => events.push((event, missed)),
+                },
+            );
+        }
+        host.tick(*now, |frame| down.send(frame, *now))
+    }
+
+    fn until(&mut self, done: impl Fn(&Self) -> bool) {
+        for _ in 0..2_000_000 {
+            if done(self) {
+                return;
+            }
+            self.step().unwrap();
+        }
+        panic!("no end: {:?} {:?}", self.host.statistics(), self.chip.statistics());
+    }
+
+    /// Gives a command as soon as there is room.
+    fn command(&mut self, command: Command<'_>) {
+        self.until(|rig| rig.host.has_room());
+        let now = self.now;
+        self.host.submit(command, now, |frame| self.down.send(frame, now)).unwrap();
+    }
+
+    fn ask(&mut self, query: Query) -> std::string::String {
+        self.until(|rig| rig.host.can_ask());
+        let now = self.now;
+        assert!(self.host.ask(query, now, |frame| self.down.send(frame, now)));
+        let count = self.answers.len();
+        self.until(|rig| rig.answers.len() > count);
+        self.answers.pop().unwrap()
+    }
+
+    fn send_touches(&mut self, numbers: core::ops::Range<u32>) {
+        for number in numbers {
+            self.command(Command::Touch { touch: (&touch(number)).into(), detail: number % 2 == 0 });
+        }
+        self.until(|rig| rig.host.is_idle());
+    }
+
+    /// Every touch was counted once, in order, and every outcome came once, in order, and is the right one.
+    fn assert_exactly_once(&self, count: u32) {
+        assert_eq!(self.notebook.touches, (0..count).map(touch).collect::<Vec<_>>());
+        assert_eq!(self.outcomes.len(), count as usize);
+        for (expected, (sequence, outcome)) in self.outcomes.iter().enumerate() {
+            let Outcome::Verdict(verdict) = outcome else { panic!("{outcome:?}") };
+            assert_eq!((*sequence as usize, verdict.touches as usize), (expected, expected + 1));
+            assert_eq!(verdict.detail.is_some(), expected % 2 == 0);
+        }
+    }
+}
+
+#[test]
+fn a_clean_line_repeats_nothing() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..1_000);
+    rig.assert_exactly_once(1_000);
+    let (host, chip) = (rig.host.statistics(), rig.chip.statistics());
+    assert_eq!((host.resent, host.garbled, host.repeated, host.early), (0, 0, 0, 0));
+    assert_eq!((chip.garbled, chip.repeated, chip.early, chip.foreign), (0, 0, 0, 0));
+    assert_eq!((host.sent, host.received), (1_002, 1_002));
+}
+
+#[test]
+fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
+    let faults = Faults { byte_lost: 0.001, byte_changed: 0.001, frame_lost: 0.03, frame_doubled: 0.03, delay: 10_000 };
+    let mut rig = Rig::new(faults, 7);
+    rig.send_touches(0..10_000);
+    rig.assert_exactly_once(10_000);
+    let (host, chip) = (rig.host.statistics(), rig.chip.statistics());
+    assert!(host.resent > 100 && host.garbled > 100 && host.repeated > 100, "{host:?}");
+    assert!(chip.garbled > 100 && chip.repeated > 100 && chip.early > 100, "{chip:?}");
+}
+
+#[test]
+fn a_model_arrives_whole_over_a_bad_line_and_a_wrong_one_leaves_the_old() {
+    let faults = Faults { byte_changed: 0.002, frame_lost: 0.05, frame_doubled: 0.05, delay: 5_000, ..CLEAN };
+    let mut rig = Rig::new(faults, 3);
+    let model: Vec<u8> = (0..5_000_u32).map(|i| ((i * i) >> 3) as u8).collect();
+    let checksum = crate::format::checksum(&model);
+    let load = |rig: &mut Rig, checksum| {
+        let length = model.len() as u32;
+        rig.command(Command::Begin { payload: Payload::Model, length, checksum });
+        for (i, bytes) in model.chunks(CHUNK).enumerate() {
+            rig.command(Command::Chunk { offset: (i * CHUNK) as u32, bytes });
+        }
+        rig.command(Command::Commit);
+        rig.until(|rig| rig.host.is_idle());
+        rig.outcomes.last().unwrap().1
+    };
+    assert_eq!(load(&mut rig, checksum), Outcome::Done);
+    assert_eq!(rig.notebook.model, model);
+    assert_eq!(load(&mut rig, checksum ^ 1), Outcome::Refused(Refusal::Checksum));
+    assert_eq!(rig.notebook.model, model);
+    let mut snapshot = Vec::new();
+    while snapshot.len() < model.len() {
+        let text = rig.ask(Query::Snapshot { offset: snapshot.len() as u32 });
+        let bytes = text.split_once('[').unwrap().1.trim_end_matches([' ', '}', ']']);
+        snapshot.extend(bytes.split(", ").map(|byte| byte.parse::<u8>().unwrap()));
+    }
+    assert_eq!(snapshot, model);
+}
+
+#[test]
+fn questions_are_answered_between_commands() {
+    let mut rig = Rig::new(CLEAN, 1);
+    assert_eq!(rig.ask(Query::Model), "Refused(NoModel)");
+    assert_eq!(rig.ask(Query::Name { object: 1 }), "Name(\"wristwatch\")");
+    assert_eq!(rig.ask(Query::Name { object: 2 }), "Refused(NoObject)");
+    rig.command(Command::Touch { touch: (&touch(0)).into(), detail: true });
+    assert!(rig.ask(Query::Statistics).contains("frames: 7"));
+    assert_eq!(rig.ask(Query::Posteriors { first: 20 }), "Posteriors([])");
+    let posteriors = rig.ask(Query::Posteriors { first: 10 });
+    assert_eq!(posteriors.matches(',').count(), 10 * 8 - 1);
+    rig.command(Command::Reset);
+    rig.until(|rig| rig.host.is_idle());
+    assert_eq!(rig.outcomes.last().unwrap(), &(1, Outcome::Done));
+    assert!(rig.notebook.touches.is_empty());
+}
+
+#[test]
+fn a_chip_says_which_program_it_runs_and_a_question_that_an_older_one_does_not_answer_is_given_up() {
+    let mut rig = Rig::new(CLEAN, 1);
+    assert_eq!(rig.ask(Query::Program), "Program(\"notebook 1.0\")");
+    // Nothing arrives: as with a chip that does not know the question.
+    rig.host.ask(Query::Program, rig.now, |_| ());
+    assert!(!rig.host.can_ask());
+    rig.host.withdraw();
+    assert_eq!(rig.ask(Query::Name { object: 0 }), "Name(\"bowl\")");
+    // Its answer is late: it is not taken for that to another question.
+    rig.host.ask(Query::Program, rig.now, |frame| rig.down.send(frame, rig.now));
+    rig.host.withdraw();
+    assert_eq!(rig.ask(Query::Name { object: 1 }), "Name(\"wristwatch\")");
+    assert!(rig.answers.is_empty());
+}
+
+#[test]
+fn events_while_the_cable_was_out_are_missed_and_those_before_are_not_taken_twice() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let event = |index: u32| Event::Fault { kind: FaultKind::Stuck, finger: index as u8 };
+    let mut frames = Vec::new();
+    (0..4).for_each(|index| rig.chip.tell(event(index), |frame| frames.push(frame.to_vec())));
+    rig.up.send(&frames[0], rig.now);
+    rig.until(|rig| rig.events.len() == 1);
+    // Out, with half of a frame, and in again: a session of the same end, so that it knows what it has heard.
+    rig.up.send(&frames[1][..frames[1].len() / 2], rig.now);
+    (0..5).for_each(|_| rig.step().unwrap());
+    rig.opened = false;
+    rig.host.connect(2, rig.now, |frame| rig.down.send(frame, rig.now));
+    rig.up.send(&frames[0], rig.now);
+    rig.until(|rig| rig.opened);
+    rig.up.send(&frames[3], rig.now);
+    rig.until(|rig| rig.events.len() == 2);
+    assert_eq!(rig.events, [(event(0), 0), (event(3), 2)]);
+    assert_eq!(rig.host.statistics().missed_events, 2);
+}
+
+#[test]
+fn a_chip_that_stored_its_progress_goes_on_after_power_cuts_with_nothing_lost_or_doubled() {
+    let faults = Faults { frame_lost: 0.02, frame_doubled: 0.02, byte_changed: 0.001, delay: 4_000, ..CLEAN };
+    let mut rig = Rig::new(faults, 11);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for number in 0..3_000 {
+        rig.command(Command::Touch { touch: (&touch(number)).into(), detail: number % 2 == 0 });
+        if rng.random_bool(0.05) {
+            // Whatever was on its way to the chip, in it, and from it is gone.
+            let (touches, progress) = rig.notebook.stored.clone().unwrap();
+            rig.notebook.touches = touches;
+            rig.boot += 1;
+            rig.chip = DeviceEnd::new(progress, rig.boot);
+            rig.down.under_way.clear();
+            rig.up.under_way.clear();
+        }
+    }
+    rig.until(|rig| rig.host.is_idle());
+    rig.assert_exactly_once(3_000);
+}
+
+#[test]
+fn a_chip_that_forgot_the_session_is_reported_with_the_touches_lost() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..5);
+    rig.chip = DeviceEnd::new(Progress::NONE, 2);
+    rig.notebook = Notebook::default();
+    rig.command(Command::Touch { touch: (&touch(5)).into(), detail: false });
+    let error = (0..1_000).find_map(|_| rig.step().err()).unwrap();
+    assert_eq!(error, LinkError::Forgotten { answered: 5, uncertain: 1 });
+    assert!(rig.notebook.touches.is_empty(), "nothing of an old session is counted in a new one");
+}
+
+#[test]
+fn a_silent_chip_is_reported_with_the_touches_in_doubt() {
+    let mut rig = Rig::with_attempts(5, CLEAN, 1);
+    rig.send_touches(0..4);
+    rig.down.faults.frame_lost = 1.0;
+    for number in 4..7 {
+        rig.command(Command::Touch { touch: (&touch(number)).into(), detail: false });
+    }
+    let error = (0..10_000).find_map(|_| rig.step().err()).unwrap();
+    assert_eq!(error, LinkError::Silent { answered: 4, uncertain: 3 });
+}
+
+#[test]
+fn a_second_host_opens_a_session_of_its_own_and_late_copies_open_none() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..3);
+    let old_opening = {
+        let frame =
+            Frame { session: 1, message: Message::Query { tag: 9, query: Query::Open { previous: 0, boot: 1 } } };
+        encode(&frame, &mut [0; FRAME_MAX]).to_vec()
+    };
+    rig.opened = false;
+    let now = rig.now;
+    rig.host.connect(2, now, |frame| rig.down.send(frame, now));
+    rig.until(|rig| rig.opened);
+    rig.send_touches(3..5);
+    let before = rig.chip.progress().clone();
+    assert_eq!((before.session(), before.executed()), (2, 2));
+    rig.chip.receive(&old_opening, &mut rig.notebook, |_| ());
+    assert_eq!(rig.chip.progress(), &before);
+}
+
+#[test]
+fn events_say_how_many_before_them_were_lost() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let fault = Event::Fault { kind: FaultKind::Bouncing, finger: 2 };
+    for (number, event) in [Event::Started, fault, fault, fault, fault].into_iter().enumerate() {
+        let (up, now) = (&mut rig.up, rig.now);
+        rig.chip.tell(event, |frame| {
+            if number != 2 {
+                up.send(frame, now);
+            }
+            if number == 3 {
+                up.send(frame, now);
+            }
+        });
+        rig.step().unwrap();
+    }
+    assert_eq!(rig.events, [(Event::Started, 0), (fault, 0), (fault, 1), (fault, 0)]);
+    assert_eq!((rig.host.statistics().missed_events, rig.host.statistics().repeated), (1, 1));
+}
+
+#[test]
+fn a_chip_that_starts_again_loses_no_event_although_its_announcement_was_lost() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let fault = Event::Fault { kind: FaultKind::Bouncing, finger: 2 };
+    let mut late = Vec::new();
+    for number in 0..50 {
+        let event = if number == 0 { Event::Started } else { fault };
+        let (up, now) = (&mut rig.up, rig.now);
+        rig.chip.tell(event, |frame| {
+            late = frame.to_vec();
+            up.send(frame, now);
+        });
+        rig.step().unwrap();
+    }
+    assert_eq!(rig.events.len(), 50);
+    // After the reset Started and the first fault are lost.
+    rig.chip = DeviceEnd::new(Progress::NONE, 2);
+    rig.chip.tell(Event::Started, |_| ());
+    rig.chip.tell(fault, |_| ());
+    for _ in 0..49 {
+        let (up, now) = (&mut rig.up, rig.now);
+        rig.chip.tell(fault, |frame| up.send(frame, now));
+        rig.step().unwrap();
+    }
+    assert_eq!(rig.events.len(), 99, "nothing counts as repeated");
+    assert_eq!(rig.events[50], (fault, 2));
+    assert!(rig.events[51..].iter().all(|event| *event == (fault, 0)));
+    assert_eq!((rig.host.statistics().missed_events, rig.host.statistics().repeated), (2, 0));
+    // A late copy from before the reset is neither new nor a loss.
+    rig.up.send(&late, rig.now);
+    rig.step().unwrap();
+    assert_eq!((rig.events.len(), rig.host.statistics().missed_events), (99, 2));
+    assert_eq!(rig.host.statistics().repeated, 1);
+}
+
+/// A touch of the chip's own.
+fn own_touch(touches: u32) -> Event {
+    let verdict = VerdictMessage { decision: Decision::Recognized(3), best: 3, touches, detail: None };
+    Event::Touch { touch: (&touch(touches)).into(), pose_age: Some(7), verdict }
+}
+
+impl Rig {
+    /// The chip is switched off and on again, and goes on from its record.
+    fn restart(&mut self) {
+        let (touches, progress) = self.notebook.stored.clone().unwrap();
+        self.notebook.touches = touches;
+        self.boot += 1;
+        self.chip = DeviceEnd::new(progress, self.boot);
+        let (up, now) = (&mut self.up, self.now);
+        self.chip.start(|frame| up.send(frame, now));
+        self.step().unwrap();
+    }
+
+    /// The chip's own fingers touch; what it says of that arrives, or the power goes before.
+    fn touch_itself(&mut self, touches: u32, arrives: bool) {
+        let Self { up, now, chip, notebook, .. } = self;
+        let send = |frame: &[u8]| {
+            if arrives {
+                up.send(frame, *now)
+            }
+        };
+        chip.report(own_touch(touches), notebook, send);
+        self.step().unwrap();
+    }
+}
+
+#[test]
+fn a_verdict_between_whose_record_and_frame_the_power_goes_is_told_after_the_restart_and_once() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.touch_itself(1, true);
+    rig.touch_itself(2, false);
+    // It is told at each start until something else is stored, and no host hears it twice.
+    (0..40).for_each(|_| rig.restart());
+    assert_eq!(rig.events[..3], [(own_touch(1), 0), (own_touch(2), 0), (Event::Started, 0)]);
+    assert!(rig.events[3..].iter().all(|event| *event == (Event::Started, 0)), "{:?}", rig.events);
+    assert_eq!(rig.events.len(), 2 + 40);
+    assert_eq!((rig.host.statistics().missed_events, rig.host.statistics().repeated), (0, 39));
+    rig.send_touches(0..1);
+    rig.restart();
+    assert_eq!(rig.host.statistics().repeated, 39, "a command was stored since");
+    // One that was told before the power went is not told twice, and what was lost on the line is counted.
+    rig.touch_itself(3, true);
+    rig.restart();
+    rig.chip.report(own_touch(4), &mut rig.notebook, |_| ());
+    rig.touch_itself(5, false);
+    rig.restart();
+    let told: Vec<_> = rig.events[2 + 40 + 1..].iter().filter(|(event, _)| *event != Event::Started).collect();
+    assert_eq!(told, [&(own_touch(3), 0), &(own_touch(5), 1)]);
+}
+
+#[test]
+fn a_host_that_has_just_come_sees_that_an_event_is_of_a_start_before() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.touch_itself(1, true);
+    let mut host = HostEnd::new(HostSettings { retry: 20_000, attempts: 10 });
+    let (sent, events) = (core::cell::RefCell::new(Vec::new()), core::cell::RefCell::new(Vec::new()));
+    let take = |incoming: Incoming<'_>| {
+        if let Incoming::Event { event, boot, .. } = incoming {
+            events.borrow_mut().push((event, boot));
+        }
+    };
+    host.connect(9, 0, |frame: &[u8]| sent.borrow_mut().extend_from_slice(frame));
+    rig.restart();
+    let (_, progress) = rig.notebook.stored.clone().unwrap();
+    rig.chip = DeviceEnd::new(progress, 3);
+    rig.chip.start(|frame| host.receive(frame, 0, |_| (), take));
+    while !sent.borrow().is_empty() {
+        let mut answers = Vec::new();
+        rig.chip.receive(&sent.take(), &mut rig.notebook, |frame| answers.extend_from_slice(frame));
+        host.receive(&answers, 0, |frame| sent.borrow_mut().extend_from_slice(frame), take);
+    }
+    assert!(host.is_idle());
+    assert_eq!((host.boot(), events.take()), (3, vec![(own_touch(1), 1), (Event::Started, 3)]));
+    // The session was stored: there is nothing to tell again.
+    let (_, progress) = rig.notebook.stored.clone().unwrap();
+    DeviceEnd::new(progress, 4).start(|frame| host.receive(frame, 0, |_| (), take));
+    assert_eq!(events.take(), [(Event::Started, 4)]);
+}
+
+/// Lets a host and a chip talk without delay; the outcomes that the host took.
+fn talk(host: &mut HostEnd, sent: &mut Vec<Vec<u8>>, chip: &mut DeviceEnd, notebook: &mut Notebook) -> usize {
+    let mut outcomes = 0;
+    while !sent.is_empty() {
+        let mut answers = Vec::new();
+        for frame in std::mem::take(sent) {
+            chip.receive(&frame, notebook, |frame| answers.push(frame.to_vec()));
+        }
+        for frame in answers {
+            let count = |incoming: Incoming<'_>| outcomes += usize::from(matches!(incoming, Incoming::Outcome { .. }));
+            host.receive(&frame, 0, |frame| sent.push(frame.to_vec()), count);
+        }
+    }
+    outcomes
+}
+
+#[test]
+fn two_hosts_that_saw_the_same_session_do_not_take_each_others_outcomes() {
+    let (mut chip, mut notebook) = (DeviceEnd::new(Progress::NONE, 1), Notebook::default());
+    // Both ask for the current session before either opens its own.
+    let mut hosts = [0x1234_5678, 0x9abc_def0].map(|session| {
+        let mut host = HostEnd::new(HostSettings::default());
+        let mut sent = Vec::new();
+        host.connect(session, 0, |frame| sent.push(frame.to_vec()));
+        let mut answers = Vec::new();
+        for frame in std::mem::take(&mut sent) {
+            chip.receive(&frame, &mut notebook, |frame| answers.push(frame.to_vec()));
+        }
+        for frame in answers {
+            host.receive(&frame, 0, |frame| sent.push(frame.to_vec()), |_| ());
+        }
+        (host, sent)
+    });
+    for (host, sent) in &mut hosts {
+        talk(host, sent, &mut chip, &mut notebook);
+        assert!(host.is_idle());
+    }
+    // The second one's, under the number after that which it could not open.
+    assert_eq!(chip.progress().session(), 0x9abc_def0_u32.wrapping_add(0x9e37_79b9));
+    for (number, (host, sent)) in hosts.iter_mut().enumerate() {
+        let touch = Command::Touch { touch: (&touch(7)).into(), detail: false };
+        host.submit(touch, 0, |frame| sent.push(frame.to_vec())).unwrap();
+        assert_eq!(talk(host, sent, &mut chip, &mut notebook), number);
+    }
+    assert_eq!(notebook.touches.len(), 1);
+    let error = hosts[0].0.tick(0, |_| ()).unwrap_err();
+    assert_eq!(error, LinkError::Forgotten { answered: 0, uncertain: 1 });
+}
+
+#[test]
+fn a_late_copy_of_an_opening_opens_nothing_on_a_chip_that_was_reset_and_kept_nothing() {
+    let open = Frame { session: 7, message: Message::Query { tag: 1, query: Query::Open { previous: 0, boot: 1 } } };
+    let mut out = [0; FRAME_MAX];
+    let bytes = encode(&open, &mut out);
+    for (boot, session) in [(1, 7), (2, 0)] {
+        let mut chip = DeviceEnd::new(Progress::NONE, boot);
+        chip.receive(bytes, &mut Notebook::default(), |_| ());
+        assert_eq!(chip.progress().session(), session);
+    }
+}
+
+#[test]
+fn a_bad_line_is_not_called_silent_with_the_default_number_of_attempts() {
+    let attempts = HostSettings::default().attempts;
+    let faults = Faults { byte_lost: 0.001, byte_changed: 0.001, frame_lost: 0.15, frame_doubled: 0.1, delay: 10_000 };
+    for seed in 0..4 {
+        let mut rig = Rig::with_attempts(attempts, faults, seed);
+        rig.send_touches(0..1_000);
+        rig.assert_exactly_once(1_000);
+    }
+}
+
+#[test]
+fn a_chip_in_an_earlier_state_of_the_session_is_reported_as_forgetful_and_not_as_silent() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..5);
+    let (touches, progress) = rig.notebook.stored.clone().unwrap();
+    rig.send_touches(5..20);
+    rig.notebook.touches = touches;
+    rig.chip = DeviceEnd::new(progress, 2);
+    rig.command(Command::Touch { touch: (&touch(20)).into(), detail: false });
+    let error = (0..1_000).find_map(|_| rig.step().err()).unwrap();
+    assert_eq!(error, LinkError::Forgotten { answered: 20, uncertain: 1 });
+}
+
+#[test]
+fn a_state_that_could_not_be_stored_is_reported_once_and_counted() {
+    let mut rig = Rig::new(CLEAN, 1);
+    rig.send_touches(0..3);
+    rig.notebook.full = true;
+    rig.send_touches(3..8);
+    rig.assert_exactly_once(8);
+    assert_eq!(rig.events, [(Event::NotStored, 0)]);
+    assert_eq!(rig.chip.statistics().unstored, 5);
+}
+
+#[test]
+fn frames_of_another_version_are_not_read() {
+    let mut out = [0; FRAME_MAX];
+    let bytes = encode(&Frame { session: 7, message: Message::Expected { sequence: 1 } }, &mut out).to_vec();
+    assert!(decode(&bytes)[0].is_ok());
+    // Version 4 with a valid checksum.
+    let mut plain = vec![4, 7, 0, 0, 0, 4, 1];
+    let checksum = crate::format::checksum(&plain);
+    plain.extend(checksum.to_le_bytes());
+    let mut encoded = [0; 32];
+    let length = cobs::encode(&plain, &mut encoded);
+    encoded[length] = 0;
+    assert_eq!(decode(&encoded[..=length]), [Err(FrameError::Version(4))]);
+}
+
+#[test]
+fn golden_frames_pin_the_format() {
+    let touch = Touch::from_micros([300, 0, 70_000]).with_pose(Pose { direction: [1, 2, 3], alignment: [-1, 0, 256] });
+    let detail = Detail { posterior: [8, 7, 6, 5, 4, 3, 2, 1], evidence: [4, 3, 2, 1] };
+    let verdict = VerdictMessage { decision: Decision::Recognized(4), best: 4, touches: 17, detail: Some(detail) };
+    // Written out by hand but for the checksums: version, session, message, CRC-32, in COBS.
+    let (mut without, down) = ([0; POSE_BYTES], Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] });
+    (without[0], without[12]) = (255, 1);
+    let frames: [(Message<'_>, &[u8]); 8] = [
+        (
+            Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
+            &[
+                0, 3, 3, 2, 1, 1, 3, 2, 1, 3, 172, 2, 6, 240, 162, 4, 1, 1, 2, 2, 2, 3, 3, 255, 255, 1, 1, 7, 1, 1,
+                150, 84, 55, 210, 0,
+            ],
+        ),
+        (
+            Message::Outcome { sequence: 200, outcome: Outcome::Verdict(verdict) },
+            &[
+                0, 3, 3, 2, 1, 1, 26, 3, 200, 1, 1, 1, 4, 4, 17, 1, 8, 7, 6, 5, 4, 3, 2, 1, 4, 3, 2, 1, 206, 160, 192,
+                215, 0,
+            ],
+        ),
+        (
+            Message::Query { tag: 5, query: Query::Open { previous: 513, boot: 7 } },
+            &[0, 3, 3, 2, 1, 1, 1, 10, 5, 1, 129, 4, 7, 213, 206, 51, 156, 0],
+        ),
+        (
+            Message::Answer { asker: 2, tag: 5, answer: Answer::Name("spoon") },
+            &[0, 3, 3, 2, 1, 1, 15, 1, 2, 5, 2, 5, 115, 112, 111, 111, 110, 220, 237, 239, 183, 0],
+        ),
+        (
+            Message::Query { tag: 5, query: Query::NextApproach { without } },
+            &[0, 3, 3, 2, 1, 1, 1, 4, 5, 7, 255, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 6, 1, 159, 153, 119, 236, 0],
+        ),
+        (
+            Message::Answer { asker: 2, tag: 5, answer: Answer::NextApproach(ApproachMessage::new(48, -5, &down)) },
+            &[0, 3, 3, 2, 1, 1, 7, 1, 2, 5, 7, 48, 9, 1, 1, 1, 5, 1, 128, 255, 127, 1, 1, 1, 5, 49, 88, 154, 7, 0],
+        ),
+        (Message::Query { tag: 5, query: Query::Program }, &[0, 3, 3, 2, 1, 1, 1, 7, 5, 8, 212, 181, 158, 15, 0]),
+        (
+            Message::Answer { asker: 2, tag: 5, answer: Answer::Program("gpio 1") },
+            &[0, 3, 3, 2, 1, 1, 16, 1, 2, 5, 8, 6, 103, 112, 105, 111, 32, 49, 42, 229, 240, 127, 0],
+        ),
+    ];
+    for (message, golden) in frames {
+        assert_eq!(encode(&Frame { session: 2, message }, &mut [0; FRAME_MAX]), golden);
+        assert_eq!(decode(golden), [Ok(())]);
+    }
+}
+
+/// Everything that a decoder makes of some bytes.
+fn decode(bytes: &[u8]) -> Vec<Result<(), FrameError>> {
+    let mut decoder = Decoder::new();
+    bytes.iter().filter_map(|&byte| decoder.feed(byte).map(|frame| frame.map(drop))).collect()
+}
+
+#[test]
+fn the_longest_messages_fit_into_a_frame() {
+    let text = core::str::from_utf8(&[b'x'; CHUNK]).unwrap();
+    let longest = [
+        Message::Command { sequence: u32::MAX, command: Command::Chunk { offset: u32::MAX, bytes: &[0; CHUNK] } },
+        Message::Answer {
+            asker: u32::MAX,
+            tag: 255,
+            answer: Answer::Snapshot { length: u32::MAX, bytes: &[255; CHUNK] },
+        },
+        Message::Answer { asker: u32::MAX, tag: 255, answer: Answer::Posteriors(&[7; CHUNK]) },
+        Message::Answer { asker: u32::MAX, tag: 255, answer: Answer::Program(text) },
+    ];
+    for message in longest {
+        let mut out = [0; FRAME_MAX];
+        let frame = Frame { session: u32::MAX, message };
+        let bytes = encode(&frame, &mut out).to_vec();
+        let mut decoder = Decoder::new();
+        let decoded: Vec<_> =
+            bytes.iter().filter_map(|&byte| decoder.feed(byte).map(|f| f == Ok(frame.clone()))).collect();
+        assert_eq!(decoded, [true]);
+    }
+    let too_long = Message::Command { sequence: 0, command: Command::Chunk { offset: 0, bytes: &[0; CHUNK + 40] } };
+    assert!(encode(&Frame { session: 0, message: too_long }, &mut [0; FRAME_MAX]).is_empty());
+}
+
+#[test]
+fn a_line_of_noise_without_an_end_is_counted_and_the_next_frame_is_read() {
+    let mut out = [0; FRAME_MAX];
+    let good = encode(&Frame { session: 7, message: Message::Expected { sequence: 1 } }, &mut out).to_vec();
+    let noise = vec![0xaa; 10_000];
+    assert_eq!(decode(&[noise, good].concat()), [Err(FrameError::TooLong), Ok(())]);
+}
+
+proptest! {
+    #[test]
+    fn touches_survive_the_journey(times: [u32; 3], pose: Option<([i16; 3], [i16; 3])>) {
+        let touch = Touch::from_micros(times);
+        let touch = match pose {
+            Some((direction, alignment)) => touch.with_pose(Pose { direction, alignment }),
+            None => touch,
+        };
+        prop_assert_eq!(Touch::from(&TouchMessage::from(&touch)), touch);
+        let command = Command::Touch { touch: (&touch).into(), detail: true };
+        let frame = Frame { session: 7, message: Message::Command { sequence: 9, command } };
+        let mut out = [0; FRAME_MAX];
+        let mut decoder = Decoder::new();
+        let mut arrived = Vec::new();
+        for &byte in encode(&frame, &mut out) {
+            if let Some(Ok(Frame { message: Message::Command { command: Command::Touch { touch, .. }, .. }, .. })) = decoder.feed(byte) {
+                arrived.push(Touch::from(&touch));
+            }
+        }
+        prop_assert_eq!(arrived, [touch]);
+    }
+
+    #[test]
+    fn no_bytes_make_an_end_panic(bytes in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>(), 0..8_u8], 0..600)) {
+        let mut host = HostEnd::new(HostSettings::default());
+        host.connect(1, 0, |_| ());
+        host.receive(&bytes, 1, |_| (), |_| ());
+        let mut chip = DeviceEnd::new(Progress::NONE, 1);
+        chip.receive(&bytes, &mut Notebook::default(), |_| ());
+    }
+
+    #[test]
+    fn whole_frames_of_any_content_make_no_end_panic(messages in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 1..20)) {
+        let mut chip = DeviceEnd::new(Progress::NONE, 1);
+        let mut host = HostEnd::new(HostSettings::default());
+        host.connect(1, 0, |_| ());
+        let mut notebook = Notebook::default();
+        let count = messages.len();
+        for message in messages {
+            let mut plain = vec![VERSION, 0, 0, 0, 0];
+            plain.extend(message);
+            let checksum = crate::format::checksum(&plain);
+            plain.extend(checksum.to_le_bytes());
+            let mut encoded = vec![0; 200];
+            let length = cobs::encode(&plain, &mut encoded);
+            chip.receive(&encoded[..=length], &mut notebook, |_| ());
+            host.receive(&encoded[..=length], 1, |_| (), |_| ());
+        }
+        prop_assert_eq!(chip.statistics().garbled + chip.statistics().frames > 0, true);
+        // Each was counted once by either end, as a message or as none.
+        prop_assert_eq!((chip.statistics().garbled + chip.statistics().frames) as usize, count);
+        prop_assert_eq!((host.statistics().garbled + host.statistics().received) as usize, count);
+    }
+
+    #[test]
+    fn every_touch_is_counted_exactly_once_over_any_line(
+        byte_lost in 0.0..0.005,
+        byte_changed in 0.0..0.005,
+        frame_lost in 0.0..0.3,
+        frame_doubled in 0.0..0.3,
+        delay in 0..40_000_u64,
+        seed: u64,
+    ) {
+        let mut rig = Rig::new(Faults { byte_lost, byte_changed, frame_lost, frame_doubled, delay }, seed);
+        rig.send_touches(0..60);
+        rig.assert_exactly_once(60);
+    }
+}
+
+/// A frame as a chip would send it.
+fn from_chip(message: Message<'_>) -> Vec<u8> {
+    encode(&Frame { session: 1, message }, &mut [0; FRAME_MAX]).to_vec()
+}
+
+#[test]
+fn late_events_of_an_earlier_start_are_not_counted_twice_and_do_not_confuse_the_count() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let fault = Event::Fault { kind: FaultKind::Bouncing, finger: 2 };
+    let mut missed = Vec::new();
+    // Two starts, and between the events of the last one late copies of the first one's.
+    for (boot, sequence) in [(1, 0), (1, 1), (2, 0), (3, 0), (1, 1), (3, 1), (1, 3), (3, 2), (3, 2), (2, 2), (3, 4)] {
+        let bytes = from_chip(Message::Event { boot, sequence, event: fault });
+        rig.host.receive(
+            &bytes,
+            0,
+            |_| (),
+            |incoming| {
+                let Incoming::Event { missed: before, .. } = incoming else { panic!("{incoming:?}") };
+                missed.push((boot, sequence, before));
+            },
+        );
+    }
+    assert_eq!(
+        missed,
+        [(1, 0, 0), (1, 1, 0), (2, 0, 0), (3, 0, 0), (3, 1, 0), (1, 3, 1), (3, 2, 0), (2, 2, 1), (3, 4, 1)]
+    );
+}
+
+#[test]
+fn an_answer_to_another_hosts_question_is_not_taken_for_ones_own() {
+    let mut rig = Rig::new(CLEAN, 1);
+    let mut tag = 0;
+    rig.host.ask(Query::Name { object: 1 }, 0, |frame| {
+        let mut decoder = Decoder::new();
+        for &byte in frame {
+            if let Some(Ok(Frame { message: Message::Query { tag: own, .. }, .. })) = decoder.feed(byte) {
+                tag = own;
+            }
+        }
+    });
+    let mut answers = Vec::new();
+    for (asker, name) in [(2, "bowl"), (1, "wristwatch")] {
+        let bytes = from_chip(Message::Answer { asker, tag, answer: Answer::Name(name) });
+        rig.host.receive(&bytes, 0, |_| (), |incoming| answers.push(std::format!("{incoming:?}")));
+    }
+    assert_eq!(answers, ["Answer(Name(\"wristwatch\"))"]);
+}
+
+#[test]
+fn a_session_that_one_chip_may_have_opened_late_is_not_opened_on_another_under_the_same_number() {
+    let mut host = HostEnd::new(HostSettings { retry: 20_000, attempts: 12 });
+    let mut chips = [1, 2].map(|boot| (DeviceEnd::new(Progress::NONE, boot), Notebook::default()));
+    let sent = core::cell::RefCell::new(Vec::new());
+    let send = |frame: &[u8]| sent.borrow_mut().extend_from_slice(frame);
+    // The frames of one side, to the other side; what that one says.
+    let say = |(end, notebook): &mut (DeviceEnd, Notebook), bytes: &[u8]| {
+        let mut said = Vec::new();
+        end.receive(bytes, notebook, |frame| said.extend_from_slice(frame));
+        said
+    };
+    host.connect(7, 0, send);
+    let answer = say(&mut chips[0], &sent.take());
+    host.receive(&answer, 0, send, |_| ());
+    // The first chip opens the session, and its answer is lost. The host is plugged into the other one and asks again.
+    let opening = sent.take();
+    say(&mut chips[0], &opening);
+    assert_eq!(chips[0].0.progress().session(), 7);
+    let answer = say(&mut chips[1], &opening);
+    host.receive(&answer, 0, send, |_| ());
+    let answer = say(&mut chips[1], &sent.take());
+    let mut opened = false;
+    host.receive(&answer, 0, send, |incoming| opened = incoming == Incoming::Opened);
+    assert!(opened);
+    host.submit(Command::Touch { touch: (&touch(0)).into(), detail: false }, 0, send).unwrap();
+    let command = sent.take();
+    say(&mut chips[1], &command);
+    // The outcome is lost; the host is plugged back and repeats the touch.
+    say(&mut chips[0], &command);
+    assert_eq!([chips[0].1.touches.len(), chips[1].1.touches.len()], [0, 1], "counted once");
+}

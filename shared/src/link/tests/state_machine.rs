@@ -1,0 +1,500 @@
+//! Two hosts and three chips against a simple specification, through everything that a line, resets and power cuts can do:
+//! each touch counts at most once, what a host believes to be counted is counted, or the host is told, and no host hears of a
+//! chip's own touch twice.
+//!
+//! Frames are delivered in any order, twice, late (also after resets), or not at all. Both hosts hear what a chip says that
+//! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.
+
+use crate::link::*;
+use crate::{Pose, Touch};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+use std::{vec, vec::Vec};
+
+const HOSTS: usize = 2;
+const CHIPS: usize = 3;
+/// Steps in one history.
+const LENGTH: usize = 300;
+/// Resets of a chip that a frame can be late by: fewer than a host remembers.
+const LATEST: u32 = 6;
+
+#[derive(Clone, Copy, Debug)]
+enum Action {
+    /// A host gives a touch.
+    Submit(usize),
+    /// A host asks for a name or an approach, whose number is the question's.
+    Ask(usize),
+    /// A host opens a session.
+    Connect(usize),
+    /// A host is plugged into a chip, and opens no session.
+    Plug(usize, usize),
+    /// The frame in this place arrives, and stays under way if it was doubled.
+    Deliver(u16, bool),
+    /// The next frame of those under way arrives.
+    DeliverOldest,
+    /// The frame in this place is lost.
+    Lose(u16),
+    /// A chip is reset and has kept nothing.
+    Reset(usize),
+    /// The power goes and comes back, and a chip goes on from its record. Before that its own fingers may have touched: then
+    /// it goes after the record was stored and before anything was told.
+    Cut(usize, bool),
+    /// A chip's own fingers touch.
+    Touch(usize),
+    /// Time passes: what is due is sent again.
+    Wait(u32),
+}
+
+fn action() -> impl Strategy<Value = Action> {
+    let (host, chip) = (0..HOSTS, 0..CHIPS);
+    prop_oneof![
+        12 => host.clone().prop_map(Action::Submit),
+        3 => host.clone().prop_map(Action::Ask),
+        1 => host.clone().prop_map(Action::Connect),
+        1 => (host, chip.clone()).prop_map(|(host, chip)| Action::Plug(host, chip)),
+        14 => (any::<u16>(), proptest::bool::weighted(0.2)).prop_map(|(place, again)| Action::Deliver(place, again)),
+        24 => Just(Action::DeliverOldest),
+        4 => any::<u16>().prop_map(Action::Lose),
+        1 => chip.clone().prop_map(Action::Reset),
+        1 => (chip.clone(), any::<bool>()).prop_map(|(chip, touches)| Action::Cut(chip, touches)),
+        4 => chip.prop_map(Action::Touch),
+        8 => (1..60_000_u32).prop_map(Action::Wait),
+    ]
+}
+
+/// A chip, and what it was told in this life.
+struct Chip {
+    end: DeviceEnd,
+    notebook: Notebook,
+    life: u32,
+    boot: u32,
+    touches: u32,
+    /// Resets of all chips when its own fingers touched last.
+    touched: u32,
+}
+
+/// Counts touches, by the number that stands in their first contact time.
+#[derive(Default)]
+struct Notebook {
+    counted: Vec<u32>,
+}
+
+impl Device for Notebook {
+    fn touch(&mut self, touch: &Touch, _: bool) -> Outcome {
+        let number = touch.times()[1].micros().expect("a number");
+        self.counted.push(number);
+        // The outcome says of which touch it is.
+        Outcome::Verdict(VerdictMessage { decision: Decision::Undecided, best: 0, touches: number, detail: None })
+    }
+
+    fn reset(&mut self) -> Outcome {
+        Outcome::Done
+    }
+
+    fn begin(&mut self, _: Payload, _: u32, _: u32) -> Outcome {
+        Outcome::Done
+    }
+
+    fn chunk(&mut self, _: u32, _: &[u8]) -> Outcome {
+        Outcome::Done
+    }
+
+    fn commit(&mut self) -> Outcome {
+        Outcome::Done
+    }
+
+    fn model(&self) -> Option<ModelInfo> {
+        None
+    }
+
+    fn name(&self, object: u8) -> Option<&str> {
+        NAMES.get(usize::from(object)).copied()
+    }
+
+    fn posterior(&self, _: u8) -> Option<u64> {
+        None
+    }
+
+    fn snapshot(&mut self, _: u32, _: &mut [u8]) -> Result<(u32, usize), Refusal> {
+        Err(Refusal::Unsupported)
+    }
+
+    fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
+        Ok(approach(without[0]))
+    }
+}
+
+/// A question for an approach, with a number in it.
+fn next_approach(number: u8) -> Query {
+    let mut without = [0; POSE_BYTES];
+    without[0] = number;
+    Query::NextApproach { without }
+}
+
+/// The answer to the question with this number.
+fn approach(number: u8) -> ApproachMessage {
+    let middle = Pose { direction: [number.into(), -1, i16::MAX], alignment: [i16::MIN, 0, 7] };
+    ApproachMessage::new(number.into(), -i32::from(number), &middle)
+}
+
+const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "f", "g", "h"];
+
+/// A host, and what its program knows.
+struct Host {
+    end: HostEnd,
+    chip: usize,
+    connected: bool,
+    /// Touches of this session, in order.
+    given: Vec<u32>,
+    /// Number of them that have an outcome.
+    answered: usize,
+    /// The number of the name or approach that was asked for.
+    asked: Option<u8>,
+    /// The next event of each life of a chip that was heard.
+    events: BTreeMap<u32, u32>,
+    /// It has heard an event.
+    listened: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum To {
+    Chip(usize),
+    Host(usize),
+}
+
+struct Frame {
+    to: To,
+    bytes: Vec<u8>,
+    /// Resets of all chips when it was sent.
+    resets: u32,
+}
+
+struct World {
+    hosts: [Host; HOSTS],
+    chips: [Chip; CHIPS],
+    under_way: Vec<Frame>,
+    now: u64,
+    next_touch: u32,
+    next_session: u32,
+    resets: u32,
+    /// Number of times that each touch of a host was counted, on any chip, in any life.
+    counted: BTreeMap<u32, u32>,
+    names: u8,
+}
+
+/// Numbers that do not come again, in no order.
+fn scatter(number: u32) -> u32 {
+    number.wrapping_mul(0x9e37_79b1) ^ 0x5bd1_e995
+}
+
+impl World {
+    fn new() -> Self {
+        let chip = |number: u32| {
+            let boot = scatter(number);
+            let end = DeviceEnd::new(Progress::NONE, boot);
+            Chip { end, notebook: Notebook::default(), life: number, boot, touches: 0, touched: 0 }
+        };
+        let host = |chip| Host {
+            end: HostEnd::new(HostSettings { retry: 20_000, attempts: 12 }),
+            chip,
+            connected: false,
+            given: Vec::new(),
+            answered: 0,
+            asked: None,
+            events: BTreeMap::new(),
+            listened: false,
+        };
+        Self {
+            hosts: [host(0), host(1)],
+            chips: [chip(0), chip(1), chip(2)],
+            under_way: Vec::new(),
+            now: 0,
+            next_touch: 0,
+            next_session: 0,
+            resets: 0,
+            counted: BTreeMap::new(),
+            names: 0,
+        }
+    }
+
+    /// Sends frames from a host.
+    fn down(&mut self, host: usize, frames: Vec<Vec<u8>>) {
+        let (to, resets) = (To::Chip(self.hosts[host].chip), self.resets);
+        self.under_way.extend(frames.into_iter().map(|bytes| Frame { to, bytes, resets }));
+    }
+
+    /// Sends frames from a chip: every host that is plugged in hears it.
+    fn up(&mut self, chip: usize, frames: Vec<Vec<u8>>) {
+        for bytes in frames {
+            for (number, _) in self.hosts.iter().enumerate().filter(|(_, host)| host.chip == chip) {
+                self.under_way.push(Frame { to: To::Host(number), bytes: bytes.clone(), resets: self.resets });
+            }
+        }
+    }
+
+    fn act(&mut self, action: Action) {
+        let now = self.now;
+        let mut frames = Vec::new();
+        match action {
+            Action::Submit(host) => {
+                let touch = Touch::from_micros([0, self.next_touch, 0]);
+                let Host { end, given, connected, .. } = &mut self.hosts[host];
+                let command = Command::Touch { touch: (&touch).into(), detail: false };
+                if *connected && end.submit(command, now, |frame| frames.push(frame.to_vec())).is_some() {
+                    given.push(self.next_touch);
+                    self.next_touch += 1;
+                }
+                self.down(host, frames);
+            }
+            Action::Ask(host) => {
+                self.names = (self.names + 1) % 8;
+                let (name, Host { end, asked, connected, .. }) = (self.names, &mut self.hosts[host]);
+                // Names and approaches in turn: the answer has the question's number.
+                let query = if name % 2 == 0 { Query::Name { object: name } } else { next_approach(name) };
+                if *connected && asked.is_none() && end.ask(query, now, |frame| frames.push(frame.to_vec())) {
+                    *asked = Some(name);
+                }
+                self.down(host, frames);
+            }
+            Action::Connect(host) => {
+                self.connect(host);
+            }
+            Action::Plug(host, chip) => self.hosts[host].chip = chip,
+            Action::Deliver(place, again) => {
+                if !self.under_way.is_empty() {
+                    let place = usize::from(place) % self.under_way.len();
+                    let frame = if again {
+                        let Frame { to, ref bytes, resets } = self.under_way[place];
+                        Frame { to, bytes: bytes.clone(), resets }
+                    } else {
+                        self.under_way.swap_remove(place)
+                    };
+                    self.deliver(frame);
+                }
+            }
+            Action::DeliverOldest => {
+                if !self.under_way.is_empty() {
+                    let frame = self.under_way.remove(0);
+                    self.deliver(frame);
+                }
+            }
+            Action::Lose(place) => {
+                if !self.under_way.is_empty() {
+                    self.under_way.swap_remove(usize::from(place) % self.under_way.len());
+                }
+            }
+            Action::Reset(chip) => self.start(chip, Progress::NONE, Notebook::default()),
+            Action::Cut(chip, touches) => {
+                // A host does not remember starts for ever, and takes for news what was told before all that it remembers.
+                if touches || self.resets - self.chips[chip].touched >= LATEST {
+                    self.touch(chip);
+                }
+                let Chip { end, notebook, .. } = &mut self.chips[chip];
+                let (progress, notebook) = (end.progress().clone(), std::mem::take(notebook));
+                self.start(chip, progress, notebook);
+            }
+            Action::Touch(chip) => {
+                let frames = self.touch(chip);
+                self.up(chip, frames);
+            }
+            Action::Wait(micros) => {
+                self.now += u64::from(micros);
+                for host in 0..HOSTS {
+                    self.tick(host);
+                }
+            }
+        }
+    }
+
+    /// A chip starts, with what it has kept.
+    fn start(&mut self, chip: usize, progress: Progress, notebook: Notebook) {
+        self.resets += 1;
+        // No line holds frames for longer than that.
+        let resets = self.resets;
+        self.under_way.retain(|frame| resets - frame.resets < LATEST);
+        let life = u32::try_from(CHIPS).unwrap() + resets;
+        let boot = scatter(life);
+        let mut end = DeviceEnd::new(progress, boot);
+        let mut frames = Vec::new();
+        end.start(|frame| frames.push(frame.to_vec()));
+        let touched = self.chips[chip].touched;
+        self.chips[chip] = Chip { end, notebook, life, boot, touches: 0, touched };
+        self.up(chip, frames);
+    }
+
+    /// A chip's own fingers touch; what it then says.
+    fn touch(&mut self, chip: usize) -> Vec<Vec<u8>> {
+        let Chip { end, notebook, life, touches, touched, .. } = &mut self.chips[chip];
+        (*touches, *touched) = (*touches + 1, self.resets);
+        // The event says which life it is from.
+        let touch = TouchMessage::from(&Touch::from_micros([0, *life, *touches]));
+        let verdict = VerdictMessage { decision: Decision::Undecided, best: 0, touches: *touches, detail: None };
+        let mut frames = Vec::new();
+        end.report(Event::Touch { touch, pose_age: None, verdict }, notebook, |frame| frames.push(frame.to_vec()));
+        frames
+    }
+
+    fn connect(&mut self, host: usize) {
+        self.next_session += 1;
+        let session = scatter(self.next_session ^ 0x4000_0000);
+        let mut frames = Vec::new();
+        let Host { end, given, answered, asked, connected, .. } = &mut self.hosts[host];
+        end.connect(session, self.now, |frame| frames.push(frame.to_vec()));
+        // What was given before and has no outcome is in doubt: the program knows, since it began again.
+        (*answered, *asked, *connected) = (0, None, true);
+        given.clear();
+        self.down(host, frames);
+    }
+
+    /// Lets a host send again what is due; says whether its session has ended, with a report that is checked.
+    fn tick(&mut self, number: usize) -> bool {
+        let mut frames = Vec::new();
+        let host = &mut self.hosts[number];
+        let result = if host.connected { host.end.tick(self.now, |frame| frames.push(frame.to_vec())) } else { Ok(()) };
+        let ended = result.is_err();
+        if let Err(LinkError::Silent { answered, uncertain } | LinkError::Forgotten { answered, uncertain }) = result {
+            assert_eq!((answered as usize, (answered + uncertain) as usize), (host.answered, host.given.len()));
+            host.connected = false;
+        }
+        self.down(number, frames);
+        ended
+    }
+
+    fn deliver(&mut self, frame: Frame) {
+        let now = self.now;
+        let mut frames = Vec::new();
+        match frame.to {
+            To::Chip(chip) => {
+                let Chip { end, notebook, .. } = &mut self.chips[chip];
+                let before = notebook.counted.len();
+                end.receive(&frame.bytes, notebook, |frame| frames.push(frame.to_vec()));
+                for &touch in &notebook.counted[before..] {
+                    let times = self.counted.entry(touch).or_default();
+                    *times += 1;
+                    assert_eq!(*times, 1, "touch {touch} was counted twice");
+                }
+                self.up(chip, frames);
+            }
+            To::Host(number) => {
+                let Host { end, given, answered, asked, connected, events, listened, .. } = &mut self.hosts[number];
+                if !*connected {
+                    return;
+                }
+                let counted = &self.counted;
+                let take = |incoming: Incoming<'_>| match incoming {
+                    Incoming::Opened => {}
+                    Incoming::Outcome { sequence, outcome } => {
+                        assert_eq!(sequence as usize, *answered, "outcomes come in order");
+                        let Outcome::Verdict(verdict) = outcome else { panic!("{outcome:?}") };
+                        assert_eq!(verdict.touches, given[*answered], "the outcome is another touch's");
+                        assert_eq!(counted.get(&verdict.touches), Some(&1), "a touch that was not counted");
+                        *answered += 1;
+                    }
+                    Incoming::Answer(answer) => {
+                        let name = asked.take().expect("something was asked");
+                        let expected = match name % 2 {
+                            0 => Answer::Name(NAMES[usize::from(name)]),
+                            _ => Answer::NextApproach(approach(name)),
+                        };
+                        assert_eq!(answer, expected, "the answer is another question's");
+                    }
+                    Incoming::Event { event, missed, .. } => {
+                        let (life, sequence) = match event {
+                            Event::Touch { touch, .. } => (touch.times[1], touch.times[2]),
+                            _ => {
+                                *listened = true;
+                                return;
+                            }
+                        };
+                        // Started is a chip's event 0, except in its first life.
+                        let sequence = if life < 3 { sequence - 1 } else { sequence };
+                        let known = events.get(&life).copied();
+                        assert!(
+                            known.is_none_or(|next| sequence >= next),
+                            "event {sequence} of life {life} came twice"
+                        );
+                        match known {
+                            Some(next) => assert_eq!(missed, sequence - next, "events of life {life} are not reported"),
+                            // What was said before the host listened to anybody is not missed. The event that announces
+                            // a start is not looked at here.
+                            None if *listened => {
+                                let started = u32::from(life >= 3);
+                                assert!(missed == sequence || missed + started == sequence, "{missed} for {sequence}");
+                            }
+                            None => {}
+                        }
+                        *listened = true;
+                        events.insert(life, sequence + 1);
+                    }
+                };
+                end.receive(&frame.bytes, now, |frame| frames.push(frame.to_vec()), take);
+                self.down(number, frames);
+            }
+        }
+    }
+
+    /// A good line from here on: every host either is told that its session has ended, or all that it was told is true of
+    /// the chip.
+    fn settle(&mut self) {
+        self.under_way.clear();
+        for number in 0..HOSTS {
+            if !self.hosts[number].connected {
+                continue;
+            }
+            let mut ended = false;
+            let mut more = true;
+            for _ in 0..2_000 {
+                if more && self.hosts[number].end.has_room() {
+                    // One touch more, so that a host that was silent hears what has become of its session.
+                    self.act(Action::Submit(number));
+                    more = false;
+                }
+                while !self.under_way.is_empty() {
+                    let frame = self.under_way.remove(0);
+                    self.deliver(frame);
+                }
+                ended = self.tick(number);
+                if ended || !more && self.hosts[number].end.is_idle() {
+                    break;
+                }
+                self.now += 10_000;
+            }
+            let host = &self.hosts[number];
+            if ended {
+                continue;
+            }
+            assert!(host.end.is_idle() && host.answered == host.given.len(), "host {number} neither ends nor is told");
+            let counted = &self.chips[host.chip].notebook.counted;
+            assert!(
+                host.given.iter().all(|touch| counted.contains(touch)),
+                "host {number} believes {:?} to be counted in boot {}, which has {counted:?}",
+                host.given,
+                self.chips[host.chip].boot
+            );
+        }
+    }
+}
+
+#[test]
+fn each_touch_counts_at_most_once_and_what_a_host_believes_is_so_or_it_is_told() {
+    let steps = std::env::var("PALPATE_LINK_STEPS").map_or(60_000, |steps| steps.parse().expect("a number of steps"));
+    let cases = u32::try_from(steps / LENGTH).unwrap();
+    let config = ProptestConfig { cases, max_shrink_iters: 20_000, failure_persistence: None, ..Default::default() };
+    let mut runner = proptest::test_runner::TestRunner::new_with_rng(
+        config,
+        proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha),
+    );
+    let histories = prop::collection::vec(action(), LENGTH);
+    let result = runner.run(&histories, |actions| {
+        let mut world = World::new();
+        world.connect(0);
+        for action in actions {
+            world.act(action);
+        }
+        world.settle();
+        Ok(())
+    });
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+}

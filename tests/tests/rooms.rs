@@ -1,0 +1,115 @@
+//! Rooms, the top-level modules of a crate, depend on each other in one direction.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::read_to_string;
+use std::path::{Path, PathBuf};
+
+/// Sources of the crates whose rooms have an order, relative to the root of the project.
+const CRATES: [&str; 4] = ["shared/src", "onboard/src", "host/trees/src", "host/src"];
+/// Modules that gather names of all rooms, and modules of tests.
+const OUTSIDE: [&str; 3] = ["error", "lib", "tests"];
+
+/// Source files below a folder, except those of tests.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());
+    let below = folders.into_iter().filter(|path| !path.ends_with("tests")).flat_map(|path| sources(&path));
+    let is_source = |path: &PathBuf| path.extension().is_some_and(|end| end == "rs") && !path.ends_with("tests.rs");
+    files.into_iter().filter(is_source).chain(below).collect()
+}
+
+/// The room that a source file belongs to.
+fn room(file: &Path, source: &Path) -> String {
+    let inside = file.strip_prefix(source).unwrap().iter().next().unwrap();
+    Path::new(inside).file_stem().unwrap().to_str().unwrap().to_owned()
+}
+
+/// First names of the paths that start with `crate::` in code, inline tests and comments left out, and the rooms that
+/// problems belong to, `touches` for `TouchesProblem`, since all problems are gathered in one module.
+fn used(text: &str) -> BTreeSet<String> {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let code = text.split("\nmod tests {").next().unwrap_or_default();
+    let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+    let code: String = lines.flat_map(|line| [line, "\n"]).collect();
+    let words = code.split(|c| !is_name(c));
+    let mut names: BTreeSet<String> =
+        words.filter_map(|word| word.strip_suffix("Problem")).map(str::to_lowercase).collect();
+    for path in code.split("crate::").skip(1) {
+        let Some(group) = path.strip_prefix('{') else {
+            names.extend(path.split(|c| !is_name(c)).next().map(str::to_owned));
+            continue;
+        };
+        // Names at the first level of the braces start a path, those further in continue one.
+        let (mut depth, mut name) = (1, String::new());
+        for c in group.chars() {
+            match c {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                ',' if depth == 1 => names.extend(name.split(':').next().map(|name| name.trim().to_owned())),
+                _ => {}
+            }
+            match (depth, c) {
+                (0, _) => break,
+                (1, ',') => name.clear(),
+                _ => name.push(c),
+            }
+        }
+        names.extend(name.split(':').next().map(|name| name.trim().to_owned()));
+    }
+    names
+}
+
+/// The rooms that each room uses.
+fn uses(source: &Path) -> BTreeMap<String, BTreeSet<String>> {
+    let files = sources(source);
+    let is_room = |name: &String| !OUTSIDE.contains(&name.as_str());
+    let rooms: BTreeSet<String> = files.iter().map(|file| room(file, source)).filter(is_room).collect();
+    let mut uses: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for file in files {
+        let own = room(&file, source);
+        if is_room(&own) {
+            let mut others = used(&read_to_string(&file).unwrap());
+            others.retain(|other| rooms.contains(other) && *other != own);
+            uses.entry(own).or_default().extend(others);
+        }
+    }
+    uses
+}
+
+/// Rooms that use each other in a circle, and those that use them: the rest after rooms that use no other have been removed,
+/// one after the other.
+fn circle(mut uses: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
+    while let Some(free) = uses.iter().find(|(_, others)| others.is_empty()).map(|(room, _)| room.clone()) {
+        uses.remove(&free);
+        uses.values_mut().for_each(|others| others.retain(|other| *other != free));
+    }
+    uses
+}
+
+#[test]
+fn rooms_have_no_circle() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    for source in CRATES.map(|source| root.join(source)).iter().filter(|source| source.exists()) {
+        let uses = uses(source);
+        assert!(uses.len() > 3, "{}: {uses:?}", source.display());
+        let circle = circle(uses);
+        assert!(circle.is_empty(), "rooms of {} use each other in a circle: {circle:#?}", source.display());
+    }
+}
+
+#[test]
+fn a_circle_is_found_whatever_way_paths_are_written() {
+    let text = "use crate::{mesh::{Mesh, triangles}, probe};\nuse crate::error::FitProblem;\n/// crate::touches\nlet x = crate::capture::sample();\n\
+                #[cfg(test)]\nmod tests {\nuse crate::chip;";
+    assert_eq!(used(text).into_iter().collect::<Vec<_>>(), ["capture", "error", "fit", "mesh", "probe"]);
+    let uses = |pairs: &[(&str, &str)]| {
+        let mut uses: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        for (room, other) in pairs {
+            uses.entry((*other).into()).or_default();
+            uses.entry((*room).into()).or_default().insert((*other).into());
+        }
+        uses
+    };
+    assert!(circle(uses(&[("a", "b"), ("b", "c"), ("a", "c")])).is_empty());
+    assert_eq!(circle(uses(&[("a", "b"), ("b", "c"), ("c", "a"), ("a", "d")])).len(), 3);
+}
