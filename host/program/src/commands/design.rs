@@ -28,9 +28,9 @@ pub(crate) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Find the probe that needs the fewest approaches to recognize your objects
+    /// Find the probe that needs the fewest approaches to your objects
     Design(DesignArguments),
-    /// Find out how your probe differs from the ideal, from touches that it made of known objects
+    /// Find out how your probe differs from the ideal, from its touches
     Fit(super::fit::FitArguments),
 }
 

@@ -71,7 +71,7 @@ commands! {
     Train => train,
     /// Compile an ensemble to the bytes that the chip reads
     Export => export,
-    /// Set thresholds that keep a promised error rate, or plan approaches
+    /// Set thresholds that keep an error rate, or plan approaches
     Calibrate => calibrate,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
@@ -83,11 +83,11 @@ commands! {
     Recognize => recognize,
     /// Say what is in a compiled model, and what it costs on a chip
     Inspect => inspect,
-    /// Remake the whole evaluation: every figure, the limit, speed against error
+    /// Remake the whole evaluation, with every figure
     Report => report,
     /// Recognize on a chip at the end of a line, or watch it
     Link => link,
-    /// Make a page that shows an object and touches, or on which to touch objects
+    /// Make a page that shows an object, or on which to touch objects
     View => view,
     /// Check, compare and record data sets of touches; write built-in objects
     Data => data,
@@ -212,7 +212,8 @@ Examples:
   palpate run                 capture, train and recognize built-in objects
   palpate run meshes/ -o out  the same for your own meshes
 
-Words of the output: docs/reference/words.md; all options: docs/reference/options.md"
+Words of the output: docs/reference/words.md
+More about options:  docs/reference/options.md"
 }
 
 impl Command {
@@ -303,10 +304,11 @@ fn message(error: &Error, command: &str) -> String {
     };
     let option = option_of(name).replace('_', "-");
     let cli = cli();
-    // The command's own options, and those of the commands below it.
+    // The command's own options, those of the commands below it, and the global ones.
     let named = cli.find_subcommand(command).into_iter();
     let mut arguments = named
         .flat_map(|command| std::iter::once(command).chain(command.get_subcommands()))
+        .chain([&cli])
         .flat_map(|command| command.get_arguments());
     if arguments.any(|argument| argument.get_long() == Some(&option)) {
         return format!("{place}--{option} is {value}. {}", problem.fix());
@@ -425,12 +427,14 @@ mod tests {
 
     #[test]
     fn no_help_is_longer_than_60_lines_at_80_and_at_120_columns() {
-        for (path, command) in listed() {
+        for (path, _) in listed() {
             for columns in [80, 120] {
-                let help = command.clone().term_width(columns).max_term_width(columns).render_long_help().to_string();
+                let words = ["palpate"].into_iter().chain(path.split(' ')).chain(["--help"]);
+                let shown = cli().term_width(columns).try_get_matches_from(words);
+                let help = shown.err().map(|help| help.render().to_string()).unwrap_or_default();
                 let lines = help.lines().count();
                 println!("{path} at {columns}: {lines}");
-                assert!(lines <= 60, "{path} at {columns} columns has {lines} lines\n{help}");
+                assert!((10..=60).contains(&lines), "{path} at {columns} columns has {lines} lines\n{help}");
             }
         }
     }

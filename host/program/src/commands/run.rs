@@ -16,9 +16,9 @@ Examples:
   palpate run meshes/ -o mine      your own meshes
   palpate run --touches 2000       a quick look
   palpate run --real noise=0..5ms,timer=1ms
-                                   trained for a real switch, and tested with one
+                                   trained and tested with a real switch
   palpate run meshes/ --true-size mm --probe probe.toml
-                                   objects as large as they are, and your probe
+                                   objects of true size, and your probe
   palpate run --json | jq .ours.accuracy
 
 Three methods are trained and compared: the published one, on the times of full touches; ours on full touches; and ours on every approach with a contact, which is the model to use: model.palpate. Models promise an error rate of 1 %.

@@ -203,7 +203,7 @@ pub(super) fn promised(model: &Model<'_>) -> Option<Promised> {
         undecided: 1.0 - f64::from(promise.given) / f64::from(promise.sequences.max(1)),
         mean: f64::from(promise.mean_thousandths) / 1e3,
         max_touches: promise.max_touches,
-        noise: probe::noise::Noise::of_promise(&promise.noise),
+        noise: crate::probe::noise::Noise::of_promise(&promise.noise),
         margins: compile::names(model)
             .into_iter()
             .take(model.known_count())

@@ -18,9 +18,9 @@ pub(crate) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Say what is wrong with a data set, or how far it is from simulated touches
+    /// Check a data set, or compare it with simulated touches
     Check(check::Arguments),
-    /// Add touches of a real probe to a data set: from lines, a log, or a chip
+    /// Record touches of a real probe: from lines, a log, or a chip
     Record(record::Arguments),
     /// Write the ten built-in objects as OBJ files
     Objects(objects::Arguments),
