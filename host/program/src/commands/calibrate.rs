@@ -44,8 +44,8 @@ pub(crate) struct Arguments {
     /// The share of wrong names to accept, such as 1%; what is promised
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
-    /// Promise it of all names on average, of each name, or of the names given to each object
-    #[arg(long, value_parser = per, default_value = "average", value_name = "average|name|object")]
+    /// Promise it on average, of each name, or of the names given to each object: average, name or object
+    #[arg(long, value_parser = per, default_value = "average", value_name = "OF")]
     per: Per,
     /// The probability that the promise is kept
     #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
@@ -59,7 +59,7 @@ pub(crate) struct Arguments {
     /// Follow the model's plan of approaches; the promise holds for a robot that does
     #[arg(long)]
     active: bool,
-    /// Add a plan of approaches with so many rolls of the row of fingers instead: 1, 2 or 4
+    /// Add a plan of approaches instead, with so many rolls: 1, 2 or 4
     #[arg(long, value_name = "ROLLS", conflicts_with_all = PROMISE)]
     pub(super) plan: Option<u8>,
     #[command(flatten)]

@@ -46,16 +46,16 @@ pub(crate) struct Arguments {
     length: Option<f64>,
     #[command(flatten)]
     size: SizeArguments,
-    /// Where approaches aim; in the bounding box, its middle, or near the surface's center of mass [default: box]
-    #[arg(long, value_name = "box|middle|mass", value_parser = aim)]
+    /// Where approaches aim: box (the bounding box), middle or mass [default: box]
+    #[arg(long, value_name = "WHERE", value_parser = aim)]
     aim: Option<Aim>,
     /// With the probe's direction and alignment; six more numbers in each line
     #[arg(long)]
     pose: bool,
-    /// How to keep the touches [default: text]
-    #[arg(long, value_name = "text|parquet", value_parser = parsed::<Format>)]
+    /// How to keep the touches: text or parquet [default: text]
+    #[arg(long, value_name = "KIND", value_parser = parsed::<Format>)]
     format: Option<Format>,
-    /// Capture only the K-th of N parts; the parts, one after the other, are the whole [default: 1/1]
+    /// Capture only the K-th of N parts, which together are the whole [default: 1/1]
     #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
     shard: Option<Shard>,
     /// Continue what was interrupted, with the same program, settings and objects

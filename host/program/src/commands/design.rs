@@ -54,16 +54,16 @@ struct DesignArguments {
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// What to try instead of the usual: distances, radii and tilts of fingers, where approaches aim, the speed
-    #[arg(long, value_name = "KEY=VALUE,…", default_value = "", hide_default_value = true)]
+    #[arg(long, value_name = "SETTINGS", default_value = "", hide_default_value = true)]
     search: Search,
     /// The share of wrong names to accept, such as 1%; approaches are counted up to it
     #[arg(long, value_name = "RATE", value_parser = error_rate, default_value = "0.01")]
     error_rate: f64,
-    /// Which features a touch is turned into
-    #[arg(long, value_name = "times|curvature|gravity|oriented", value_parser = super::train::descriptor, default_value = "curvature")]
+    /// Features of a touch: times, curvature, gravity or oriented
+    #[arg(long, value_name = "NAME", value_parser = super::train::descriptor, default_value = "curvature")]
     descriptor: Descriptor,
-    /// Which approaches are evidence; those with three contacts, with at least one, or all
-    #[arg(long, value_name = "full|contacts|all", value_parser = super::train::evidence, default_value = "contacts")]
+    /// Approaches that are evidence: full, contacts (at least one) or all
+    #[arg(long, value_name = "WHICH", value_parser = super::train::evidence, default_value = "contacts")]
     evidence: Counted,
     /// Approaches to each object; to train on in the last round, and others to test on
     #[arg(long, value_name = "N", value_parser = super::numbers::count, default_value = "8000")]

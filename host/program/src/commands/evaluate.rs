@@ -40,22 +40,22 @@ pub(crate) struct Arguments {
     /// Touches: a directory, or a robot's log (MCAP); with --label a CSV file of rows
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Column of the rows' classes, or of the numbers that a regression should give
+    /// Column of the rows' classes, or a regression's numbers
     #[arg(long, value_name = "COLUMN", conflicts_with_all = ["at", "confusion"])]
     label: Option<String>,
-    /// Touches of objects that the model does not know: also say how many are detected
+    /// Touches of objects that the model does not know: how many are detected
     #[arg(long, value_name = "DIR")]
     unknown: Option<PathBuf>,
-    /// Numbers of touches after which to give the accuracy [default: 5,10,20,30,60, as far as the touches go]
+    /// Give the accuracy after these touches [default: 5,10,20,30,60]
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     at: Option<Vec<usize>>,
     /// Sequences of touches to draw; of each object, and as many groups
     #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences)]
     sequences: usize,
-    /// The share of wrong names to accept, such as 1%; stops there, which nothing promises [default: the model's own thresholds]
+    /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
-    /// Give up after this many touches [default: the model's own limit; 200 for an ensemble]
+    /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
     /// Show the confusion matrix after this many touches
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     /// Follow the model's plan of approaches
     #[arg(long)]
     active: bool,
-    /// Also exchange the object at a random approach, with and without forgetting at so many nats [default: 5]
+    /// Also exchange the object, with and without forgetting at so many nats [default: 5]
     #[arg(long, value_name = "NATS", num_args = 0..=1, default_missing_value = "5")]
     switch: Option<f32>,
     #[command(flatten)]

@@ -15,7 +15,7 @@ pub(crate) struct ExpectedArguments {
 /// How often objects are touched.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct PriorArguments {
-    /// How likely objects are before any touch, such as fork=0.3,spoon=20%; the others share the rest equally
+    /// How likely objects are, such as fork=0.3,spoon=20%; the others share the rest
     #[arg(long, value_delimiter = ',', value_parser = prior, value_name = "NAME=P,…")]
     prior: Vec<(String, f64)>,
 }

@@ -40,20 +40,20 @@ pub(crate) struct Arguments {
     /// Where to write; the model
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// The classes' names, in the order of the labels, or a file with one per line [default: the file's own, or 0, 1, …]
-    #[arg(long, value_name = "NAME,…|FILE")]
+    /// The classes' names in order, or a file with one per line [default: the file's own, or 0, 1, …]
+    #[arg(long, value_name = "NAME,…")]
     names: Option<String>,
-    /// What leaves are stored as [default: i16; i8 for touches of more than 50 objects]
-    #[arg(long, value_parser = leaf, value_name = "i8|i16|f32")]
+    /// Type of leaves: i8, i16 or f32 [default: i16; i8 for touches of more than 50 objects]
+    #[arg(long, value_parser = leaf, value_name = "TYPE")]
     leaf: Option<Leaf>,
-    /// How trees are laid out, or what the layout is chosen for
-    #[arg(long, value_parser = layout, default_value = "balanced", value_name = "LAYOUT|GOAL")]
+    /// How trees are laid out, or what that is chosen for
+    #[arg(long, value_parser = layout, default_value = "balanced", value_name = "NAME")]
     layout: LayoutChoice,
-    /// Store equal leaves once, in a table; auto where that is smaller, and better for what --layout says
-    #[arg(long, value_parser = sharing, default_value = "auto", value_name = "auto|yes|no")]
+    /// Store equal leaves once: yes, no, or auto where that is better
+    #[arg(long, value_parser = sharing, default_value = "auto", value_name = "WHEN")]
     shared_leaves: Sharing,
-    /// Compare whole numbers; how many units of a feature make up 1, or the units that a CSV file of rows needs
-    #[arg(long, value_name = "FEATURE=UNITS,…|ROWS.csv", value_delimiter = ',', value_parser = scale)]
+    /// Compare whole numbers: width=100 for hundredths, or a CSV file of rows that says which
+    #[arg(long, value_name = "SCALES", value_delimiter = ',', value_parser = scale)]
     scale: Vec<Scale>,
     /// The share of wrong names to accept, such as 1%; recognizers stop at it unless told otherwise
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
@@ -61,10 +61,10 @@ pub(crate) struct Arguments {
     /// Give up after this many touches
     #[arg(long, default_value = "200", value_name = "N")]
     max_touches: u32,
-    /// Write beside it: an array in FILE.h with palpate.h to read it, or in FILE.rs, or the trees as XGBoost's JSON
-    #[arg(long, value_name = "c|rust|json,…", value_delimiter = ',', value_parser = emitted)]
+    /// Write beside it: c, rust (source code) or json (the trees, as XGBoost's)
+    #[arg(long, value_name = "KIND,…", value_delimiter = ',', value_parser = emitted)]
     emit: Vec<Emitted>,
-    /// The function from a regression's margin to its value: identity, logistic, exponential, square or softplus [default: the file's]
+    /// From a regression's margin to its value: identity, logistic, exponential, square or softplus [default: the file's]
     #[arg(long, value_parser = link, value_name = "LINK")]
     link: Option<Link>,
     #[command(flatten)]

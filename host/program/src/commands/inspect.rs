@@ -22,8 +22,8 @@ Examples:
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
-    /// The processor; says what the model costs on it
-    #[arg(long, value_parser = core, value_name = "m0+|m4f")]
+    /// The processor, m0+ or m4f; says what the model costs on it
+    #[arg(long, value_parser = core, value_name = "NAME")]
     chip: Option<Core>,
     /// The processor's clock in MHz, to give the time per touch
     #[arg(long, requires = "chip", value_name = "MHZ", value_parser = megahertz)]

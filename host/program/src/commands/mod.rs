@@ -123,13 +123,13 @@ pub(crate) struct Global {
     /// Print the result as JSON
     #[arg(long, global = true)]
     json: bool,
-    /// Threads; the results are the same for any number [default: all]
+    /// Threads, which change no result [default: all]
     #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<usize>,
     /// Seed of all that is random [default: 1]
     #[arg(long, global = true, value_name = "N", value_parser = numbers::count)]
     seed: Option<u64>,
-    /// Print neither progress nor remarks, only results and errors
+    /// Print neither progress nor remarks
     #[arg(long, global = true)]
     quiet: bool,
 }
@@ -202,9 +202,9 @@ fn overview(cli: &clap::Command) -> String {
     text + "
 Global options:
   --json         Print the result as JSON
-  --threads <N>  Threads; the results are the same for any number
+  --threads <N>  Threads, which change no result
   --seed <N>     Seed of all that is random
-  --quiet        Print neither progress nor remarks, only results and errors
+  --quiet        Print neither progress nor remarks
   --help         Print help; `palpate help capture`, with examples
   --version      Print the version
 
@@ -212,8 +212,9 @@ Examples:
   palpate run                 capture, train and recognize built-in objects
   palpate run meshes/ -o out  the same for your own meshes
 
-Words of the output: docs/reference/words.md
-More about options:  docs/reference/options.md"
+More:
+  docs/reference/words.md    the words of the output
+  docs/reference/options.md  what options take, and how commands work"
 }
 
 impl Command {

@@ -15,8 +15,8 @@ use std::path::PathBuf;
 /// The probe.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct ProbeArguments {
-    /// The probe; published, or a file that states its unit, radius, spacing, speed, tilt and what a real one adds
-    #[arg(long, value_name = "published|FILE", default_value = PUBLISHED, hide_default_value = true)]
+    /// The probe: published (the default), or a file that states it
+    #[arg(long, value_name = "FILE", default_value = PUBLISHED, hide_default_value = true)]
     probe: PathBuf,
 }
 
@@ -90,10 +90,10 @@ pub(crate) struct SizeArguments {
 /// Whether objects keep their true sizes, and whether they have instances.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct UnitArguments {
-    /// Touch objects at their true size, with a probe in mm; the unit of meshes that state none, or `stated`
-    #[arg(long, value_name = "[NAME=]UNIT,…", value_parser = mesh_unit, value_delimiter = ',')]
+    /// Objects keep their size, in mm: the unit of meshes that state none (mm, cm, m, in, NAME=cm), or stated
+    #[arg(long, value_name = "UNIT,…", value_parser = mesh_unit, value_delimiter = ',')]
     true_size: Vec<MeshUnit>,
-    /// Several meshes per object; each subdirectory is an object, or with N each built-in object is varied N times
+    /// Several meshes per object: those of a subdirectory, or N variants of a built-in one
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "0", value_parser = instances)]
     instances: Option<usize>,
 }

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 /// What disturbs touches.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct RealArguments {
-    /// Disturb touches as real ones are: noise=0..5ms,timer=1ms,missed=2% and so on, none, or a probe file's [real]
-    #[arg(long, value_parser = real, value_name = "KEY=VALUE,…|FILE")]
+    /// What disturbs touches: noise=0..5ms,timer=1ms,missed=2% and the like, none, or a probe file
+    #[arg(long, value_parser = real, value_name = "NOISE")]
     real: Option<Real>,
 }
 

@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     /// Add up the evidence of rows until there is a verdict, as that of touches
     #[arg(long, requires = "features")]
     add_up: bool,
-    /// The share of wrong names to accept, such as 1%; stops there, which nothing promises [default: the model's own thresholds]
+    /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit]

@@ -12,8 +12,8 @@ use std::path::PathBuf;
 /// Whether, and how, a model is to find out what it does not know.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct StrangersArguments {
-    /// Detect objects that the model does not know; certain also holds names back until strangers would be detected
-    #[arg(long, value_parser = held, value_name = "off|likely|certain")]
+    /// Detect objects that the model does not know: off, likely or certain [default: off]
+    #[arg(long, value_parser = held, value_name = "HOW")]
     strangers: Option<Wanted>,
     /// Touches of many other shapes; they tell what strangers are like [default: of 200 shapes, captured as DIR was]
     #[arg(long, value_name = "DIR", requires = "strangers")]

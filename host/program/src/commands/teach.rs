@@ -10,19 +10,19 @@ use std::path::{Path, PathBuf};
 /// Recorded touches, and what they are taught to.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TeachArguments {
-    /// Recorded touches of objects without a mesh: a directory, a file called like its object, or a log (MCAP); repeatable
-    #[arg(long, value_name = "RECORDED")]
+    /// Recorded touches of objects without a mesh: a directory, a file called like its object, or a log; repeatable
+    #[arg(long, value_name = "DIR|FILE")]
     pub(crate) teach: Vec<PathBuf>,
-    /// Teach the recorded objects to this ensemble, trained on the objects of DIRECTORY, instead of training another one
+    /// Teach the recorded objects to this ensemble, instead of training another one
     #[arg(
         long,
-        value_name = "ENSEMBLE",
+        value_name = "FILE",
         requires = "teach",
         requires = "directory",
         conflicts_with_all = ["preset", "descriptor", "evidence", "trees", "probe", "real"]
     )]
     pub(crate) extend: Option<PathBuf>,
-    /// Write a page that shows how well the recorded objects are recognized, and the gain from more approaches
+    /// Write a page about how well the recorded objects are recognized
     #[arg(long, value_name = "FILE", requires = "teach")]
     pub(crate) page: Option<PathBuf>,
 }

@@ -47,17 +47,17 @@ pub(crate) struct Arguments {
     /// Touches of many other shapes; they train a column for what the model does not know
     #[arg(long, value_name = "DIR")]
     background: Option<PathBuf>,
-    /// Where the settings start from
-    #[arg(long, value_parser = preset, default_value = "compact", value_name = "compact|paper")]
+    /// Where the settings start from: compact or paper
+    #[arg(long, value_parser = preset, default_value = "compact", value_name = "NAME")]
     preset: Preset,
-    /// Which features a touch is turned into [default: the preset's]
-    #[arg(long, value_parser = descriptor, value_name = "times|curvature|gravity|oriented")]
+    /// Features of a touch: times, curvature, gravity or oriented [default: the preset's]
+    #[arg(long, value_parser = descriptor, value_name = "NAME")]
     descriptor: Option<Descriptor>,
-    /// Which approaches are evidence; those with three contacts, with at least one, or all [default: as the data set has]
-    #[arg(long, value_parser = evidence, value_name = "full|contacts|all")]
+    /// Approaches that are evidence: full, contacts (at least one) or all [default: as the data set has]
+    #[arg(long, value_parser = evidence, value_name = "WHICH")]
     evidence: Option<Counted>,
     /// How trees are grown, such as rounds=30,depth=6,eta=0.3 [default: the preset's]
-    #[arg(long, value_name = "KEY=VALUE,…")]
+    #[arg(long, value_name = "SETTINGS")]
     trees: Option<Trees>,
     #[command(flatten)]
     probe: ProbeArguments,

@@ -40,11 +40,11 @@ pub(crate) struct Arguments {
     /// The most instructions per touch
     #[arg(long, value_name = "N")]
     max_instructions: Option<u64>,
-    /// The processor; instructions are counted for it
-    #[arg(long, value_parser = core, default_value = "m4f", value_name = "m0+|m4f")]
+    /// The processor, m0+ or m4f; instructions are counted for it
+    #[arg(long, value_parser = core, default_value = "m4f", value_name = "NAME")]
     chip: Core,
-    /// Which features a touch is turned into
-    #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "times|curvature|gravity|oriented")]
+    /// Features of a touch: times, curvature, gravity or oriented
+    #[arg(long, value_parser = super::train::descriptor, default_value = "curvature", value_name = "NAME")]
     descriptor: Descriptor,
     /// The share of wrong names to accept, such as 1%; the model promises it
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]

@@ -4,8 +4,8 @@ use palpate::ensemble::import::Options;
 
 #[derive(clap::Args)]
 pub(super) struct UnstatedArguments {
-    /// The number that stood for a missing value in training (XGBoost's `missing=`), such as 0; NaN always does
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    /// The number that stood for a missing value in training, such as 0
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     missing: Option<f32>,
     /// Take all trees where training stopped early, not those up to the best iteration
     #[arg(long)]

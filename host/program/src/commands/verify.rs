@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
     pub(super) sequences: usize,
     /// The library's own raw scores of the rows
-    #[arg(long, value_name = "MARGINS.csv")]
+    #[arg(long, value_name = "CSV")]
     library_margins: Option<PathBuf>,
     #[command(flatten)]
     unstated: UnstatedArguments,

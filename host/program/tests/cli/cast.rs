@@ -2,7 +2,7 @@ use crate::{command, run, stderr, stdout};
 use std::path::{Path, PathBuf};
 
 fn slivers(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data").join(name)
 }
 
 #[test]

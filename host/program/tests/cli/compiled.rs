@@ -185,7 +185,7 @@ fn recognize_answers_each_line_of_a_slow_pipe_before_the_next_comes() {
 #[test]
 fn six_touches_of_one_outer_finger_give_no_name_with_a_model_of_full_touches() {
     let place = Place::new();
-    let household = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/household.palpate");
+    let household = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
     for model in [household.to_owned(), place.text("model.palpate")] {
         let bytes = std::fs::read(&model).unwrap();
         let opened = palpate_onboard::Model::new(&bytes).unwrap();
@@ -491,7 +491,7 @@ fn leaves_of_touches_of_more_than_fifty_objects_take_a_byte_unless_told_otherwis
 #[test]
 fn full_touches_alone_are_warned_of_where_it_is_evidence_which_fingers_touch() {
     let place = Place::new();
-    let household = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/household.palpate");
+    let household = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
     let full = "0 0.031 0.012\n".repeat(40);
     let said = |model: &str, touches: &str| {
         std::fs::write(place.path("touches.txt"), touches).unwrap();

@@ -1,4 +1,4 @@
-//! `palpate probe fit`, `palpate capture --probe` and `palpate data compare`, as a user calls them.
+//! `palpate probe fit`, `palpate capture --probe` and `palpate data check`, as a user calls them.
 
 use crate::{json, listing, run, stderr, stdout};
 use serde_json::Value;

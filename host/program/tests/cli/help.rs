@@ -91,7 +91,7 @@ fn every_commands_help_wraps_well_at_80_and_at_120_columns() {
 fn the_program_without_a_command_prints_its_help() {
     let directory = tempfile::tempdir().unwrap();
     let error = stderr(command([""; 0]).current_dir(&directory).output().unwrap(), 2);
-    assert!(error.contains("Usage: palpate <COMMAND>") && error.contains("palpate run"), "{error}");
+    assert!(error.contains("Usage: palpate [OPTIONS] <COMMAND>") && error.contains("palpate run"), "{error}");
     assert!(crate::listing(directory.path()).is_empty());
 }
 

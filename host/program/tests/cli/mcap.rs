@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Output, Stdio};
 
 /// A log that MCAP's library for Python wrote: twenty touches of a bowl and twenty of a mug, and another channel.
-const PYTHON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/mcap/json-zstd.mcap");
+const PYTHON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/mcap/json-zstd.mcap");
 
 /// Writes a log with these touches, lines of text, and the objects that they name.
 fn log<'a>(path: &Path, touches: impl IntoIterator<Item = (&'a str, Option<&'a str>)>) {

@@ -3,7 +3,7 @@ use std::path::Path;
 
 /// The model that the repository ships.
 fn household() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/household.palpate")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/household.palpate")
 }
 
 #[test]

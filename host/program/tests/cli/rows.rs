@@ -7,7 +7,7 @@ use tempfile::TempDir;
 
 /// Real files of other libraries; see `make.py` there.
 fn data(name: &str) -> String {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/import");
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import");
     directory.join(name).to_str().unwrap().to_owned()
 }
 

@@ -32,8 +32,8 @@ pub(super) struct Arguments {
     /// Simulated touches of the same objects, to compare the recorded ones in DIR with
     #[arg(value_name = "SIMULATED")]
     simulated: Option<PathBuf>,
-    /// Which features a touch is turned into; where two data sets are compared
-    #[arg(long, value_parser = descriptor, value_name = "times|curvature|gravity|oriented", default_value = "curvature", requires = "simulated")]
+    /// Features of a touch: times, curvature, gravity or oriented; where two data sets are compared
+    #[arg(long, value_parser = descriptor, value_name = "NAME", default_value = "curvature", requires = "simulated")]
     pub(super) descriptor: Descriptor,
     /// Sequences of touches to draw; of each object, where two data sets are compared
     #[arg(long, value_name = "N", value_parser = sequences, default_value_t = Settings::default().groups, requires = "simulated")]

@@ -29,11 +29,11 @@ pub(crate) struct LineOptions {
     /// Speed of a serial port, in bits per second
     #[arg(long, value_name = "BAUD", default_value = "115200")]
     baud: u32,
-    /// Image that the emulator runs [default: onboard/firmware/target/thumbv7em-none-eabihf/release/uart]
+    /// Image that the emulator runs [default: uart in onboard/firmware]
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// Make the line bad: probabilities that a byte is lost and changed, that a frame comes twice; longest delay in ms
-    #[arg(long, value_name = "LOST,CHANGED,DOUBLED,MS")]
+    /// Make the line bad: probabilities of lost and changed bytes and doubled frames, longest delay in ms
+    #[arg(long, value_name = "FAULTS")]
     bad_line: Option<Faults>,
 }
 
