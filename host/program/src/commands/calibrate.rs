@@ -20,16 +20,13 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. Wrong names break it; a sequence without a name is undecided, neither right nor wrong. docs/reference/options.md says how thresholds are found, and how many touches that takes.
 
-With --strangers the model also tests whether touches fit any object that it knows; at most 2 % of known objects' sequences end as unknown. likely costs hardly a touch and detects about half of the strangers; certain detects nearly all that can be detected.
-
-With --plan the model gets a plan of approaches instead of thresholds. DIR then holds approaches with pose to all of its objects, 20 or more of each in every pose.
+With --strangers the model also tests whether touches fit any object that it knows. With --plan it gets a plan of approaches instead, and DIR holds approaches with pose.
 
 Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
   palpate calibrate model.palpate fresh -o names.palpate --per name
   palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
-  palpate calibrate model.palpate fresh -o noisy.palpate --real noise=0..5ms
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
   palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
 pub(crate) struct Arguments {

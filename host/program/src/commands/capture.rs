@@ -26,7 +26,6 @@ Examples:
   palpate capture meshes/ -o data --true-size mm --probe probe.toml
                                                    as large as they are
   palpate capture meshes/ -o data --instances      a directory for each object
-  palpate capture builtin -o data --instances 20   twenty forks are a fork
   palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
 pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them

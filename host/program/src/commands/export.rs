@@ -26,11 +26,8 @@ Without a layout of its own (compact, complete, grid, wide, patterns), --layout 
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
-  palpate export ensemble.json -o kitchen.palpate --prior fork=0.3,spoon=0.3
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
-  palpate export lightgbm.txt -o model.palpate --layout speed
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
-  palpate export forest.onnx -o model.palpate --scale rows.csv
   palpate export xgboost.json -o model.palpate --missing -999
   palpate export sure.palpate -o sure.palpate --emit c     # sure.h alone
   palpate export lightgbm.txt -o model.palpate --emit json # model.json too")]

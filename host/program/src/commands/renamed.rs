@@ -120,18 +120,18 @@ pub(super) fn said(words: &[String], error: &clap::Error) -> Option<String> {
 fn path(words: &[String]) -> String {
     let cli = super::cli();
     let (mut command, mut path) = (&cli, Vec::new());
-    for word in words {
-        match command.find_subcommand(word) {
-            Some(found) => {
-                path.push(word.as_str());
-                command = found;
+    let mut words = words.iter();
+    while let Some(word) = words.next() {
+        if word.starts_with('-') {
+            // Global options may stand before the command; two of them have values.
+            if ["--seed", "--threads"].contains(&word.as_str()) {
+                words.next();
             }
-            None if path.is_empty() && !word.starts_with('-') && command.get_name() != "palpate" => break,
-            None => {}
+            continue;
         }
-        if !command.has_subcommands() {
-            break;
-        }
+        let Some(found) = command.find_subcommand(word) else { break };
+        path.push(word.as_str());
+        command = found;
     }
     path.join(" ")
 }
@@ -162,6 +162,8 @@ mod tests {
             (&["capture", "bowl", "-o", "data", "--approaches"], "--approaches 60000"),
             (&["run", "--true-size", "--unit", "mm"], "--true-size mm"),
             (&["evaluate", "m", "d", "--noise=5ms"], "--real noise="),
+            (&["parity", "e.json", "m.palpate", "data"], "palpate verify"),
+            (&["--seed", "3", "data", "compare", "a", "b"], "palpate data check"),
         ] {
             let said = said_to(words).unwrap_or_else(|| panic!("{words:?}"));
             assert!(said.contains(expected), "{said}");

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Pages work in any browser, without a network. The inside of a surface is orange: a mesh that shows orange from outside is inside out, or has holes.
+Pages work in any browser, without a network. The inside of a surface is orange; a mesh that shows orange from outside is inside out, or has holes.
 
 With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute.
 

@@ -72,7 +72,7 @@ fn change(path: &Path, change: impl FnOnce(&mut Vec<u8>)) {
 fn export_says_size_splits_leaves_and_error_and_the_file_has_that_size() {
     let place = Place::new();
     for leaf in ["i8", "i16", "f32"] {
-        for layout in ["auto", "compact", "complete", "grid"] {
+        for layout in ["balanced", "compact", "complete", "grid"] {
             let output = place.text("other.palpate");
             let exported = json(&[
                 "export",

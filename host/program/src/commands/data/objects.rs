@@ -13,10 +13,10 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate data objects -o meshes                    ten files: meshes/bowl.obj, ...
+  palpate data objects -o meshes                    ten files: bowl.obj, ...
   palpate data objects -o meshes --only fork        one of them
   palpate data objects -o meshes --picture all.png  and a picture of them
-  palpate data objects -o meshes --varied 7         other proportions, from seed 7
+  palpate data objects -o meshes --varied 7         other proportions
 
 The meshes are closed, in centimeters, with z up. The same command always writes the same bytes.")]
 pub(super) struct Arguments {

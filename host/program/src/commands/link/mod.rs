@@ -75,6 +75,7 @@ Examples:
       --stop-after 10000 --bad-line 0.001,0.001,0.01,5")]
 pub(crate) struct Arguments {
     /// A serial port, tcp://HOST:PORT, or emulator; with --watch also a journal that another link writes
+    #[arg(value_parser = port)]
     port: String,
     /// Touches to recognize: a data set's directory, a file of lines, a robot's log (MCAP), or - for standard input
     source: Option<PathBuf>,
@@ -104,6 +105,14 @@ pub(crate) struct Arguments {
     journal: Option<PathBuf>,
     #[command(flatten)]
     line: LineOptions,
+}
+
+/// The name of a port, or of a journal: a serial port is a file, too, but none with lines to follow.
+fn port(text: &str) -> Result<String> {
+    if !Path::new(text).is_file() {
+        text.parse::<Port>()?;
+    }
+    Ok(text.into())
 }
 
 impl Arguments {
