@@ -75,6 +75,9 @@ pub struct Confusion {
     pub counts: Vec<Vec<usize>>,
 }
 
+/// Weights of objects, of their names and the model's own weights; `None` for these.
+pub type Expecting<'e> = dyn Fn(&[String], &[f64]) -> Result<Option<Vec<u32>>> + 'e;
+
 /// Measures a model on touches that have their noise already. `expecting` gives the weight of each object, of the objects'
 /// names and the model's own weights; `None` leaves these.
 ///
@@ -85,7 +88,7 @@ pub fn measure(
     candidate: Candidate<'_>,
     dataset: &Dataset,
     wanted: &Wanted<'_>,
-    expecting: &dyn Fn(&[String], &[f64]) -> Result<Option<Vec<u32>>>,
+    expecting: &Expecting<'_>,
 ) -> Result<Evaluated> {
     let mut margins = Margins::new(candidate, dataset)?;
     let own = match candidate {

@@ -63,7 +63,7 @@ pub use margins::Margins;
 pub(crate) use margins::OfTouches;
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
-pub use measure::{Confusion, Evaluated, Wanted, measure, own_weights};
+pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};
 pub use noisy::{ROBOTS, add_noise};
 pub use palpate_trees::verify::{
     self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict, together,

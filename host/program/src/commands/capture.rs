@@ -129,8 +129,7 @@ fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, S
 
 /// Which options help, where the library refuses what is in the directory.
 pub(super) fn hint(error: &Error) -> Option<&'static str> {
-    let Some(problem) = error.problem::<CaptureProblem>() else { return None };
-    match problem {
+    match error.problem::<CaptureProblem>()? {
         CaptureProblem::HoldsOtherObjects { .. } => Some("--add adds to what is there, --force replaces it."),
         CaptureProblem::HoldsOtherSettings { .. } | CaptureProblem::Shorter { .. } => {
             Some("--force replaces what is there.")

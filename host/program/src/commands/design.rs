@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 #[derive(clap::Subcommand)]
 enum Command {
     /// Find the probe that needs the fewest approaches to your objects
-    Design(DesignArguments),
+    Design(Box<DesignArguments>),
     /// Find out how your probe differs from the ideal, from its touches
     Fit(super::fit::FitArguments),
 }

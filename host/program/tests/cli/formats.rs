@@ -101,7 +101,7 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
     let (_, error) = capture(&directory.path().join("cup.stl"), &directory.path().join("touches"));
     let line = error.lines().find(|line| line.starts_with("cup: The mesh is open")).unwrap_or_default();
     assert!(
-        line.contains("partly inside out") && line.contains("stray parts") && line.contains("a size that"),
+        line.contains("partly inside out") && line.contains("stray parts") && line.contains("an implausible size"),
         "{error}"
     );
 }
