@@ -107,7 +107,7 @@ commands! {
     max_term_width = 120,
     arg_required_else_help = true,
     subcommand_required = true,
-    help_template = "{about-with-newline}\n{usage-heading} {usage}\n{after-help}"
+    help_template = "{about-with-newline}\n{usage-heading} {usage}{after-help}"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -199,7 +199,8 @@ fn overview(cli: &clap::Command) -> String {
             text += &format!("  {path:14}{about}\n");
         }
     }
-    text + "
+    text.trim_start().to_owned()
+        + "
 Global options:
   --json         Print the result as JSON
   --threads <N>  Threads, which change no result
