@@ -327,22 +327,22 @@ fn what_cannot_be_taught_says_why() {
     let [known, recorded, _] = setting(60);
     let ensemble = train(&known, &quick(), &()).unwrap();
     let one_value = train(&known, &train::Settings { multi_output: false, ..quick() }, &()).unwrap();
-    assert_eq!(problem(&one_value, &known, &recorded), TeachProblem::OneValue.into());
+    assert_eq!(problem(&one_value, &known, &recorded), TeachProblem::OneValue);
     let mut renamed = recorded.clone();
     renamed.objects[0].name = "object1".into();
-    assert_eq!(problem(&ensemble, &known, &renamed), TeachProblem::Known { object: "object1".into() }.into());
+    assert_eq!(problem(&ensemble, &known, &renamed), TeachProblem::Known { object: "object1".into() });
     let first = known.only(|name| name == "object0");
     let missing = TeachProblem::Missing { objects: vec!["object1".into()] };
-    assert_eq!(problem(&ensemble, &first, &recorded), missing.into());
-    assert_eq!(problem(&ensemble, &known, &Dataset::default()), TeachProblem::Nothing.into());
+    assert_eq!(problem(&ensemble, &first, &recorded), missing);
+    assert_eq!(problem(&ensemble, &known, &Dataset::default()), TeachProblem::Nothing);
     let mut few = recorded.clone();
     few.objects[0] = few.objects[0].select(0..19);
     let too_few = TeachProblem::TooFew { object: "object2".into(), touches: 19, least: 20 };
-    assert_eq!(problem(&ensemble, &known, &few), too_few.into());
+    assert_eq!(problem(&ensemble, &known, &few), too_few);
     let mut full = recorded.clone();
     full.objects[0] = full.objects[0].filtered(Touch::is_full);
     let counted = palpate_shared::format::Counted::Contacts;
-    assert_eq!(problem(&ensemble, &known, &full), TeachProblem::FullTouches { counted }.into());
+    assert_eq!(problem(&ensemble, &known, &full), TeachProblem::FullTouches { counted });
     let groups = Settings { groups: 0, ..few_groups() };
     let error = teach(&ensemble, &known, &recorded, &groups, &()).unwrap_err();
     assert_eq!(error.exit_code(), 2);
@@ -365,11 +365,11 @@ fn another_probe_and_a_missing_pose_are_refused() {
     let probe = crate::ensemble::StatedProbe::of(&known);
     let ensemble = train(&known, &train::Settings { probe, ..settings }, &()).unwrap();
     let no_pose = TeachProblem::NoPose { object: "object2".into(), descriptor: Descriptor::ContactsOriented };
-    assert_eq!(problem(&ensemble, &known, &recorded), no_pose.into());
+    assert_eq!(problem(&ensemble, &known, &recorded), no_pose);
     with_pose(&mut recorded);
     teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
     recorded.origin = origin(2.0);
-    let different = problem(&ensemble, &known, &recorded);
+    let different = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap_err();
     assert!(different.to_string().contains("spacing 1.5 and 2"), "{different}");
 }
 
