@@ -12,7 +12,7 @@ use palpate_trees::compile as trees;
 /// As [`palpate_trees::compile::compile`]; [`EnsembleProblem::Attribute`](crate::error::EnsembleProblem::Attribute) if the
 /// ensemble states something of its touches that cannot be read.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
-    Ok(trees::compile(ensemble, &stated(ensemble, settings)?)?)
+    trees::compile(ensemble, &stated(ensemble, settings)?)
 }
 
 /// Compiles an ensemble to at most `most` bytes, as [`compile`].
@@ -20,7 +20,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
 /// # Errors
 /// As [`palpate_trees::compile::compile_within`], and as [`compile`].
 pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> Result<Compiled> {
-    Ok(trees::compile_within(ensemble, &stated(ensemble, settings)?, most)?)
+    trees::compile_within(ensemble, &stated(ensemble, settings)?, most)
 }
 
 /// The settings, with what the ensemble states of its touches.

@@ -151,7 +151,7 @@ impl<'a> Context<'a> {
 
     /// Stops the stage if the report was cancelled.
     pub(super) fn check(&self) -> Result<()> {
-        Ok(progress::check(self.progress)?)
+        progress::check(self.progress)
     }
 
     /// Training settings of the paper's method.

@@ -105,7 +105,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
         let terms = Terms { rate, confidence: CONFIDENCE, per };
         match choose(sequences, &names, strictest(), &terms) {
             Ok(chosen) => Ok(Some(chosen.odds)),
-            Err(error) if matches!(error.problem::<CalibrateProblem>(), Some(_)) => Ok(None),
+            Err(error) if error.problem::<CalibrateProblem>().is_some() => Ok(None),
             Err(error) => Err(error),
         }
     };

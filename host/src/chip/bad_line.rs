@@ -105,6 +105,9 @@ mod tests {
         assert!("0,0,0,-1".parse::<Faults>().is_err());
         assert!("0,0,0,0".parse::<Faults>().is_ok());
         let error = "often".parse::<Faults>().unwrap_err().to_string();
-        assert!(error.starts_with("`often` does not describe") && error.ends_with("as in 0.001,0.001,0.01,5."), "{error}");
+        assert!(
+            error.starts_with("`often` does not describe") && error.ends_with("as in 0.001,0.001,0.01,5."),
+            "{error}"
+        );
     }
 }

@@ -10,7 +10,7 @@ use crate::touches::Dataset;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What to measure.
+/// Measurements to make.
 #[derive(Clone, Debug)]
 pub struct Wanted<'d> {
     /// Numbers of touches after which to give the accuracy; `None` for the usual ones, as far as the touches go.
@@ -23,11 +23,11 @@ pub struct Wanted<'d> {
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,
-    /// What the touches were disturbed with, as a promise is compared with it.
+    /// Noise of the touches, with which a promise is compared.
     pub noise: Noise,
     /// The number of touches after which to give the confusion matrix.
     pub confusion: Option<usize>,
-    /// Whether each approach is made where the model's plan says.
+    /// True if each approach is made where the model's plan says.
     pub active: bool,
     /// The nats at which recognizers forget, where the object is exchanged.
     pub switch: Option<f32>,
@@ -43,7 +43,7 @@ pub struct Evaluated {
     pub evaluation: Evaluation,
     /// Robots that made the touches in turn, each with its own bias.
     pub robots: usize,
-    /// How many instances or recordings the objects have that have several: each group is of touches of one.
+    /// Number of instances or recordings of the objects that have several: each group is of touches of one.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub instances: BTreeMap<String, usize>,
     /// Objects whose touches are those that the model was trained on.
@@ -51,13 +51,13 @@ pub struct Evaluated {
     /// The confusion matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confusion: Option<Confusion>,
-    /// What the plan proposed approaches from, where it did.
+    /// Stock that the plan proposed approaches from, where it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub active: Option<ActiveFacts>,
     /// Sequences in which the object is exchanged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub switch: Option<Switched>,
-    /// What is said to objects that the model does not know.
+    /// Answers to objects that the model does not know.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strangers: Option<Strangers>,
 }

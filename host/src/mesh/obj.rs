@@ -326,7 +326,7 @@ mod tests {
         ] {
             let error = parse_text(text).unwrap_err();
             assert!(error.to_string().contains(expected), "{text:?}: {error}");
-            assert!(matches!(error.problem::<MeshProblem>(), Some(_)), "{error:?}");
+            assert!(error.problem::<MeshProblem>().is_some(), "{error:?}");
             assert!(error.to_string().ends_with("Correct the line, or export the mesh again."), "{error}");
             assert_eq!(error.exit_code(), 1);
         }

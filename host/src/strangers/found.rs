@@ -1,4 +1,4 @@
-//! What a calibration of strangers found, as it is shown.
+//! Findings of a calibration of strangers, as they are shown.
 
 use super::{Calibrated, Settings};
 

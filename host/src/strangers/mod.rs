@@ -199,7 +199,7 @@ pub fn without(model: &Model<'_>) -> Result<Vec<u8>> {
     let header = Strangers::header(true, false).to_vec();
     let section = model.background().map(|_| (true, header));
     let sections = vec![(Tag::Strangers, section), (Tag::Promise, None)];
-    Ok(restate(model, &Restated { sections, ..Restated::default() })?)
+    restate(model, &Restated { sections, ..Restated::default() })
 }
 
 fn check(settings: &Settings) -> Result<()> {
@@ -336,7 +336,7 @@ fn stated(model: &Model<'_>, terms: &MisfitTerms, misfits: &[misfit::Misfit]) ->
     section.extend(terms.to_bytes());
     misfits.iter().for_each(|misfit| fixed::write(misfit, f64::from(model.unit()), &mut section));
     let sections = vec![(Tag::Strangers, Some((true, section))), (Tag::Promise, None)];
-    Ok(restate(model, &Restated { sections, ..Restated::default() })?)
+    restate(model, &Restated { sections, ..Restated::default() })
 }
 
 /// The touches after which four of five sequences of left-out objects are detected.

@@ -119,7 +119,7 @@ impl Listing {
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, directory: &Path) -> Result<()> {
-        Ok(output::write_json(&Self::path(directory), self)?)
+        output::write_json(&Self::path(directory), self)
     }
 
     /// The touches of a listed object, and what each of them is of.

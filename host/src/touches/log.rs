@@ -221,7 +221,7 @@ impl LogWriter {
         let file = self.writer.finish()?.into_inner().map_err(|error| temporary(error.into_error()));
         let mut file = file?;
         file.seek(SeekFrom::Start(0)).map_err(temporary)?;
-        Ok(output::write_whole(path, |out| std::io::copy(&mut file, out).map(drop))?)
+        output::write_whole(path, |out| std::io::copy(&mut file, out).map(drop))
     }
 }
 

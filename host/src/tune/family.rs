@@ -74,7 +74,7 @@ pub(super) fn train(
             let first = Ensemble { trees: ensemble.trees[..trees].to_vec(), ..ensemble.clone() };
             family.push((Recipe { trees, depth, eta, bins, different_leaves: None }, first));
         }
-        Ok(progress::advance(progress, 1)?)
+        progress::advance(progress, 1)
     };
     add(6, 0.15, None, &[120])?;
     for (depth, eta, stops) in TREES {

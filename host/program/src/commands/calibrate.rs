@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::print_about(&arguments.output, &text)
 }
 
-/// What was found.
+/// Results of both calibrations.
 #[derive(serde::Serialize)]
 struct Both<'c> {
     #[serde(flatten)]

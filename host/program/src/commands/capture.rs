@@ -51,7 +51,7 @@ pub(crate) struct Arguments {
     /// With the probe's direction and alignment; six more numbers in each line
     #[arg(long)]
     pose: bool,
-    /// How to keep the touches: text or parquet [default: text]
+    /// Format of the touches: text or parquet [default: text]
     #[arg(long, value_name = "KIND", value_parser = parsed::<Format>)]
     format: Option<Format>,
     /// Capture only the K-th of N parts, which together are the whole [default: 1/1]
@@ -96,7 +96,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 }
 
 impl Arguments {
-    /// What the options say, and where they say nothing the defaults or, for objects to add, the data set.
+    /// Settings from the options; where they are open, the defaults or, for objects to add, the data set's.
     fn origin(&self, seed: Option<u64>) -> Result<Origin> {
         let there = if self.add { Listing::read(&self.output)? } else { None };
         let base = self.size.origin(there.map_or_else(Origin::default, |listing| listing.origin))?;
@@ -127,7 +127,7 @@ fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, S
     text.parse().map_err(|problem: TouchesProblem| format!("{problem}. {}", problem.fix()))
 }
 
-/// Which options help, where the library refuses what is in the directory.
+/// Options that help where the library refuses the contents of the directory.
 pub(super) fn hint(error: &Error) -> Option<&'static str> {
     match error.problem::<CaptureProblem>()? {
         CaptureProblem::HoldsOtherObjects { .. } => Some("--add adds to what is there, --force replaces it."),

@@ -53,7 +53,7 @@ struct DesignArguments {
     /// Where to write; a directory for probe.toml and design.html
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// What to try instead of the usual: distances, radii and tilts of fingers, where approaches aim, the speed
+    /// Trials instead of the usual: distances, radii and tilts of fingers, where approaches aim, the speed
     #[arg(long, value_name = "SETTINGS", default_value = "", hide_default_value = true)]
     search: Search,
     /// The share of wrong names to accept, such as 1%; approaches are counted up to it

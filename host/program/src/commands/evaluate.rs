@@ -75,7 +75,7 @@ pub(crate) struct Arguments {
     real: RealArguments,
 }
 
-/// Whether which fingers touch is evidence to the model.
+/// True if the pattern of touching fingers is evidence to the model.
 fn counts_patterns(file: &ModelFile) -> bool {
     let counted = match file {
         ModelFile::Full(ensemble) => ensemble.origin.trained.map_or(Counted::Full, |trained| trained.touches.counted),

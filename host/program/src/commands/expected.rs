@@ -2,7 +2,7 @@
 
 use palpate::error::{Error, Result};
 
-/// Which objects to expect.
+/// Objects to expect.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct ExpectedArguments {
     #[command(flatten)]
@@ -12,10 +12,10 @@ pub(crate) struct ExpectedArguments {
     only: Vec<String>,
 }
 
-/// How often objects are touched.
+/// Frequencies with which objects are touched.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct PriorArguments {
-    /// How likely objects are, such as fork=0.3,spoon=20%; the others share the rest
+    /// Probabilities of objects, such as fork=0.3,spoon=20%; the others share the rest
     #[arg(long, value_delimiter = ',', value_parser = prior, value_name = "NAME=P,…")]
     prior: Vec<(String, f64)>,
 }
@@ -50,7 +50,7 @@ impl PriorArguments {
 }
 
 impl ExpectedArguments {
-    /// Whether anything else is expected than what a model says.
+    /// True if anything else is expected than the model states.
     pub(crate) fn is_given(&self) -> bool {
         !self.prior.prior.is_empty() || !self.only.is_empty()
     }

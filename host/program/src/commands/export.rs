@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     /// Type of leaves: i8, i16 or f32 [default: i16; i8 for touches of more than 50 objects]
     #[arg(long, value_parser = leaf, value_name = "TYPE")]
     leaf: Option<Leaf>,
-    /// How trees are laid out, or what that is chosen for
+    /// Layout of the trees, or the goal that it is chosen for
     #[arg(long, value_parser = layout, default_value = "balanced", value_name = "NAME")]
     layout: LayoutChoice,
     /// Store equal leaves once: yes, no, or auto where that is better
@@ -93,7 +93,7 @@ impl LayoutChoice {
     }
 }
 
-/// How a feature is measured in whole numbers.
+/// Measure of a feature in whole numbers.
 #[derive(Clone)]
 enum Scale {
     /// So many units of this feature make up 1.
@@ -102,11 +102,11 @@ enum Scale {
     Rows(PathBuf),
 }
 
-/// Whether leaves are shared; `None` leaves it open.
+/// Sharing of equal leaves; `None` leaves it open.
 #[derive(Clone)]
 struct Sharing(Option<bool>);
 
-/// What is written beside the model.
+/// Files written beside the model.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Emitted {
     /// The compiled model as source code.
@@ -129,7 +129,7 @@ struct Exported {
     bytes: usize,
     layout: &'static str,
     leaf: &'static str,
-    /// How many different leaves there are, if equal ones stand once.
+    /// Number of different leaves, if equal ones are stored once.
     #[serde(skip_serializing_if = "Option::is_none")]
     shared_leaves: Option<usize>,
     trees: usize,
@@ -137,7 +137,7 @@ struct Exported {
     leaves: usize,
     margin_error: f32,
     instructions: Instructions,
-    /// What the layouts come to that were tried, in the same order every time.
+    /// Sizes and costs of the layouts that were tried, in the same order every time.
     candidates: Vec<Candidate>,
     /// Features, by name, for a model over rows.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -152,10 +152,10 @@ struct Exported {
     /// The kind of file, if another library wrote it.
     #[serde(skip_serializing_if = "Option::is_none")]
     imported: Option<String>,
-    /// What a user should know about it.
+    /// Facts about it that a user should know.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
-    /// What whole numbers do to each feature.
+    /// Effects of whole numbers on each feature.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     scales: Vec<Effect>,
     /// Files with source code.
@@ -166,7 +166,7 @@ struct Exported {
     ensemble: Option<PathBuf>,
 }
 
-/// What is written of a compiled model.
+/// Sources written of a compiled model.
 #[derive(serde::Serialize)]
 struct Sources {
     bytes: usize,
@@ -256,7 +256,7 @@ impl Arguments {
     }
 }
 
-/// Whether a file is a compiled model, by its first bytes. Where it cannot be read, whoever reads it as an ensemble says so.
+/// True if a file is a compiled model, by its first bytes. Where it cannot be read, whoever reads it as an ensemble says so.
 fn is_compiled(path: &Path) -> bool {
     let mut head = [0; MAGIC.len()];
     // A pipe must not lose its first bytes, and is read as an ensemble.
@@ -389,10 +389,10 @@ fn names(text: &str) -> Result<Vec<String>> {
 struct Predicts {
     /// "class" or "value".
     what: &'static str,
-    /// What makes a value of a margin.
+    /// Function from a margin to a value.
     #[serde(skip_serializing_if = "Option::is_none")]
     link: Option<&'static str>,
-    /// Whether the last of several largest margins names the class.
+    /// True if the last of several largest margins names the class.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     last_of_ties: bool,
     /// The least and the largest of the numbers that stand for a missing value, beside NaN.
@@ -427,7 +427,7 @@ impl Predicts {
     }
 }
 
-/// What a link makes of a margin.
+/// Formula of a link, from a margin to a value.
 pub(super) fn formula(link: &str) -> &'static str {
     match link {
         "logistic" => "the value 1 / (1 + e^-x)",
@@ -542,7 +542,7 @@ fn text(path: &Path, exported: &Exported) -> String {
     if has_sentinel { text + features.trim_end() + ", sentinel\n" } else { text + &features }
 }
 
-/// What whole numbers do: of features that they hold exactly only how many there are.
+/// Effects of whole numbers; of features that they hold exactly, only the number.
 fn effects(all: &[Effect]) -> String {
     let mut text = String::new();
     let is_exact = |effect: &&Effect| effect.values_are_whole == Some(true) && effect.different == effect.thresholds;

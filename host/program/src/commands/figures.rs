@@ -7,7 +7,7 @@ use palpate::evaluate::{
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// What `palpate evaluate` prints: tables, then sentences about what was asked for beside them.
+/// Output of `palpate evaluate`: tables, then sentences about what was asked for beside them.
 pub(super) fn text(evaluated: &Evaluated) -> String {
     let mut text = table(&evaluated.evaluation);
     if let Some(approaches) = &evaluated.evaluation.approaches {
@@ -89,7 +89,7 @@ fn above_text(evaluation: &Evaluation) -> String {
     }
 }
 
-/// What was promised, what was measured, whether the promise is kept, and what makes it void.
+/// The promise, the measurement, the outcome, and what makes the promise void.
 fn promise_text(check: &PromiseCheck) -> String {
     let of = match (check.per, &check.of) {
         ("name", Some(name)) => format!(" of {name}, the name that is wrong most often,"),
@@ -200,7 +200,7 @@ fn given(share: f64) -> String {
     if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
 }
 
-/// What approaches come to: one row per object, one column per number of approaches; then the sequential figures.
+/// Figures of approaches: one row per object, one column per number of approaches; then the sequential figures.
 fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> String {
     let names = approaches.per_object.keys().map(|name| name.chars().count());
     let width = names.max().unwrap_or(0).max("approaches".len());
@@ -252,7 +252,7 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
     text
 }
 
-/// What an exchanged object comes to: one row per rule.
+/// Figures of an exchanged object: one row per rule.
 fn switch_table(switch: &Switched) -> String {
     let mut text = format!(
         "\n{:20} {:>22} {:>8} {:>26} {:>8} {:>8}\n",
@@ -276,7 +276,7 @@ fn switch_table(switch: &Switched) -> String {
     text + "Exchanged at a random approach before the verdict; wrong is any name but that of the object touched last.\n"
 }
 
-/// What is said to strangers, in percent: one row per object.
+/// Answers to strangers, in percent: one row per object.
 fn strangers_table(strangers: &Strangers) -> String {
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     if !strangers.has_test {

@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     }
 }
 
-/// What was found, one line for each number.
+/// Estimates, one line for each number.
 fn table(found: &Fit) -> String {
     let [full, pairs] = found.contacts;
     let presses = if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() };

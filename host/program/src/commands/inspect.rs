@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json { output::print_json(&inspected) } else { output::print(&text(&inspected)) }
 }
 
-/// What a model over rows predicts, in words.
+/// Prediction of a model over rows, in words.
 fn predicts_text(predicts: &Predicts) -> String {
     let what = match predicts.link {
         None if predicts.last_of_ties => "the class with the largest margin, of several the last",
@@ -202,7 +202,7 @@ fn probe_lines(lines: &mut Lines, probe: &Probe, touches: &Touches) {
     );
 }
 
-/// What it was trained with and on, and its plan.
+/// Its training, and its plan.
 fn training_lines(lines: &mut Lines, inspected: &Inspected<'_>) {
     if let Some(Noise { least, largest, timer, pose_degrees }) = &inspected.noise {
         let ms = |micros: &u32| f64::from(*micros) / 1e3;

@@ -160,10 +160,10 @@ fn threads(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Whether `--quiet` is given.
+/// True if `--quiet` is given.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// Whether neither progress nor remarks are printed.
+/// True if neither progress nor remarks are printed.
 fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
@@ -219,7 +219,7 @@ More:
 }
 
 impl Command {
-    /// What to add to an error with which the command ends: which of its options help.
+    /// Addition to an error with which the command ends: its options that help.
     fn hint(&self) -> fn(&Error) -> Option<&'static str> {
         match self {
             Self::Capture(_) => capture::hint,
@@ -441,7 +441,7 @@ mod tests {
         }
     }
 
-    /// What an option means: its name for values, its kind, and its help up to the first semicolon or bracket.
+    /// Meaning of an option: its name for values, its kind, and its help up to the first semicolon or bracket.
     fn meaning(option: &clap::Arg) -> String {
         let help = option.get_help().map(ToString::to_string).unwrap_or_default();
         let first = help.split(['[', ';']).next().unwrap_or_default().trim().to_owned();

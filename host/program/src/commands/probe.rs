@@ -29,7 +29,7 @@ impl ProbeArguments {
         Some(&self.probe).filter(|path| path.as_os_str() != PUBLISHED)
     }
 
-    /// What the file states, if one is given.
+    /// Contents of the file, if one is given.
     pub(crate) fn read(&self) -> Result<Option<ProbeFile>> {
         self.path().map(ProbeFile::read).transpose()
     }
@@ -56,7 +56,7 @@ impl ProbeArguments {
         Ok(own.or(Some(given)))
     }
 
-    /// What is to be added to the touches of a data set: what the file says under `[real]`, without a file `usual`, and
+    /// Noise to add to the touches of a data set: the file's under `[real]`, without a file `usual`, and
     /// nothing where the touches were captured with such a file and have it already.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ pub(crate) struct SizeArguments {
     pub(crate) units: UnitArguments,
 }
 
-/// Whether objects keep their true sizes, and whether they have instances.
+/// True sizes of objects, and their instances.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct UnitArguments {
     /// Objects keep their size, in mm: the unit of meshes that state none (mm, cm, m, in, NAME=cm), or stated
@@ -172,7 +172,7 @@ impl UnitArguments {
         Ok(())
     }
 
-    /// Whether objects are touched at their true size.
+    /// True if objects are touched at their true size.
     pub(crate) fn is_true_size(&self) -> bool {
         !self.true_size.is_empty()
     }
@@ -225,7 +225,7 @@ impl SizeArguments {
         }
     }
 
-    /// Whether objects are touched at their true size with a probe that was not stated: the published one is in units.
+    /// True if objects are touched at their true size with a probe that was not stated: the published one is in units.
     pub(crate) fn lacks_probe(&self) -> bool {
         self.units.is_true_size() && self.probe.path().is_none()
     }
@@ -236,7 +236,7 @@ impl SizeArguments {
     }
 }
 
-/// What states a probe for objects at their true size.
+/// Source of a probe for objects at their true size.
 pub(crate) const IN_MILLIMETERS: &str = "a file that states it in millimeters, since the published one is in units: such as \
      probe.toml with the lines unit = \"mm\", radius = 1.5, spacing = 15, speed = 100, one below the other";
 
@@ -258,10 +258,10 @@ fn tell(objects: &[Object]) {
 /// Units of meshes, and how many millimeters they are.
 const UNITS: [(&str, f64); 4] = [("mm", 1.0), ("cm", 10.0), ("m", 1_000.0), ("in", 25.4)];
 
-/// What a true size is measured in.
+/// Unit of a true size.
 #[derive(Clone, Debug, PartialEq)]
 enum MeshUnit {
-    /// What each mesh states itself.
+    /// The unit that each mesh states.
     Stated,
     /// Of meshes that state none, in millimeters.
     Unstated(f64),

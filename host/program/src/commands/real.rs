@@ -5,10 +5,10 @@ use palpate::probe::file::ProbeFile;
 use palpate::probe::noise::{Noise, PartialNoise};
 use std::path::{Path, PathBuf};
 
-/// What disturbs touches.
+/// Disturbances of touches.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct RealArguments {
-    /// What disturbs touches: noise=0..5ms,timer=1ms,missed=2% and the like, none, or a probe file
+    /// Disturbances of touches: noise=0..5ms,timer=1ms,missed=2% and the like, none, or a probe file
     #[arg(long, value_parser = real, value_name = "NOISE")]
     real: Option<Real>,
 }
@@ -27,7 +27,7 @@ enum Given {
 }
 
 impl RealArguments {
-    /// What the option says; `base` without it, and where it leaves settings open.
+    /// Noise of the option; `base` without it, and where it leaves settings open.
     ///
     /// # Errors
     /// If its probe file cannot be read.
@@ -39,7 +39,7 @@ impl RealArguments {
         }
     }
 
-    /// Whether the option was given.
+    /// True if the option was given.
     pub(crate) fn is_given(&self) -> bool {
         self.real.is_some()
     }

@@ -65,7 +65,7 @@ struct Line<'a> {
     verdict: &'static str,
     object: &'a str,
     posterior: f64,
-    /// Why the touch was not counted.
+    /// Reason why the touch was not counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     refused: Option<String>,
     /// The approach that helps most.
@@ -150,7 +150,7 @@ fn log_to(path: &Path, arguments: &Arguments, objects: &[String]) -> Result<LogW
 struct Stream<'m> {
     recognizer: Recognizer<'m, 256>,
     model: &'m Model<'m>,
-    /// How often each object is touched, if not as the model says.
+    /// Frequencies of the objects, if they are not the model's.
     weights: Option<Vec<u32>>,
     /// The longest time between contacts that makes sense, in seconds.
     longest: f64,
@@ -158,7 +158,7 @@ struct Stream<'m> {
     json: bool,
     /// Where touches and verdicts are written too.
     log: Option<LogWriter>,
-    /// How many touches there were, and whether a finger was missing in any of them.
+    /// Number of touches, and whether a finger was missing in any of them.
     touches: usize,
     is_any_partial: bool,
 }
@@ -254,7 +254,7 @@ impl<'m> Stream<'m> {
         Err(EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed: self.model.header().speed() })
     }
 
-    /// What there is to say after a touch.
+    /// Line to print after a touch.
     fn line(&self, refused: Option<String>) -> Line<'m> {
         let best = self.recognizer.best();
         Line {

@@ -9,7 +9,7 @@ use palpate::rows::{Encoder, feature_names};
 use palpate_onboard::{Recognizer, Verdict};
 use std::path::Path;
 
-/// What is said about a row.
+/// Answer to a row.
 #[derive(serde::Serialize)]
 struct Line<'a> {
     /// Counted from 1.
@@ -24,7 +24,7 @@ struct Line<'a> {
     /// Rows of the same object so far, where their evidence is added.
     #[serde(skip_serializing_if = "Option::is_none")]
     rows: Option<u32>,
-    /// What a regression predicts, after its inverse link.
+    /// Prediction of a regression, after its inverse link.
     #[serde(skip_serializing_if = "Option::is_none")]
     value: Option<f32>,
     /// The row's own, before any link.

@@ -8,7 +8,7 @@ struct Renamed {
     command: &'static str,
     /// The option with its dashes; empty for a command.
     option: &'static str,
-    /// What to write instead.
+    /// Name to write instead.
     now: &'static str,
 }
 
@@ -84,7 +84,7 @@ const WITH_VALUE: &[(&str, &str)] = &[
     ("--true-size", "a unit such as --true-size mm, or --true-size stated where all meshes state theirs"),
 ];
 
-/// What to say of an error that comes from an old name; nothing of any other.
+/// Answer to an error that comes from an old name; nothing for any other.
 pub(super) fn said(words: &[String], error: &clap::Error) -> Option<String> {
     let context = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),

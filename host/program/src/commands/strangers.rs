@@ -9,7 +9,7 @@ use palpate_shared::format::Held;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Whether, and how, a model is to find out what it does not know.
+/// Test for objects that the model does not know.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct StrangersArguments {
     /// Detect objects that the model does not know: off, likely or certain [default: off]
@@ -39,7 +39,7 @@ impl StrangersArguments {
     }
 }
 
-/// What was found, as text.
+/// Findings, as text.
 pub(crate) fn text(found: &Found) -> String {
     let percent = |share: f64| format!("{:.2} %", 100.0 * share);
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! What `palpate train` takes and says about recorded touches.
+//! Options and output of `palpate train` for recorded touches.
 
 use palpate::error::{Error, Place, Result, TouchesProblem};
 use palpate::teach::{Taught, TaughtObject};
@@ -78,7 +78,7 @@ fn add(all: &mut Dataset, read: Dataset, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What was taught, how well, and what more approaches would come to.
+/// Taught objects, their figures, and the expected gain from more approaches.
 pub(crate) fn text(taught: &Taught) -> String {
     let mut text = String::new();
     for object in &taught.objects {

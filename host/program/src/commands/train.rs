@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     /// Approaches that are evidence: full, contacts (at least one) or all [default: as the data set has]
     #[arg(long, value_parser = evidence, value_name = "WHICH")]
     evidence: Option<Counted>,
-    /// How trees are grown, such as rounds=30,depth=6,eta=0.3 [default: the preset's]
+    /// Settings of the trees, such as rounds=30,depth=6,eta=0.3 [default: the preset's]
     #[arg(long, value_name = "SETTINGS")]
     trees: Option<Trees>,
     #[command(flatten)]
@@ -84,9 +84,9 @@ struct Trained<'m> {
     splits: usize,
     leaves: usize,
     seconds: f64,
-    /// What [`SWITCH`] would cost; null where the training had noise, or too few touches.
+    /// Cost of [`SWITCH`]; null where the training had noise, or too few touches.
     cost_of_noise: Option<CostOfNoise>,
-    /// What was learned from recorded touches.
+    /// Results of teaching from recorded touches.
     #[serde(skip_serializing_if = "Option::is_none")]
     taught: Option<&'m Taught>,
 }
@@ -99,7 +99,7 @@ struct Made {
     ensemble: Ensemble,
     dataset: Dataset,
     taught: Option<Taught>,
-    /// Whether it was trained here, on simulated touches without noise.
+    /// True if it was trained here, on simulated touches without noise.
     is_clean: bool,
     settings: Settings,
 }
@@ -153,7 +153,7 @@ impl<'m> Trained<'m> {
     }
 }
 
-/// What was trained, as text.
+/// Summary of the training, as text.
 fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
     let text = format!(
         "{}: {} trees, {} splits on {} of {} of {} {} of {} objects ({}), trained in {:.1} s\n",
@@ -229,13 +229,13 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
     Ok(Made { ensemble, dataset: recorded, taught: Some(taught), is_clean: false, settings })
 }
 
-/// How objects are taught to an ensemble of such a training.
+/// Settings for teaching objects to an ensemble of such a training.
 fn teaching(settings: &Settings) -> teach::Settings {
     let Settings { seed, threads, leaf_bits, .. } = *settings;
     teach::Settings { seed, threads, leaf_bits, ..teach::Settings::default() }
 }
 
-/// What noise would cost, as a line; nothing where the training had noise.
+/// Cost of noise, as a line; nothing where the training had noise.
 fn cost(trained: &Trained<'_>, is_clean: bool) -> String {
     let ms = SWITCH / 1e3;
     match trained.cost_of_noise {

@@ -102,7 +102,7 @@ impl Trees {
     }
 }
 
-/// What a word stands for.
+/// Meaning of a word.
 fn choice<T: Copy>(word: &str, choices: [(&str, T); 2]) -> Option<T> {
     choices.into_iter().find(|(name, _)| *name == word).map(|(_, meaning)| meaning)
 }

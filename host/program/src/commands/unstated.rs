@@ -1,4 +1,4 @@
-//! What a file of another library does not say, on the command line.
+//! Facts that a file of another library does not state, from the command line.
 
 use palpate::ensemble::import::Options;
 

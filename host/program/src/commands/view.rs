@@ -56,14 +56,14 @@ pub(crate) struct Arguments {
     pub(super) real: RealArguments,
 }
 
-/// What is printed of a page.
+/// Output about a page.
 #[derive(serde::Serialize)]
 struct Shown<'a> {
     page: &'a PathBuf,
     object: &'a str,
-    /// What is wrong with the mesh.
+    /// Faults of the mesh.
     complaints: Vec<String>,
-    /// Whether it can be touched as it is.
+    /// Verdict on whether it can be touched as it is.
     verdict: String,
 }
 

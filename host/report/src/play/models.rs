@@ -104,7 +104,7 @@ fn promising(
     };
     match calibrate_fresh(&compile::open(&bytes)?, objects, fresh, &terms, &mut calibrate::Fresh::default(), progress) {
         Ok(calibrated) => Ok(calibrated.model),
-        Err(error) if matches!(error.problem::<CalibrateProblem>(), Some(_)) => Ok(bytes),
+        Err(error) if error.problem::<CalibrateProblem>().is_some() => Ok(bytes),
         Err(error) => Err(error),
     }
 }

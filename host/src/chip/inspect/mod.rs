@@ -1,4 +1,4 @@
-//! What is in a compiled model, and what it costs on a chip.
+//! Contents of a compiled model, and its cost on a chip.
 
 mod stated;
 
@@ -14,7 +14,7 @@ use palpate_shared::{Pose, Q15_ONE, Touch};
 use stated::{evidence, features, noise, pattern, plan, predicts, priors, probe, promised, tested, trained_on};
 use std::collections::BTreeMap;
 
-/// What a compiled model is and states.
+/// Contents and statements of a compiled model.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Inspected<'a> {
     /// The format's version.
@@ -25,7 +25,7 @@ pub struct Inspected<'a> {
     pub ensemble: String,
     /// The name of its descriptor.
     pub descriptor: &'static str,
-    /// How many features there are.
+    /// Number of features.
     pub features: usize,
     /// Of a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -39,7 +39,7 @@ pub struct Inspected<'a> {
     pub layout: &'static str,
     /// The type of leaves.
     pub leaf: &'static str,
-    /// How many different leaves there are, if equal ones stand once.
+    /// Number of different leaves, if equal ones are stored once.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shared_leaves: Option<usize>,
     /// Trees.
@@ -60,13 +60,13 @@ pub struct Inspected<'a> {
     pub margin_error: f32,
     /// When recognizers stop unless told otherwise.
     pub stopping: Defaults,
-    /// What the model promises; null if it was not calibrated.
+    /// Promise of the model; null if it was not calibrated.
     pub promise: Option<Promised>,
-    /// Whether it has a column for what it does not know.
+    /// True if it has a column for unknown objects.
     pub background: bool,
     /// Its test of whether touches fit any object that it knows; null without one.
     pub strangers: Option<Tested>,
-    /// What evidence is divided by before it is shown as a posterior.
+    /// Divisor of the evidence before it is shown as a posterior.
     pub temperature: f64,
     /// The logarithm of each object's prior, the largest 0; null if all are equal.
     pub priors: Option<BTreeMap<&'a str, f64>>,
@@ -112,7 +112,7 @@ pub struct OnChip {
 /// Instructions of a verdict beyond the margins, where nothing is measured: between 500 and 1,400.
 const VERDICT: u64 = 1_000;
 
-/// What a model is and states; its cost on a chip is left out.
+/// Contents and statements of a model, without its cost on a chip.
 pub fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
     let header = model.header();
     let stopping = Stopping::from_model(model);

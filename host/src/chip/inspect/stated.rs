@@ -1,4 +1,4 @@
-//! What a compiled model states about itself: its features, its training, what it promises.
+//! Statements of a compiled model: its features, its training, its promise.
 
 use crate::rows::{Encoder, feature_names};
 use crate::{calibrate, compile, evaluate, probe};
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 pub struct Feature {
     /// The name.
     pub name: String,
-    /// How many units make up 1; null where f32 values are compared.
+    /// Units that make up 1; null where f32 values are compared.
     pub scale: Option<f32>,
 }
 
@@ -36,7 +36,7 @@ pub struct Promised {
     pub confidence: f64,
     /// "touches" or "approaches".
     pub counted: &'static str,
-    /// Whether each approach was in the pose that the plan proposed.
+    /// True if each approach was in the pose that the plan proposed.
     pub active: bool,
     /// The sequences that it rests on.
     pub sequences: u32,
@@ -50,18 +50,18 @@ pub struct Promised {
     pub mean: f64,
     /// The touches after which they give up.
     pub max_touches: u32,
-    /// What was added to the touches.
+    /// Noise added to the touches.
     pub noise: probe::noise::Noise,
     /// Nats by which an object has to be ahead of all others for its name to be given.
     pub margins: BTreeMap<String, f64>,
-    /// What the error rate is at most by theory, with any priors.
+    /// Largest error rate by theory, with any priors.
     pub by_theory: f64,
 }
 
 /// A test of whether touches fit any object that a model knows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Tested {
-    /// How long names are held back: "likely" or "certain".
+    /// Rule for holding names back: "likely" or "certain".
     pub held: &'static str,
     /// The promised share of known objects' sequences that end as unknown.
     pub promised: f64,
@@ -98,9 +98,9 @@ pub struct Probe {
     pub spacing: f32,
     /// The speed, per second.
     pub speed: f32,
-    /// What lengths are measured in: "unit", a tenth of the object's longest side, or "mm".
+    /// Unit of lengths: "unit", a tenth of the object's longest side, or "mm".
     pub unit: &'static str,
-    /// Whether the model states its probe; otherwise the published one is assumed.
+    /// True if the model states its probe; otherwise the published one is assumed.
     pub stated: bool,
 }
 
@@ -111,7 +111,7 @@ pub struct Touches {
     pub counted: &'static str,
     /// The contact patterns that are evidence.
     pub patterns: Vec<&'static str>,
-    /// Whether touches need the probe's direction and alignment.
+    /// True if touches need the probe's direction and alignment.
     pub needs_pose: bool,
     /// The largest time between the first and the last contact in microseconds; null if the model does not state it.
     pub largest_spread: Option<u32>,
@@ -135,12 +135,12 @@ pub struct Noise {
 pub struct Predicts {
     /// "class" or "value".
     pub what: &'static str,
-    /// What makes a value of a margin.
+    /// Function from a margin to a value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<&'static str>,
-    /// What a margin of the model is multiplied by to be the library's.
+    /// Factor from a margin of the model to the library's.
     pub scale: f32,
-    /// Whether the last of several largest margins names the class.
+    /// True if the last of several largest margins names the class.
     pub last_of_ties: bool,
     /// The least and the largest of the features that stand for a missing value: whole numbers, or keys of f32 values.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -52,9 +52,9 @@ pub struct PartialNoise {
 pub struct BadNoise {
     /// The key, such as `timer`; `real` where it is the text as a whole.
     pub key: String,
-    /// What was written.
+    /// The text as written.
     pub value: String,
-    /// What can be written, such as "a duration such as 5ms".
+    /// Values that can be written, such as "a duration such as 5ms".
     pub wanted: String,
 }
 
@@ -107,12 +107,12 @@ impl PartialNoise {
         }
     }
 
-    /// Whether nothing is left open.
+    /// True if nothing is left open.
     fn is_whole(&self) -> bool {
         *self == Self::from(self.over(Noise::default()))
     }
 
-    /// Whether the setting of this key is given.
+    /// True if the setting of this key is given.
     fn has(&self, key: &str) -> bool {
         match key {
             "noise" => self.deviation.is_some(),

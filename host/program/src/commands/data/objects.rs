@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     picture: Option<PathBuf>,
 }
 
-/// What was written for one object.
+/// Files written for one object.
 #[derive(serde::Serialize)]
 struct Written {
     name: String,

@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     output::print(&summary(&recording, directory, counts))
 }
 
-/// Whether a source is a chip rather than a file of touches.
+/// True if a source is a chip rather than a file of touches.
 fn is_chip(source: &str) -> bool {
     let is_com = source.strip_prefix("COM").is_some_and(|number| number.parse::<u16>().is_ok());
     let is_port =

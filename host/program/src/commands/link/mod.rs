@@ -23,7 +23,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// How a chip is reached.
+/// Line to a chip.
 #[derive(clap::Args)]
 pub(crate) struct LineOptions {
     /// Speed of a serial port, in bits per second

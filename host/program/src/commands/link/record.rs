@@ -99,7 +99,7 @@ fn say(json: bool, text: &str) -> Result<()> {
     if json { Ok(()) } else { print(text) }
 }
 
-/// What a recording added; how many of the touches have no, one, two and three contacts.
+/// Additions of a recording, with the number of touches that have no, one, two and three contacts.
 pub(crate) fn summary(recording: &Recording, directory: &Path, contacts: [u64; 4]) -> String {
     let [none, one, two, three] = contacts;
     let (object, touches, all) = (recording.object(), recording.touches(), recording.all_touches());
@@ -121,7 +121,7 @@ fn line(number: u64, touch: &Touch, said: Option<&str>) -> String {
     format!("{number:5}{} ms{said}", times.concat())
 }
 
-/// What the chip says to a touch; nothing if it has no model.
+/// Answer of the chip to a touch; nothing if it has no model.
 fn said(verdict: &Result<VerdictMessage, Refusal>, names: &[String]) -> Option<String> {
     let name = |object: u8| names.get(usize::from(object)).map_or("?", String::as_str);
     match verdict {

@@ -1,4 +1,4 @@
-//! What is known of a chip, drawn in a terminal.
+//! State of a chip, drawn in a terminal.
 
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use crossterm::style::{ContentStyle, PrintStyledContent, StyledContent, Stylize};
@@ -38,7 +38,7 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Whether it is time to draw again.
+    /// True if it is time to draw again.
     pub(super) fn is_due(&self) -> bool {
         self.drawn.is_none_or(|drawn| drawn.elapsed() >= INTERVAL)
     }
