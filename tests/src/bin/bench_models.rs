@@ -81,7 +81,7 @@ fn main() -> Result<()> {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    Ok(palpate::output::write_bytes(path, bytes)?)
+    palpate::output::write_bytes(path, bytes)
 }
 
 /// A run's touches, trained and tested on.
