@@ -2,8 +2,8 @@
 
 use crate::failure::Failure;
 use palpate::error::Error;
-use palpate::shared::Descriptor;
 use palpate::probe::noise::{Noise, quantity};
+use palpate::shared::Descriptor;
 
 /// The descriptor with this name.
 pub(crate) fn descriptor_of(name: &str) -> palpate::Result<Descriptor> {

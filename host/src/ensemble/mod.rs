@@ -18,7 +18,7 @@ use std::path::Path;
 /// Reads an ensemble, over touches or over rows, and checks what it states of its touches.
 ///
 /// # Errors
-/// As [`Ensemble::load`]; [`EnsembleProblem::Attribute`](crate::error::EnsembleProblem::Attribute) for statements that this
+/// As [`Ensemble::load`]; [`EnsembleProblem::Attribute`] for statements that this
 /// crate did not write.
 pub fn load(path: impl AsRef<Path>) -> Result<Ensemble> {
     let path = path.as_ref();

@@ -5,7 +5,7 @@
 //!   probe starts, in which direction it moves, how its row of fingers is turned. It gives the distance that each finger
 //!   travels, and from these distances a touch.
 //! - [`sweep`] finds the first contact of one sphere with the mesh: boxes, then a quick reject, then the exact time.
-//! - [`file`] reads a probe from a TOML file, with what a real one adds; [`noise`] adds it to touches.
+//! - [`mod@file`] reads a probe from a TOML file, with what a real one adds; [`noise`] adds it to touches.
 //! - [`cast`] reads spheres and known contact times from a file, to compare this simulator with another.
 //!
 //! Contact is rigid and motion straight: no forces, no friction. From here [`capture`](crate::capture) draws approaches

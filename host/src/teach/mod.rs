@@ -136,7 +136,7 @@ pub struct TaughtObject {
 /// knows. `known` holds touches of these objects, such as those that the ensemble was trained on. The same touches and settings give the same ensemble on any number of threads.
 ///
 /// # Errors
-/// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
+/// [`TeachProblem`] if the ensemble has leaves of one value or is not over touches, if a name
 /// is known already, if touches are missing or too few, have no pose, or are not every approach;
 /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if probes do;
 /// [`Setting`](crate::error::Setting); [`Error::Cancelled`](crate::Error::Cancelled).

@@ -183,7 +183,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.best(&self.model)
     }
 
-    /// Result of the model's test of fit of the touches so far with the [best](Self::best) object; [`Fit::Fits`]
+    /// Result of the model's test of fit of the touches so far with the [best](Self::best) object; [`Familiarity::Known`]
     /// without one, and before the first touch.
     ///
     /// Cost: as the test in [`push`](Self::push).
@@ -196,7 +196,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// Sum of the weights of all objects but the [best](Self::best), the best one's being 1, in Q56; the largest value
     /// where the background has more. The best object is recognized once this is at most its
-    /// [threshold](Stopping::odds_of), and its touches [fit](Self::fit).
+    /// [threshold](Stopping::odds_of), and its touches [fit](Self::familiarity).
     ///
     /// Cost: an exponential for each object.
     pub fn rivals(&self) -> u64 {

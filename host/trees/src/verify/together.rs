@@ -67,7 +67,7 @@ impl Together {
         self.units = units;
     }
 
-    /// The margins of rows of features as the library has them (see [`verify::margins`](super::verify::margins)): one row for each row of
+    /// The margins of rows of features as the library has them (see [`verify::margins`](super::margins)): one row for each row of
     /// `values`, which has as many as the model has features. `margins` is as long as that.
     pub fn rows<V: Copy + Into<f64>>(
         &mut self,
