@@ -67,7 +67,7 @@ pub(super) fn rounded(vertex: [f64; 3], offset: [f64; 3]) -> [f32; 3] {
     std::array::from_fn(|axis| (vertex[axis] - offset[axis]) as f32)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "objects"))]
 mod tests {
     use super::*;
     use crate::capture::{self, Settings};
