@@ -4,7 +4,7 @@ use crate::error::Problem;
 
 /// Problems with scenes, probes and casts.
 ///
-/// What is wrong with a scene's mesh is a [`MeshProblem`](crate::mesh::MeshProblem), what is wrong with a probe's measures a
+/// A fault of a scene's mesh is a [`MeshProblem`](crate::mesh::MeshProblem), a probe's measure out of range a
 /// [`Setting`](crate::error::Setting).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]

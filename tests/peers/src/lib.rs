@@ -22,7 +22,7 @@ pub struct Paired {
     /// Seconds per item: the median of each contestant's rounds.
     pub seconds: Vec<f64>,
     /// Time of each contestant, relative to the first: the median over the rounds, in each of which all take turns.
-    /// What disturbs a round disturbs all of them.
+    /// A disturbance of a round affects all of them.
     pub ratios: Vec<f64>,
 }
 
