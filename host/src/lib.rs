@@ -87,14 +87,13 @@
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |
 //! | `serial` | yes | chips at serial ports |
-//! | `cli` | yes | the program `palpate`, and `page`, `report` and `run`, which only it needs; includes `train`, `objects` and `experiments` |
-//! | `experiments` | yes | `probe::sweep::precision`: other precisions to compare the sweep with |
 //! | `xgboost` | no | XGBoost 1.6.2 as a second trainer, built from its C++ source |
 //!
 //! `palpate = { version = "0.3", default-features = false }` brings no terminal, no progress bar, no plots, no serial
 //! port and no trainer.
 
 pub mod error;
+pub mod in_order;
 pub mod random;
 
 pub mod mesh;

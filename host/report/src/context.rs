@@ -7,6 +7,7 @@ use palpate::compile;
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train;
 use palpate::error::Result;
+use palpate::in_order::in_order;
 use palpate::mesh::Object;
 use palpate::mesh::builtin;
 use palpate::probe::scene::Scene;
@@ -129,7 +130,7 @@ impl<'a> Context<'a> {
             let jobs: Vec<(usize, usize)> =
                 (0..count).flat_map(|k| (0..names.len()).map(move |kind| (k, kind))).collect();
             self.progress.begin("making objects", Some(jobs.len() as u64));
-            let made = jobs.into_par_iter().map(|(instance, kind)| {
+            let made = jobs.into_par_iter().map(|(instance, kind)| -> Result<Object> {
                 let object = match instance {
                     0 if is_builtin => self.objects[kind].clone(),
                     0 => builtin::one(names[kind])?,
@@ -138,7 +139,7 @@ impl<'a> Context<'a> {
                 progress::advance(self.progress, 1)?;
                 Ok(object)
             });
-            let made: Vec<Object> = made.collect::<Result<_>>()?;
+            let made = in_order(made)?;
             Ok(made.chunks(names.len()).map(<[Object]>::to_vec).collect())
         })
         .map(Vec::as_slice)
@@ -205,8 +206,7 @@ pub(super) fn touch(
         progress::advance(progress, indices.len() as u64)?;
         indices.map(|index| sampler.sample(index as u64)).collect()
     };
-    let chunks: Vec<Vec<(Touch, u64)>> =
-        (0..count.div_ceil(CHUNK)).into_par_iter().map(chunk).collect::<Result<_>>()?;
+    let chunks = in_order((0..count.div_ceil(CHUNK)).into_par_iter().map(chunk))?;
     let approaches = chunks.iter().flatten().map(|sample| sample.1).sum();
     let touches = chunks.into_iter().flatten().map(|sample| sample.0).collect();
     Ok((ObjectTouches::in_turn(name, touches, &capture::numbered(scenes), 0), approaches))

@@ -3,6 +3,7 @@
 use super::ahead::Ahead;
 use super::sequence::{Sequence, odds_of};
 use crate::error::{EvaluateProblem, Result};
+use crate::in_order::in_order;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::ObjectTouches;
@@ -240,7 +241,7 @@ pub fn follow<G: FnMut(&Moment<'_>) -> bool>(
         17..=64 => supply.follow::<64, G>(model, wanted, until, &gate, progress),
         _ => supply.follow::<256, G>(model, wanted, until, &gate, progress),
     };
-    let mut found: Vec<Vec<Sequence>> = supplies.par_iter_mut().zip(wanted).map(of).collect::<Result<_>>()?;
+    let mut found = in_order(supplies.par_iter_mut().zip(wanted).map(of))?;
     let share = |(found, wanted): (&Vec<Sequence>, &usize)| (*wanted > 0).then(|| found.len() as f64 / *wanted as f64);
     let share = found.iter().zip(wanted).filter_map(share).fold(1.0, f64::min);
     for (found, &wanted) in found.iter_mut().zip(wanted) {

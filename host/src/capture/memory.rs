@@ -2,6 +2,7 @@
 
 use super::{Sampler, Settings, entry, scenes};
 use crate::error::{CaptureProblem, Result};
+use crate::in_order::in_order;
 use crate::mesh::Object;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Meshes, ObjectTouches};
@@ -47,7 +48,7 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
             progress::advance(progress, count)?;
             Ok(drawn)
         };
-        let drawn: Vec<Vec<(Touch, u64)>> = chunks.into_par_iter().map(chunk).collect::<Result<_>>()?;
+        let drawn: Vec<Vec<(Touch, u64)>> = in_order(chunks.into_par_iter().map(chunk))?;
         approaches.push(drawn.iter().flatten().map(|(_, approaches)| approaches).sum());
         let kept = |(touch, _): (Touch, u64)| if origin.writes_pose() { touch } else { Touch::new(touch.times()) };
         let touches = drawn.into_iter().flatten().map(kept).collect();

@@ -35,6 +35,7 @@ mod store;
 mod tests;
 
 use crate::error::{Error, Result};
+use crate::in_order::in_order;
 use crate::mesh::{Instance, Object};
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
@@ -180,9 +181,9 @@ pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> 
     };
     let of = |object: &&Object| {
         let instances: Vec<&Instance> = object.instances().collect();
-        instances.into_par_iter().map(|instance| scene((object, instance))).collect()
+        in_order(instances.into_par_iter().map(|instance| scene((object, instance))))
     };
-    objects.par_iter().map(of).collect()
+    in_order(objects.par_iter().map(of))
 }
 
 /// The touches of one object with these sample numbers, in memory: the same that [`capture`] writes. The object's
@@ -194,8 +195,7 @@ pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64
     origin.check()?;
     let sampler = Sampler::of_instances(scenes, name, origin);
     let first = samples.start;
-    let touches: Vec<Touch> =
-        samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)).collect::<Result<_>>()?;
+    let touches = in_order(samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)))?;
     Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first))
 }
 

@@ -17,6 +17,7 @@ use super::density::Observed;
 use super::likelihood::Explained;
 use super::search::{self, Best};
 use crate::error::Result;
+use crate::in_order::in_order;
 use crate::progress::{self, Progress};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -173,8 +174,7 @@ pub(super) fn suspects(evidence: &Evidence<'_>, best: &Best, progress: &dyn Prog
             let found = if sound.is_sound[index] { suspect(&sound, index) } else { None };
             Ok(found.map(|(suspect, nats)| Found { index, suspect, nats }))
         };
-        let found: Vec<Option<Found>> =
-            (0..evidence.recordings.len()).into_par_iter().map(one).collect::<Result<_>>()?;
+        let found = in_order((0..evidence.recordings.len()).into_par_iter().map(one))?;
         let worst = found.into_iter().flatten().max_by(|a, b| {
             let ((a_name, a_nats), (b_name, b_nats)) = (a.rank(), b.rank());
             a_name.cmp(&b_name).then(a_nats.total_cmp(&b_nats))

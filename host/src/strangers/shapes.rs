@@ -1,6 +1,7 @@
 //! Touches of many other shapes: as of one object, each shape being an instance.
 
 use crate::error::Result;
+use crate::in_order::in_order;
 use crate::touches::{ObjectTouches, Origin};
 
 /// Touches of each shape that are captured.
@@ -31,7 +32,7 @@ pub fn captured(count: usize, origin: &Origin, progress: &dyn crate::progress::P
         let sampler = Sampler::new(&scene, &instance.name, origin);
         Ok((0..TOUCHES).map_while(|sample| sampler.sample(sample).ok()).map(|(touch, _)| touch).collect())
     };
-    let each: Vec<Vec<Touch>> = instances.par_iter().map(of).collect::<Result<_>>()?;
+    let each = in_order(instances.par_iter().map(of))?;
     let whole = || instances.iter().zip(&each).filter(|(_, touches)| touches.len() == TOUCHES as usize);
     let names: Vec<String> = whole().map(|(instance, _)| instance.name.clone()).collect();
     let touches = (0..TOUCHES as usize).flat_map(|sample| whole().map(move |(_, touches)| touches[sample])).collect();

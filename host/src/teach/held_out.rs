@@ -6,6 +6,7 @@ use super::column::{Part, fit};
 use super::rows::{Leaves, Rows, log_sum};
 use crate::ensemble::Ensemble;
 use crate::error::Result;
+use crate::in_order::in_order;
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
@@ -185,7 +186,7 @@ impl Material {
             progress::advance(progress, 1)?;
             Ok(held)
         };
-        let parts: Vec<Vec<_>> = (0..division.parts).into_par_iter().map(one).collect::<Result<_>>()?;
+        let parts: Vec<Vec<_>> = in_order((0..division.parts).into_par_iter().map(one))?;
         let given = self.known.iter().chain(which.iter().map(|&index| &self.recorded[index].plain));
         let mut all: Vec<Held> = given.map(|rows| vec![None; rows.given]).collect();
         for (object, rows) in parts.into_iter().flat_map(|part| part.into_iter().enumerate()) {

@@ -30,6 +30,7 @@ use crate::ensemble::train::{BASE_MARGIN, round_leaves};
 use crate::ensemble::{Ensemble, Node, TouchOrigin};
 use crate::error::Result;
 use crate::evaluate::ROBOTS;
+use crate::in_order::in_order;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
 use crate::touches::{Dataset, ObjectTouches, Source};
@@ -242,7 +243,7 @@ fn smoothings(material: &Material, objects: usize, progress: &dyn Progress) -> R
             let held = material.held_out(&[object], &[smoothing], thin, division, progress)?;
             Ok((held_out::loss(&held), smoothing))
         };
-        let losses: Vec<(f64, Smoothing)> = candidates.par_iter().map(loss).collect::<Result<_>>()?;
+        let losses = in_order(candidates.par_iter().map(loss))?;
         // There are candidates; the first of equal ones.
         let least = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
         Ok(least.map_or(Smoothing { jitter: 1.0, prior: 1.0 }, |(_, smoothing)| smoothing))

@@ -8,6 +8,7 @@ use palpate::ensemble::StatedProbe;
 use palpate::ensemble::train::{self as trainer, Settings};
 use palpate::error::{CalibrateProblem, Error, Result};
 use palpate::evaluate::{self, Candidate, Margins, SequentialSettings};
+use palpate::in_order::in_order;
 use palpate::mesh::Object;
 use palpate::probe::noise::Noise;
 use palpate::probe::scene::Scene;
@@ -128,8 +129,7 @@ pub fn expect(
         let scene = [Scene::new(&surface.mesh(), surface.length)?];
         touches(&scene, &surface.name, &origin, 0..TESTED.0)
     };
-    let objects: Vec<ObjectTouches> =
-        surfaces.par_iter().map(touched).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
+    let objects = in_order(surfaces.par_iter().map(touched))?;
     let mut dataset = Dataset { origin: Some(origin.clone()), ..Dataset::new(objects) };
     evaluate::add_noise(&mut dataset, noise, origin.seed)?;
     let contender = |model: CompiledModel| {

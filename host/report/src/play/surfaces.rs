@@ -2,6 +2,7 @@
 
 use crate::page::scene::SimplifiedMesh;
 use palpate::error::Result;
+use palpate::in_order::in_order;
 use palpate::mesh::{Mesh, Object};
 use palpate::play::{pack, unpack};
 use palpate::touches::Origin;
@@ -46,8 +47,7 @@ pub fn surfaces(objects: &[Object], origin: &Origin) -> Result<Vec<Surface>> {
     let mut most = MOST_TRIANGLES;
     loop {
         let surface = |object: &Object| surface(object, origin, most);
-        let surfaces: Vec<Surface> =
-            objects.par_iter().map(surface).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
+        let surfaces = in_order(objects.par_iter().map(surface))?;
         let bytes: usize = surfaces.iter().map(|surface| surface.packed.len()).sum();
         let largest = surfaces.iter().map(|surface| surface.triangles).max().unwrap_or(0);
         // Hundreds of objects may not fit: then the page is larger.

@@ -17,6 +17,7 @@ pub use features::FeatureComparison;
 use super::Estimate;
 use crate::ensemble::{feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};
+use crate::in_order::in_order;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, folds};
 use palpate_shared::format::Counted;
@@ -161,7 +162,7 @@ pub fn compare(
         progress::advance(progress, 1)?;
         Ok(compared)
     };
-    let compared: Vec<(ObjectComparison, Estimate)> = pairs.par_iter().map(one).collect::<Result<_>>()?;
+    let compared: Vec<(ObjectComparison, Estimate)> = in_order(pairs.par_iter().map(one))?;
     let told_apart = Share::of(Estimate::mean_of(compared.iter().map(|(_, told)| *told)));
     let recorded = recorded.only(|name| find(name).is_some());
     Ok(Comparison {

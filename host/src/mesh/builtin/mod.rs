@@ -29,6 +29,7 @@ mod winebottle;
 mod wristwatch;
 
 use crate::error::{Error, MeshProblem, Result};
+use crate::in_order::in_order;
 use crate::mesh::{BACKGROUND, Instance, Object};
 use contour::Form;
 use proportions::Proportions;
@@ -96,13 +97,11 @@ pub fn instances(name: &str, count: usize, seed: u64) -> Result<Object> {
     let kind = kind(name)?;
     // A large prime: no two of the seeds that anyone gives share an instance.
     let first = seed.wrapping_mul(1_000_000_007);
-    let made: Vec<Instance> = (0..count.max(1) as u64)
-        .into_par_iter()
-        .map(|number| {
-            let seed = first.wrapping_add(number);
-            Ok(Instance { name: format!("varied-{seed}"), mesh: make_one(&kind, Some(seed))?.mesh().clone() })
-        })
-        .collect::<Result<_>>()?;
+    let make = |number: u64| -> Result<Instance> {
+        let seed = first.wrapping_add(number);
+        Ok(Instance { name: format!("varied-{seed}"), mesh: make_one(&kind, Some(seed))?.mesh().clone() })
+    };
+    let made = in_order((0..count.max(1) as u64).into_par_iter().map(make))?;
     let object = Object::of_instances(name, made).ok_or(MeshProblem::NoMeshes)?;
     Ok(Object { millimeters: Some(MILLIMETERS), ..object })
 }
@@ -121,8 +120,7 @@ pub const BACKGROUND_SHAPES: usize = 200;
 /// [`MeshProblem::NotMeshed`] if none of many shapes in a row has a closed mesh, never so far.
 pub fn background(count: usize, seed: u64) -> Result<Object> {
     let first = seed.wrapping_mul(1_000_000_007);
-    let made: Vec<Instance> =
-        (0..count.max(1) as u64).into_par_iter().map(|number| shape(first, number)).collect::<Result<_>>()?;
+    let made = in_order((0..count.max(1) as u64).into_par_iter().map(|number| shape(first, number)))?;
     let object = Object::of_instances(BACKGROUND, made).ok_or(MeshProblem::NoMeshes)?;
     Ok(Object { millimeters: Some(MILLIMETERS), ..object })
 }
@@ -170,7 +168,7 @@ pub fn many(count: usize) -> Result<Vec<Object>> {
             }
         }
     };
-    (0..count).into_par_iter().map(make).collect()
+    in_order((0..count).into_par_iter().map(make))
 }
 
 /// The objects `names`, in that order: canonical, or with a seed [`varied`].
@@ -183,7 +181,7 @@ pub fn make(names: &[&str], seed: Option<u64>) -> Result<Vec<Object>> {
 }
 
 fn make_all(kinds: &[Kind], seed: Option<u64>) -> Result<Vec<Object>> {
-    kinds.par_iter().map(|kind| make_one(kind, seed)).collect()
+    in_order(kinds.par_iter().map(|kind| make_one(kind, seed)))
 }
 
 fn make_one(&(name, form): &Kind, seed: Option<u64>) -> Result<Object> {

@@ -4,6 +4,7 @@ mod layout;
 mod search;
 
 use crate::error::{Error, MeshProblem, Place, Result};
+use crate::in_order::in_order;
 use crate::mesh::file;
 use crate::mesh::{BACKGROUND, builtin};
 use crate::mesh::{Instance, Object};
@@ -33,8 +34,7 @@ use std::path::{Path, PathBuf};
 /// When a source does not exist, holds no mesh file, or a file is not a usable mesh, and when two objects have the same
 /// name.
 pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
-    let read: Vec<Result<Object>> = files(sources)?.into_par_iter().map(Source::read).collect();
-    read.into_iter().collect()
+    in_order(files(sources)?.into_par_iter().map(Source::read))
 }
 
 /// The only object of `source`, found as [`objects`](fn@objects) finds it.
@@ -105,7 +105,7 @@ impl Source {
                     let file::Contents { mesh, millimeters, moved: by, .. } = file::read(&path)?;
                     Ok((Instance { name, mesh }, (millimeters, moved(&path, by))))
                 };
-                let read = files.into_par_iter().map(read).collect::<Result<Vec<_>>>()?;
+                let read = in_order(files.into_par_iter().map(read))?;
                 let (mut instances, stated): (Vec<_>, Vec<_>) = read.into_iter().unzip();
                 let (units, moved): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
@@ -153,7 +153,7 @@ fn one_unit(instances: &mut [Instance], units: &[Option<f64>]) -> (Option<f64>, 
 /// # Errors
 /// As [`objects`](fn@objects).
 pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
-    found(sources, true)?.into_par_iter().map(Source::read).collect::<Vec<_>>().into_iter().collect()
+    in_order(found(sources, true)?.into_par_iter().map(Source::read))
 }
 
 /// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.

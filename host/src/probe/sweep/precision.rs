@@ -1,4 +1,4 @@
-//! Experiments (feature `experiments`): what would other precisions save, and cost?
+//! Other precisions than the production search has: savings and costs.
 //!
 //! The production search rejects triangles in f32 and decides the rest in f64. Benchmarks and the report compare it with
 //! the two searches here, which share its tree but decide otherwise.

@@ -17,6 +17,7 @@ mod lists;
 use super::{Engine, Evidence, Rows, Settings, origin};
 use crate::ensemble::{Ensemble, Node, Output, Tree};
 use crate::error::{Error, Result};
+use crate::in_order::in_order;
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use cases::Cases;
@@ -100,7 +101,7 @@ pub(crate) fn train_each(
                 origin: origin.clone(),
             })
         };
-        stops.par_iter().map(fit).collect()
+        in_order(stops.par_iter().map(fit))
     };
     match settings.threads.map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build()) {
         Some(Ok(pool)) => pool.install(train),
