@@ -41,7 +41,6 @@ use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Entry, ObjectTouches, Origin};
 pub use error::CaptureProblem;
-use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
 use std::ops::Range;
