@@ -33,12 +33,12 @@ pub enum Purpose {
     Active,
     /// When objects are exchanged, and for which.
     Switch,
-    /// The order in which touches are used to calibrate a test of fit.
-    Fit,
+    /// The order in which touches are used to calibrate a misfit test.
+    Misfit,
     /// Noise that a real probe adds to the touches of a capture.
     Capture,
     /// Touches as a fitted probe would make them.
-    Fitted,
+    Fit,
     /// Recorded touches that are held out together, and groups of them.
     Teach,
     /// Made-up touches for tests.
@@ -63,9 +63,9 @@ impl Purpose {
             Self::Calibration => Some(9),
             Self::Active => Some(16),
             Self::Switch => Some(17),
-            Self::Fit => Some(11),
+            Self::Misfit => Some(11),
             Self::Capture => Some(28),
-            Self::Fitted => Some(29),
+            Self::Fit => Some(29),
             Self::Teach => Some(18),
             #[cfg(test)]
             Self::Synthetic => Some(6),
@@ -117,9 +117,9 @@ mod tests {
             Calibration,
             Active,
             Switch,
-            Fit,
+            Misfit,
             Capture,
-            Fitted,
+            Fit,
             Teach,
             Synthetic,
         ];

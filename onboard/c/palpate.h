@@ -139,7 +139,7 @@ typedef enum {
 typedef enum {
     PALPATE_UNDECIDED = 0,
     PALPATE_RECOGNIZED, /* an object, until the reset */
-    PALPATE_UNKNOWN,    /* the touches fit no object that the model knows, until the reset: by a test of fit */
+    PALPATE_UNKNOWN,    /* the touches fit no object that the model knows, until the reset: by a misfit test */
     PALPATE_GAVE_UP     /* the limit of touches was reached, until the reset */
 } palpate_verdict;
 
@@ -310,13 +310,13 @@ static inline int palpate_trained_(palpate_model *model, const uint8_t *content)
     return 1;
 }
 
-/* Bytes of an object's record in a test of fit with so many rivals. */
+/* Bytes of an object's record in a misfit test with so many rivals. */
 static inline uint32_t palpate_record_(uint32_t rivals)
 {
     return (8 + rivals + (rivals & 1) + 4 * rivals + rivals * (rivals + 1) + 3) & ~PALPATE_AS_(uint32_t, 3);
 }
 
-/* A background, and a test of fit; 0 if they make no sense. */
+/* A background, and a misfit test; 0 if they make no sense. */
 static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *content, uint32_t length)
 {
     const uint8_t *record = content + 44;
@@ -1397,7 +1397,7 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
     return palpate_subtract_(slope, PALPATE_AS_(int64_t, PALPATE_AS_(int32_t, palpate_u32_(record + 4))) * touches);
 }
 
-/* Whether the leader may be named by the model's test of fit: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
+/* Whether the leader may be named by the model's misfit test: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
 static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const palpate_model *model = recognizer->model;

@@ -68,7 +68,7 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     with_sections(bytes, &sections)
 }
 
-/// A background, and mostly a test of fit, with limits that some touches pass and some do not.
+/// A background, and mostly a misfit test, with limits that some touches pass and some do not.
 fn strangers(objects: usize, background: bool, rng: &mut SmallRng) -> Vec<u8> {
     let has_test = rng.random_bool(0.8);
     let mut content = Strangers::header(background, has_test).to_vec();

@@ -1,4 +1,4 @@
-//! Tests of fit in models: bytes that make no sense are refused, and those that pass can be walked.
+//! Misfit tests in models: bytes that make no sense are refused, and those that pass can be walked.
 
 use palpate::compile::{Settings, compile};
 use palpate_onboard::{Familiarity, Forgetting, Model, Recognizer, Rivals, SNAPSHOT_LENGTH, Stopping, Verdict};
@@ -158,7 +158,7 @@ fn step(model: &Model<'_>) -> i32 {
     1 << ((1.0 / model.unit()) as i32).ilog2()
 }
 
-/// A model with a test of fit in which a touch of an object speaks by a step for it against each other one, and nothing else fits.
+/// A model with a misfit test in which a touch of an object speaks by a step for it against each other one, and nothing else fits.
 fn strict() -> Vec<u8> {
     let bytes = model();
     let step = step(&Model::new(&bytes).unwrap());

@@ -80,7 +80,7 @@ pub(super) fn measure(context: &Context) -> Result<Measured> {
     match column(None).and_then(|without| Ok([without, column(Some(&background))?])) {
         Ok(columns) => Ok(Measured::Columns(columns)),
         Err(error) if is_too_few(&error) => Ok(Measured::Not(format!(
-            "the test of fit could not be calibrated so that at most 2 % of known objects are taken for unknown, from {} \
+            "the misfit test could not be calibrated so that at most 2 % of known objects are taken for unknown, from {} \
              touches of each object: {}",
             counts[1],
             error.problem::<EvaluateProblem>().map(ToString::to_string).unwrap_or_default()
@@ -90,8 +90,8 @@ pub(super) fn measure(context: &Context) -> Result<Measured> {
 }
 
 fn is_too_few(error: &Error) -> bool {
-    use EvaluateProblem::{TooFewForAlarms, TooFewForFit};
-    matches!(error.problem::<EvaluateProblem>(), Some(TooFewForAlarms { .. } | TooFewForFit { .. }))
+    use EvaluateProblem::{TooFewForAlarms, TooFewForMisfit};
+    matches!(error.problem::<EvaluateProblem>(), Some(TooFewForAlarms { .. } | TooFewForMisfit { .. }))
 }
 
 /// Touches of the shapes that a background column is trained on.
@@ -148,7 +148,7 @@ pub(super) fn section(context: &Context, measured: &Measured) -> Result<Section>
     let at = |way: &Way, touches: usize| number(100.0 * way.detected.get(touches - 1).copied().unwrap_or(0.0), 0);
     let [likely, certain] = [&with.ways[1], &with.ways[2]];
     section.text(format!(
-        "Each object is left out of the training in turn, and then touched; a test of fit may declare it unknown. The \
+        "Each object is left out of the training in turn, and then touched; a misfit test may declare it unknown. The \
          test is calibrated to a false alarm rate of at most 2 %: the share of known objects taken for unknown. With \
          names held back until a stranger would have been detected (certain), {} % of strangers are detected by 60 \
          touches and {} % by 120, and {} % get a name; a known object takes {} touches. Without holding back (likely), \

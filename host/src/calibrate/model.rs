@@ -145,7 +145,7 @@ pub(super) fn worse(objects: &BTreeMap<String, OfObject>, rate: f64) -> Vec<Wors
 }
 
 /// Sets a model's thresholds so that it keeps a promised error rate and uses it up, on touches that nothing was trained
-/// on; also its temperature. A data set of approaches is counted in these. If the model has a test of fit, names are held
+/// on; also its temperature. A data set of approaches is counted in these. If the model has a misfit test, names are held
 /// back and sequences end as unknown where the chip's would, and the promise is one of the model with its test.
 ///
 /// # Errors

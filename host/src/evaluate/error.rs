@@ -29,7 +29,7 @@ pub enum EvaluateProblem {
     },
     /// An object has too few touches to say what its touches give.
     #[error("an object has only {found} touches to learn the expected evidence from, or they are all alike")]
-    TooFewForFit {
+    TooFewForMisfit {
         /// Number of touches.
         found: usize,
     },
@@ -157,7 +157,7 @@ impl Problem for EvaluateProblem {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
             Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
             Self::MissingObject { .. } => "Capture touches of every object that the model knows.",
-            Self::TooFewForFit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
+            Self::TooFewForMisfit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
             Self::RawFeatures => {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
             }

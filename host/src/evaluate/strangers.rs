@@ -14,7 +14,7 @@ pub const DETECTED_BY: [usize; 3] = [30, 60, 120];
 /// evidence; each object is weighted equally.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Strangers {
-    /// True if the model has a test of fit; without one no stranger is ever detected.
+    /// True if the model has a misfit test; without one no stranger is ever detected.
     pub has_test: bool,
     /// Share of the known objects' sequences that ended as unknown.
     pub false_alarms: f64,

@@ -268,7 +268,7 @@ impl Densities {
 
     /// Touches as a candidate probe would record them, made of some of the simulated ones.
     pub(super) fn redrawn(&self, candidate: &Candidate, kept: Kept) -> Vec<Observed> {
-        let mut random = random::generator(1, Purpose::Fitted, &self.name, 0);
+        let mut random = random::generator(1, Purpose::Fit, &self.name, 0);
         let Candidate { factor, late, noise, missed } = *candidate;
         let again = |times: &[Option<f64>; 3]| {
             let times: [Option<f64>; 3] = std::array::from_fn(|finger| {

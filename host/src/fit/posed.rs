@@ -49,7 +49,7 @@ pub(super) fn in_poses(name: &str, touches: &[Touch], scenes: &[Scene], settings
         return Vec::new();
     }
     let one = |(index, touch): (usize, &Touch)| {
-        let mut random = random::generator(settings.seed, Purpose::Fitted, name, 1 + index as u64);
+        let mut random = random::generator(settings.seed, Purpose::Fit, name, 1 + index as u64);
         let pose = touch.pose()?;
         let approaches = (0..APPROACHES).map(|turn| {
             let scene = &scenes[turn % scenes.len()];

@@ -160,17 +160,7 @@ impl Approach {
 
     /// The same if all three fingers touch, else none: as soon as one finger misses, no other is cast.
     pub fn full_distances(&self, scene: &Scene, probe: &Probe) -> Option<[f64; FINGERS]> {
-        let [first, middle, last] = self.fingers(probe.spacing);
-        let may_touch = |finger| scene.may_touch(finger, self.direction, probe.radius);
-        // The middle finger is aimed at the box, so it is the one that is likely to get there.
-        if !may_touch(first) || !may_touch(last) {
-            return None;
-        }
-        let contact = |finger| scene.first_contact(finger, self.direction, probe.radius);
-        let first = contact(first)?;
-        let last = contact(last)?;
-        let middle = contact(middle)?;
-        Some([first, middle, last])
+        scene.all_contacts(self.fingers(probe.spacing), self.direction, probe.radius)
     }
 
     /// The touch that these distances give: times in whole microseconds after the first contact, and the pose.

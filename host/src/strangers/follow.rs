@@ -80,7 +80,7 @@ impl Sequence {
 
 /// Puts the touches of an object's pool in a random order.
 pub(super) fn shuffle<T>(touches: &mut [T], name: &str, seed: u64, pool: u64) {
-    touches.shuffle(&mut random::generator(seed, Purpose::Fit, name, pool));
+    touches.shuffle(&mut random::generator(seed, Purpose::Misfit, name, pool));
 }
 
 /// Amount by which a misfit may exceed the threshold after this number of touches, in nats.

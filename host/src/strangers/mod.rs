@@ -151,8 +151,8 @@ pub fn calibrate(
     let (learn, test) = learned_and_tested(supplies, objects);
     let known = model.known_count();
     let moments = Moments::new(&learn, &of_shapes(model, shapes), known, objects, unit);
-    let misfits =
-        misfit::misfits(&moments, None).ok_or(EvaluateProblem::TooFewForFit { found: learn_count(&learn, objects) })?;
+    let misfits = misfit::misfits(&moments, None)
+        .ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
     let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
     // Levels of misfit do not depend on any threshold.
     let untested = stated(model, &terms(0.0, FIRST), &misfits)?;

@@ -12,7 +12,7 @@ use palpate_shared::Touch;
 /// their margins' differences since they last began to, never less than 0 (a cumulative sum, Page 1954). Once that reaches
 /// the limit for any object, all touches before those that spoke for this one most are forgotten: the evidence becomes the
 /// priors, or the weights of [`Recognizer::reset_to`], and the margins of the touches that are left, which are also all that
-/// the model's test of fit counts. An object of weight 0 stays one. With little evidence in a touch a restart comes late, and
+/// the model's misfit test counts. An object of weight 0 stays one. With little evidence in a touch a restart comes late, and
 /// a verdict that a few touches would have settled may still come first; `palpate evaluate --switch` measures both.
 ///
 /// State: five numbers of 32 bits for each object, and a few more; not part of a snapshot. After a snapshot was restored, a restart begins with the

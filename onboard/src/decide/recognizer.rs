@@ -26,7 +26,7 @@ pub enum Verdict {
         rivals: Rivals,
     },
     /// The touches fit no object that the model knows, which stays so until [`Recognizer::reset`]. Only of a model with a
-    /// [test of fit](Model::strangers).
+    /// [misfit test](Model::strangers).
     Unknown,
     /// The limit of touches was reached without a decision, which stays so until [`Recognizer::reset`]: the touches said
     /// too little.
@@ -135,7 +135,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// Takes in a touch.
     ///
-    /// Cost: the margins, then a few instructions for each object and one exponential, rarely more; and that of a test of fit, if
+    /// Cost: the margins, then a few instructions for each object and one exponential, rarely more; and that of a misfit test, if
     /// the model has one. Cannot fail: evidence
     /// that reaches the limits of 64 bits (after 2^33 touches at the earliest) stays there, which brings objects closer
     /// together and never makes one recognized.
@@ -183,7 +183,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.best(&self.model)
     }
 
-    /// Result of the model's test of fit of the touches so far with the [best](Self::best) object; [`Familiarity::Known`]
+    /// Result of the model's misfit test of the touches so far with the [best](Self::best) object; [`Familiarity::Known`]
     /// without one, and before the first touch.
     ///
     /// Cost: as the test in [`push`](Self::push).
@@ -233,7 +233,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// Forgets all touches, for the next object, which is one of those with a weight: `weights` say how often each
     /// object is touched, in any common unit, and replace the model's priors until the next [`reset`](Self::reset). An
     /// object of weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the
-    /// model promises was determined for its own priors, and its test of fit takes the weights' for evidence. The
+    /// model promises was determined for its own priors, and its misfit test takes the weights' for evidence. The
     /// weights `&[3, 0, 1]` say that there are three of the first object for each of the third, and none of the second.
     ///
     /// Cost: two logarithms for each object, bit by bit.

@@ -1,4 +1,4 @@
-//! Test of fit: do the touches so far fit the object with the most evidence, or none that the model knows?
+//! Misfit test: do the touches so far fit the object with the most evidence, or none that the model knows?
 
 use super::evidence::best;
 use super::expected::is_possible;
@@ -6,7 +6,7 @@ use crate::exponential::exp2_negative;
 use crate::model::Model;
 use palpate_shared::format::{MisfitTerms, MisfitTest, ObjectMisfit};
 
-/// Result of a model's test of fit.
+/// Result of a model's misfit test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Familiarity {

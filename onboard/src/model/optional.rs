@@ -19,8 +19,7 @@ pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
 }
 
 /// Checks that sections fill their part of the model, in the order of their tags, that what recognition depends on makes
-/// sense (whoever asks for probe or noise finds out about those), and that none is there
-/// that has to be understood and is not. Sets what they state.
+/// sense (probe and noise are checked when asked for), and that none is there that has to be understood and is not. Sets what they state.
 pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) -> Result<(), Wrong> {
     let mut last = 0;
     while !rest.is_empty() {

@@ -1,4 +1,4 @@
-//! Statements of a model about objects that it does not know: a background, and a test of fit.
+//! Statements of a model about objects that it does not know: a background, and a misfit test.
 //!
 //! The test compares the evidence so far with what touches of the leading object give. With r the evidence of *rivals*
 //! (other objects, and the background) against the leader, less its mean, summed over n touches, the misfit is
@@ -49,7 +49,7 @@ pub struct MisfitTerms {
     pub confidence: u32,
 }
 
-/// A test of fit, read in place.
+/// A misfit test, read in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MisfitTest<'a> {
     /// Terms that are the same for all objects.

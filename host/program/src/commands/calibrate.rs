@@ -1,5 +1,6 @@
 use super::Global;
 use super::numbers::{count, error_rate, share};
+use super::plan::{self, Wanted};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
@@ -31,13 +32,13 @@ Examples:
   palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
 pub(crate) struct Arguments {
     /// Compiled model
-    pub(super) model: PathBuf,
+    model: PathBuf,
     /// Touches to calibrate on: a directory that `palpate capture` filled
     #[arg(value_name = "DIR")]
-    pub(super) directory: PathBuf,
+    directory: PathBuf,
     /// Where to write; the calibrated model
     #[arg(short, long, value_name = "PATH")]
-    pub(super) output: PathBuf,
+    output: PathBuf,
     /// The share of wrong names to accept, such as 1%; what is promised
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
@@ -56,15 +57,15 @@ pub(crate) struct Arguments {
     /// Follow the model's plan of approaches; the promise holds for a robot that does
     #[arg(long)]
     active: bool,
-    /// Add a plan of approaches instead, with so many rolls: 1, 2 or 4
+    /// Add a plan of approaches instead, with 1, 2 or 4 rolls per direction
     #[arg(long, value_name = "ROLLS", conflicts_with_all = PROMISE)]
-    pub(super) plan: Option<u8>,
+    plan: Option<u8>,
     #[command(flatten)]
     strangers: StrangersArguments,
     #[command(flatten)]
-    pub(super) probe: ProbeArguments,
+    probe: ProbeArguments,
     #[command(flatten)]
-    pub(super) real: RealArguments,
+    real: RealArguments,
 }
 
 /// The options that a plan has no use for.
@@ -73,7 +74,8 @@ const PROMISE: [&str; 8] =
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if let Some(rolls) = arguments.plan {
-        return super::plan::run(&arguments, rolls, global);
+        let Arguments { model, directory, output, probe, real, .. } = &arguments;
+        return plan::run(&Wanted { model, directory, output, rolls, probe, real }, global);
     }
     output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
     let compiled = CompiledModel::read(&arguments.model)?;

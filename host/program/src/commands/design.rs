@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
 enum Command {
     /// Find the probe that needs the fewest approaches to your objects
     Design(Box<DesignArguments>),
-    /// Find out how your probe differs from the ideal, from its touches
+    /// Measure how your probe differs from the ideal, from its touches
     Fit(super::fit::FitArguments),
 }
 

@@ -291,8 +291,8 @@ fn strangers_table(strangers: &Strangers) -> String {
         );
     }
     let names = strangers.detected_per_object.keys().map(|name| name.chars().count());
-    let width = names.max().unwrap_or(0).max("found out by".len());
-    let mut text = format!("\n{:width$}", "found out by");
+    let width = names.max().unwrap_or(0).max("detected by".len());
+    let mut text = format!("\n{:width$}", "detected by");
     // Writing to a string cannot fail.
     strangers.detected.keys().for_each(|at| _ = write!(text, " {at:>8}"));
     _ = writeln!(text, " {:>9}", "named");
@@ -308,7 +308,7 @@ fn strangers_table(strangers: &Strangers) -> String {
     let (alarms, undecided) = (percent(strangers.false_alarms), percent(strangers.undecided));
     _ = writeln!(
         text,
-        "\nObjects that the model does not know: the share found out by each number of touches, and the share that got a name; \
+        "\nObjects that the model does not know: the share detected after each number of touches, and the share that got a name; \
          {undecided} got no verdict.\nOf the objects that it knows, {alarms} were taken for unknown."
     );
     text

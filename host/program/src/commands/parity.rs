@@ -2,18 +2,23 @@
 
 use super::Global;
 use super::progress::Bar;
-use super::verify::Arguments;
 use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::Ensemble;
 use palpate::evaluate::parity;
 use palpate::output;
+use std::path::Path;
 
-/// Compares a compiled model with its ensemble, touch by touch and sequence by sequence.
-pub(super) fn run(arguments: &Arguments, ensemble: &Ensemble, compiled: &CompiledModel, global: &Global) -> Result<()> {
-    let dataset = super::dataset(&arguments.data)?;
-    let parity = parity::parity(ensemble, &compiled.model(), &dataset, arguments.sequences, global.seed(), &Bar::new())
-        .map_err(|error| error.in_file(&arguments.model))?;
+/// Compares a compiled model with its ensemble, touch by touch and in a number of sequences.
+pub(super) fn run(
+    (model, compiled): (&Path, &CompiledModel),
+    ensemble: &Ensemble,
+    (data, sequences): (&Path, usize),
+    global: &Global,
+) -> Result<()> {
+    let dataset = super::dataset(data)?;
+    let parity = parity::parity(ensemble, &compiled.model(), &dataset, sequences, global.seed(), &Bar::new())
+        .map_err(|error| error.in_file(model))?;
     if global.json {
         return output::print_json(&parity);
     }

@@ -1,14 +1,16 @@
 //! `palpate calibrate --plan`.
 
 use super::Global;
-use super::calibrate::Arguments;
+use super::probe::ProbeArguments;
 use super::progress::Bar;
+use super::real::RealArguments;
 use palpate::compile::CompiledModel;
 use palpate::evaluate::{self, Planned};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
 use palpate::{Error, Result};
+use std::path::{Path, PathBuf};
 
 #[derive(serde::Serialize)]
 struct Written {
@@ -17,27 +19,41 @@ struct Written {
     planned: Planned,
 }
 
-/// Adds a plan with so many rolls of the row of fingers for each direction.
-pub(super) fn run(arguments: &Arguments, rolls: u8, global: &Global) -> Result<()> {
-    let inputs = super::files_of(&arguments.directory);
-    output::refuse_input(&arguments.output, inputs.iter().chain([&arguments.model]))?;
-    let compiled = CompiledModel::read(&arguments.model)?;
-    let mut dataset = super::dataset(&arguments.directory)?;
-    let file = arguments.probe.read()?;
-    arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let noise = arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
+/// A plan to be made.
+pub(super) struct Wanted<'a> {
+    /// The model that gets it.
+    pub(super) model: &'a PathBuf,
+    /// Approaches with pose.
+    pub(super) directory: &'a Path,
+    pub(super) output: &'a Path,
+    /// The number of rolls of the row of fingers for each direction.
+    pub(super) rolls: u8,
+    pub(super) probe: &'a ProbeArguments,
+    pub(super) real: &'a RealArguments,
+}
+
+/// Adds a plan to a model.
+pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
+    let Wanted { directory, output: path, .. } = *wanted;
+    let inputs = super::files_of(directory);
+    output::refuse_input(path, inputs.iter().chain([wanted.model]))?;
+    let compiled = CompiledModel::read(wanted.model)?;
+    let mut dataset = super::dataset(directory)?;
+    let file = wanted.probe.read()?;
+    wanted.probe.of_dataset(file.as_ref(), &dataset)?;
+    let noise = wanted.real.over(wanted.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
     evaluate::add_noise(&mut dataset, &noise, global.seed())?;
     let progress = Bar::new();
     progress.begin("planning", None);
-    let planned = evaluate::plan(&compiled.model(), &dataset, rolls).map_err(|error| match error {
-        Error::At { .. } if error.exit_code() == 1 => error.in_file(&arguments.directory),
+    let planned = evaluate::plan(&compiled.model(), &dataset, wanted.rolls).map_err(|error| match error {
+        Error::At { .. } if error.exit_code() == 1 => error.in_file(directory),
         _ => error,
     })?;
     drop(progress);
-    output::write_bytes(&arguments.output, &planned.bytes)?;
+    output::write_bytes(path, &planned.bytes)?;
     let written = Written { bytes: planned.bytes.len(), planned };
     if global.json {
-        return output::print_json_about(&arguments.output, &written);
+        return output::print_json_about(path, &written);
     }
     let Written { bytes, planned: Planned { plan_bytes, poses, rolls, left_out, fewest, hardest, .. } } = &written;
     let [first, second] = &hardest.objects;
@@ -46,9 +62,9 @@ pub(super) fn run(arguments: &Arguments, rolls: u8, global: &Global) -> Result<(
          {left_out} never touch\n\
          Hardest to tell apart: {first} and {second}, by {:.3} of 1 in the best pose. Means are of {fewest} approaches or \
          more.\n",
-        arguments.output.display(),
+        path.display(),
         if *rolls == 1 { "" } else { "s" },
         hardest.separation,
     );
-    output::print_about(&arguments.output, &text)
+    output::print_about(path, &text)
 }

@@ -1,8 +1,8 @@
 //! `palpate view --play`.
 
-use super::probe::refuse_unstated;
+use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
-use super::view::Arguments;
+use super::real::RealArguments;
 use super::{Global, shell};
 use palpate::compile::CompiledModel;
 use palpate::output;
@@ -18,8 +18,21 @@ const TOUCHES: u64 = 10_000;
 /// Rounds of 100 approaches in a trace.
 const ROUNDS: u64 = 10;
 
-pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let Arguments { mut sources, model, output, touches, trace, size, real, .. } = arguments;
+/// A page to be made on which objects are touched.
+pub(super) struct Wanted {
+    pub(super) sources: Vec<String>,
+    /// Compiled models; some are trained if there are none.
+    pub(super) model: Vec<PathBuf>,
+    pub(super) output: PathBuf,
+    /// Full touches of each object to train on.
+    pub(super) touches: Option<u64>,
+    pub(super) trace: Option<PathBuf>,
+    pub(super) size: SizeArguments,
+    pub(super) real: RealArguments,
+}
+
+pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
+    let Wanted { mut sources, model, output, touches, trace, size, real } = wanted;
     let (touches, seed) = (touches.unwrap_or(TOUCHES), global.seed());
     if touches < 100 {
         return Err(Error::setting("touches", touches, "100 or more"));

@@ -62,8 +62,8 @@ pub(crate) fn text(found: &Found) -> String {
         shares.values().for_each(|share| _ = write!(text, " {:>8}", percent(*share)));
         text.push('\n');
     }
-    text + "The share found out after each number of touches when the model does not use the object's column: about what \
-            happens to strangers.\n"
+    text + "The share detected after each number of touches when the model does not use the object's column: about the \
+            detection rate of strangers.\n"
 }
 
 fn held(name: &str) -> Result<Wanted, String> {

@@ -25,15 +25,15 @@ Examples:
   palpate verify model.palpate m.json rows.csv --library-margins margins.csv")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
-    pub(super) model: PathBuf,
+    model: PathBuf,
     /// The file that it was exported from
-    pub(super) ensemble: PathBuf,
+    ensemble: PathBuf,
     /// Touches (a directory), or rows of features (a CSV file)
     #[arg(value_name = "DATA")]
-    pub(super) data: PathBuf,
+    data: PathBuf,
     /// Sequences of touches to draw; of all objects together
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
-    pub(super) sequences: usize,
+    sequences: usize,
     /// The library's own raw scores of the rows
     #[arg(long, value_name = "CSV")]
     library_margins: Option<PathBuf>,
@@ -53,7 +53,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             (None, true) if !palpate::touches::is_log(&arguments.data) => {
                 Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches))
             }
-            (None, _) => super::parity::run(&arguments, &ensemble, &compiled, global),
+            (None, _) => {
+                let data = (arguments.data.as_path(), arguments.sequences);
+                super::parity::run((&arguments.model, &compiled), &ensemble, data, global)
+            }
         };
     }
     let rows = read_rows(&arguments.data, &ensemble.inputs.names(), None)?;

@@ -31,13 +31,13 @@ Examples:
 pub(crate) struct Arguments {
     /// An object: a built-in object's name, or a mesh (OBJ, STL, PLY, glTF, GLB, COLLADA); with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present = "play")]
-    pub(super) sources: Vec<String>,
+    sources: Vec<String>,
     /// Where to write; the page
     #[arg(short, long, value_name = "PATH")]
-    pub(super) output: PathBuf,
+    output: PathBuf,
     /// Touches of each object; to show [default: 24], or with --play to train on [default: 10000]
     #[arg(long, value_name = "N", value_parser = super::numbers::count)]
-    pub(super) touches: Option<u64>,
+    touches: Option<u64>,
     /// Approaches to show in which a finger missed
     #[arg(long, value_name = "N", default_value = "12", conflicts_with = "play")]
     misses: usize,
@@ -46,14 +46,14 @@ pub(crate) struct Arguments {
     play: bool,
     /// A compiled model for the page; may be given several times
     #[arg(long, value_name = "FILE", requires = "play", conflicts_with = "touches")]
-    pub(super) model: Vec<PathBuf>,
+    model: Vec<PathBuf>,
     /// For tests of the page: also write what it has to compute, as this program computes it
     #[arg(long, value_name = "FILE", requires = "play")]
-    pub(super) trace: Option<PathBuf>,
+    trace: Option<PathBuf>,
     #[command(flatten)]
-    pub(super) size: SizeArguments,
+    size: SizeArguments,
     #[command(flatten)]
-    pub(super) real: RealArguments,
+    real: RealArguments,
 }
 
 /// Output about a page.
@@ -69,7 +69,8 @@ struct Shown<'a> {
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.play {
-        return play::run(arguments, global);
+        let Arguments { sources, model, output, touches, trace, size, real, .. } = arguments;
+        return play::run(play::Wanted { sources, model, output, touches, trace, size, real }, global);
     }
     let Arguments { sources, output, touches, misses, size, real, .. } = &arguments;
     let [source] = &sources[..] else {

@@ -16,7 +16,7 @@ mod tests;
 
 use glam::DVec3;
 use narrow::{Motion, Triangle};
-use tree::Tree;
+use tree::{Search, Tree};
 
 /// A triangle mesh, ready for casting spheres at it.
 #[derive(Clone, Debug)]
@@ -87,6 +87,37 @@ impl Surface {
         let start = self.start(origin, direction, radius)?;
         let distance = start.skipped + self.tree.first_contact(&self.triangles, &start.motion)?;
         Some(distance * self.unit / start.length)
+    }
+
+    /// As [`first_contact`](Self::first_contact) of each of these origins, if all of them touch; none as soon as one does not,
+    /// which takes a part of the time.
+    pub fn all_contacts<const N: usize>(&self, origins: [DVec3; N], direction: DVec3, radius: f64) -> Option<[f64; N]> {
+        let mut starts = [const { None }; N];
+        for (start, origin) in starts.iter_mut().zip(origins) {
+            *start = Some(self.start(origin, direction, radius)?);
+        }
+        // The path farthest from the middle of the mesh is the one that most likely misses.
+        let away = |start: &Option<Start>| {
+            start.as_ref().map_or(0.0, |Start { motion, .. }| motion.origin.cross(motion.direction).length_squared())
+        };
+        let mut order: [usize; N] = std::array::from_fn(|index| index);
+        order.sort_by(|&a, &b| away(&starts[b]).total_cmp(&away(&starts[a])));
+        let mut searches = [const { None }; N];
+        for index in order {
+            let Start { motion, .. } = starts[index].as_ref()?;
+            let mut search = Search::new(&self.tree, motion);
+            if !search.touches(&self.tree, &self.triangles, motion) {
+                return None;
+            }
+            searches[index] = Some(search);
+        }
+        let mut contacts = [0.0; N];
+        for ((contact, start), search) in contacts.iter_mut().zip(starts).zip(searches) {
+            let Start { motion, skipped, length } = start?;
+            let distance = skipped + search?.first(&self.tree, &self.triangles, &motion)?;
+            *contact = distance * self.unit / length;
+        }
+        Some(contacts)
     }
 
     /// The cast in the frame of the casts, its start moved up to the mesh's box; none if it never gets there.

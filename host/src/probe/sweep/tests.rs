@@ -322,6 +322,34 @@ fn meshes_that_are_fine_compared_with_the_sphere_agree_with_brute_force() {
 }
 
 #[test]
+fn all_contacts_at_once_are_each_ones_first_contact_bit_for_bit_or_none_if_one_misses() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
+    let (mut all, mut some) = (0, 0);
+    // Coarse, about as large as the sphere, and fine: each kind of search; and a single triangle.
+    for (triangles, radius) in [(globe(4), 0.05), (globe(12), 0.15), (globe(60), 0.3), (vec![FLOOR], 0.5)] {
+        let surface = Surface::new(triangles);
+        for case in 0..2_000 {
+            let (origin, direction) = random_cast(&mut rng);
+            // At rest, side by side on a line through the aim, in one place, and not of unit length.
+            let direction =
+                [direction, direction * 3.0, DVec3::ZERO][usize::from(case % 50 == 0) + usize::from(case % 100 == 0)];
+            let side = random_point(&mut rng, 0.4) * f64::from(u8::from(case % 7 != 0));
+            let origins = [origin - side, origin, origin + side];
+            let each = origins.map(|origin| surface.first_contact(origin, direction, radius));
+            let expected = match each {
+                [Some(a), Some(b), Some(c)] => Some([a, b, c].map(f64::to_bits)),
+                _ => None,
+            };
+            let found = surface.all_contacts(origins, direction, radius);
+            assert_eq!(found.map(|found| found.map(f64::to_bits)), expected, "{origins:?} along {direction}");
+            all += usize::from(expected.is_some());
+            some += usize::from(expected.is_none() && each.iter().any(Option::is_some));
+        }
+    }
+    assert!(all > 500 && some > 500, "{all} {some}");
+}
+
+#[test]
 fn random_soups_of_triangles_agree_with_brute_force() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     for round in 0..300 {

@@ -103,30 +103,7 @@ impl Tree {
 
     /// The distance that the sphere travels until it touches one of the triangles.
     pub(super) fn first_contact(&self, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
-        let ray = Ray::new(motion);
-        match self.scale_for(&ray) {
-            scale::COARSE => self.search::<{ scale::COARSE }>(triangles, motion, &ray),
-            scale::MIDDLE => self.search::<{ scale::MIDDLE }>(triangles, motion, &ray),
-            _ => self.search::<{ scale::FINE }>(triangles, motion, &ray),
-        }
-    }
-
-    fn search<const SCALE: u8>(&self, triangles: &[Triangle], motion: &Motion, ray: &Ray) -> Option<f64> {
-        let mut first = farthest(motion);
-        let mut limit = first as f32;
-        let mut stack = self.candidates::<SCALE>(ray, limit);
-        while let Some(candidate) = stack.pop() {
-            let Some(pack) = self.resolve::<SCALE>(&candidate, ray, limit, &mut stack) else { continue };
-            let mut earliest = pack.earliest(ray, limit);
-            while let Some(lane) = earliest.pop(limit) {
-                let triangle = &triangles[pack.first as usize + lane];
-                if let Some(distance) = narrow::first_contact(motion, triangle, first) {
-                    first = distance;
-                    limit = limit_after(first, motion, ray);
-                }
-            }
-        }
-        (first < farthest(motion)).then_some(first)
+        Search::new(self, motion).first(self, triangles, motion)
     }
 
     /// The children of the root that the sphere may touch before `limit`.
@@ -207,6 +184,72 @@ impl Tree {
             passed |= self.discs[index as usize].passed(&node.center, ray, limit);
         }
         passed.bitmask()
+    }
+}
+
+/// A search for the first contact of a sphere, which can pause at any contact.
+pub(super) struct Search {
+    ray: Ray,
+    scale: u8,
+    stack: Vec<Candidate>,
+    /// Distance of the first contact so far.
+    first: f64,
+    /// The same for boxes and packs.
+    limit: f32,
+}
+
+impl Search {
+    pub(super) fn new(tree: &Tree, motion: &Motion) -> Self {
+        let (ray, first) = (Ray::new(motion), farthest(motion));
+        let (scale, limit) = (tree.scale_for(&ray), first as f32);
+        let stack = match scale {
+            scale::COARSE => tree.candidates::<{ scale::COARSE }>(&ray, limit),
+            scale::MIDDLE => tree.candidates::<{ scale::MIDDLE }>(&ray, limit),
+            _ => tree.candidates::<{ scale::FINE }>(&ray, limit),
+        };
+        Self { ray, scale, stack, first, limit }
+    }
+
+    /// True if the sphere touches a triangle, early or late: much is left to search then.
+    pub(super) fn touches(&mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) -> bool {
+        self.go_on::<true>(tree, triangles, motion);
+        self.first < farthest(motion)
+    }
+
+    /// The distance of the first contact.
+    pub(super) fn first(mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
+        self.go_on::<false>(tree, triangles, motion);
+        (self.first < farthest(motion)).then_some(self.first)
+    }
+
+    #[inline]
+    fn go_on<const PAUSES: bool>(&mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) {
+        match self.scale {
+            scale::COARSE => self.go_on_at::<PAUSES, { scale::COARSE }>(tree, triangles, motion),
+            scale::MIDDLE => self.go_on_at::<PAUSES, { scale::MIDDLE }>(tree, triangles, motion),
+            _ => self.go_on_at::<PAUSES, { scale::FINE }>(tree, triangles, motion),
+        }
+    }
+
+    /// Searches all candidates that are left, or those up to the first pack with a contact.
+    fn go_on_at<const PAUSES: bool, const SCALE: u8>(&mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) {
+        let Self { ray, stack, first, limit, .. } = self;
+        while let Some(candidate) = stack.pop() {
+            let Some(pack) = tree.resolve::<SCALE>(&candidate, ray, *limit, stack) else { continue };
+            let mut earliest = pack.earliest(ray, *limit);
+            let mut touches = false;
+            while let Some(lane) = earliest.pop(*limit) {
+                let triangle = &triangles[pack.first as usize + lane];
+                if let Some(distance) = narrow::first_contact(motion, triangle, *first) {
+                    *first = distance;
+                    *limit = limit_after(*first, motion, ray);
+                    touches = true;
+                }
+            }
+            if PAUSES && touches {
+                return;
+            }
+        }
     }
 }
 

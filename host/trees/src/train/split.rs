@@ -181,7 +181,7 @@ fn best_score(first: f64, second: f64) -> f64 {
     if second > 0.0 { score } else { 0.0 }
 }
 
-/// True only if the scores of two sides do not add up to more than `least`, found out without a division. Scores in f32 are
+/// True only if the scores of two sides do not add up to more than `least`, decided without a division. Scores in f32 are
 /// within 2⁻²⁰ of the best ones.
 fn cannot_exceed(one: [f64; 2], other: [f64; 2], least: f64) -> bool {
     let (a, b) = (one[1] + LAMBDA, other[1] + LAMBDA);

@@ -28,21 +28,23 @@ Examples:
 pub(super) struct Arguments {
     /// A directory with a file of touches for each object, or a robot's log (MCAP)
     #[arg(value_name = "DIR")]
-    pub(super) directory: PathBuf,
+    directory: PathBuf,
     /// Simulated touches of the same objects, to compare the recorded ones in DIR with
     #[arg(value_name = "SIMULATED")]
     simulated: Option<PathBuf>,
     /// Features of a touch: times, curvature, gravity or oriented; where two data sets are compared
     #[arg(long, value_parser = descriptor, value_name = "NAME", default_value = "curvature", requires = "simulated")]
-    pub(super) descriptor: Descriptor,
+    descriptor: Descriptor,
     /// Sequences of touches to draw; of each object, where two data sets are compared
     #[arg(long, value_name = "N", value_parser = sequences, default_value_t = Settings::default().groups, requires = "simulated")]
-    pub(super) sequences: usize,
+    sequences: usize,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     if let Some(simulated) = &arguments.simulated {
-        return super::compare::run(arguments, simulated, global);
+        let (descriptor, groups) = (arguments.descriptor, arguments.sequences);
+        let settings = Settings { descriptor, groups, seed: global.seed(), ..Settings::default() };
+        return super::compare::run(&arguments.directory, simulated, &settings, global);
     }
     let check = Check::of(&arguments.directory)?;
     match global.json {

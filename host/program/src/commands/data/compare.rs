@@ -1,6 +1,5 @@
 //! `palpate data check` of two data sets.
 
-use super::check::Arguments;
 use crate::commands::progress::Bar;
 use crate::commands::{Global, checked, dataset, remark};
 use palpate::Result;
@@ -11,8 +10,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Says how far recorded touches are from simulated ones, and what that costs.
-pub(super) fn run(arguments: &Arguments, simulated: &Path, global: &Global) -> Result<()> {
-    let recorded = checked(Dataset::read_any(&arguments.directory)?);
+pub(super) fn run(directory: &Path, simulated: &Path, settings: &Settings, global: &Global) -> Result<()> {
+    let recorded = checked(Dataset::read_any(directory)?);
     let simulated = dataset(simulated)?;
     if let Some((recorded, simulated)) = Captured::of(&recorded).zip(Captured::of(&simulated)) {
         let objects = recorded.shared(&simulated).join(", ");
@@ -23,14 +22,8 @@ pub(super) fn run(arguments: &Arguments, simulated: &Path, global: &Global) -> R
             ));
         }
     }
-    let settings = Settings {
-        descriptor: arguments.descriptor,
-        groups: arguments.sequences,
-        seed: global.seed(),
-        ..Settings::default()
-    };
-    let compared = compare(&recorded, &simulated, &settings, &Bar::new())
-        .map_err(|error| if error.exit_code() == 1 { error.in_file(&arguments.directory) } else { error })?;
+    let compared = compare(&recorded, &simulated, settings, &Bar::new())
+        .map_err(|error| if error.exit_code() == 1 { error.in_file(directory) } else { error })?;
     if global.json { output::print_json(&compared) } else { output::print(&text(&compared)) }
 }
 
@@ -53,7 +46,7 @@ fn text(compared: &Comparison) -> String {
     _ = writeln!(
         text,
         "\n{:width$}  {:>8}  {:>9}  {:16}  by itself, each feature is",
-        "object", "recorded", "simulated", "told apart"
+        "object", "recorded", "simulated", "accuracy"
     );
     for own in &compared.objects {
         let [recorded, simulated] = own.touches;
