@@ -96,10 +96,13 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
     let names = context.names();
     // Other seeds than those of the folds and of the large capture.
     let seeds = [0x11_1118, 0x11_1119].map(|other| context.settings.seed.wrapping_add(other));
-    let draw = |model: &Model<'_>| -> Result<[Vec<Sequence>; 2]> {
-        Ok([sequences(context, model, seeds[0])?, sequences(context, model, seeds[1])?])
+    // Both models on the same touches, captured once.
+    let draw = |seed: u64| -> Result<[Vec<Sequence>; 2]> {
+        let kept = &mut calibrate::Fresh::default();
+        Ok([sequences(context, &ours, seed, kept)?, sequences(context, &limit, seed, kept)?])
     };
-    let (ours, limit) = (draw(&ours)?, draw(&limit)?);
+    let [[ours_chosen, limit_chosen], [ours_tested, limit_tested]] = [draw(seeds[0])?, draw(seeds[1])?];
+    let (ours, limit) = ([ours_chosen, ours_tested], [limit_chosen, limit_tested]);
     let mut found = Vec::new();
     let chosen = |sequences: &[Sequence], rate: f64, per: Per| -> Result<Option<Odds>> {
         let terms = Terms { rate, confidence: CONFIDENCE, per };
@@ -137,8 +140,8 @@ fn strictest() -> f64 {
     ((1.0 - least) / least).ln() + BEYOND
 }
 
-/// Sequences of full touches captured for this, the same for any number of rates.
-fn sequences(context: &Context, model: &Model<'_>, seed: u64) -> Result<Vec<Sequence>> {
+/// Sequences of full touches captured for this, the same for any number of rates; what is `kept` is not captured again.
+fn sequences(context: &Context, model: &Model<'_>, seed: u64, kept: &mut calibrate::Fresh) -> Result<Vec<Sequence>> {
     let names = context.names();
     let objects: Vec<(&str, &[Scene])> =
         names.iter().map(String::as_str).zip(context.all_scenes().iter().map(Vec::as_slice)).collect();
@@ -150,8 +153,7 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64) -> Result<Vec<Sequ
         ..calibrate::Settings::default()
     };
     let origin = Origin { seed, approaches: false, ..context.settings.capture.clone() };
-    let dataset =
-        calibrate::fresh(model, &objects, &origin, &settings, &mut calibrate::Fresh::default(), context.progress)?;
+    let dataset = calibrate::fresh(model, &objects, &origin, &settings, kept, context.progress)?;
     // The model's objects are the context's, in the same order.
     let mut supplies: Vec<Supply<'_>> =
         (0..names.len()).zip(&dataset.objects).map(|(object, of)| Supply::new(object, of, seed)).collect();

@@ -125,6 +125,7 @@ impl Settings {
             limit_touches: 30_000,
             limit_rounds: 60,
             background_shapes: BACKGROUND_SHAPES / 5,
+            other_shapes: BACKGROUND_SHAPES / 5,
             growth_objects: vec![2, 5, 10, 20],
             growth_triangles: vec![1_000, 10_000, 100_000],
             growth_approaches: 1_200,

@@ -17,6 +17,7 @@ pub(crate) fn dataset(counts: &[usize], seed: u64) -> Dataset {
 }
 
 /// Objects of which number `k` has the instances `kinds[k]`, touched in turn: each is as object number `kinds[k][i]` above.
+#[cfg(feature = "objects")]
 pub(crate) fn of_instances(kinds: &[&[usize]], count: usize, seed: u64) -> Dataset {
     let object = |(index, kinds): (usize, &&[usize])| {
         let name = format!("object{index}");
