@@ -47,22 +47,23 @@ pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Resul
     let Some(compared) = compared else { return Ok(None) };
     let mut section = Section::new("recorded", "Accuracy of the simulation");
     let told = &compared.told_apart;
+    section.text(compared.verdict());
     section.text(format!(
         "Recorded touches of {} objects were compared with simulated ones of the same objects{}. A classifier trained \
-         to distinguish the two is right {} of the time on touches that it was not trained on; 50 % is chance level. {}",
+         to distinguish the two is right {} of the time on touches that it was not trained on; 50 % is chance level.",
         compared.objects.len(),
         if context.settings.real.is_none() { String::new() } else { format!(", made with {}", context.settings.real) },
         with_interval(told),
-        compared.verdict(),
     ));
     section.figure(told_figure(context, compared)?);
     section.figure(features_figure(context, compared)?);
     section.table(words(context, compared));
     if let Some(cost) = &compared.cost {
         section.text(format!(
-            "Cost of the difference: a model of {} objects was trained on simulated touches. {}",
+            "Cost of the difference: a model of {} objects was trained on simulated touches. {} {}",
             cost.known,
-            cost.sentence()
+            cost.sentence(),
+            cost.confusions()
         ));
         section.figure(cost_figure(context, cost)?);
     }

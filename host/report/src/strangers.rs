@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 /// Touches of each object to train, calibrate and test on; and the same for a quick report.
 const TOUCHES: [usize; 3] = [21_000, 40_000, 10_000];
-const QUICK: [usize; 3] = [6_000, 10_000, 4_000];
+const QUICK: [usize; 3] = [5_000, 8_000, 3_000];
 /// Touches for each shape of the background, on average.
 const PER_SHAPE: usize = 300;
 /// Touches up to which detection is shown.

@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 const AT: [usize; 5] = [5, 10, 20, 30, 60];
 /// Approaches whose accuracy on simulated touches is asked for on recorded ones.
 const COST_AT: usize = 20;
+/// The least rise of the share of a confusion that is listed.
+const MORE: f64 = 0.05;
 
 /// Cost to a model of the difference between recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,9 +29,43 @@ pub struct Cost {
     pub after: usize,
     /// After how many approaches the model is right as often on recorded touches; none if it never is.
     pub needed: Option<f64>,
+    /// Pairs of objects that are confused more often on recorded touches, by 5 points or more; the most confused first.
+    #[serde(default)]
+    pub confused: Vec<Confused>,
+}
+
+/// An object that is taken for another one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Confused {
+    /// The object that was touched.
+    pub touched: String,
+    /// The object that it was taken for.
+    pub named: String,
+    /// The number of touches after which it was.
+    pub touches: usize,
+    /// The share of the groups of touches for which it was, on simulated touches.
+    pub simulated: f64,
+    /// The same on recorded ones.
+    pub recorded: f64,
 }
 
 impl Cost {
+    /// Accuracy that is lost on recorded touches after the largest number of approaches that both were measured at, and
+    /// that number.
+    pub fn loss(&self) -> Option<(usize, f64)> {
+        self.simulated.iter().rev().find_map(|(at, own)| Some((*at, own.value - self.recorded.get(at)?.value)))
+    }
+
+    /// The confusions, in a sentence; empty if there are none.
+    pub fn confusions(&self) -> String {
+        let one = |Confused { touched, named, simulated, recorded, .. }: &Confused| {
+            format!("{touched} as {named} ({:.0} %, simulated {:.0} %)", 100.0 * recorded, 100.0 * simulated)
+        };
+        let all: Vec<String> = self.confused.iter().take(3).map(one).collect();
+        let after = self.confused.first().map_or(0, |first| first.touches);
+        if all.is_empty() { String::new() } else { format!("Mistaken after {after} touches: {}.", all.join(", ")) }
+    }
+
     /// Cost, in a sentence.
     pub fn sentence(&self) -> String {
         let Self { after, needed, .. } = self;
@@ -62,8 +98,9 @@ pub(super) fn cost(
     let names = recorded.names();
     let tested = split.test.only(|name| names.iter().any(|own| own == name));
     progress.begin("measuring", None);
-    let accuracy = |dataset: &Dataset, at: &[usize]| -> Result<BTreeMap<usize, Estimate>> {
-        let margins = Margins::new(Candidate::Full(&model), dataset)?;
+    let candidate = || Candidate::Full(&model);
+    let margins = [Margins::new(candidate(), &tested)?, Margins::new(candidate(), recorded)?];
+    let accuracy = |margins: &Margins<'_>, at: &[usize]| -> Result<BTreeMap<usize, Estimate>> {
         let at: Vec<usize> = at.iter().copied().filter(|at| *at <= margins.fewest_approaches()).collect();
         let sequences =
             SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed: settings.seed };
@@ -72,7 +109,7 @@ pub(super) fn cost(
         Ok(both.map(|((at, value), error)| (*at, Estimate { value: *value, standard_error: *error })).collect())
     };
     let all: Vec<usize> = (1..=*AT.last().unwrap_or(&1)).collect();
-    let [own, other] = [&tested, recorded].map(|dataset| accuracy(dataset, &all));
+    let [own, other] = margins.each_ref().map(|margins| accuracy(margins, &all));
     let (own, other) = (own?, other?);
     let shown = |of: &BTreeMap<usize, Estimate>| -> BTreeMap<usize, Share> {
         AT.iter().filter_map(|at| Some((*at, Share::of(*of.get(at)?)))).collect()
@@ -85,7 +122,33 @@ pub(super) fn cost(
         recorded: shown(&other),
         after,
         needed: needed(&other, wanted),
+        confused: confused(&margins, settings)?,
     }))
+}
+
+/// The confusions that are more frequent on the second's touches than on the first's.
+fn confused(margins: &[Margins<'_>; 2], settings: &Settings) -> Result<Vec<Confused>> {
+    let fewest = margins.iter().map(Margins::fewest_touches).min().unwrap_or(0);
+    let touches = fewest.min(*AT.last().unwrap_or(&1));
+    if touches == 0 {
+        return Ok(Vec::new());
+    }
+    let [own, other] = margins.each_ref().map(|margins| margins.confusion(touches, settings.groups, settings.seed));
+    let (own, other) = (own?, other?);
+    let names = margins[1].objects();
+    let mut confused = Vec::new();
+    // Both are of the same objects, in the order of their names.
+    for ((touched, own), other) in margins[1].tested_names().iter().zip(&own).zip(&other) {
+        for ((named, &own), &other) in names.iter().zip(own).zip(other) {
+            let [simulated, recorded] = [own, other].map(|count| count as f64 / settings.groups.max(1) as f64);
+            if named != touched && recorded - simulated >= MORE {
+                let (touched, named) = (touched.clone(), named.clone());
+                confused.push(Confused { touched, named, touches, simulated, recorded });
+            }
+        }
+    }
+    confused.sort_by(|a, b| b.recorded.total_cmp(&a.recorded));
+    Ok(confused)
 }
 
 /// The number of approaches after which this accuracy is reached, in between two of them by a straight line.

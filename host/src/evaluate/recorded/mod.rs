@@ -11,7 +11,7 @@
 mod cost;
 mod features;
 
-pub use cost::Cost;
+pub use cost::{Confused, Cost};
 pub use features::FeatureComparison;
 
 use super::Estimate;
@@ -70,6 +70,13 @@ impl Share {
     }
 }
 
+/// Loss of accuracy below which a simulation is nearly correct, if it is measured after [`ENOUGH`] approaches.
+const NEARLY: f64 = 0.02;
+/// Approaches after which the loss of accuracy decides.
+const ENOUGH: usize = 60;
+/// Loss of accuracy from which on something is wrong with the simulation.
+const STRONGLY: f64 = 0.1;
+
 /// Comparison of recorded and simulated touches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
@@ -100,15 +107,36 @@ pub struct ObjectComparison {
 }
 
 impl Comparison {
-    /// Meaning of the figure, in a sentence.
-    pub fn verdict(&self) -> &'static str {
-        match self.told_apart {
-            Share { low, .. } if low <= 0.5 => "No difference was found: the simulation agrees with the recordings.",
-            Share { value, .. } if value < 0.55 => "They differ slightly: the simulation is nearly correct.",
-            Share { value, .. } if value < 0.65 => {
-                "They differ: fit the probe to recorded touches, or record more of them."
+    /// Verdict on the simulation, in sentences: by the accuracy that a model trained on it loses on recorded touches, since a
+    /// difference that a classifier finds may cost nothing; by the classifier where there is no such loss to measure.
+    pub fn verdict(&self) -> String {
+        if self.told_apart.low <= 0.5 {
+            return "No difference was found: the simulation agrees with the recordings.".into();
+        }
+        let lost = |at, loss: f64| match 100.0 * loss {
+            points if points < 0.05 => format!("no accuracy is lost after {at} approaches"),
+            points => format!("accuracy after {at} approaches is {points:.1} points lower on recorded touches"),
+        };
+        match self.cost.as_ref().and_then(Cost::loss) {
+            Some((at, loss)) if loss < NEARLY && at >= ENOUGH => {
+                format!("The simulation is nearly correct: {}.", lost(at, loss))
             }
-            _ => "They differ strongly: the simulated probe, a mesh or its size is wrong.",
+            Some((at, loss)) if loss < NEARLY => {
+                format!(
+                    "They differ slightly: {}. Record {ENOUGH} approaches to each object to see what it costs then.",
+                    lost(at, loss)
+                )
+            }
+            Some((at, loss)) if loss < STRONGLY => {
+                format!("They differ: {}. Fit the probe to recorded touches, or record more of them.", lost(at, loss))
+            }
+            Some((at, loss)) => {
+                format!("They differ strongly: {}. The simulated probe, a mesh or its size is wrong.", lost(at, loss))
+            }
+            None if self.told_apart.value < 0.65 => {
+                "They differ: fit the probe to recorded touches. Two objects or more show what it costs.".into()
+            }
+            None => "They differ strongly: the simulated probe, a mesh or its size is wrong.".into(),
         }
     }
 }
@@ -293,6 +321,55 @@ mod tests {
         let cost = compared.cost.unwrap();
         assert!(cost.recorded[&20].value < cost.simulated[&20].value - 0.05, "{cost:?}");
         assert!(cost.needed.is_none_or(|needed| needed > 1.2 * cost.after as f64), "{cost:?}");
+    }
+
+    #[test]
+    fn the_verdict_is_of_the_accuracy_lost_and_nearly_correct_takes_sixty_approaches_and_two_points() {
+        let share = |value: f64| Share { value, low: value - 0.01, high: value + 0.01 };
+        let verdict = |told: f64, lost: Option<(usize, f64)>| {
+            let cost = lost.map(|(at, loss)| Cost {
+                known: 2,
+                simulated: BTreeMap::from([(5, share(0.5)), (at, share(0.9))]),
+                recorded: BTreeMap::from([(5, share(0.1)), (at, share(0.9 - loss))]),
+                after: 5,
+                needed: None,
+                confused: Vec::new(),
+            });
+            Comparison { descriptor: "times".into(), told_apart: share(told), objects: Vec::new(), cost }.verdict()
+        };
+        assert!(verdict(0.5, Some((60, 0.5))).starts_with("No difference"));
+        // A classifier that is hardly better than chance says nothing of the cost, nor does one that is nearly always right.
+        for (told, at, loss, expected) in [
+            (0.53, 60, 0.019, "The simulation is nearly correct: accuracy after 60 approaches is 1.9 points lower"),
+            (0.95, 60, 0.019, "The simulation is nearly correct: accuracy after 60"),
+            (0.53, 60, -0.01, "The simulation is nearly correct: no accuracy is lost after 60 approaches."),
+            (0.53, 30, 0.0, "They differ slightly: no accuracy is lost after 30 approaches. Record 60 approaches"),
+            (0.53, 60, 0.021, "They differ: accuracy after 60 approaches is 2.1 points lower"),
+            (0.53, 20, 0.2, "They differ strongly: accuracy after 20 approaches is 20.0 points lower"),
+        ] {
+            let found = verdict(told, Some((at, loss)));
+            assert!(found.starts_with(expected), "{found}");
+        }
+        assert!(verdict(0.53, None).starts_with("They differ: fit the probe"));
+        assert!(verdict(0.7, None).starts_with("They differ strongly"));
+    }
+
+    #[test]
+    fn objects_that_are_mistaken_for_each_other_on_recorded_touches_only_are_listed() {
+        let [one, other] = [1, 2].map(|seed| synthetic::dataset(&[300, 300, 300], seed));
+        // What is recorded as object1 feels like object2.
+        let mut wrong = one.clone();
+        wrong.objects[1] =
+            ObjectTouches::new("object1", one.objects[2].touches().to_vec(), crate::touches::Source::Object);
+        let cost = compare(&wrong, &other, &quick(), &()).unwrap().cost.unwrap();
+        let first = &cost.confused[0];
+        assert_eq!((first.touched.as_str(), first.named.as_str()), ("object1", "object2"), "{cost:?}");
+        assert!(first.recorded > 0.8 && first.simulated < 0.2, "{first:?}");
+        assert!(
+            cost.confusions().starts_with(&format!("Mistaken after {} touches: object1 as object2 (", first.touches))
+        );
+        let same = compare(&one, &other, &quick(), &()).unwrap().cost.unwrap();
+        assert!(same.confused.iter().all(|own| own.recorded < 0.5), "{same:?}");
     }
 
     #[test]

@@ -35,11 +35,11 @@ fn percent(share: &Share) -> String {
 fn text(compared: &Comparison) -> String {
     let told = &compared.told_apart;
     let mut text = format!(
-        "A classifier tells recorded from simulated touches {:.1} % of the time (between {:.1} and {:.1} %). 50 % is guessing.\n{}\n",
+        "{}\nA classifier tells recorded from simulated touches {:.1} % of the time (between {:.1} and {:.1} %). 50 % is guessing.\n",
+        compared.verdict(),
         100.0 * told.value,
         100.0 * told.low,
         100.0 * told.high,
-        compared.verdict()
     );
     let width = compared.objects.iter().map(|own| own.name.len()).max().unwrap_or(0).max(6);
     // Writing to a string cannot fail.
@@ -80,5 +80,7 @@ fn cost_text(cost: &Cost) -> String {
             _ = write!(text, "{shown:>8}");
         }
     }
-    text + &format!("\n{}\n", cost.sentence())
+    text += &format!("\n{}\n", cost.sentence());
+    let confusions = cost.confusions();
+    if confusions.is_empty() { text } else { text + &confusions + "\n" }
 }
