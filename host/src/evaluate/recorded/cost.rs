@@ -29,7 +29,8 @@ pub struct Cost {
     pub after: usize,
     /// After how many approaches the model is right as often on recorded touches; none if it never is.
     pub needed: Option<f64>,
-    /// Pairs of objects that are confused more often on recorded touches, by 5 points or more; the most confused first.
+    /// Pairs of objects that are confused more often on recorded touches, by 5 points and two standard errors or more; the most
+    /// confused first.
     #[serde(default)]
     pub confused: Vec<Confused>,
 }
@@ -122,12 +123,13 @@ pub(super) fn cost(
         recorded: shown(&other),
         after,
         needed: needed(&other, wanted),
-        confused: confused(&margins, settings)?,
+        confused: confused(&margins, [&tested, recorded], settings)?,
     }))
 }
 
-/// The confusions that are more frequent on the second's touches than on the first's.
-fn confused(margins: &[Margins<'_>; 2], settings: &Settings) -> Result<Vec<Confused>> {
+/// The confusions that are more frequent on the second data set's touches than on the first's: by [`MORE`], and by two
+/// standard errors of the difference of two shares.
+fn confused(margins: &[Margins<'_>; 2], datasets: [&Dataset; 2], settings: &Settings) -> Result<Vec<Confused>> {
     let fewest = margins.iter().map(Margins::fewest_touches).min().unwrap_or(0);
     let touches = fewest.min(*AT.last().unwrap_or(&1));
     if touches == 0 {
@@ -138,10 +140,17 @@ fn confused(margins: &[Margins<'_>; 2], settings: &Settings) -> Result<Vec<Confu
     let names = margins[1].objects();
     let mut confused = Vec::new();
     // Both are of the same objects, in the order of their names.
-    for ((touched, own), other) in margins[1].tested_names().iter().zip(&own).zip(&other) {
+    for (position, ((touched, own), other)) in margins[1].tested_names().iter().zip(&own).zip(&other).enumerate() {
+        // As many groups as share no touch.
+        let groups = datasets.map(|dataset| {
+            let all = dataset.objects.get(position).map_or(0, |object| object.len());
+            (all / touches).clamp(1, settings.groups.max(1)) as f64
+        });
         for ((named, &own), &other) in names.iter().zip(own).zip(other) {
             let [simulated, recorded] = [own, other].map(|count| count as f64 / settings.groups.max(1) as f64);
-            if named != touched && recorded - simulated >= MORE {
+            let shared = (simulated * groups[0] + recorded * groups[1]) / (groups[0] + groups[1]);
+            let error = (shared * (1.0 - shared) * (1.0 / groups[0] + 1.0 / groups[1])).sqrt();
+            if named != touched && recorded - simulated >= MORE.max(2.0 * error) {
                 let (touched, named) = (touched.clone(), named.clone());
                 confused.push(Confused { touched, named, touches, simulated, recorded });
             }

@@ -369,7 +369,7 @@ mod tests {
             cost.confusions().starts_with(&format!("Mistaken after {} touches: object1 as object2 (", first.touches))
         );
         let same = compare(&one, &other, &quick(), &()).unwrap().cost.unwrap();
-        assert!(same.confused.iter().all(|own| own.recorded < 0.5), "{same:?}");
+        assert_eq!(same.confused, [], "{same:?}");
     }
 
     #[test]
