@@ -35,12 +35,12 @@ pub struct Cost {
     pub confused: Vec<Confused>,
 }
 
-/// An object that is taken for another one.
+/// An object that is mistaken for another one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Confused {
     /// The object that was touched.
     pub touched: String,
-    /// The object that it was taken for.
+    /// The object that it was mistaken for.
     pub named: String,
     /// The number of touches after which it was.
     pub touches: usize,
