@@ -35,7 +35,7 @@ fn percent(share: &Share) -> String {
 fn text(compared: &Comparison) -> String {
     let told = &compared.told_apart;
     let mut text = format!(
-        "{}\nA classifier tells recorded from simulated touches {:.1} % of the time (between {:.1} and {:.1} %). 50 % is guessing.\n",
+        "{}\nA classifier distinguishes recorded from simulated touches with an accuracy of {:.1} % ({:.1} to {:.1} %). 50 % is guessing.\n",
         compared.verdict(),
         100.0 * told.value,
         100.0 * told.low,
