@@ -6,11 +6,9 @@ pub use crate::chip::ChipProblem;
 pub use crate::evaluate::EvaluateProblem;
 #[cfg(feature = "train")]
 pub use crate::fit::FitProblem;
-pub use crate::mesh::MeshProblem;
-pub use crate::probe::ProbeProblem;
 #[cfg(feature = "train")]
 pub use crate::teach::TeachProblem;
 pub use crate::touches::TouchesProblem;
 #[cfg(feature = "train")]
 pub use crate::tune::TuneProblem;
-pub use palpate_trees::error::*;
+pub use palpate_simulator::error::*;

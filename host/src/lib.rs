@@ -93,11 +93,7 @@
 //! port and no trainer.
 
 pub mod error;
-pub mod in_order;
-pub mod random;
 
-pub mod mesh;
-pub mod probe;
 pub mod touches;
 
 pub mod capture;
@@ -130,5 +126,6 @@ pub use error::{Error, Result};
 pub use glam;
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;
+pub use palpate_simulator::{self as simulator, in_order, mesh, probe, random};
 pub use palpate_trees::{self as trees, output, progress, rows};
 pub use rand;

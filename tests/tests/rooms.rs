@@ -5,7 +5,7 @@ use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
 /// Sources of the crates whose rooms have an order, relative to the root of the project.
-const CRATES: [&str; 4] = ["shared/src", "onboard/src", "host/trees/src", "host/src"];
+const CRATES: [&str; 5] = ["shared/src", "onboard/src", "host/trees/src", "host/simulator/src", "host/src"];
 /// Modules that gather names of all rooms, and modules of tests.
 const OUTSIDE: [&str; 3] = ["error", "lib", "tests"];
 

@@ -1,6 +1,6 @@
 //! Random numbers that depend on a seed and on what they are for, and on nothing else.
 //!
-//! The touches of a capture have a generator of their own ([`capture::Sampler`](crate::capture::Sampler)).
+//! The touches of a capture have a generator of their own (`palpate::capture::Sampler`).
 
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -42,7 +42,6 @@ pub enum Purpose {
     /// Recorded touches that are held out together, and groups of them.
     Teach,
     /// Made-up touches for tests.
-    #[cfg(test)]
     Synthetic,
 }
 
@@ -67,7 +66,6 @@ impl Purpose {
             Self::Capture => Some(28),
             Self::Fit => Some(29),
             Self::Teach => Some(18),
-            #[cfg(test)]
             Self::Synthetic => Some(6),
         }
     }

@@ -14,13 +14,13 @@ use std::str::FromStr;
 /// nothing. [`Display`](fmt::Display) writes a text that reads as the same.
 ///
 /// ```
-/// use palpate::probe::noise::{Noise, PartialNoise};
+/// use palpate_simulator::probe::noise::{Noise, PartialNoise};
 ///
 /// let given: PartialNoise = "timer=0ms,missed=2%".parse()?;
 /// let noise = given.over(Noise::switch());
 /// assert_eq!((noise.deviation.largest, noise.timer, noise.missed), (5_000.0, 0.0, [0.02; 3]));
 /// assert!("none".parse::<PartialNoise>()?.over(Noise::switch()).is_none());
-/// # Ok::<_, palpate::probe::noise::BadNoise>(())
+/// # Ok::<_, palpate_simulator::probe::noise::BadNoise>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PartialNoise {

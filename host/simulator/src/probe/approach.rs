@@ -108,7 +108,7 @@ impl Aim {
     }
 
     /// True if this is the default, which files leave out.
-    pub(crate) fn is_box(&self) -> bool {
+    pub fn is_box(&self) -> bool {
         *self == Self::Box
     }
 }

@@ -4,16 +4,24 @@ use palpate_shared::format::Length;
 use serde::{Deserialize, Deserializer, Serializer, de::Error};
 
 /// The unit of data sets, ensembles and probe files that state none.
-pub(crate) fn tenth() -> Length {
+pub fn tenth() -> Length {
     Length::Tenth
 }
 
+/// Writes the name, for serde.
+///
+/// # Errors
+/// Those of the serializer.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature is serde's")]
-pub(crate) fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S::Error> {
+pub fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(unit.name())
 }
 
-pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Length, D::Error> {
+/// Reads the name, for serde.
+///
+/// # Errors
+/// If it is none of the names.
+pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Length, D::Error> {
     let name = std::borrow::Cow::<str>::deserialize(deserializer)?;
     let named = Length::ALL.iter().copied().find(|unit| unit.name() == name);
     named.ok_or_else(|| D::Error::custom(format!("unit {name:?}, where \"unit\" or \"mm\" is expected")))

@@ -9,12 +9,12 @@
 //! From here a mesh goes to [`Scene::new`](crate::probe::Scene::new), which scales it to the units of the probe.
 //!
 //! ```
-//! use palpate::mesh::facts::Facts;
-//! use palpate::mesh::{Mesh, obj};
-//! use palpate::probe::Scene;
-//! use palpate::probe::glam::DVec3;
+//! use palpate_simulator::mesh::facts::Facts;
+//! use palpate_simulator::mesh::{Mesh, obj};
+//! use palpate_simulator::probe::Scene;
+//! use palpate_simulator::probe::glam::DVec3;
 //!
-//! # fn main() -> palpate::Result<()> {
+//! # fn main() -> palpate_simulator::Result<()> {
 //! // A tetrahedron, as it would stand in a file.
 //! let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 //! let mesh: Mesh = obj::parse(text.as_bytes(), "tetrahedron.obj".as_ref())?;

@@ -5,9 +5,9 @@
 //! those of a real object; [`varied`] makes others of the same kind.
 //!
 //! ```
-//! # fn main() -> palpate::Result<()> {
-//! let bowl = palpate::mesh::builtin::one("bowl")?;
-//! assert!(palpate::mesh::facts::Facts::of(bowl.mesh()).is_right_side_out());
+//! # fn main() -> palpate_simulator::Result<()> {
+//! let bowl = palpate_simulator::mesh::builtin::one("bowl")?;
+//! assert!(palpate_simulator::mesh::facts::Facts::of(bowl.mesh()).is_right_side_out());
 //! # Ok(())
 //! # }
 //! ```

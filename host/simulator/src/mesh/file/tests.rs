@@ -1,20 +1,15 @@
 use super::*;
+use crate::mesh::tests::full_touches;
 use crate::mesh::tests::samples::{self, corners};
-use crate::probe::scene::Scene;
-use crate::touches::Origin;
 
 #[test]
 fn one_object_in_every_format_has_the_same_triangles_and_the_same_touches() {
     let globe = Mesh::globe(7);
-    let touches = |mesh: &Mesh| {
-        let scene = [Scene::new(mesh, 10.0).unwrap()];
-        crate::capture::touches(&scene, "cup", &Origin::default(), 0..200).unwrap()
-    };
-    let expected = touches(&globe);
+    let expected = full_touches(&globe, 200);
     for (name, bytes) in samples::all(&globe) {
         let contents = parse(&bytes, Path::new(name)).unwrap_or_else(|error| panic!("{error}"));
         assert!(corners(&contents.mesh) == corners(&globe), "{name}");
-        assert!(touches(&contents.mesh) == expected, "{name}");
+        assert!(full_touches(&contents.mesh, 200) == expected, "{name}");
         let unit = match contents.format {
             Format::Gltf => Some(1_000.0),
             Format::Collada => Some(25.4),

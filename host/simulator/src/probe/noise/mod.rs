@@ -4,7 +4,7 @@
 //! same for all touches of one robot is a bias.
 //!
 //! ```
-//! use palpate::probe::noise::{Deviation, Noise};
+//! use palpate_simulator::probe::noise::{Deviation, Noise};
 //! use palpate_shared::Touch;
 //!
 //! let noise = Noise { deviation: "0..10ms".parse()?, timer: 1_000.0, ..Noise::default() };
@@ -12,7 +12,7 @@
 //! // The first contact is 0 again, and the timer counts whole milliseconds.
 //! assert!(noisy[0].times().iter().all(|time| time.micros().is_some_and(|micros| micros % 1_000 == 0)));
 //! assert_eq!(Deviation::from(5_000.0).largest, 5_000.0);
-//! # Ok::<_, palpate::error::ProbeProblem>(())
+//! # Ok::<_, palpate_simulator::error::ProbeProblem>(())
 //! ```
 
 mod partial;
@@ -285,7 +285,7 @@ impl Noise {
 
     /// A touch with this noise, whose random numbers come from `random`; made by a robot of its own. For touches that are
     /// made one at a time, such as those of a capture.
-    pub(crate) fn add_to(&self, touch: &Touch, random: &mut ChaCha8Rng) -> Touch {
+    pub fn add_to(&self, touch: &Touch, random: &mut ChaCha8Rng) -> Touch {
         let normal = std::array::from_fn(|_| StandardNormal.sample(random));
         let [own, robot] = [Draw::new(random), Draw::new(random)];
         self.one(touch, normal, &own, &robot)
@@ -316,7 +316,7 @@ impl Noise {
     }
 
     /// The same with touch i made by robot `robot(i)`.
-    pub(crate) fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
+    pub fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
         // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
         // version 0.1.0, and no other setting changes it.
         let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);

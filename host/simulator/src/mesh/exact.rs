@@ -70,10 +70,9 @@ pub(super) fn rounded(vertex: [f64; 3], offset: [f64; 3]) -> [f32; 3] {
 #[cfg(all(test, feature = "objects"))]
 mod tests {
     use super::*;
-    use crate::capture::{self, Settings};
     use crate::mesh::facts::Facts;
-    use crate::mesh::{Mesh, Object, builtin, file};
-    use crate::touches::Origin;
+    use crate::mesh::tests::full_touches;
+    use crate::mesh::{Mesh, builtin, file};
     use std::fmt::Write as _;
     use std::path::Path;
 
@@ -136,10 +135,7 @@ mod tests {
 
     /// Contact times of the first touches.
     fn times(mesh: &Mesh) -> Vec<u32> {
-        let origin = Origin { touches: 40, ..Origin::default() };
-        let dataset = capture::in_memory(&[Object::new("bowl", mesh.clone())], &Settings::from(origin), &()).unwrap().0;
-        let touches = dataset.objects[0].touches().iter();
-        touches.flat_map(|touch| touch.times().map(|time| time.micros().unwrap())).collect()
+        full_touches(mesh, 40).iter().flat_map(|touch| touch.times().map(|time| time.micros().unwrap())).collect()
     }
 
     #[test]

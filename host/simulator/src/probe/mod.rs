@@ -8,15 +8,15 @@
 //! - [`mod@file`] reads a probe from a TOML file, with what a real one adds; [`noise`] adds it to touches.
 //! - [`cast`] reads spheres and known contact times from a file, to compare this simulator with another.
 //!
-//! Contact is rigid and motion straight: no forces, no friction. From here [`capture`](crate::capture) draws approaches
-//! and keeps their touches.
+//! Contact is rigid and motion straight: no forces, no friction. From here `palpate::capture` draws
+//! approaches and keeps their touches.
 //!
 //! ```
-//! use palpate::mesh::Mesh;
-//! use palpate::probe::{Approach, Probe, Scene, rand};
+//! use palpate_simulator::mesh::Mesh;
+//! use palpate_simulator::probe::{Approach, Probe, Scene, rand};
 //! use rand::SeedableRng;
 //!
-//! # fn main() -> palpate::Result<()> {
+//! # fn main() -> palpate_simulator::Result<()> {
 //! let scene = Scene::new(&Mesh::globe(20), 10.0)?;
 //! let probe = Probe::default();
 //! let mut random = rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1);
@@ -42,7 +42,7 @@ pub mod file;
 pub mod noise;
 pub mod scene;
 pub mod sweep;
-pub(crate) mod unit;
+pub mod unit;
 
 pub use approach::{Aim, Approach, Probe};
 pub use error::ProbeProblem;

@@ -1,3 +1,0 @@
-//! Meshes and files for the tests of all formats.
-
-pub(super) mod samples;
