@@ -12,7 +12,6 @@ pub fn tenth() -> Length {
 ///
 /// # Errors
 /// Those of the serializer.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature is serde's")]
 pub fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(unit.name())
 }
