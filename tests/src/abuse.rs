@@ -104,7 +104,14 @@ pub fn places(model: &[u8]) -> [usize; 8] {
 
 /// Statements of the models in these tests.
 pub const TRAINED: Trained = Trained {
-    probe: Some(TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Millimeter }),
+    probe: Some(TrainedProbe {
+        radius: 0.15,
+        spacing: 1.5,
+        speed: 10.0,
+        length: Length::Millimeter,
+        stroke: None,
+        travel: None,
+    }),
     touches: Some(TrainedTouches {
         patterns: Patterns::CONTACTS,
         counted: Counted::Contacts,

@@ -76,9 +76,8 @@ pub(crate) fn parity(
     progress: Option<Callback>,
 ) -> Result<String, Failure> {
     let (ensemble, model, data) = (&ensemble.get().ensemble, model.get().model(), &data.get().dataset);
-    if let Some((own, other)) = StatedProbe::of(data).zip(model.probe()) {
-        StatedProbe::compare(["the model", "the data set"], [other, own.trained()]).map_err(Error::from)?;
-    }
+    let longest = model.trained_touches().largest_spread;
+    StatedProbe::compare_with(["the model", "the data set"], model.probe(), longest, data).map_err(Error::from)?;
     let found = long(py, progress.as_ref(), |progress| compare(ensemble, model, data, sequences, seed, progress))?;
     json(&found)
 }

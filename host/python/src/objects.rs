@@ -55,7 +55,9 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Probe {
     fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
         let number = |name: &str| object.getattr(name)?.extract::<f64>();
         let (radius, spacing) = (number("radius")?, number("spacing")?);
-        Ok(Self(Measures { radius, spacing, speed: number("speed")?, tilt: number("tilt")? }))
+        let length = |name: &str| object.getattr(name)?.extract::<Option<f64>>();
+        let (stroke, travel) = (length("stroke")?, length("travel")?);
+        Ok(Self(Measures { radius, spacing, speed: number("speed")?, tilt: number("tilt")?, stroke, travel }))
     }
 }
 
@@ -68,7 +70,7 @@ impl<'py> IntoPyObject<'py> for Probe {
 
     fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let Measures { radius, spacing, speed, tilt } = self.0;
-        class(py, "Probe", &CLASS)?.call1((radius, spacing, speed, tilt))
+        let Measures { radius, spacing, speed, tilt, stroke, travel } = self.0;
+        class(py, "Probe", &CLASS)?.call1((radius, spacing, speed, tilt, stroke, travel))
     }
 }

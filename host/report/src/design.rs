@@ -1,7 +1,7 @@
 //! The page of a search for a probe: what it costs in approaches to build another one.
 
 use crate::page::axis::{Axis, number};
-use crate::page::chart::{Chart, Mark, Shape, Stroke};
+use crate::page::chart::{Chart, Mark, Shape, Stroke, Svg};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
@@ -19,6 +19,8 @@ pub fn page(design: &Design, command: &str) -> Result<Page> {
     result.text(assumed(design)).table(compared(design, command)).table(by_aim(design, command));
     let mut trade = Section::new("spacing", "Cost of another spacing");
     trade.figure(by_spacing(design, command)?);
+    let mut strokes = Section::new("stroke", "Cost of a shorter stroke");
+    strokes.figure(by_stroke(design, command)?);
     let mut tried = Section::new("tried", "What was tried");
     tried.table(rounds(design, command));
     Ok(Page {
@@ -35,7 +37,7 @@ pub fn page(design: &Design, command: &str) -> Result<Page> {
                 Length::Millimeter => "Lengths are in millimeters: objects have their true sizes.",
             }
         ),
-        sections: vec![result, trade, tried],
+        sections: vec![result, trade, strokes, tried],
         facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
         files: false,
     })
@@ -188,49 +190,100 @@ fn rounds(design: &Design, command: &str) -> Table {
     }
 }
 
-fn by_spacing(design: &Design, command: &str) -> Result<Figure> {
-    let line = &design.by_spacing;
-    let mut data = Records::new(["object", "spacing", "approaches"]);
+/// A curve of all objects together, and of each.
+struct Curve {
+    /// Column of the data, and a caption of the axis.
+    column: &'static str,
+    axis: (String, Axis),
+    /// The best probe's place on it.
+    best: f64,
+}
+
+/// The trials' approaches against a number of theirs, for each object: a chart, and its data.
+fn curve(design: &Design, trials: &[Trial], of: impl Fn(&Trial) -> f64, curve: Curve) -> Result<(Records, Svg)> {
+    let mut data = Records::new(["object", curve.column, "approaches"]);
     let mut lines: Vec<(&str, Vec<(f64, f64)>)> =
-        vec![("all", line.iter().map(|trial| (trial.probe.spacing, trial.approaches)).collect())];
+        vec![("all", trials.iter().map(|trial| (of(trial), trial.approaches)).collect())];
     for name in design.best.per_object.keys() {
-        let point = |trial: &Trial| (trial.probe.spacing, trial.per_object.get(name).copied().unwrap_or(f64::NAN));
-        lines.push((name, line.iter().map(point).collect()));
+        let point = |trial: &Trial| (of(trial), trial.per_object.get(name).copied().unwrap_or(f64::NAN));
+        lines.push((name, trials.iter().map(point).collect()));
     }
     for (name, points) in &lines {
         points.iter().for_each(|&(x, y)| data.push([(*name).into(), Cell::Number(x, 2), Cell::Number(y, 2)]));
     }
     let all = || lines.iter().flat_map(|line| &line.1).map(|point| point.1).filter(|y| y.is_finite());
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(1.0, f64::max));
-    let spacings = || line.iter().map(|trial| trial.probe.spacing);
-    let mut chart = Chart::new(
-        format!("distance between neighboring fingers ({})", unit(design)),
-        Axis::linear(spacings().fold(f64::INFINITY, f64::min), spacings().fold(0.0, f64::max), 6),
-        "approaches to a verdict",
-        Axis::logarithmic(0.9 * low, 1.1 * high),
-    )
-    .sized(760, 480);
+    let (label, axis) = curve.axis;
+    let mut chart =
+        Chart::new(label, axis, "approaches to a verdict", Axis::logarithmic(0.9 * low, 1.1 * high)).sized(760, 480);
     for (index, (name, points)) in lines.iter().enumerate().skip(1) {
         let stroke = if index % 2 == 0 { Stroke::Dashed } else { Stroke::Thin };
         chart.line(name, color::series(index), stroke, points);
     }
     let (name, points) = &lines[0];
     chart.series(name, color::INK, Shape::Disc, points);
-    chart.marks.push(Mark::Vertical(design.best.probe.spacing));
-    let unreached = line.iter().filter(|trial| !trial.reached).count();
-    let note = match unreached {
+    chart.marks.push(Mark::Vertical(curve.best));
+    Ok((data, chart.svg()?))
+}
+
+/// A note on trials that did not reach the error rate.
+fn unreached(trials: &[Trial]) -> String {
+    match trials.iter().filter(|trial| !trial.reached).count() {
         0 => String::new(),
         count => format!(" {count} of these probes did not reach the error rate, whatever the stopping rule."),
+    }
+}
+
+/// Place of a hand that goes on past the object on the axis of strokes: twice the longest stroke that was tried.
+fn far(design: &Design) -> f64 {
+    2.0 * design.by_stroke.iter().filter_map(|trial| trial.probe.stroke).fold(0.5, f64::max)
+}
+
+fn by_stroke(design: &Design, command: &str) -> Result<Figure> {
+    let line = &design.by_stroke;
+    let far = far(design);
+    let place = |trial: &Trial| trial.probe.stroke.unwrap_or(far);
+    let shortest = line.iter().map(place).fold(f64::INFINITY, f64::min);
+    let longest = line.iter().map(place).fold(shortest * 1.01, f64::max);
+    let axis = Axis::logarithmic(shortest, longest);
+    let label = format!("stroke of the hand after the first contact ({})", unit(design));
+    let (data, panel) =
+        curve(design, line, place, Curve { column: "stroke", axis: (label, axis), best: place(&design.best) })?;
+    let past = match design.best.probe.stroke {
+        None => format!(" A hand that goes on past the object is drawn at {}.", number(far, 1)),
+        Some(_) => String::new(),
     };
+    Ok(Figure {
+        id: "strokes".into(),
+        title: "Approaches against stroke, for each object".into(),
+        caption: format!(
+            "The best probe with hands that stop earlier: a contact that would come later than the stroke is missing.{past}{}",
+            unreached(line)
+        ),
+        command: command.into(),
+        panels: vec![panel],
+        data,
+    })
+}
+
+fn by_spacing(design: &Design, command: &str) -> Result<Figure> {
+    let line = &design.by_spacing;
+    let spacings = || line.iter().map(|trial| trial.probe.spacing);
+    let axis = Axis::linear(spacings().fold(f64::INFINITY, f64::min), spacings().fold(0.0, f64::max), 6);
+    let label = format!("distance between neighboring fingers ({})", unit(design));
+    let best = design.best.probe.spacing;
+    let (data, panel) =
+        curve(design, line, |trial| trial.probe.spacing, Curve { column: "spacing", axis: (label, axis), best })?;
     Ok(Figure {
         id: "approaches".into(),
         title: "Approaches against spacing, for each object".into(),
         caption: format!(
             "Radius, tilt and aim are those of the best probe, whose spacing the vertical line marks. One stopping rule \
-             for all objects: the error rate is that of all together.{note}"
+             for all objects: the error rate is that of all together.{}",
+            unreached(line)
         ),
         command: command.into(),
-        panels: vec![chart.svg()?],
+        panels: vec![panel],
         data,
     })
 }

@@ -328,7 +328,8 @@ fn finished(
         (Tag::Temperature, Some((false, stated.to_bytes().to_vec()))),
     ];
     if let (None, Some(probe)) = (model.probe(), StatedProbe::of(dataset)) {
-        sections.push((Tag::Probe, Some((false, probe.trained().to_bytes().to_vec()))));
+        let trained = probe.trained();
+        sections.push((Tag::Probe, Some((false, trained.to_bytes().into_iter().take(trained.length()).collect()))));
     }
     let restated = Restated {
         odds: Some(chosen.odds.strictest()),

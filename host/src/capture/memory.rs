@@ -56,7 +56,7 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
         let entry = entry(object, origin);
         let meshes = Meshes { checksums: entry.meshes, millimeters: entry.millimeters };
         let object = ObjectTouches::in_turn(&object.name, touches, &instances, samples.start);
-        touched.push(object.of_meshes(Some(meshes)));
+        touched.push(object.of_meshes(Some(meshes)).of_stroke(origin.probe.window()));
     }
     Ok((Dataset { origin: Some(origin.clone()), ..Dataset::new(touched) }, approaches))
 }

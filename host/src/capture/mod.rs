@@ -37,6 +37,7 @@ mod tests;
 use crate::error::{Error, Result};
 use crate::in_order::in_order;
 use crate::mesh::{Instance, Object};
+use crate::probe::approach::FINGERS;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Entry, ObjectTouches, Origin};
@@ -48,7 +49,7 @@ use std::path::Path;
 use std::time::Instant;
 
 pub use memory::in_memory;
-pub use sample::{MOST_ATTEMPTS, Sampler};
+pub use sample::{Drawn, MOST_ATTEMPTS, Sampler};
 
 /// Settings of a capture, and how it treats what is already there.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -108,6 +109,10 @@ pub struct ObjectSummary {
     pub approaches: u64,
     /// Number of approaches made in this run.
     pub approaches_now: u64,
+    /// Contacts of each finger in this run that came later than the stroke, and are missing; see [`Drawn::late`].
+    pub late: [u64; FINGERS],
+    /// Number of approaches in this run that ended before the first contact, at the end of the travel.
+    pub turned_back: u64,
     /// Duration of this run for the object, in seconds.
     pub seconds: f64,
 }
@@ -195,7 +200,7 @@ pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64
     let sampler = Sampler::of_instances(scenes, name, origin);
     let first = samples.start;
     let touches = in_order(samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)))?;
-    Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first))
+    Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first).of_stroke(origin.probe.window()))
 }
 
 /// Names for an object's instances of which only the scenes are known.

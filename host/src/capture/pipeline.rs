@@ -7,6 +7,7 @@
 use super::store::Store;
 use super::{ObjectSummary, Sampler, Settings};
 use crate::error::{CaptureProblem, Result};
+use crate::probe::approach::FINGERS;
 use crate::progress::{self, Progress};
 use crate::touches::write_touch;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -26,6 +27,8 @@ const MOST_THREADS: usize = 256;
 struct Chunk {
     text: String,
     approaches: u64,
+    late: [u64; FINGERS],
+    turned_back: u64,
 }
 
 /// Captures everything that the store does not have yet.
@@ -71,12 +74,15 @@ pub(super) fn run(
         for (object, samples) in &jobs {
             let start = Instant::now();
             let before = store.entry(*object).clone();
+            let (mut late, mut turned_back) = ([0; FINGERS], 0);
             progress.advance(before.touches);
             for part in split(samples) {
                 let turn = turns.next().unwrap_or(0);
                 let chunk = receive(&channels[turn])?;
                 let touches = part.end - part.start;
                 store.append(*object, chunk.text.as_bytes(), touches, chunk.approaches)?;
+                late.iter_mut().zip(chunk.late).for_each(|(late, more)| *late += more);
+                turned_back += chunk.turned_back;
                 progress::advance(progress, touches)?;
             }
             store.complete(*object)?;
@@ -86,6 +92,8 @@ pub(super) fn run(
                 touches: entry.touches,
                 approaches: entry.approaches,
                 approaches_now: entry.approaches - before.approaches,
+                late,
+                turned_back,
                 seconds: start.elapsed().as_secs_f64(),
             });
         }
@@ -122,12 +130,14 @@ fn produce(
 }
 
 fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>, progress: &dyn Progress) -> Result<Chunk> {
-    let mut chunk = Chunk { text: String::new(), approaches: 0 };
+    let mut chunk = Chunk { text: String::new(), approaches: 0, late: [0; FINGERS], turned_back: 0 };
     for sample in samples {
         progress::check(progress)?;
-        let (touch, approaches) = sampler.sample(sample)?;
-        write_touch(&mut chunk.text, &touch, settings.origin.writes_pose());
-        chunk.approaches += approaches;
+        let drawn = sampler.drawn(sample)?;
+        write_touch(&mut chunk.text, &drawn.touch, settings.origin.writes_pose());
+        chunk.approaches += drawn.approaches;
+        chunk.late.iter_mut().zip(drawn.late).for_each(|(late, more)| *late += more);
+        chunk.turned_back += drawn.turned_back;
     }
     Ok(chunk)
 }

@@ -4,7 +4,8 @@
 //! to and compared across versions. It is therefore not one of the streams of `random`.
 
 use crate::error::{CaptureProblem, Result};
-use crate::probe::approach::Approach;
+use crate::probe::approach::{Approach, FINGERS};
+use crate::probe::hand;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
@@ -15,6 +16,20 @@ use rand::rngs::Xoshiro256PlusPlus;
 /// After this many approaches without a full touch, an object counts as one that cannot be touched with three fingers.
 /// Real objects need 2 to 36; a wire as thin as a hundredth of the fingers needs a few thousand.
 pub const MOST_ATTEMPTS: u64 = 1 << 22;
+
+/// A sample, and what it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drawn {
+    /// The touch.
+    pub touch: Touch,
+    /// Number of approaches that it took.
+    pub approaches: u64,
+    /// Contacts of each finger in these approaches that came later than the stroke, and are missing; where only full touches
+    /// are kept, of approaches in which all fingers would have touched.
+    pub late: [u64; FINGERS],
+    /// Number of these approaches that ended before the first contact, at the end of the travel.
+    pub turned_back: u64,
+}
 
 /// Draws the samples of one object.
 #[derive(Debug)]
@@ -50,6 +65,14 @@ impl<'a> Sampler<'a> {
     /// # Errors
     /// [`CaptureProblem::Untouchable`] when [`MOST_ATTEMPTS`] approaches give no full touch.
     pub fn sample(&self, index: u64) -> Result<(Touch, u64)> {
+        self.drawn(index).map(|drawn| (drawn.touch, drawn.approaches))
+    }
+
+    /// The same, with the contacts that the hand did not reach.
+    ///
+    /// # Errors
+    /// As [`sample`](Self::sample).
+    pub fn drawn(&self, index: u64) -> Result<Drawn> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
         let untouchable = || CaptureProblem::Untouchable { name: self.name.into(), approaches: MOST_ATTEMPTS };
@@ -63,17 +86,24 @@ impl<'a> Sampler<'a> {
             Some(random) => self.origin.real.add_to(&touch, random),
             None => touch,
         };
-        for attempts in 1..=MOST_ATTEMPTS {
+        let (window, mut late, mut turned_back) = (probe.window(), [0; FINGERS], 0);
+        for approaches in 1..=MOST_ATTEMPTS {
             let target = self.origin.aim.target(scene);
             let approach = Approach::draw_at(&mut rng, bounds, target, probe.tilt, clearance);
-            if self.origin.approaches {
-                return Ok((real(approach.touch(approach.distances(scene, probe), probe)), attempts));
-            }
-            if let Some(distances) = approach.full_distances(scene, probe) {
-                let touch = real(approach.touch(distances.map(Some), probe));
-                if touch.is_full() {
-                    return Ok((touch, attempts));
-                }
+            let distances = match self.origin.approaches {
+                true => Some(approach.distances(scene, probe)),
+                false => approach.full_distances(scene, probe).map(|distances| distances.map(Some)),
+            };
+            let Some(distances) = distances else { continue };
+            let (distances, is_turned_back) = probe.within_travel(distances);
+            // The stroke begins with the first contact that is noticed.
+            let touch = real(approach.touch(distances, probe));
+            let is_late = hand::late(&touch, window);
+            late.iter_mut().zip(is_late).for_each(|(late, is_late)| *late += u64::from(is_late));
+            turned_back += u64::from(is_turned_back);
+            let touch = hand::within(&touch, window);
+            if self.origin.approaches || touch.is_full() {
+                return Ok(Drawn { touch, approaches, late, turned_back });
             }
         }
         Err(untouchable().into())

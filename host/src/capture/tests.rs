@@ -2,6 +2,8 @@ use super::*;
 
 use crate::mesh::Mesh;
 use crate::probe::approach::Probe;
+use crate::probe::hand;
+use crate::probe::noise::Noise;
 use crate::touches::{Dataset, Listing, Shard};
 use std::collections::BTreeMap;
 
@@ -467,7 +469,7 @@ fn touches_of_an_object_are_of_its_instances_in_turn() {
 #[test]
 fn an_object_at_its_true_size_is_scaled_to_millimeters() {
     let unit = Length::Millimeter;
-    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 10.0 };
+    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, ..Probe::default() };
     let origin = Origin { unit, probe, ..origin(50) };
     let mut object = Object::new("globe", Mesh::globe(12));
     let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem::<CaptureProblem>().cloned();
@@ -495,4 +497,53 @@ fn at_ten_units_a_side_true_size_is_the_normalized_one() {
         touches(&scenes[0], "globe", &origin, 0..100).unwrap()
     };
     assert_eq!(touches(Length::Millimeter), touches(Length::Tenth));
+}
+
+#[test]
+fn a_stroke_takes_away_late_contacts_and_changes_nothing_else() {
+    let approaches = |probe: Probe, real: Noise| {
+        let origin = Origin { approaches: true, pose: true, probe, real, ..origin(600) };
+        in_memory(&objects(), &with(origin), &()).unwrap().0
+    };
+    let short = Probe { stroke: Some(1.0), ..Probe::default() };
+    // Noise pushes contacts over the end of the stroke, too.
+    for real in [Noise::default(), Noise { missed: [0.3, 0.0, 0.0], ..Noise::gaussian(20_000.0) }] {
+        let (whole, cut) = (approaches(Probe::default(), real), approaches(short, real));
+        let expected = whole.each(|own| own.changed(|touch| hand::within(touch, Some(100_000)))).objects;
+        let of = |object: &ObjectTouches| object.touches().to_vec();
+        assert_eq!(cut.objects.iter().map(of).collect::<Vec<_>>(), expected.iter().map(of).collect::<Vec<_>>());
+        assert_ne!(cut.objects[1].touches(), whole.objects[1].touches());
+        // What is added later pushes none over it.
+        let mut noisy = cut.clone();
+        noisy.add_noise(&Noise::gaussian(30_000.0), 1, 1);
+        assert!(noisy.touches().all(|touch| touch.spread() <= 100_000));
+        assert!(noisy.touches().any(|touch| touch.spread() > 90_000));
+    }
+    // Full touches are those with all contacts within the stroke.
+    let (full, _) = in_memory(&objects(), &with(Origin { probe: short, ..origin(300) }), &()).unwrap();
+    assert!(full.touches().all(|touch| touch.is_full() && touch.spread() <= 100_000));
+}
+
+#[test]
+fn a_capture_counts_by_finger_what_the_hand_did_not_reach() {
+    let directory = tempfile::tempdir().unwrap();
+    let probe = Probe { stroke: Some(1.0), travel: Some(9.0), ..Probe::default() };
+    let settings = with(Origin { approaches: true, probe, ..origin(600) });
+    let summary = capture(&objects(), &settings, directory.path(), &()).unwrap();
+    let scenes = scenes(&objects().iter().collect::<Vec<_>>(), &settings.origin, &()).unwrap();
+    for (object, scenes) in summary.objects.iter().zip(&scenes) {
+        let sampler = Sampler::of_instances(scenes, &object.name, &settings.origin);
+        let (mut late, mut turned_back) = ([0; FINGERS], 0);
+        for sample in 0..600 {
+            let distances = sampler.approach(&scenes[0], sample).distances(&scenes[0], &probe);
+            let first = distances.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+            turned_back += u64::from(first.is_finite() && first > 9.0);
+            let is_late = |distance: &f64| first <= 9.0 && *distance > first + 1.0 + 1e-6;
+            for (late, distance) in late.iter_mut().zip(distances) {
+                *late += u64::from(distance.as_ref().is_some_and(is_late));
+            }
+        }
+        assert_eq!((object.late, object.turned_back), (late, turned_back), "{}", object.name);
+        assert!(late.iter().all(|late| *late > 0) && turned_back > 0, "{late:?} {turned_back}");
+    }
 }

@@ -3,6 +3,7 @@
 use super::{Origin, Trained};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
 use crate::probe::approach::Probe;
+use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::unit::{self, tenth};
 use crate::touches::{self, Captured, Dataset, short};
@@ -161,16 +162,18 @@ impl StatedProbe {
             Length::Tenth => 10.0 / self.length,
             Length::Millimeter => 1.0,
         };
-        let [radius, spacing, speed] =
-            [self.probe.radius, self.probe.spacing, self.probe.speed].map(|number| (number * scale) as f32);
-        TrainedProbe { radius, spacing, speed, length: self.unit }
+        let scaled = |number: f64| (number * scale) as f32;
+        let Probe { radius, spacing, speed, stroke, travel, .. } = self.probe;
+        let [radius, spacing, speed] = [radius, spacing, speed].map(scaled);
+        let [stroke, travel] = [stroke, travel].map(|length| length.map(scaled));
+        TrainedProbe { radius, spacing, speed, length: self.unit, stroke, travel }
     }
 
     /// Compares what two sides state, such as a data set and a model; `names` says who they are.
     ///
     /// # Errors
-    /// [`ProbeProblem::Differs`] if radius, spacing, nominal speed or scale differ. The tilt is not compared: it is how
-    /// approaches were drawn.
+    /// [`ProbeProblem::Differs`] if radius, spacing, nominal speed, stroke or scale differ. Tilt and travel are not compared:
+    /// they are how approaches were drawn.
     pub fn compare(names: [&str; 2], [one, other]: [TrainedProbe; 2]) -> Result<(), ProbeProblem> {
         let differs = |a: f32, b: f32| (a - b).abs() > 1e-5 * a.abs().max(b.abs());
         let mut differences = Vec::new();
@@ -184,11 +187,100 @@ impl StatedProbe {
         ];
         let different = numbers.into_iter().filter(|(_, one, other)| differs(*one, *other));
         differences.extend(different.map(|(name, one, other)| format!("{name} {one} and {other}")));
+        let strokes = [one.stroke, other.stroke];
+        let is_same = match strokes {
+            [Some(one), Some(other)] => !differs(one, other),
+            _ => strokes == [None; 2],
+        };
+        if !is_same {
+            let [one, other] = strokes.map(|stroke| stroke.map_or("none".into(), |stroke| stroke.to_string()));
+            differences.push(format!("stroke {one} and {other}"));
+        }
         if differences.is_empty() {
             return Ok(());
         }
         let [first, second] = names.map(str::to_owned);
         Err(ProbeProblem::Differs { first, second, differences: differences.join(", ") })
+    }
+}
+
+/// Latest contacts of touches of which nothing states the stroke, compared with that of a model.
+impl StatedProbe {
+    /// Compares a probe, such as a model's, with that of a data set, as [`compare`](Self::compare) does. Recorded touches may
+    /// not state their stroke; it is then compared with their latest contacts: none may be later than the stroke of `probe`, by
+    /// more than a fiftieth of it; and where they end at once, long before `longest`, the largest time between contacts that
+    /// the model was trained on, another stroke ended them. `longest` of `u32::MAX`: not known.
+    ///
+    /// Cost: a pass over touches that no capture made.
+    ///
+    /// # Errors
+    /// As [`compare`](Self::compare), and [`ProbeProblem::OtherStroke`] with both strokes.
+    pub fn compare_with(
+        names: [&str; 2],
+        probe: Option<TrainedProbe>,
+        longest: u32,
+        dataset: &Dataset,
+    ) -> Result<(), ProbeProblem> {
+        let own = Self::of(dataset).map(|own| own.trained());
+        let is_simulated = own.is_some() && !dataset.is_recorded();
+        if let Some((probe, own)) = probe.zip(own) {
+            let unstated = |own: TrainedProbe| TrainedProbe { stroke: own.stroke.or(probe.stroke), ..own };
+            Self::compare(names, [probe, if is_simulated { own } else { unstated(own) }])?;
+        }
+        if is_simulated {
+            return Ok(());
+        }
+        let stroke = probe.and_then(|probe| Some((probe.stroke?, probe.speed)));
+        let window = stroke.map(|(stroke, speed)| f64::from(stroke) / f64::from(speed) * 1e6);
+        let Some(latest) = Latest::of(dataset) else { return Ok(()) };
+        let is_later = window.is_some_and(|window| latest.micros > window * (1.0 + hand::TOLERANCE));
+        let is_ended = |window: f64| latest.ends_at_once() && latest.micros < ENDED * window;
+        // Without a stroke the longest time of the training is that of the objects' shapes.
+        let longest = Some(f64::from(longest)).filter(|_| longest < u32::MAX);
+        let is_other = match window {
+            Some(window) => is_later || is_ended(window * STATED),
+            None => longest.is_some_and(is_ended),
+        };
+        if !is_other {
+            return Ok(());
+        }
+        let [first, second] = names.map(str::to_owned);
+        let seconds = |micros: f64| format!("{:.3} s", micros / 1e6);
+        let stroke = match stroke.zip(window) {
+            Some(((stroke, _), window)) => format!("a stroke of {stroke} ({})", seconds(window)),
+            None => "no stroke".into(),
+        };
+        Err(ProbeProblem::OtherStroke { first, second, stroke, latest: seconds(latest.micros), is_later })
+    }
+}
+
+/// Contacts that end before this share of the longest time between them were ended by a stroke.
+const ENDED: f64 = 0.75;
+/// The same of a stated stroke, at which contacts end at once in any case.
+const STATED: f64 = 1.2;
+
+/// The latest contacts of touches.
+struct Latest {
+    /// The latest of all after the first contact of its touch, in microseconds.
+    micros: f64,
+    /// Touches of two or more contacts, those that end in the last tenth of the time up to the latest, and in the tenth before.
+    touches: usize,
+    last: usize,
+    before: usize,
+}
+
+impl Latest {
+    fn of(dataset: &Dataset) -> Option<Self> {
+        let spreads = || dataset.touches().map(|touch| f64::from(touch.spread())).filter(|spread| *spread > 0.0);
+        let micros = spreads().max_by(f64::total_cmp)?;
+        let between =
+            |low: f64, high: f64| spreads().filter(|spread| (low * micros..high * micros).contains(spread)).count();
+        Some(Self { micros, touches: spreads().count(), last: between(0.9, 1.1), before: between(0.8, 0.9) })
+    }
+
+    /// True if contacts do not become rare before they end: an object's shape makes them rare, a stroke does not.
+    fn ends_at_once(&self) -> bool {
+        self.last >= 20 && 100 * self.last >= self.touches && 2 * self.last >= self.before
     }
 }
 

@@ -4,12 +4,14 @@ use super::Candidate;
 use super::together::margins_of_touches;
 use crate::ensemble::{StatedProbe, TouchOrigin, feature_row};
 use crate::error::{Error, EvaluateProblem, Result};
+use crate::probe::hand;
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping};
 use palpate_shared::format::TrainedProbe;
 use palpate_shared::{Descriptor, Touch};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// A model's margins for every touch of a data set.
@@ -90,9 +92,8 @@ impl OfTouches for Candidate<'_> {
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
             return Err(EvaluateProblem::NoPose { descriptor }.into());
         }
-        if let Some((model, data)) = self.probe()?.zip(StatedProbe::of(dataset)) {
-            StatedProbe::compare(["the model", "the data set"], [model, data.trained()])?;
-        }
+        let longest = self.trained_touches().largest_spread;
+        StatedProbe::compare_with(["the model", "the data set"], self.probe()?, longest, dataset)?;
         Ok(descriptor)
     }
 
@@ -116,6 +117,8 @@ impl<'m> Margins<'m> {
     ///
     /// # Errors
     /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if model and data set state different probes;
+    /// [`ProbeProblem::OtherStroke`](crate::error::ProbeProblem::OtherStroke) if recorded touches show another stroke than the
+    /// model's;
     /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
@@ -140,6 +143,16 @@ impl<'m> Margins<'m> {
     fn with(candidate: Candidate<'m>, descriptor: Descriptor, indices: &[usize], dataset: &Dataset) -> Self {
         let objects = candidate.objects();
         let trained = candidate.trained_touches();
+        // What is a little later than the stroke the effector takes for missing.
+        let is_late = |touch: &Touch| touch.spread() > trained.largest_spread;
+        let has_stroke = || candidate.probe().is_ok_and(|probe| probe.is_some_and(|probe| probe.stroke.is_some()));
+        let within = match dataset.touches().any(is_late) && has_stroke() {
+            true => {
+                Cow::Owned(dataset.each(|own| own.changed(|touch| hand::within(touch, Some(trained.largest_spread)))))
+            }
+            false => Cow::Borrowed(dataset),
+        };
+        let dataset = within.as_ref();
         let tested = dataset.objects.iter().zip(indices).map(|(touched, &object)| {
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
             let evidence: Vec<&Touch> = touched.touches().iter().filter(is_evidence).collect();

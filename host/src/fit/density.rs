@@ -10,6 +10,7 @@
 //! interpolation; what a candidate probe does to times (factor, offsets) is undone before a table is read.
 
 use super::candidate::{Candidate, Kept, NOISE};
+use super::late::Late;
 use crate::random::{self, Purpose};
 use palpate_shared::Touch;
 use rand::RngExt;
@@ -20,7 +21,7 @@ use std::sync::OnceLock;
 /// Standard deviations of the tables begin at the least of [`NOISE`]: how much larger each is than the one before, and how
 /// many there are.
 const RATIO: f64 = 1.3;
-const LEVELS: usize = 22;
+pub(super) const LEVELS: usize = 22;
 /// By how much of its distance from 0 a simulated touch is smoothed.
 const SMOOTHING: f64 = 0.03;
 /// Growth of cells with the distance from 0, as a share of it.
@@ -124,13 +125,13 @@ impl Axis {
 
 /// A density of one number.
 #[derive(Clone, Debug)]
-struct Line {
+pub(super) struct Line {
     axis: Axis,
     density: Vec<f32>,
 }
 
 impl Line {
-    fn new(samples: &[f32], deviation: f64) -> Self {
+    pub(super) fn new(samples: &[f32], deviation: f64) -> Self {
         let farthest = samples.iter().fold(1.0_f64, |most, x| most.max(f64::from(x.abs())));
         let axis = Axis::new(deviation, 1.2 * farthest + 4.0 * deviation);
         let values: Vec<f64> = (0..axis.cells()).map(|cell| axis.value(cell)).collect();
@@ -144,7 +145,7 @@ impl Line {
         Self { axis, density }
     }
 
-    fn at(&self, x: f64) -> f64 {
+    pub(super) fn at(&self, x: f64) -> f64 {
         let Some((cell, share)) = self.axis.between(x) else { return 0.0 };
         let [one, other] = [cell, cell + 1].map(|cell| f64::from(self.density[cell]));
         one + share * (other - one)
@@ -227,11 +228,21 @@ pub(super) struct Densities {
     /// Contact times of some of the approaches, in milliseconds.
     some: Vec<[Option<f64>; 3]>,
     levels: [OnceLock<Level>; LEVELS],
+    /// What a stroke makes of them, if the recordings have one.
+    pub(super) late: Option<Late>,
+}
+
+/// The share of each set of fingers, a set and its mirror image alike, of these counts among `all` approaches.
+pub(super) fn mirrored(counts: &[u32; 8], all: usize) -> [f64; 8] {
+    let mirror = |fingers: usize| fingers & 0b010 | (fingers & 1) << 2 | fingers >> 2;
+    let all = all.max(1) as f64;
+    std::array::from_fn(|fingers| f64::from(counts[fingers] + counts[mirror(fingers)]) / (2.0 * all))
 }
 
 impl Densities {
-    /// Of simulated approaches, whether they touched or not.
-    pub(super) fn new(name: &str, touches: &[Touch]) -> Self {
+    /// Of simulated approaches, whether they touched or not, that no stroke ended; and the recordings' stroke as a time in
+    /// milliseconds.
+    pub(super) fn new(name: &str, touches: &[Touch], window: Option<f64>) -> Self {
         let (mut full, mut neighbors, mut outer) = (Vec::new(), [Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
         let mut counts = [0_u32; 8];
         for observed in touches.iter().map(Observed::of) {
@@ -250,19 +261,17 @@ impl Densities {
                 _ => {}
             }
         }
-        let mirror = |fingers: usize| fingers & 0b010 | (fingers & 1) << 2 | fingers >> 2;
-        let all = touches.len().max(1) as f64;
-        let share = |fingers: usize| f64::from(counts[fingers] + counts[mirror(fingers)]) / (2.0 * all);
         Self {
             name: name.into(),
             full,
             neighbors,
             outer,
-            shares: std::array::from_fn(share),
+            shares: mirrored(&counts, touches.len()),
             some: (touches.iter().take(SOME))
                 .map(|touch| touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3)))
                 .collect(),
             levels: std::array::from_fn(|_| OnceLock::new()),
+            late: window.map(|window| Late::new(touches, window)),
         }
     }
 
@@ -276,7 +285,9 @@ impl Densities {
                 let time = times[finger].filter(|_| chance >= missed[finger])?;
                 Some(factor * time + late[finger] + noise * normal)
             });
-            Observed::of_times(times)
+            let first = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+            let end = self.late.as_ref().map_or(f64::INFINITY, |late| first + late.window());
+            Observed::of_times(times.map(|time| time.filter(|time| *time <= end)))
         };
         let is_kept = |observed: &Observed| match kept {
             Kept::All => true,
@@ -293,7 +304,7 @@ impl Densities {
 
     fn level(&self, level: usize) -> &Level {
         self.levels[level].get_or_init(|| {
-            let deviation = NOISE[0] * RATIO.powi(i32::try_from(level).unwrap_or(0));
+            let deviation = deviation_of(level);
             let pair = 2.0_f64.sqrt() * deviation;
             let lines = |samples: &[Vec<f32>; 2]| [0, 1].map(|which: usize| Line::new(&samples[which], pair));
             Level {
@@ -308,15 +319,24 @@ impl Densities {
     pub(super) fn under(&self, noise: f64) -> Smoothed<'_> {
         let position = ((noise / NOISE[0]).ln() / RATIO.ln()).clamp(0.0, (LEVELS - 1) as f64);
         let level = (position.floor() as usize).min(LEVELS - 2);
-        Smoothed { levels: [self.level(level), self.level(level + 1)], share: position - level as f64 }
+        let levels = [self.level(level), self.level(level + 1)];
+        Smoothed { level, levels, share: position - level as f64, late: self.late.as_ref() }
     }
+}
+
+/// The standard deviation of a level, in milliseconds.
+fn deviation_of(level: usize) -> f64 {
+    NOISE[0] * RATIO.powi(i32::try_from(level).unwrap_or(0))
 }
 
 /// Densities under a noise between two tables'.
 #[derive(Clone, Copy)]
 pub(super) struct Smoothed<'a> {
+    /// The lower level.
+    level: usize,
     levels: [&'a Level; 2],
     share: f64,
+    late: Option<&'a Late>,
 }
 
 impl Smoothed<'_> {
@@ -338,5 +358,13 @@ impl Smoothed<'_> {
     /// The same of the outer fingers.
     pub(super) fn outer(&self, late: f64) -> [f64; 2] {
         [0, 1].map(|which: usize| self.between(|level| level.outer[which].at(late)))
+    }
+
+    /// As [`Late::density`], 0 without a stroke.
+    pub(super) fn late(&self, window: f64, which: usize, apart: f64) -> f64 {
+        let Some(late) = self.late else { return 0.0 };
+        let at = |level: usize| late.density(window, level, 2.0_f64.sqrt() * deviation_of(level), which, apart);
+        let [one, other] = [self.level, self.level + 1].map(at);
+        one + self.share * (other - one)
     }
 }

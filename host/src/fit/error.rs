@@ -22,6 +22,14 @@ pub enum FitProblem {
         /// Number of touches needed.
         least: usize,
     },
+    /// The recordings show another stroke than the probe states.
+    #[error("the probe states a stroke of {stated}, and in the recordings {found}")]
+    OtherStroke {
+        /// The stroke that is stated, as a length and as a time.
+        stated: String,
+        /// Description of what was recorded.
+        found: String,
+    },
     /// Recordings look wrong.
     #[error("recordings look wrong:\n  {}\nNothing was written", suspects.join("\n  "))]
     Suspects {
@@ -38,6 +46,9 @@ impl Problem for FitProblem {
             }
             Self::FewRecorded { .. } => {
                 "Record a few hundred approaches to objects whose meshes you have; 60 presses on a plate help too."
+            }
+            Self::OtherStroke { .. } => {
+                "Give the stroke that the touches were recorded with, or none: it is then estimated from the recordings."
             }
             Self::Suspects { .. } => "Record again, or leave the recording out.",
         }

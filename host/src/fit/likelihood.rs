@@ -14,14 +14,29 @@ pub(super) struct Explained<'a> {
     candidate: Candidate,
     smoothed: super::density::Smoothed<'a>,
     shares: [f64; 8],
+    /// The stroke: the recorded one as a time, and what the simulated approaches come to with it.
+    stroke: Option<Stroke>,
     /// The logarithm of the share of approaches that were recorded.
     recorded: f64,
     kept: Kept,
 }
 
+/// The stroke that ended recorded approaches.
+#[derive(Clone, Copy)]
+struct Stroke {
+    /// As a time on the recording's clock, in milliseconds.
+    window: f64,
+    /// The share of each set of fingers, late ones left out.
+    shares: [f64; 8],
+}
+
 impl<'a> Explained<'a> {
     pub(super) fn new(candidate: &Candidate, object: &'a Densities, kept: Kept) -> Self {
-        let touched = |fingers: u8| -> f64 { object.shares[usize::from(fingers)] };
+        let late = object.late.as_ref();
+        let stroke =
+            late.map(|late| Stroke { window: late.window(), shares: late.shares(late.window() / candidate.factor) });
+        let shares = stroke.map_or(object.shares, |stroke| stroke.shares);
+        let touched = |fingers: u8| -> f64 { shares[usize::from(fingers)] };
         // An approach is not recorded if every finger that touched missed its contact.
         let nothing: f64 = (0..8).map(|fingers| touched(fingers) * product(fingers, 0, &candidate.missed)).sum();
         let recorded = match kept {
@@ -32,6 +47,7 @@ impl<'a> Explained<'a> {
             candidate: *candidate,
             smoothed: object.under(candidate.noise / candidate.factor),
             shares: object.shares,
+            stroke,
             recorded,
             kept,
         }
@@ -43,6 +59,11 @@ impl<'a> Explained<'a> {
 
     pub(super) fn kept(&self) -> Kept {
         self.kept
+    }
+
+    /// The stroke as a time on the recording's clock, in milliseconds; none without one.
+    pub(super) fn window(&self) -> Option<f64> {
+        self.stroke.map(|stroke| stroke.window)
     }
 
     /// The logarithm of the share of approaches that were recorded.
@@ -65,14 +86,32 @@ impl<'a> Explained<'a> {
             OUTER => (self.smoothed.outer((x - (third - first)) / factor).map(|d| d / factor), wide(x)),
             _ => ([1.0; 2], 1.0),
         };
+        let full = usize::from(FULL);
         if self.kept == Kept::Full {
-            return (times[1] * (1.0 - ODD) + ODD * odd).ln();
+            let within = self.stroke.map_or(1.0, |stroke| stroke.shares[full] / self.shares[full].max(1e-9));
+            return (times[1] / within.max(1e-9) * (1.0 - ODD) + ODD * odd).ln();
         }
+        // Times do not count where there is only one contact, or none.
+        let shares = match self.stroke {
+            Some(stroke) if observed.contacts() < 2 => stroke.shares,
+            _ => self.shares,
+        };
         // What was touched may be more than what was recorded.
         let mut density = 0.0;
         for touched in (0..8).filter(|touched| touched & fingers == fingers) {
-            let share = self.shares[usize::from(touched)] * product(touched, fingers, &missed);
+            let share = shares[usize::from(touched)] * product(touched, fingers, &missed);
             density += share * times[usize::from(touched == FULL)];
+        }
+        if let Some(window) = self.window() {
+            // The third finger would have touched too, later than the stroke.
+            let late = |which, late: f64| self.smoothed.late(window / factor, which, late / factor) / factor;
+            density += product(fingers, fingers, &missed)
+                * match fingers {
+                    0b011 => late(0, x - (middle - first)),
+                    0b110 => late(0, third - middle - x),
+                    OUTER => late(1, x - (third - first)),
+                    _ => 0.0,
+                };
         }
         (density * (1.0 - ODD) + ODD * odd / 8.0).ln() - self.recorded
     }

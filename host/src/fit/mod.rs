@@ -12,6 +12,9 @@
 //! Only differences of contact times are recorded, so an offset of all three fingers alike cannot be told, and changes
 //! nothing: offsets are relative to the first finger's.
 //!
+//! A contact that came later than the hand's stroke is missing, and counts as such: the likelihood is that of censored
+//! times. Where the probe states no stroke, it is estimated from the recordings.
+//!
 //! Presses on a flat plate, the probe rolled by half a turn after each, say more about offsets and noise than touches of
 //! objects do: κ is 0 on a plate, and the slope changes its sign.
 //!
@@ -36,11 +39,13 @@ mod advice;
 mod candidate;
 mod density;
 mod error;
+mod late;
 mod likelihood;
 mod outcome;
 mod posed;
 mod recording;
 mod search;
+mod stroke;
 mod suspects;
 #[cfg(all(test, feature = "objects"))]
 mod tests;
@@ -53,9 +58,10 @@ pub use suspects::Suspect;
 use crate::capture;
 use crate::error::{Error, Result};
 use crate::mesh::Object;
+use crate::probe::approach::Probe;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::{Dataset, Origin};
+use crate::touches::{Dataset, ObjectTouches, Origin};
 use candidate::{Candidate, Kept};
 use density::{Densities, FULL, Observed};
 use likelihood::{Explained, Plate};
@@ -63,6 +69,7 @@ use palpate_shared::Touch;
 use rayon::prelude::*;
 use recording::Recording;
 use search::Best;
+use stroke::Stroke;
 use timer::Timer;
 
 /// Settings of a fit.
@@ -94,6 +101,7 @@ struct Evidence<'a> {
     /// For each recording its object.
     of: Vec<usize>,
     plate: Option<Plate>,
+    stroke: Stroke,
 }
 
 impl Evidence<'_> {
@@ -117,7 +125,8 @@ impl Evidence<'_> {
 ///
 /// # Errors
 /// [`FitProblem::NotRecorded`] if a recorded object is not among the objects; [`FitProblem::FewRecorded`] for fewer than
-/// [`LEAST`] touches with two or three contacts; as [`crate::capture::touches`]; [`Error::Cancelled`].
+/// [`LEAST`] touches with two or three contacts; [`FitProblem::OtherStroke`] if the recordings show another stroke than the
+/// probe states; as [`crate::capture::touches`]; [`Error::Cancelled`].
 pub fn fit(
     recorded: &Dataset,
     objects: &[Object],
@@ -132,8 +141,12 @@ pub fn fit(
     if found < LEAST {
         return Err(FitProblem::FewRecorded { touches: found, least: LEAST }.into());
     }
-    let (objects, scenes) = simulated(objects, settings, progress)?;
+    let (simulated, scenes) = simulated(objects, settings, progress)?;
     let kept = kept(recorded);
+    let of_recorded: Vec<&ObjectTouches> = of.iter().map(|&object| &simulated[object]).collect();
+    let stroke = stroke::stroke(recorded, &of_recorded, kept, &settings.origin.probe)?;
+    let densities = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
+    let objects: Vec<Densities> = simulated.iter().map(densities).collect();
     let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
         name: &own.name,
         touches: own.touches().iter().map(Observed::of).collect(),
@@ -145,6 +158,7 @@ pub fn fit(
         objects,
         of,
         plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
+        stroke,
     };
     progress.begin("fitting", None);
     evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
@@ -176,27 +190,29 @@ fn kept(recorded: &Dataset) -> Kept {
     }
 }
 
-/// Each object, touched by the probe as it should be, and the scenes of its instances.
+/// Each object, touched by the probe as it should be whose hand goes on past it, and the scenes of its instances.
 fn simulated(
     objects: &[Object],
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<(Vec<Densities>, Vec<Vec<Scene>>)> {
+) -> Result<(Vec<ObjectTouches>, Vec<Vec<Scene>>)> {
     if settings.approaches < 1_000 {
         return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
     }
     let real = crate::probe::noise::Noise::default();
-    let origin =
-        Origin { approaches: true, touches: settings.approaches, seed: settings.seed, real, ..settings.origin.clone() };
+    // What the hand does not reach is left out later, when a candidate says how fast it is.
+    let probe = Probe { stroke: None, ..settings.origin.probe };
+    let (touches, seed) = (settings.approaches, settings.seed);
+    let origin = Origin { approaches: true, touches, seed, real, probe, ..settings.origin.clone() };
     let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
     progress.begin("touching", Some(objects.len() as u64));
     let one = |(object, scenes): (&Object, &Vec<_>)| {
         let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
         progress::advance(progress, 1)?;
-        Ok(Densities::new(&object.name, touches.touches()))
+        Ok(touches)
     };
-    let densities = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
-    Ok((densities, scenes))
+    let simulated = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
+    Ok((simulated, scenes))
 }
 
 /// The best candidate, and its intervals, number by number.

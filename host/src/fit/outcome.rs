@@ -67,6 +67,8 @@ pub struct Fit {
     pub noise: Estimate,
     /// The share of contacts that each finger misses; none where only full touches were recorded.
     pub missed: Option<[Estimate; FINGERS]>,
+    /// The stroke where it was not stated, in the probe's unit; none if it was, or if the hand goes on past the objects.
+    pub stroke: Option<Estimate>,
     /// The timer's resolution; none if it is finer than 0.02 ms, or there are too few times to tell.
     pub timer: Option<f64>,
     /// Recorded touches and approaches.
@@ -109,13 +111,17 @@ pub(super) fn outcome(
     let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Kept::Full);
     let missed =
         [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
+    let stroke = evidence.stroke.estimated;
+    let written = |stroke: Estimate| (1e4 * stroke.value).round() / 1e4;
+    let probe = Probe { stroke: stroke.map(written).or(settings.origin.probe.stroke), ..settings.origin.probe };
     Fit {
-        probe: settings.origin.probe,
+        probe,
         unit: settings.origin.unit,
         speed_factor: estimate(0, true, &|candidate: &Candidate| 1.0 / candidate.factor),
         late: [1, 2].map(|finger: usize| estimate(finger, false, &|candidate: &Candidate| candidate.late[finger])),
         noise: estimate(3, false, &noise),
         missed: (!only_full).then_some(missed),
+        stroke,
         timer: resolution,
         recorded: evidence.recordings.iter().map(|own| own.touches.len()).sum(),
         contacts: super::counts(evidence),
@@ -142,7 +148,7 @@ impl Fit {
 
     /// The probe as the text of a `probe.toml`, with the intervals as comments.
     pub fn toml(&self) -> String {
-        let Probe { radius, spacing, speed, tilt } = self.probe;
+        let Probe { radius, spacing, speed, tilt, stroke, travel } = self.probe;
         let unit = match self.unit {
             Length::Tenth => "# A unit is a tenth of the object's longest side.\nunit = \"unit\"\n",
             Length::Millimeter => "unit = \"mm\"\n",
@@ -163,9 +169,19 @@ impl Fit {
         for suspect in &self.suspects {
             _ = writeln!(text, "# LOOKS WRONG: {suspect}");
         }
+        _ = writeln!(text, "{unit}radius = {radius:?}\nspacing = {spacing:?}\nspeed = {speed:?}\ntilt = {tilt:?}");
+        if let Some(stroke) = stroke {
+            let estimated = self.stroke.map_or_else(String::new, |stroke| {
+                format!("  # {}: no recorded contact is later", between(&stroke, 1.0, 3))
+            });
+            _ = writeln!(text, "stroke = {stroke:?}{estimated}");
+        }
+        if let Some(travel) = travel {
+            _ = writeln!(text, "travel = {travel:?}");
+        }
         _ = write!(
             text,
-            "{unit}radius = {radius:?}\nspacing = {spacing:?}\nspeed = {speed:?}\ntilt = {tilt:?}\n\n[real]\n\
+            "\n[real]\n\
              speed_factor = {:.4}  # {}\n\
              # How far each finger stands out, relative to the first one. Late: {} ms and {} ms.\n\
              offsets = [0.0, {:.5}, {:.5}]\n\

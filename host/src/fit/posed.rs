@@ -97,29 +97,62 @@ fn aimed(random: &mut impl Rng, pose: &Pose, scene: &Scene, settings: &Settings)
     Approach { start: low + (high - low) * shares - direction * away, direction, alignment: vector(pose.alignment) }
 }
 
+/// For each finger the probability that its contact is missing, though it touches: missed, or later than the stroke. What was
+/// recorded was not late. Where the fingers that were recorded are all that count, the first of them begins the stroke.
+fn unreached(missed: &[f64; 3], touched: u8, recorded: u8, seen: &[f64; 3], window: f64, noise: f64) -> [f64; 3] {
+    let fingers = if recorded == 0 || recorded & touched != recorded { touched } else { recorded };
+    let first =
+        (0..3).filter(|finger| fingers >> finger & 1 == 1).map(|finger| seen[finger]).fold(f64::INFINITY, f64::min);
+    std::array::from_fn(|finger| match touched >> finger & 1 == 1 && recorded >> finger & 1 == 0 {
+        true => missed[finger] + (1.0 - missed[finger]) * late_share(seen[finger] - first, window, noise),
+        false => missed[finger],
+    })
+}
+
+/// The probability that a contact simulated this long after the first comes later than the stroke.
+fn late_share(after: f64, window: f64, noise: f64) -> f64 {
+    // About a standard deviation of a simulated time: the end of the stroke is no sharper.
+    let width = (SMOOTHING * window).hypot(2.0 * noise);
+    (0.5 + (after - window) / (2.0 * width)).clamp(0.0, 1.0)
+}
+
 /// The logarithm of the density of a recorded touch, given approaches in its pose.
 pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pose: &InPose) -> f64 {
     let all = explained.log_density(observed);
-    let Some(density) = density(explained.candidate(), explained.kept(), observed, in_pose) else { return all };
+    let Some(density) = density(explained, observed, in_pose) else { return all };
     let posed = density.ln() - explained.recorded();
     let most = posed.max(all);
     most + (TRUSTED * (posed - most).exp() + (1.0 - TRUSTED) * (all - most).exp()).ln()
 }
 
 /// The density among the approaches in its pose; none if none of them says anything.
-fn density(candidate: &Candidate, kept: Kept, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
-    let Candidate { factor, late, noise, missed } = candidate;
+fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
+    let (Candidate { factor, late, noise, missed }, kept) = (explained.candidate(), explained.kept());
     let (mut sum, mut weights) = (0.0, 0.0);
     for Simulated { touched, times, gap } in approaches {
+        let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];
+        // A contact that is late, by what is known of its time, is missing.
+        let missed = match explained.window() {
+            Some(window) => unreached(missed, *touched, observed.fingers, &std::array::from_fn(seen), window, *noise),
+            None => *missed,
+        };
         let weight = match kept {
             Kept::Full => f64::from(u8::from(*touched == FULL)),
-            Kept::All | Kept::Contacts => product(*touched, observed.fingers, missed),
+            Kept::All | Kept::Contacts => product(*touched, observed.fingers, &missed),
         };
-        weights += if kept == Kept::Full { weight } else { 1.0 };
+        weights += match (kept, explained.window()) {
+            (Kept::Full, Some(window)) => {
+                let times = [seen(0), seen(1), seen(2)];
+                let [first, last] =
+                    [times.iter().copied().fold(f64::INFINITY, f64::min), times.into_iter().fold(0.0, f64::max)];
+                weight * (1.0 - late_share(last - first, window, *noise))
+            }
+            (Kept::Full, None) => weight,
+            _ => 1.0,
+        };
         if touched & observed.fingers != observed.fingers || weight <= 0.0 {
             continue;
         }
-        let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];
         let kernel = |expected: f64, found: f64, variance: f64, of: f64| {
             let variance = variance * noise * noise + (SMOOTHING * of).powi(2) + (factor * f64::from(*gap)).powi(2);
             (-0.5 * (found - expected).powi(2) / variance).exp() / (std::f64::consts::TAU * variance).sqrt()

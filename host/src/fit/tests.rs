@@ -312,3 +312,69 @@ fn a_fit_is_the_same_on_any_number_of_threads_and_read_back_as_written() {
         assert_eq!(written.timer, real.timer);
     }
 }
+
+/// The same touches of a hand that stops this many milliseconds after the first contact.
+fn stopped(recorded: &Dataset, after: u32) -> Dataset {
+    recorded.each(|own| own.changed(|touch| crate::probe::hand::within(touch, Some(1_000 * after))))
+}
+
+#[test]
+fn a_stroke_is_found_and_contacts_later_than_it_bend_no_estimate() {
+    let long = recorded(&objects(), 400, 1, &BENT);
+    let short = stopped(&long, 250);
+    let [long, found] = [&long, &short].map(|recorded| fitted(recorded, Some(&plate(60, &BENT))));
+    assert_eq!((long.stroke, long.probe.stroke), (None, None), "no stroke where contacts come as late as they can");
+    let stroke = found.stroke.unwrap();
+    assert!(stroke.holds(2.5) && (stroke.value - 2.5).abs() < 0.1 && stroke.low.unwrap() > 2.3, "{stroke:?}");
+    near(&found, &BENT, [0.05, 1.5, 0.3]);
+    // Each finger lost tens of contacts to the stroke, and none of these counts as missed.
+    let lost = |finger: usize| {
+        let missing = |dataset: &Dataset| dataset.touches().filter(|touch| touch.times()[finger].is_missing()).count();
+        missing(&short) - missing(&recorded(&objects(), 400, 1, &BENT))
+    };
+    assert!((0..3).all(|finger| lost(finger) > 40), "{:?}", [lost(0), lost(1), lost(2)]);
+    let text = found.toml();
+    assert!(text.contains("stroke = 2.") && text.contains("no recorded contact is later"), "{text}");
+    let file = crate::probe::file::ProbeFile::parse(&text, "probe.toml".as_ref()).unwrap();
+    assert_eq!(file.probe.stroke, found.probe.stroke);
+}
+
+#[test]
+fn a_stated_stroke_is_kept_and_recordings_of_another_are_refused_with_both() {
+    let short = stopped(&recorded(&objects(), 400, 1, &BENT), 300);
+    let stating = |stroke: f64| {
+        let probe = Probe { stroke: Some(stroke), ..Probe::default() };
+        let origin = Origin { probe, ..Origin::default() };
+        fit(&short, &objects(), None, &Settings { origin, ..settings() }, &())
+    };
+    let found = stating(3.0).unwrap();
+    assert_eq!((found.stroke, found.probe.stroke), (None, Some(3.0)));
+    assert!((found.speed_factor.value * BENT.longer - 1.0).abs() < 0.06, "{:?}", found.speed_factor);
+    assert!(found.toml().contains("\nstroke = 3.0\n"), "{}", found.toml());
+    for (stroke, parts) in [
+        (2.0, ["a stroke of 2 (0.200 s)", "s after the first"]),
+        (6.0, ["a stroke of 6 (0.600 s)", "no contact is later than 0."]),
+    ] {
+        let error = stating(stroke).unwrap_err();
+        assert!(matches!(error.problem::<FitProblem>(), Some(FitProblem::OtherStroke { .. })), "{error}");
+        assert!(parts.iter().all(|part| error.to_string().contains(part)), "{error}");
+    }
+}
+
+#[test]
+fn full_touches_and_poses_of_a_short_stroke_are_fitted_as_well() {
+    let mut posed = stopped(&recorded(&objects(), 250, 2, &BENT), 250);
+    let origin = Origin { approaches: true, seed: 1_002, ..Origin::default() };
+    for (own, object) in posed.objects.iter_mut().zip(&objects()) {
+        let scenes = capture::scenes(&[object], &origin, &()).unwrap();
+        let poses = capture::touches(&scenes[0], &object.name, &origin, 0..250).unwrap();
+        let with = |(touch, posed): (&Touch, &Touch)| touch.with_pose(posed.pose().unwrap());
+        own.edit(|touches| *touches = touches.iter().zip(poses.touches()).map(with).collect());
+    }
+    near(&fitted(&posed, None), &BENT, [0.06, 3.0, 0.5]);
+    let mut full = stopped(&recorded(&objects(), 900, 10, &BENT), 250);
+    full.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
+    let found = fitted(&full, None);
+    assert!((found.speed_factor.value * BENT.longer - 1.0).abs() < 0.06, "{:?}", found.speed_factor);
+    assert!(found.stroke.unwrap().holds(2.5), "{:?}", found.stroke);
+}

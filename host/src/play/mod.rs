@@ -36,6 +36,7 @@ use crate::capture::Sampler;
 use crate::error::{EvaluateProblem, Result};
 use crate::mesh::Mesh;
 use crate::probe::approach::{Approach, FINGERS};
+use crate::probe::hand::{self, Unreached};
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::touches::Origin;
@@ -87,6 +88,8 @@ pub struct Approached {
     pub approach: Approach,
     /// Distance that each finger moved to its contact, in units; none for one that missed.
     pub distances: [Option<f64>; FINGERS],
+    /// Reason why a finger with an object in its way has no contact: the hand had stopped.
+    pub unreached: [Option<Unreached>; FINGERS],
     /// The touch as it was.
     pub exact: Touch,
     /// The touch as the sensor reports it, with noise: what the models see.
@@ -94,7 +97,7 @@ pub struct Approached {
 }
 
 impl<'m> Game<'m> {
-    /// A game without objects and models, in which objects are touched as `origin` says: of it count unit, probe and aim.
+    /// A game without objects and models, in which objects are touched as `origin` says: of it count unit, probe (with its stroke and travel) and aim.
     pub fn new(origin: &Origin) -> Self {
         let origin = Origin { approaches: true, pose: true, ..origin.clone() };
         Self { origin, objects: Vec::new(), models: Vec::new(), noise: Noise::default() }
@@ -219,15 +222,26 @@ impl<'m> Game<'m> {
 
     fn touch(&self, round: &mut Round<'m>, approach: Approach) -> Approached {
         let (thing, probe) = (&self.objects[round.object], &self.origin.probe);
-        let distances = approach.distances(&thing.scene, probe);
-        let exact = approach.touch(distances, probe);
+        let way = approach.distances(&thing.scene, probe);
+        let (distances, is_turned_back) = probe.within_travel(way);
+        let window = probe.window();
+        let whole = approach.touch(distances, probe);
+        // As in a capture: contacts later than the stroke are missing, and what is left gets the noise.
+        let exact = hand::within(&whole, window);
         // A seed for every approach: its noise does not depend on how many there were before.
         let seed = (round.origin.seed << 32).wrapping_add(round.next);
         let noisy = if self.noise.is_none() { None } else { self.noise.add(&thing.name, &[exact], seed).pop() };
         let touch = noisy.unwrap_or(exact);
+        let [late, pushed] = [&whole, &touch].map(|touch| hand::late(touch, window));
+        let unreached = std::array::from_fn(|finger| match way[finger] {
+            Some(_) if is_turned_back => Some(Unreached::Travel),
+            _ => (late[finger] || pushed[finger]).then_some(Unreached::Stroke),
+        });
+        let touch = hand::within(&touch, window);
+        let distances = std::array::from_fn(|finger| distances[finger].filter(|_| unreached[finger].is_none()));
         round.next += 1;
         round.players.iter_mut().for_each(|player| player.take(&touch));
-        Approached { approach, distances, exact, touch }
+        Approached { approach, distances, unreached, exact, touch }
     }
 }
 

@@ -140,3 +140,30 @@ fn what_cannot_be_played_with_is_refused() {
     let error = Game::new(&Origin::default()).add_model(compile::open(&rows).unwrap()).unwrap_err();
     assert!(matches!(error.problem::<EvaluateProblem>(), Some(EvaluateProblem::RawFeatures)), "{error}");
 }
+
+#[test]
+fn a_finger_that_the_hand_does_not_reach_is_missing_with_the_reason() {
+    let probe = crate::probe::Probe { stroke: Some(1.0), travel: Some(9.0), ..Default::default() };
+    let mut game = Game::new(&Origin { probe, ..Origin::default() });
+    game.add_object("disc", &Mesh::globe(12).stretched([1.0, 1.0, 0.1]), 10.0).unwrap();
+    let origin = Origin { approaches: true, pose: true, seed: 7, probe, ..Origin::default() };
+    let captured = capture::touches(std::slice::from_ref(game.scene(0).unwrap()), "disc", &origin, 0..300).unwrap();
+    let mut round = game.round(0, 7).unwrap();
+    let mut reasons = [0, 0];
+    for captured in captured.touches() {
+        let approached = game.touch_at_random(&mut round);
+        assert_eq!(approached.touch, *captured);
+        let way = approached.approach.distances(game.scene(0).unwrap(), &probe);
+        for finger in 0..FINGERS {
+            let is_missing = captured.times()[finger].is_missing();
+            assert_eq!(approached.unreached[finger].is_some(), way[finger].is_some() && is_missing);
+            assert_eq!(approached.distances[finger], way[finger].filter(|_| !is_missing));
+            match approached.unreached[finger] {
+                Some(Unreached::Stroke) => reasons[0] += 1,
+                Some(Unreached::Travel) => reasons[1] += 1,
+                None => {}
+            }
+        }
+    }
+    assert!(reasons.iter().all(|count| *count > 10), "{reasons:?}");
+}

@@ -32,7 +32,7 @@ pub(super) fn check(
     }
     names(ensemble, recorded)?;
     let stated = TouchOrigin::of(&ensemble.origin)?.probe.or_else(|| StatedProbe::of(known));
-    same_probe(stated, recorded)?;
+    same_probe(stated, ensemble.trained_touches().largest_spread, recorded)?;
     approaches(ensemble.trained_touches().counted, recorded)?;
     poses(descriptor, recorded)?;
     Ok(descriptor)
@@ -54,12 +54,10 @@ fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
     Ok(())
 }
 
-/// The same probe, where both sides state one.
-fn same_probe(stated: Option<StatedProbe>, recorded: &Dataset) -> Result<()> {
-    if let Some((own, other)) = stated.zip(StatedProbe::of(recorded)) {
-        StatedProbe::compare(["the simulation", "the recording"], [own.trained(), other.trained()])?;
-    }
-    Ok(())
+/// The same probe, where both sides state one, and the same stroke.
+fn same_probe(stated: Option<StatedProbe>, longest: u32, recorded: &Dataset) -> Result<()> {
+    let stated = stated.as_ref().map(StatedProbe::trained);
+    Ok(StatedProbe::compare_with(["the simulation", "the recording"], stated, longest, recorded)?)
 }
 
 /// Partial touches are evidence only where every approach was recorded.

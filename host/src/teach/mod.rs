@@ -273,7 +273,14 @@ fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], const
     }
     let objects = (at, recorded.objects.len());
     if let Some(trained) = &mut extended.origin.trained {
+        let has_stroke = TouchOrigin::of(&ensemble.origin)
+            .is_ok_and(|stated| stated.probe.is_some_and(|stated| stated.probe.stroke.is_some()));
+        let largest_spread = trained.touches.largest_spread;
         trained.touches = with(trained.touches, &recorded.objects);
+        // With a stroke it is that of the hand, whatever a recording's clock says.
+        if has_stroke {
+            trained.touches.largest_spread = largest_spread;
+        }
         trained.shares = trained.shares.map(|shares| mean(shares, recorded.shares(), objects));
     }
     extended

@@ -3,4 +3,6 @@
 pub(crate) mod repetitions;
 #[cfg(feature = "objects")]
 mod several_meshes;
+#[cfg(feature = "train")]
+mod stroke;
 pub(crate) mod synthetic;

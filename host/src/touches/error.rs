@@ -300,6 +300,14 @@ pub enum TouchesProblem {
     /// A touch has no pose, but the data set is recorded with one.
     #[error("no pose, but this data set is recorded with one")]
     NoPose,
+    /// A touch has a contact that the hand cannot have reached.
+    #[error("a contact {latest} after the first, and this data set is recorded with a stroke of {stroke}")]
+    LaterThanStroke {
+        /// The stroke as a length and as a time.
+        stroke: String,
+        /// The latest contact's time.
+        latest: String,
+    },
     /// A text names no shard.
     #[error("{text:?} is not a shard")]
     BadShard {
@@ -408,6 +416,7 @@ impl Problem for TouchesProblem {
             Self::OtherRecording { .. } => "Record as these touches were, or into another directory.",
             Self::RecordedBefore { .. } => "Give other lines.",
             Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
+            Self::LaterThanStroke { .. } => "Give the probe file the stroke that the hand has, and record into another directory.",
             Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
             Self::HoldsFiles { .. } => "Give another directory, or move the files away.",

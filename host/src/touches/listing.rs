@@ -124,7 +124,7 @@ impl Listing {
 
     /// The touches of a listed object, and what each of them is of.
     pub(super) fn with_sources(&self, entry: &Entry, touches: Vec<Touch>) -> Result<ObjectTouches> {
-        let name = entry.name.clone();
+        let (name, window) = (entry.name.clone(), self.origin.probe.window());
         if self.is_recorded() {
             let recorded = self.recorded.iter().filter(|recorded| recorded.object == name).cloned();
             let mut runs: Vec<_> = recorded.map(|one| (one.touches, Source::Recording(one))).collect();
@@ -135,11 +135,12 @@ impl Listing {
                 runs.push((count, Source::Recording(one)));
             }
             let runs = runs.into_iter().map(|(count, source)| (source, count)).collect();
-            return Ok(ObjectTouches::in_runs(name, touches, runs));
+            return Ok(ObjectTouches::in_runs(name, touches, runs).of_stroke(window));
         }
         if entry.counts.is_empty() {
             let meshes = Meshes { checksums: entry.meshes.clone(), millimeters: entry.millimeters };
-            let object = ObjectTouches::in_turn(name, touches, &entry.instances, self.origin.samples().start);
+            let object =
+                ObjectTouches::in_turn(name, touches, &entry.instances, self.origin.samples().start).of_stroke(window);
             return Ok(object.of_meshes(Some(meshes).filter(|meshes| !meshes.checksums.is_empty())));
         }
         let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
@@ -152,7 +153,8 @@ impl Listing {
             return Err(TouchesProblem::BadListing { message }.into());
         }
         let instances = entry.instances.iter().cloned().map(Source::Instance);
-        Ok(ObjectTouches::in_runs(name, touches, instances.zip(entry.counts.iter().copied()).collect()))
+        let runs = instances.zip(entry.counts.iter().copied()).collect();
+        Ok(ObjectTouches::in_runs(name, touches, runs).of_stroke(window))
     }
 
     /// The objects' names.

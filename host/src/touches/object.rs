@@ -1,6 +1,7 @@
 //! The touches of one object, and what each of them is of.
 
 use super::{Meshes, Recorded};
+use crate::probe::hand;
 use crate::probe::noise::Noise;
 use palpate_shared::Touch;
 use std::path::PathBuf;
@@ -34,6 +35,9 @@ pub struct ObjectTouches {
     robot_of: Vec<u32>,
     /// Meshes that were touched, as far as they are known.
     meshes: Option<Meshes>,
+    /// The stroke of the probe that made them as a time in microseconds: also with noise that is added, a later contact is
+    /// missing.
+    window: Option<u32>,
 }
 
 /// Touches of an object that may be mixed in a sequence: those of one source that one robot made.
@@ -49,7 +53,15 @@ impl ObjectTouches {
     /// Touches that are all of one source.
     pub fn new(name: impl Into<String>, touches: Vec<Touch>, source: Source) -> Self {
         let sources = if touches.is_empty() { Vec::new() } else { vec![source] };
-        Self { name: name.into(), touches, sources, source_of: Vec::new(), robot_of: Vec::new(), meshes: None }
+        Self {
+            name: name.into(),
+            touches,
+            sources,
+            source_of: Vec::new(),
+            robot_of: Vec::new(),
+            meshes: None,
+            window: None,
+        }
     }
 
     /// Touches of instances in turn: touch i is of instance `first` + i modulo their number. Without names, or with one,
@@ -62,7 +74,8 @@ impl ObjectTouches {
         // Below the number of the instances.
         let source_of = (0..touches.len() as u64).map(|touch| ((first % count + touch) % count) as u32).collect();
         let sources = instances.iter().cloned().map(Source::Instance).collect();
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), meshes: None }.tidied()
+        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), meshes: None, window: None }
+            .tidied()
     }
 
     /// Touches in any order, each with the number of its instance.
@@ -78,7 +91,7 @@ impl ObjectTouches {
         let place = |(_, number): &(Touch, i64)| numbers.partition_point(|other| other < number) as u32;
         let source_of = touches.iter().map(place).collect();
         let sources = numbers.iter().map(|number| Source::Instance(number.to_string())).collect();
-        Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), meshes: None }
+        Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), meshes: None, window: None }
     }
 
     /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
@@ -96,7 +109,8 @@ impl ObjectTouches {
             sources.push(Source::Object);
             source_of = vec![0; touches.len()];
         }
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), meshes: None }.tidied()
+        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), meshes: None, window: None }
+            .tidied()
     }
 
     /// The touches of several objects, one after the other, as those of one whose sources are all of theirs.
@@ -122,6 +136,9 @@ impl ObjectTouches {
     fn extend(&mut self, more: &Self, may_share: bool) {
         if self.is_empty() || self.meshes != more.meshes {
             self.meshes = more.meshes.clone().filter(|_| self.is_empty() && may_share);
+        }
+        if self.is_empty() {
+            self.window = more.window;
         }
         let (before, robots) = (self.touches.len(), self.robot_of.len() + more.robot_of.len());
         if self.source_of.is_empty() {
@@ -171,6 +188,20 @@ impl ObjectTouches {
     #[must_use]
     pub fn of_meshes(self, meshes: Option<Meshes>) -> Self {
         Self { meshes, ..self }
+    }
+
+    /// The same touches, of a probe with this stroke as a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
+    #[must_use]
+    pub fn of_stroke(self, window: Option<u32>) -> Self {
+        Self { window, ..self }
+    }
+
+    /// Touches made of these, such as by noise, without contacts later than the stroke.
+    pub(crate) fn within_stroke(&self, mut touches: Vec<Touch>) -> Vec<Touch> {
+        if self.window.is_some() {
+            touches.iter_mut().for_each(|touch| *touch = hand::within(touch, self.window));
+        }
+        touches
     }
 
     /// The meshes that the object was touched as, as far as that is known.
@@ -257,6 +288,7 @@ impl ObjectTouches {
             source_of: of(&self.source_of),
             robot_of: of(&self.robot_of),
             meshes: self.meshes.clone(),
+            window: self.window,
         };
         some.tidied()
     }
@@ -302,7 +334,7 @@ impl ObjectTouches {
         let robot =
             |touch: u64| usize::try_from(touch).ok().and_then(|touch| robot_of.get(touch)).copied().unwrap_or(0);
         let touches = noise.add_by(&self.name, &self.touches, seed, |touch| robot(touch).into());
-        Self { touches, robot_of, ..self.clone() }
+        Self { touches: self.within_stroke(touches), robot_of, ..self.clone() }
     }
 }
 

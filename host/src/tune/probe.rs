@@ -3,7 +3,7 @@
 //! Every probe tried touches the objects in the simulator; a model is trained on these approaches and tested on
 //! others, with the stopping rule set so that the share of wrong verdicts is the one asked for. What counts is how many approaches that takes on average. The search narrows down: a coarse grid with a quarter of the approaches
 //! per object; the best of it and what lies between them with half; and, with all of them, every spacing at the best
-//! radius, tilt and aim.
+//! radius, tilt and aim, and a few strokes with the best probe: how far the hand must go on after the first contact.
 //!
 //! The figures compare probes and promise nothing: the stopping threshold is set, and the best probe chosen, on the touches
 //! that are counted. The best of many looks somewhat better than it is.
@@ -38,6 +38,10 @@ use std::ops::RangeInclusive;
 
 /// Spacings of the coarse grid.
 const SPACINGS: usize = 5;
+/// Strokes that are tried without a range, in units, beside a hand that goes on past the object.
+const USUAL_STROKES: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 5.0];
+/// Strokes of a range.
+const STROKES: usize = 5;
 /// The share of the coarse grid that goes on.
 const KEPT: usize = 10;
 /// A recognizer gives up after this many touches: later than any that is of use.
@@ -59,6 +63,9 @@ pub struct Settings {
     pub radius: RangeInclusive<f64>,
     /// Largest tilts of the row of fingers to either side, in degrees.
     pub tilt: RangeInclusive<f64>,
+    /// Strokes of the hand: the best probe is searched with the longest, and every one is tried with it. None: it is searched
+    /// for a hand that goes on past the object, and strokes of 0.5 to 5 units are tried with it.
+    pub stroke: Option<RangeInclusive<f64>>,
     /// Where approaches may aim, at least one.
     pub aims: Vec<Aim>,
     /// The probe's speed, per second.
@@ -89,6 +96,7 @@ impl Default for Settings {
             spacing: 0.5..=3.0,
             radius: 0.1..=0.3,
             tilt: 0.0..=20.0,
+            stroke: None,
             aims: Aim::ALL.into(),
             speed: Probe::default().speed,
             published: Probe::default(),
@@ -118,7 +126,9 @@ impl Settings {
 
     /// Refuses settings out of their ranges.
     fn check(&self) -> Result<()> {
-        for (name, range) in [("spacing", &self.spacing), ("radius", &self.radius), ("tilt", &self.tilt)] {
+        let stroke = self.stroke.as_ref().map(|stroke| ("stroke", stroke));
+        let ranges = [("spacing", &self.spacing), ("radius", &self.radius), ("tilt", &self.tilt)];
+        for (name, range) in ranges.into_iter().chain(stroke) {
             let [low, high] = [*range.start(), *range.end()];
             if !(low.is_finite() && high.is_finite() && low <= high) {
                 return Err(Error::setting(name, format!("{low}..{high}"), "the smaller number first, as in 0.5..3"));
@@ -142,7 +152,8 @@ impl Settings {
         let corners = [(self.spacing.start(), self.radius.start()), (self.spacing.end(), self.radius.end())];
         for (&spacing, &radius) in corners {
             for tilt in [*self.tilt.start(), *self.tilt.end()] {
-                let probe = Probe { radius, spacing, speed: self.speed, tilt };
+                let stroke = self.stroke.as_ref().map(|stroke| *stroke.start());
+                let probe = Probe { radius, spacing, speed: self.speed, tilt, stroke, travel: None };
                 probe.check(if self.unit == Length::Tenth { LENGTH } else { 1.0 })?;
             }
         }
@@ -164,8 +175,9 @@ pub fn median_length(objects: &[Object]) -> Option<f64> {
 /// The same probe where what was a unit is `unit`; lengths are rounded to hundredths.
 pub fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
     let scaled = |length: f64| hundredths(length * unit);
-    let Probe { radius, spacing, speed, tilt } = *probe;
-    Probe { radius: scaled(radius), spacing: scaled(spacing), speed: scaled(speed), tilt }
+    let Probe { radius, spacing, speed, tilt, stroke, travel } = *probe;
+    let [radius, spacing, speed] = [radius, spacing, speed].map(scaled);
+    Probe { radius, spacing, speed, tilt, stroke: stroke.map(scaled), travel: travel.map(scaled) }
 }
 
 /// A probe that was tried, and what it achieved.
@@ -212,6 +224,8 @@ pub struct Design {
     pub published: Trial,
     /// The trade-off: probes of every spacing with the best radius, tilt and aim, by spacing; the best is one of them.
     pub by_spacing: Vec<Trial>,
+    /// The best probe with hands of other strokes, the longest last: the best itself.
+    pub by_stroke: Vec<Trial>,
     /// All probes tried in the rounds before, the best of each round first.
     pub rounds: Vec<Vec<Trial>>,
     /// Unit of lengths.
@@ -239,7 +253,7 @@ impl Design {
         format!(
             "# Found by `palpate probe design`: {verdict}{approaches:.1} approaches to {} % errors,\n\
              # aiming at: {} (`palpate capture --aim {}`). Assumed: noise of {} ms on contact times.\n\
-             {unit}radius = {:?}\nspacing = {:?}\nspeed = {:?}\ntilt = {:?}\n",
+             {unit}radius = {:?}\nspacing = {:?}\nspeed = {:?}\ntilt = {:?}\n{}",
             100.0 * self.error_rate,
             aim.name(),
             aim.name(),
@@ -248,6 +262,7 @@ impl Design {
             probe.spacing,
             probe.speed,
             probe.tilt,
+            probe.stroke.map_or_else(String::new, |stroke| format!("stroke = {stroke:?}\n")),
         )
     }
 }
@@ -272,7 +287,7 @@ pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) 
     let search = Search { objects: names.zip(scenes).collect(), settings, progress };
     let coarse = search.coarse();
     // The second round has what was kept, and at most two neighbors in each of three directions; the third the spacings.
-    progress.begin("trying probes", Some((coarse.len() + 2 * KEPT + SPACINGS) as u64));
+    progress.begin("trying probes", Some((coarse.len() + 2 * KEPT + SPACINGS + STROKES) as u64));
     let first = search.try_all(coarse, settings.approaches / 4)?;
     let second = search.try_all(search.finer(&first), settings.approaches / 2)?;
     let best = &second[0];
@@ -286,12 +301,14 @@ pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) 
     let mut by_spacing = search.try_all(line, settings.approaches)?;
     let best = by_spacing[0].clone();
     by_spacing.sort_by(|a, b| a.probe.spacing.total_cmp(&b.probe.spacing));
-    let published = Probe { speed: settings.speed, ..settings.published };
+    let by_stroke = search.by_stroke(&best)?;
+    let published = Probe { speed: settings.speed, stroke: search.stroke(), ..settings.published };
     let published = search.attempt(published, Aim::Box, settings.approaches)?;
     Ok(Design {
         best,
         published,
         by_spacing,
+        by_stroke,
         rounds: vec![first, second],
         unit: settings.unit,
         error_rate: settings.error_rate,
@@ -319,12 +336,35 @@ impl Search<'_> {
         for spacing in steps(&settings.spacing, SPACINGS) {
             for radius in steps(&settings.radius, 2) {
                 for tilt in steps(&settings.tilt, 2) {
-                    let probe = Probe { radius, spacing, speed: settings.speed, tilt };
+                    let stroke = self.stroke();
+                    let probe = Probe { radius, spacing, speed: settings.speed, tilt, stroke, travel: None };
                     plans.extend(settings.aims.iter().map(|&aim| (probe, aim)));
                 }
             }
         }
         plans
+    }
+
+    /// The stroke with which the best probe is searched: the longest.
+    fn stroke(&self) -> Option<f64> {
+        self.settings.stroke.as_ref().map(|stroke| *stroke.end())
+    }
+
+    /// The best probe with shorter strokes, and the best itself.
+    fn by_stroke(&self, best: &Trial) -> Result<Vec<Trial>> {
+        let unit = self.settings.published.spacing / Probe::default().spacing;
+        let mut strokes = match &self.settings.stroke {
+            Some(range) => steps(range, STROKES),
+            None => USUAL_STROKES.map(|stroke| hundredths(stroke * unit)).into(),
+        };
+        strokes.retain(|stroke| Some(*stroke) != best.probe.stroke);
+        let with = |stroke: &f64| (Probe { stroke: Some(*stroke), ..best.probe }, best.aim);
+        let mut trials = self.try_all(strokes.iter().map(with).collect(), self.settings.approaches)?;
+        trials.sort_by(|a, b| {
+            a.probe.stroke.unwrap_or(f64::INFINITY).total_cmp(&b.probe.stroke.unwrap_or(f64::INFINITY))
+        });
+        trials.push(best.clone());
+        Ok(trials)
     }
 
     /// The best of a round, and what lies between the best and its neighbors.
@@ -521,6 +561,24 @@ mod tests {
     }
 
     #[test]
+    fn a_shorter_stroke_loses_contacts_and_the_longest_is_the_best_probes() {
+        let objects = objects();
+        let found = design(&objects, &Settings { spacing: 1.0..=1.0, ..settings() }, &()).unwrap();
+        let strokes: Vec<Option<f64>> = found.by_stroke.iter().map(|trial| trial.probe.stroke).collect();
+        assert_eq!(strokes, [Some(0.5), Some(1.0), Some(2.0), Some(3.0), Some(5.0), None]);
+        assert_eq!(found.by_stroke.last(), Some(&found.best));
+        let full = |trial: &Trial| trial.patterns["all"];
+        assert!(found.by_stroke.is_sorted_by(|a, b| full(a) <= full(b)), "{:?}", found.by_stroke);
+        assert!(full(&found.by_stroke[0]) < 0.9 * full(&found.best), "{:?}", found.by_stroke);
+        assert!(!found.toml().contains("stroke"));
+        let settings = Settings { spacing: 1.0..=1.0, stroke: Some(0.5..=2.0), approaches: 200, ..settings() };
+        let short = design(&objects, &settings, &()).unwrap();
+        assert_eq!((short.best.probe.stroke, short.published.probe.stroke), (Some(2.0), Some(2.0)));
+        assert_eq!(short.by_stroke.len(), STROKES);
+        assert!(short.toml().ends_with("stroke = 2.0\n"), "{}", short.toml());
+    }
+
+    #[test]
     fn at_true_size_the_search_is_in_millimeters_and_takes_objects_of_known_size_only() {
         let mut objects = objects();
         assert!(Settings::at_true_size(&objects).is_none());
@@ -573,6 +631,7 @@ mod tests {
             ("radius", Settings { radius: 0.0..=1.0, ..base.clone() }),
             ("tilt", Settings { tilt: 0.0..=90.0, ..base.clone() }),
             ("speed", Settings { speed: 0.0, ..base.clone() }),
+            ("stroke", Settings { stroke: Some(0.0..=3.0), ..base.clone() }),
             ("noise", Settings { noise: f64::NAN, ..base.clone() }),
             ("error_rate", Settings { error_rate: 0.0, ..base.clone() }),
             ("approaches", Settings { approaches: 99, ..base.clone() }),

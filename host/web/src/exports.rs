@@ -33,9 +33,9 @@ export! {
     }
 
     /// Begins with an empty game. `millimeters`: whether objects are touched at their true size; `aim`: 0 box, 1 middle,
-    /// 2 mass.
-    fn start(millimeters: u32, aim: u32, radius: f64, spacing: f64, speed: f64, tilt: f64) -> i32 {
-        with(|table| number(table.start(millimeters != 0, aim, [radius, spacing, speed, tilt])))
+    /// 2 mass; `stroke` and `travel`: 0 for none.
+    fn start(millimeters: u32, aim: u32, radius: f64, spacing: f64, speed: f64, tilt: f64, stroke: f64, travel: f64) -> i32 {
+        with(|table| number(table.start(millimeters != 0, aim, [radius, spacing, speed, tilt, stroke, travel])))
     }
 
     /// Adds the object of the input, its name (`name` bytes) and its packed mesh, with this longest side. Returns its number.

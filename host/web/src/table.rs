@@ -5,6 +5,7 @@ use palpate::glam::DVec3;
 use palpate::mesh::Mesh;
 use palpate::onboard::{Refused, Verdict};
 use palpate::play::{Approached, Game, Round, Series, decompress, unpack};
+use palpate::probe::hand::Unreached;
 use palpate::probe::noise::{Deviation, Noise};
 use palpate::probe::{Aim, Probe};
 use palpate::shared::format::Length;
@@ -45,11 +46,13 @@ impl Table {
         self.input.as_mut_ptr()
     }
 
-    pub(crate) fn start(&mut self, millimeters: bool, aim: u32, measures: [f64; 4]) -> Option<usize> {
+    pub(crate) fn start(&mut self, millimeters: bool, aim: u32, measures: [f64; 6]) -> Option<usize> {
         let unit = if millimeters { Length::Millimeter } else { Length::Tenth };
-        let [radius, spacing, speed, tilt] = measures;
+        let [radius, spacing, speed, tilt, ..] = measures;
+        let [.., stroke, travel] = measures.map(|length| (length > 0.0).then_some(length));
         let aim = *Aim::ALL.get(index(aim))?;
-        let origin = Origin { unit, aim, probe: Probe { radius, spacing, speed, tilt }, ..Origin::default() };
+        let origin =
+            Origin { unit, aim, probe: Probe { radius, spacing, speed, tilt, stroke, travel }, ..Origin::default() };
         *self = Self { game: Some(Game::new(&origin)), ..Self::default() };
         Some(0)
     }
@@ -114,13 +117,14 @@ impl Table {
     }
 
     /// Does an approach and puts it out: start, direction, alignment (3 numbers each); how far each finger moves to its
-    /// contact; when each touched, exactly and as sensed, in microseconds; NaN for a finger that missed; and the code of the
-    /// contact pattern as sensed.
+    /// contact; when each touched, exactly and as sensed, in microseconds; NaN for a finger that missed; the code of the
+    /// contact pattern as sensed; and for each finger why the hand did not reach its contact: 1 the stroke, 2 the travel.
     pub(crate) fn touch(
         &mut self,
         approach: impl FnOnce(&Game<'static>, &mut Round<'static>) -> Option<Approached>,
     ) -> Option<usize> {
-        let Approached { approach, distances, exact, touch } = approach(self.game.as_ref()?, self.round.as_mut()?)?;
+        let Approached { approach, distances, unreached, exact, touch } =
+            approach(self.game.as_ref()?, self.round.as_mut()?)?;
         let vectors = [approach.start, approach.direction, approach.alignment];
         let times = |touch: Touch| touch.times().map(|time| time.micros().map_or(f64::NAN, f64::from));
         self.output = vectors.iter().flat_map(|vector| vector.to_array()).collect();
@@ -128,6 +132,11 @@ impl Table {
         self.output.extend(times(exact));
         self.output.extend(times(touch));
         self.output.push(touch.pattern().code().into());
+        self.output.extend(unreached.map(|reason| match reason {
+            None => 0.0,
+            Some(Unreached::Stroke) => 1.0,
+            Some(Unreached::Travel) => 2.0,
+        }));
         Some(0)
     }
 

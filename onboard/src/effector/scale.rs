@@ -52,6 +52,13 @@ impl Scale {
         u32::try_from((u64::from(micros) * ONE).div_ceil(least)).unwrap_or(u32::MAX)
     }
 
+    /// The longest that contacts can be apart with this probe so that they are never more than `micros` apart with the
+    /// model's.
+    pub fn shortest(&self, micros: u32) -> u32 {
+        let most = self.linear.max(self.square).max(1);
+        u32::try_from(u64::from(micros) * ONE / most).unwrap_or(u32::MAX)
+    }
+
     /// The touch as the model's probe would have made it, rounded to whole microseconds; the pose stays.
     ///
     /// Cost: a few products of 64 bits for each time. Cannot fail: times too long for a [`ContactTime`] become the longest.

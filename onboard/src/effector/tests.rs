@@ -2,7 +2,7 @@ use super::*;
 use core::cell::Cell;
 use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::digital::{Mock, State as Level, Transaction};
-use palpate_shared::format::{HeaderBuilder, Trained, TrainedTouches, checksum};
+use palpate_shared::format::{HeaderBuilder, Trained, TrainedProbe, TrainedTouches, checksum};
 use palpate_shared::{ContactTime, Touch};
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
@@ -543,6 +543,43 @@ fn the_timeout_is_that_of_the_model_and_so_no_full_touch_becomes_a_partial_one()
     let unstated = crate::Model::new(&unstated).unwrap();
     assert_eq!(SETTINGS.for_model(&unstated, &Scale::IDENTITY), SETTINGS);
     assert!(Settings::default().timeout > spread, "longer than the paper's probe takes");
+}
+
+#[test]
+fn the_timeout_of_a_model_with_a_stroke_is_the_strokes_time_and_what_comes_later_is_missing() {
+    let stroke = 300_000;
+    let touches = TrainedTouches { largest_spread: stroke, ..TrainedTouches::full(false) };
+    let probe = TrainedProbe {
+        radius: 0.15,
+        spacing: 1.5,
+        speed: 10.0,
+        length: palpate_shared::format::Length::Tenth,
+        stroke: Some(3.0),
+        travel: None,
+    };
+    let bytes = model_of(&Trained { touches: Some(touches), probe: Some(probe), ..Trained::default() });
+    let model = crate::Model::new(&bytes).unwrap();
+    for (last, expected) in [(stroke, Some(stroke)), (stroke + 1, None), (stroke + 9_000, None)] {
+        let mut effector = Effector::new(SETTINGS.for_model(&model, &Scale::IDENTITY));
+        let mut outcomes = Outcomes::new();
+        poll(&mut effector, 50_000_u32.wrapping_sub(SETTINGS.release), &mut outcomes);
+        poll(&mut effector, 50_000, &mut outcomes);
+        for (finger, at) in [(First, 0), (Middle, 70_000), (Last, last)] {
+            outcomes.extend(effector.edge(Edge::new(finger, true, 50_000 + at)).transpose());
+        }
+        poll(&mut effector, 100_000 + last, &mut outcomes);
+        let last = expected.map_or(ContactTime::MISSING, ContactTime::from_micros);
+        assert_eq!(outcomes, [Ok(Touch::new([ContactTime::FIRST, ContactTime::from_micros(70_000), last]))]);
+    }
+    // With another probe, too, no contact that it waits for is later to the model than its stroke.
+    for (spacing, speed) in [(7, 10), (10, 5), (19, 3), (5, 31)] {
+        let scale = Scale::new(Geometry { spacing: 10, speed: 10 }, Geometry { spacing, speed }).unwrap();
+        let longest = SETTINGS.for_model(&model, &scale).timeout - 1;
+        for times in [[0, longest / 2, longest], [0, longest, 0], [longest, 0, longest]] {
+            let touch = scale.apply(&Touch::from_micros(times));
+            assert!(touch.spread() <= stroke, "{spacing} {speed}: {touch:?}");
+        }
+    }
 }
 
 /// A model without a tree.

@@ -70,7 +70,7 @@ pub const MUST_UNDERSTAND: u16 = 1 << 15;
 /// Bytes before a section's content: tag, two zeros, length.
 pub const SECTION_HEADER_LENGTH: usize = 8;
 
-/// The probe that a model was trained for: 16 bytes.
+/// The probe that a model was trained for: 16 bytes, or 24 where it states how far the hand goes.
 ///
 /// The header's `spacing` and `speed` are those of the simulated training; here they are as the user stated them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,36 +83,52 @@ pub struct TrainedProbe {
     pub speed: f32,
     /// Unit of a length.
     pub length: Length,
+    /// How far the hand goes on after the first contact, in lengths; none: past the object.
+    pub stroke: Option<f32>,
+    /// How far it goes from its start before an approach is a miss, in lengths; none: past the object.
+    pub travel: Option<f32>,
 }
 
 impl TrainedProbe {
-    /// Bytes of the section.
+    /// Bytes of the section without stroke and travel: the least that it has.
     pub const LENGTH: usize = 16;
 
-    /// The section's content.
-    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
-        let numbers = [self.radius, self.spacing, self.speed].map(f32::to_le_bytes);
-        let mut bytes = [0; Self::LENGTH];
+    /// Bytes of the section with them.
+    pub const WITH_HAND: usize = 24;
+
+    /// The section's content: of these bytes the first [`length`](Self::length).
+    pub fn to_bytes(self) -> [u8; Self::WITH_HAND] {
+        let [radius, spacing, speed] = [self.radius, self.spacing, self.speed].map(f32::to_le_bytes);
+        let [stroke, travel] = [self.stroke, self.travel].map(|length| length.unwrap_or_default().to_le_bytes());
+        let numbers = [radius, spacing, speed, [self.length.code(), 0, 0, 0], stroke, travel];
+        let mut bytes = [0; Self::WITH_HAND];
         bytes.iter_mut().zip(numbers.into_iter().flatten()).for_each(|(to, from)| *to = from);
-        let [.., length, _, _, _] = &mut bytes;
-        *length = self.length.code();
         bytes
     }
 
-    /// Reads a section; `None` if a number is not positive and finite, or the unit of length does not exist. Bytes after
-    /// those that are known are ignored.
+    /// Bytes of the section's content: without stroke and travel as many as in version 0.2.
+    pub const fn length(&self) -> usize {
+        if self.stroke.is_none() && self.travel.is_none() { Self::LENGTH } else { Self::WITH_HAND }
+    }
+
+    /// Reads a section; `None` if a number is not positive and finite (stroke and travel may be 0, or not there), or the
+    /// unit of length does not exist. Bytes after those that are known are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let ([radius, spacing, speed, [length, ..]], _) = bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
+        let ([radius, spacing, speed, [length, ..]], rest) = bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
         let number = |bytes: &[u8; 4]| {
             let bits = u32::from_le_bytes(*bytes);
             // Positive and finite, without floating point.
             (bits.wrapping_sub(1) < f32::INFINITY.to_bits() - 1).then(|| f32::from_bits(bits))
         };
+        let stated = |bytes: &[u8; 4]| if *bytes == [0; 4] { Some(None) } else { number(bytes).map(Some) };
+        let [stroke, travel] = rest.first_chunk::<2>().unwrap_or(&[[0; 4]; 2]);
         Some(Self {
             radius: number(radius)?,
             spacing: number(spacing)?,
             speed: number(speed)?,
             length: Length::from_code(*length)?,
+            stroke: stated(stroke)?,
+            travel: stated(travel)?,
         })
     }
 }
@@ -127,7 +143,8 @@ pub struct TrainedTouches {
     /// True if a touch must have a pose.
     pub needs_pose: bool,
     /// The largest time between the first and the last contact of a touch, in microseconds; `u32::MAX` if it is not
-    /// known. An effector that waits for less turns full touches into partial ones.
+    /// known. An effector that waits for less turns full touches into partial ones. Of a probe with a stroke it is the time
+    /// that the stroke takes: an effector waits no longer, and what comes later is missing.
     pub largest_spread: u32,
 }
 
@@ -317,7 +334,8 @@ impl Trained {
     /// [`write_section`].
     pub fn write(&self, mut put: impl FnMut(&[u8])) {
         if let Some(probe) = self.probe {
-            write_section(Tag::Probe, false, &probe.to_bytes(), &mut put);
+            let bytes = probe.to_bytes();
+            write_section(Tag::Probe, false, bytes.get(..probe.length()).unwrap_or(&bytes), &mut put);
         }
         if let Some(touches) = self.touches {
             // Whoever does not know it would take as evidence what is none.
@@ -389,7 +407,8 @@ mod tests {
         needs_pose: true,
         largest_spread: 1_050_000,
     };
-    const PROBE: TrainedProbe = TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth };
+    const PROBE: TrainedProbe =
+        TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth, stroke: None, travel: None };
     const NOISE: TrainedNoise = TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 5_000 };
 
     #[test]
@@ -413,6 +432,18 @@ mod tests {
         assert_eq!(sections[3].content, b"seven b");
         for length in 0..16 {
             assert_eq!(take_section(&mut &bytes[..length]), None, "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn a_probe_states_its_stroke_and_travel_and_one_without_is_as_it_was() {
+        assert_eq!(PROBE.length(), 16);
+        assert_eq!(TrainedProbe::from_bytes(&PROBE.to_bytes()[..16]), Some(PROBE));
+        for (stroke, travel) in [(Some(3.0), None), (None, Some(20.0)), (Some(0.5), Some(20.0))] {
+            let probe = TrainedProbe { stroke, travel, ..PROBE };
+            assert_eq!(probe.length(), 24);
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "as far as it is whole");
         }
     }
 
@@ -452,6 +483,10 @@ mod tests {
         assert_eq!(TrainedNoise::from_bytes(&TrainedNoise { least: 20_000, ..NOISE }.to_bytes()), None);
         assert_eq!(TrainedTouches::from_bytes(&TOUCHES.to_bytes()[..7]), None);
         assert_eq!(TrainedProbe::from_bytes(&PROBE.to_bytes()[..15]), None);
+        for wrong in [-1.0, f32::NAN, f32::INFINITY] {
+            let probe = TrainedProbe { stroke: Some(wrong), ..PROBE };
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), None, "{wrong}");
+        }
         assert_eq!(TrainedNoise::from_bytes(&NOISE.to_bytes()[..15]), None);
     }
 

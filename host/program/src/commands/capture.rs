@@ -92,7 +92,37 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json {
         return output::print_json(&summary);
     }
-    output::print(&if settings.origin.approaches { kept(&summary) } else { table(&summary) })
+    let text = if settings.origin.approaches { kept(&summary) } else { table(&summary) };
+    output::print(&(text + &unreached(&summary, &settings.origin)))
+}
+
+/// Contacts that are missing because the hand had stopped, by finger, and why.
+fn unreached(summary: &Summary, origin: &Origin) -> String {
+    let approaches: u64 = summary.objects.iter().map(|object| object.approaches_now).sum();
+    let percent = |count: u64| 100.0 * count as f64 / approaches.max(1) as f64;
+    let mut text = String::new();
+    if let Some((stroke, window)) = origin.probe.stroke.zip(origin.probe.window()) {
+        let late = |finger: usize| percent(summary.objects.iter().map(|object| object.late[finger]).sum());
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "Missing since they came later than the stroke of {stroke} ({:.3} s after the first contact): contacts of finger \
+             1 in {:.1} % of the approaches, of finger 2 in {:.1} %, of finger 3 in {:.1} %.",
+            f64::from(window) / 1e6,
+            late(0),
+            late(1),
+            late(2),
+        );
+    }
+    if let Some(travel) = origin.probe.travel {
+        let turned_back = percent(summary.objects.iter().map(|object| object.turned_back).sum());
+        _ = writeln!(
+            text,
+            "Missing since the object was farther away than the travel of {travel}: all contacts in {turned_back:.1} % of the \
+             approaches."
+        );
+    }
+    text
 }
 
 impl Arguments {

@@ -38,7 +38,7 @@ enum Command {
 #[command(after_help = "\
 Tries probes in the simulator. For each, a model is trained and tested on other approaches; the best probe needs the fewest approaches at the error rate. DIR gets probe.toml, the best probe, and design.html, which says what another one would cost. Lengths are in units, a tenth of the object's longest side, or with --true-size in millimeters. Figures compare probes and promise nothing.
 
-Keys of --search: spacing, radius and tilt, each a range such as 1..2 or one number; aim, such as box+middle+mass; speed, one number.
+Keys of --search: spacing, radius, tilt and stroke, each a range such as 1..2 or one number; aim, such as box+middle+mass; speed, one number.
 
 Examples:
   palpate probe design meshes/ -o design
@@ -83,6 +83,7 @@ struct Search {
     spacing: Option<RangeInclusive<f64>>,
     radius: Option<RangeInclusive<f64>>,
     tilt: Option<RangeInclusive<f64>>,
+    stroke: Option<RangeInclusive<f64>>,
     aims: Option<Vec<Aim>>,
     speed: Option<f64>,
 }
@@ -104,6 +105,7 @@ impl FromStr for Search {
                 "spacing" => search.spacing = Some(range(value).map_err(said)?),
                 "radius" => search.radius = Some(range(value).map_err(said)?),
                 "tilt" => search.tilt = Some(range(value).map_err(said)?),
+                "stroke" => search.stroke = Some(range(value).map_err(said)?),
                 "aim" => {
                     let aims = value.split('+').map(|aim| super::capture::aim(aim.trim())).collect::<Result<_, _>>();
                     search.aims = Some(aims.map_err(said)?);
@@ -113,7 +115,9 @@ impl FromStr for Search {
                     search.speed = Some(speed.ok_or_else(|| said("give a number".into()))?);
                 }
                 _ => {
-                    return Err(format!("{part:?} is nothing to search; use spacing=1..2, radius, tilt, aim or speed"));
+                    return Err(format!(
+                        "{part:?} is nothing to search; use spacing=1..2, radius, tilt, stroke, aim or speed"
+                    ));
                 }
             }
         }
@@ -169,11 +173,12 @@ impl DesignArguments {
             true => Settings::at_true_size(objects).ok_or_else(unknown)?,
             false => Settings::default(),
         };
-        let Search { spacing, radius, tilt, aims, speed } = self.search.clone();
+        let Search { spacing, radius, tilt, stroke, aims, speed } = self.search.clone();
         Ok(Settings {
             spacing: spacing.unwrap_or_else(|| usual.spacing.clone()),
             radius: radius.unwrap_or_else(|| usual.radius.clone()),
             tilt: tilt.unwrap_or(TILT),
+            stroke,
             aims: aims.unwrap_or_else(|| Aim::ALL.into()),
             speed: speed.unwrap_or(usual.speed),
             noise: self.noise()?,
@@ -192,13 +197,14 @@ impl DesignArguments {
         let range = |range: &RangeInclusive<f64>| format!("{}..{}", range.start(), range.end());
         let aims: Vec<&str> = settings.aims.iter().map(|aim| aim.name()).collect();
         format!(
-            "palpate probe design {} -o {} --search spacing={},radius={},tilt={},aim={},speed={} --real noise={}us \
+            "palpate probe design {} -o {} --search spacing={},radius={},tilt={}{},aim={},speed={} --real noise={}us \
              --error-rate {} --descriptor {} --evidence {} --approaches {} --sequences {} --seed {}{}",
             self.sources.join(" "),
             self.output.display(),
             range(&settings.spacing),
             range(&settings.radius),
             range(&settings.tilt),
+            settings.stroke.as_ref().map_or_else(String::new, |stroke| format!(",stroke={}", range(stroke))),
             aims.join("+"),
             settings.speed,
             settings.noise,
@@ -225,6 +231,18 @@ fn table(design: &Design) -> String {
     head(&mut text, "Every spacing at the best radius, tilt and aim", &design.by_spacing);
     for trial in &design.by_spacing {
         line(&mut text, if trial == best { "*" } else { "" }, trial);
+    }
+    _ = writeln!(text, "\nThe best probe with other strokes, {} approaches per object to train on", best.trained_on);
+    _ = writeln!(text, "  {:>12} {:>10} {:>6} {:>6}", "stroke", "approaches", "±", "errors");
+    for trial in &design.by_stroke {
+        let stroke = trial.probe.stroke.map_or("past it".into(), |stroke| stroke.to_string());
+        let approaches = format!("{}{:.1}", if trial.reached { "" } else { ">" }, trial.approaches);
+        let (error, mark) = (100.0 * trial.error, if trial == best { "*" } else { "" });
+        _ = writeln!(
+            text,
+            "{mark:1} {stroke:>12} {approaches:>10} {:>6.1} {error:>5.1}%",
+            trial.approaches_standard_error
+        );
     }
     head(&mut text, palpate_report::design::published(design), std::slice::from_ref(&design.published));
     line(&mut text, "", &design.published);

@@ -4,11 +4,12 @@ use super::numbers::count;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::{Global, remark};
-use palpate::error::FitProblem;
+use palpate::error::{FitProblem, ProbeProblem};
 use palpate::fit::{Estimate, Fit, Settings, between, fit};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
 use palpate::{Error, Result};
+use palpate_shared::format::Length;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -54,7 +55,17 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     if recorded.origin.as_ref().is_none_or(|origin| origin.probe == Origin::default().probe) {
         refuse_unstated(&arguments.size)?;
     }
-    let origin = arguments.size.origin(base)?;
+    let there = base.probe.stroke;
+    let mut origin = arguments.size.origin(base)?;
+    // The stroke that the recordings state holds where the file states none; one that differs is refused.
+    match (there, origin.probe.stroke) {
+        (Some(there), Some(given)) if there != given => {
+            let [first, second] = ["the probe file", "the data set"].map(str::to_owned);
+            let differences = format!("stroke {given} and {there}");
+            return Err(ProbeProblem::Differs { first, second, differences }.into());
+        }
+        (_, given) => origin.probe.stroke = given.or(there),
+    }
     let objects = arguments.size.objects(&arguments.sources, global.seed())?;
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
     let settings = Settings { origin, approaches: arguments.approaches, seed: global.seed() };
@@ -109,10 +120,16 @@ fn table(found: &Fit) -> String {
     for (name, missed) in ["first", "second", "third"].into_iter().zip(found.missed.iter().flatten()) {
         line(&format!("{name} finger misses"), missed, 100.0, 1, " %");
     }
+    if let Some(stroke) = &found.stroke {
+        line("stroke", stroke, 1.0, 3, if found.unit == Length::Tenth { "" } else { " mm" });
+    }
     _ = match found.timer {
         Some(timer) => writeln!(text, "{:22}{:>10}", "timer", format!("{timer} ms")),
         None => writeln!(text, "{:22}{:>10}", "timer", "none found"),
     };
+    if found.stroke.is_some() {
+        text += "\nThe stroke was not stated: no recorded contact is later, where many would be.";
+    }
     text += "\nOffsets are relative to the first finger's: only differences of times are recorded.\n";
     for warning in &found.warnings {
         _ = writeln!(text, "Not told well: {warning}");

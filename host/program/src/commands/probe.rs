@@ -4,6 +4,7 @@ use super::remark;
 use palpate::ensemble::StatedProbe;
 use palpate::error::ProbeProblem;
 use palpate::mesh::{BACKGROUND, Object, builtin, source};
+use palpate::probe::Probe;
 use palpate::probe::file::ProbeFile;
 use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
@@ -50,9 +51,11 @@ impl ProbeArguments {
         let Some(file) = file else { return Ok(own) };
         let given = StatedProbe { probe: file.probe, unit: file.unit, ..StatedProbe::default() };
         let name = self.path().map_or_else(String::new, |path| path.display().to_string());
-        if let Some(own) = own {
-            StatedProbe::compare([&name, "the data set"], [given.trained(), own.trained()])?;
-        }
+        StatedProbe::compare_with([&name, "the data set"], Some(given.trained()), u32::MAX, dataset)?;
+        // Recordings need not state the stroke that a file states.
+        let stroke = given.probe.stroke.filter(|_| dataset.is_recorded());
+        let own =
+            own.map(|own| StatedProbe { probe: Probe { stroke: own.probe.stroke.or(stroke), ..own.probe }, ..own });
         Ok(own.or(Some(given)))
     }
 

@@ -50,6 +50,10 @@ class Probe:
     """The probe's speed, in units per second."""
     tilt: float = 10.0
     """The largest tilt of the row to either side, in degrees."""
+    stroke: float | None = None
+    """How far the hand goes on after the first contact; a later contact is missing. None: past the object."""
+    travel: float | None = None
+    """How far the hand goes from its start before an approach is a miss. None: past the object."""
 
 
 @dataclass(frozen=True)

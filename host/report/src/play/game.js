@@ -18,8 +18,8 @@ function openGame(data) {
     new Uint8Array(exports.memory.buffer, at, all.length).set(all);
   };
 
-  const { radius, spacing, speed, tilt } = data.probe;
-  sure(exports.start(data.millimeters ? 1 : 0, data.aim, radius, spacing, speed, tilt), "the probe");
+  const { radius, spacing, speed, tilt, stroke = 0, travel = 0 } = data.probe;
+  sure(exports.start(data.millimeters ? 1 : 0, data.aim, radius, spacing, speed, tilt, stroke, travel), "the probe");
   // An object is put on the table when it is first needed: that takes a while. Its number there.
   const numbers = data.objects.map(() => null);
   const add = ({ name, mesh, length }) => {
@@ -44,12 +44,12 @@ function openGame(data) {
   // What an approach put out; null where there was none.
   const approached = (done) => {
     if (done < 0) return null;
-    const numbers = [...taken(19)];
+    const numbers = [...taken(22)];
     const three = (at) => numbers.slice(at, at + 3);
     const some = (at) => three(at).map((number) => (Number.isNaN(number) ? null : number));
     return {
       start: three(0), direction: three(3), alignment: three(6), distances: some(9), exact: some(12), times: some(15),
-      pattern: PATTERNS[numbers[18]],
+      pattern: PATTERNS[numbers[18]], unreached: three(19).map((reason) => [null, "stroke", "travel"][reason] ?? null),
     };
   };
   const VERDICTS = ["undecided", "recognized", "unknown", "gave up"];

@@ -345,6 +345,16 @@ fn notes(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) ->
                 @if timer > 0.0 { "; the timer counts steps of " (timer / 1e3) " ms" }
                 ". Times count from the first contact; – is a finger that missed."
             }
+            @if let Some((stroke, window)) = settings.origin.probe.stroke.zip(settings.origin.probe.window()) {
+                p {
+                    "The hand goes on for its stroke of " (stroke) " after the first contact, which takes "
+                    (f64::from(window) / 1e6) " s. What a finger would touch later, it does not touch: the contact is missing, \
+                     and the table says of which finger."
+                }
+            }
+            @if let Some(travel) = settings.origin.probe.travel {
+                p { "An approach without a contact ends after " (travel) ", the hand's travel." }
+            }
             @if contenders.iter().any(|contender| contender.expected.is_some()) {
                 p {
                     "The expected number is the mean that the program measured on captured approaches, with "

@@ -106,8 +106,13 @@
       : "";
   };
   const MOST_ROWS = 200;
-  const list = ({ times, pattern }) => {
-    const row = rowOf([approaches, ...times.map(milliseconds), pattern], 0);
+  // Which fingers had the object in their way, and the hand stopped before: after the first contact, or before any.
+  const because = (unreached) => ["stroke", "travel"].map((reason) => {
+    const fingers = [1, 2, 3].filter((finger) => unreached[finger - 1] === reason);
+    return fingers.length ? `; finger ${fingers.join(" and ")} beyond the ${reason}` : "";
+  }).join("");
+  const list = ({ times, pattern, unreached }) => {
+    const row = rowOf([approaches, ...times.map(milliseconds), pattern + because(unreached)], 0);
     [0, 1, 2, 3].forEach((column) => row.cells[column].classList.add("number"));
     const body = element("touches").tBodies[0];
     body.prepend(row);

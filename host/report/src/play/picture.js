@@ -5,7 +5,7 @@ function openPicture(data, touch) {
   const view = openStage();
   if (!view) return { show() {}, clear() {}, approach() {}, propose() {} };
   const { scene, color, draw } = view;
-  const { radius, spacing } = data.probe;
+  const { radius, spacing, stroke, travel } = data.probe;
   const vector = (numbers) => new THREE.Vector3(...numbers);
   const hues = ["first", "middle", "last"].map(color);
 
@@ -86,10 +86,12 @@ function openPicture(data, touch) {
     draw();
   };
 
-  // Where each finger starts and ends: one that misses goes on beyond the object.
+  // Where each finger starts and ends: one that misses goes on beyond the object, as far as the hand does.
   const paths = ({ start, direction, alignment, distances }) => [-1, 0, 1].map((place, finger) => {
     const from = vector(start).addScaledVector(vector(alignment), place * spacing);
-    const way = distances[finger] ?? -2 * from.dot(vector(direction));
+    const contacts = distances.filter((distance) => distance !== null);
+    const end = contacts.length ? Math.min(...contacts) + (stroke ?? Infinity) : (travel ?? Infinity);
+    const way = distances[finger] ?? Math.min(-2 * from.dot(vector(direction)), end);
     return [from, from.clone().addScaledVector(vector(direction), way)];
   });
   // Moves the fingers to their contacts, all at the same speed, within 0.6 s; at once where that is asked for.

@@ -3,6 +3,7 @@
 use super::{Contender, Settings, Surface};
 use palpate::capture::touches;
 use palpate::error::{EvaluateProblem, Result};
+use palpate::probe::hand::within;
 use palpate::probe::scene::Scene;
 use palpate::touches::Origin;
 use palpate_onboard::{CapacityError, Recognizer, Stopping, Verdict};
@@ -27,7 +28,8 @@ pub fn trace(surfaces: &[Surface], contenders: &[Contender], settings: &Settings
             let origin = Origin { approaches: true, pose: true, seed, ..settings.origin.clone() };
             let captured = touches(&scene, &surface.name, &origin, 0..ROUND)?;
             let noisy = |(index, touch): (u64, &Touch)| {
-                settings.noise.add(&surface.name, std::slice::from_ref(touch), (seed << 32) + index).pop()
+                let noisy = settings.noise.add(&surface.name, std::slice::from_ref(touch), (seed << 32) + index).pop();
+                noisy.map(|touch| within(&touch, origin.probe.window()))
             };
             let sensed: Vec<Touch> = (0..).zip(captured.touches()).filter_map(noisy).collect();
             let models: Vec<_> = contenders.iter().map(|contender| contender.model.model()).collect();

@@ -27,12 +27,20 @@ pub struct Probe {
     pub speed: f64,
     /// Largest tilt of the row of fingers from the perpendicular to the motion, in degrees, to either side.
     pub tilt: f64,
+    /// How far the hand goes on after the first contact, in units, at the nominal speed: a contact that comes later than it
+    /// takes for that is missing. None: as far as any finger needs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stroke: Option<f64>,
+    /// How far the hand goes from its start before an approach without a contact counts as a miss, in units. None: past the
+    /// object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub travel: Option<f64>,
 }
 
-/// The published probe: radius 0.15, spacing 1.5, 10 units per second, ±10°.
+/// The published probe: radius 0.15, spacing 1.5, 10 units per second, ±10°, and a hand that goes on past the object.
 impl Default for Probe {
     fn default() -> Self {
-        Self { radius: 0.15, spacing: 1.5, speed: 10.0, tilt: 10.0 }
+        Self { radius: 0.15, spacing: 1.5, speed: 10.0, tilt: 10.0, stroke: None, travel: None }
     }
 }
 
@@ -54,6 +62,15 @@ impl Probe {
         }
         if !(0.0..90.0).contains(&self.tilt) {
             return Err(Error::setting("tilt", self.tilt, "a number of degrees from 0 to less than 90"));
+        }
+        for (name, value) in [("stroke", self.stroke), ("travel", self.travel)] {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Error::setting(name, value, "a length greater than 0, or leave it out"));
+            }
+        }
+        if self.window() == Some(0) {
+            let stroke = self.stroke.unwrap_or_default();
+            return Err(Error::setting("stroke", stroke, "a longer one: one that takes a microsecond or more"));
         }
         // Twice the diagonal of a cube, the clearance, and the row, generously.
         let longest_way = 4.0 * length + 2.0 * (CLEARANCE + self.spacing + self.radius);

@@ -19,6 +19,26 @@ pub enum ProbeProblem {
         /// The differences: "radius 0.15 and 0.3".
         differences: String,
     },
+    /// Recorded touches were made with another stroke than a model or a file states.
+    #[error(
+        "{first} has {stroke}, and in {second} {}",
+        match is_later {
+            true => format!("contacts come up to {latest} after the first"),
+            false => format!("no contact is later than {latest} after the first, though many come just before"),
+        }
+    )]
+    OtherStroke {
+        /// The side that states the stroke, such as "the model".
+        first: String,
+        /// The touches.
+        second: String,
+        /// The stated stroke, as a length and as a time.
+        stroke: String,
+        /// The latest contact.
+        latest: String,
+        /// True if contacts are later than the stroke; else they end before.
+        is_later: bool,
+    },
     /// A probe file is not TOML, or not a probe.
     #[error("not a usable probe file: {message}")]
     BadFile {
@@ -57,8 +77,13 @@ impl Problem for ProbeProblem {
     fn fix(&self) -> String {
         match self {
             Self::Differs { .. } => "Use both with the same probe: with another, times have another meaning.".into(),
+            Self::OtherStroke { .. } => {
+                "Train for the stroke of the hand that made the touches: state it as stroke in probe.toml, or let `palpate probe \
+                 fit` estimate it."
+                    .into()
+            }
             Self::BadFile { .. } => {
-                "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, timer and [real].".into()
+                "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, stroke, travel, timer and [real].".into()
             }
             Self::BadQuantity { example, .. } => format!("Give {example}."),
             Self::CastFields { .. } | Self::CastCoordinate { .. } | Self::CastTime { .. } => {

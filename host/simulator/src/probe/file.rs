@@ -6,6 +6,8 @@
 //! spacing = 15.0    # between neighboring fingers
 //! speed = 100.0     # per second
 //! tilt = 10.0       # degrees; the default
+//! stroke = 30.0     # how far the hand goes on after the first contact; later ones are missing. By default past the object
+//! travel = 200.0    # how far it goes from its start before an approach is a miss; by default past the object
 //! timer = "1ms"     # the timer's resolution; by default none
 //!
 //! [real]                          # what the real probe adds; all of it may be left out
@@ -20,7 +22,7 @@
 //! pose_bias = "1deg"
 //! ```
 //!
-//! Radius, spacing, speed and unit are what a data set and a model state and what is compared. What the real probe adds
+//! Radius, spacing, speed, stroke and unit are what a data set and a model state and what is compared. What the real probe adds
 //! is not compared: it is added to touches by a capture with this file or else in training and testing, and never twice.
 
 use crate::error::{Error, Place, ProbeProblem, Problem, Result};
@@ -52,6 +54,8 @@ struct Document {
     speed: f64,
     #[serde(default = "tilt")]
     tilt: f64,
+    stroke: Option<f64>,
+    travel: Option<f64>,
     #[serde(default, deserialize_with = "duration")]
     timer: Option<f64>,
     #[serde(default)]
@@ -118,7 +122,7 @@ impl ProbeFile {
     }
 
     fn of(document: &Document) -> Self {
-        let Document { unit, radius, spacing, speed, tilt, timer, ref real } = *document;
+        let Document { unit, radius, spacing, speed, tilt, stroke, travel, timer, ref real } = *document;
         let real = Noise {
             deviation: real.noise.unwrap_or_default(),
             timer: real.timer.or(timer).unwrap_or_default(),
@@ -132,7 +136,7 @@ impl ProbeFile {
             pose: real.pose_noise.unwrap_or_default(),
             pose_bias: real.pose_bias.unwrap_or_default(),
         };
-        Self { probe: Probe { radius, spacing, speed, tilt }, unit, real }
+        Self { probe: Probe { radius, spacing, speed, tilt, stroke, travel }, unit, real }
     }
 }
 
@@ -199,7 +203,7 @@ mod tests {
 
     #[test]
     fn measures_are_enough_and_a_unit_is_a_tenth_of_the_longest_side() {
-        let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 10.0 };
+        let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, ..Probe::default() };
         assert_eq!(parse(MEASURES).unwrap(), ProbeFile { probe, unit: Length::Tenth, real: Noise::default() });
     }
 
@@ -227,6 +231,18 @@ mod tests {
         assert_eq!(file.real, real);
         let each = parse(&text.replace("\"2%\"", "[\"1%\", \"0.02\", \"0%\"]")).unwrap();
         assert_eq!(each.real, Noise { missed: [0.01, 0.02, 0.0], ..real });
+    }
+
+    #[test]
+    fn a_stroke_and_a_travel_are_lengths_in_the_unit_of_the_file() {
+        let file = parse(&format!("{MEASURES}stroke = 30\ntravel = 200.5\n")).unwrap();
+        assert_eq!((file.probe.stroke, file.probe.travel), (Some(30.0), Some(200.5)));
+        assert_eq!(file.probe.window(), Some(300_000));
+        for (text, named) in [("stroke = 0", "stroke"), ("travel = -3", "travel"), ("stroke = \"3\"", "floating point")]
+        {
+            let error = parse(&format!("{MEASURES}{text}\n")).unwrap_err().to_string();
+            assert!(error.starts_with("probe.toml:") && error.contains(named), "{error}");
+        }
     }
 
     #[test]

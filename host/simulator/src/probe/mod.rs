@@ -5,6 +5,7 @@
 //!   probe starts, in which direction it moves, how its row of fingers is turned. It gives the distance that each finger
 //!   travels, and from these distances a touch.
 //! - [`sweep`] finds the first contact of one sphere with the mesh: boxes, then a quick reject, then the exact time.
+//! - [`hand`] says how far the hand goes, and which contacts it therefore never makes.
 //! - [`mod@file`] reads a probe from a TOML file, with what a real one adds; [`noise`] adds it to touches.
 //! - [`cast`] reads spheres and known contact times from a file, to compare this simulator with another.
 //!
@@ -39,6 +40,7 @@ pub mod approach;
 pub mod cast;
 mod error;
 pub mod file;
+pub mod hand;
 pub mod noise;
 pub mod scene;
 pub mod sweep;

@@ -100,6 +100,10 @@ pub struct Probe {
     pub speed: f32,
     /// Unit of lengths: "unit", a tenth of the object's longest side, or "mm".
     pub unit: &'static str,
+    /// How far the hand goes on after the first contact; null: past the object.
+    pub stroke: Option<f32>,
+    /// How far it goes from its start before an approach is a miss; null: past the object.
+    pub travel: Option<f32>,
     /// True if the model states its probe; otherwise the published one is assumed.
     pub stated: bool,
 }
@@ -171,8 +175,8 @@ pub(super) fn features(model: &Model<'_>) -> Vec<Feature> {
 /// The probe that a model states, or the one that its header assumes.
 pub(super) fn probe(model: &Model<'_>) -> Probe {
     match model.probe() {
-        Some(TrainedProbe { radius, spacing, speed, length }) => {
-            Probe { radius: Some(radius), spacing, speed, unit: length.name(), stated: true }
+        Some(TrainedProbe { radius, spacing, speed, length, stroke, travel }) => {
+            Probe { radius: Some(radius), spacing, speed, unit: length.name(), stroke, travel, stated: true }
         }
         None => {
             let header = model.header();
@@ -181,6 +185,8 @@ pub(super) fn probe(model: &Model<'_>) -> Probe {
                 spacing: header.spacing(),
                 speed: header.speed(),
                 unit: Length::Tenth.name(),
+                stroke: None,
+                travel: None,
                 stated: false,
             }
         }

@@ -350,6 +350,8 @@ struct Evidence<'d> {
     objects: Vec<Cow<'d, [Touch]>>,
     counted: Counted,
     needs_pose: bool,
+    /// The stroke as a time, where the probe has one.
+    window: Option<u32>,
 }
 
 impl<'d> Evidence<'d> {
@@ -366,7 +368,7 @@ impl<'d> Evidence<'d> {
             let mut touches: Cow<'_, [Touch]> = if settings.noise.is_none() {
                 object.touches().into()
             } else {
-                settings.noise.add(&object.name, object.touches(), settings.seed).into()
+                object.within_stroke(settings.noise.add(&object.name, object.touches(), settings.seed)).into()
             };
             if !touches.iter().all(counts) {
                 touches.to_mut().retain(counts);
@@ -376,7 +378,9 @@ impl<'d> Evidence<'d> {
                 _ => Ok(touches),
             }
         });
-        Ok(Self { objects: objects.collect::<Result<_>>()?, counted, needs_pose })
+        let probe = settings.probe.map(|stated| stated.probe).or(dataset.probe().copied());
+        let window = probe.and_then(|probe| probe.window());
+        Ok(Self { objects: objects.collect::<Result<_>>()?, counted, needs_pose, window })
     }
 
     /// Statement of the ensemble about them.
@@ -386,7 +390,7 @@ impl<'d> Evidence<'d> {
             patterns: touches().map(Touch::pattern).collect::<Patterns>(),
             counted: self.counted,
             needs_pose: self.needs_pose,
-            largest_spread: touches().map(Touch::spread).max().unwrap_or(u32::MAX),
+            largest_spread: self.window.or_else(|| touches().map(Touch::spread).max()).unwrap_or(u32::MAX),
         }
     }
 }

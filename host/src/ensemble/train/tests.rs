@@ -307,3 +307,23 @@ fn an_object_without_a_touch_that_counts_is_named() {
     let problem = EnsembleProblem::NothingCounts { object: "fork".into(), counted: Counted::Full };
     assert_eq!(error.problem::<EnsembleProblem>(), Some(&problem), "{error}");
 }
+
+#[test]
+fn a_stroke_is_the_largest_spread_of_the_ensemble_and_of_every_compiled_model() {
+    let mut dataset = approaches();
+    let probe = crate::probe::Probe { stroke: Some(0.05), travel: Some(20.0), ..Default::default() };
+    dataset.origin = Some(crate::touches::Origin { probe, approaches: true, ..Default::default() });
+    dataset = dataset.each(|own| own.clone().of_stroke(probe.window()));
+    let noise = Noise::gaussian(2_000.0);
+    let settings = Settings { probe: StatedProbe::of(&dataset), noise, ..quick() };
+    let ensemble = train(&dataset, &settings, &()).unwrap();
+    assert_eq!(ensemble.trained_touches().largest_spread, 5_000);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    ensemble.save(file.path()).unwrap();
+    assert_eq!(Ensemble::load(file.path()).unwrap(), ensemble);
+    let compiled = crate::compile::compile(&ensemble, &crate::compile::Settings::default()).unwrap();
+    let model = crate::compile::open(&compiled.bytes).unwrap();
+    assert_eq!(model.trained_touches().largest_spread, 5_000);
+    let stated = model.probe().unwrap();
+    assert_eq!((stated.stroke, stated.travel), (Some(0.05), Some(20.0)));
+}

@@ -14,6 +14,7 @@ use super::listing::is_file_name;
 use super::{Entry, Format, Listing, Origin, Warning, text, write_touch};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
+use crate::probe::hand;
 use crc::{Digest, Table};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
@@ -199,7 +200,8 @@ impl Recording {
     /// Adds a touch. When this returns, the touch is on the disk.
     ///
     /// # Errors
-    /// [`TouchesProblem::NoPose`] if it [lacks its pose](Self::lacks_pose); when the file cannot be written.
+    /// [`TouchesProblem::NoPose`] if it [lacks its pose](Self::lacks_pose); [`TouchesProblem::LaterThanStroke`] if a contact is
+    /// later than the stroke that the data set states; when the file cannot be written.
     pub fn add(&mut self, touch: &Touch) -> Result<()> {
         self.append(std::slice::from_ref(touch))?;
         if self.checkpointed.elapsed() >= CHECKPOINT { self.checkpoint() } else { Ok(()) }
@@ -225,6 +227,14 @@ impl Recording {
     fn append(&mut self, touches: &[Touch]) -> Result<()> {
         if touches.iter().any(|touch| self.lacks_pose(touch)) {
             return Err(TouchesProblem::NoPose.into());
+        }
+        let probe = &self.listing.origin.probe;
+        let window = probe.window().map(|window| f64::from(window) * (1.0 + hand::TOLERANCE));
+        let is_late = |touch: &&Touch| window.is_some_and(|window| f64::from(touch.spread()) > window);
+        if let Some((touch, stroke)) = touches.iter().find(is_late).zip(probe.stroke) {
+            let seconds = |micros: u32| format!("{:.3} s", f64::from(micros) / 1e6);
+            let stroke = format!("{stroke} ({})", seconds(probe.window().unwrap_or_default()));
+            return Err(TouchesProblem::LaterThanStroke { stroke, latest: seconds(touch.spread()) }.into());
         }
         let lines = lines(touches);
         if self.recorded.touches == 0 {
@@ -317,6 +327,12 @@ fn differences(there: &Origin, here: &Origin) -> Vec<String> {
     if there.unit != here.unit {
         differences.push(format!("unit is {} there and {} here", there.unit.name(), here.unit.name()));
     }
+    let hand = |origin: &Origin| [("stroke", origin.probe.stroke), ("travel", origin.probe.travel)];
+    let said = |length: Option<f64>| length.map_or("none".into(), |length| length.to_string());
+    let pairs = hand(there).into_iter().zip(hand(here)).filter(|(there, here)| there != here);
+    differences.extend(
+        pairs.map(|((name, there), (_, here))| format!("{name} is {} there and {} here", said(there), said(here))),
+    );
     let pairs = numbers(there).into_iter().zip(numbers(here)).filter(|(there, here)| there != here);
     differences.extend(pairs.map(|((name, there), (_, here))| format!("{name} is {there} there and {here} here")));
     if there.pose != here.pose {

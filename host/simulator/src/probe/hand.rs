@@ -1,0 +1,97 @@
+//! The end of an approach: how far the hand goes, and the contacts that it therefore never makes.
+//!
+//! A hand goes on after the first contact, while that finger gives way or is drawn back, until it has moved by its stroke.
+//! What another finger would touch later is never touched: its contact is missing, as one that does not exist. Without any
+//! contact the hand goes on for its travel, and the approach is a miss.
+//!
+//! The stroke counts at the nominal speed, so that it is a time on the clock of every part that measures contacts: of an
+//! effector, which stops waiting for a finger, as well as of a recording, in which no contact is later.
+
+use super::approach::{FINGERS, Probe};
+use palpate_shared::{ContactTime, Touch};
+
+/// A recorded contact may be later than the stroke by this share of it: clocks and lengths are a little off.
+pub const TOLERANCE: f64 = 0.02;
+
+/// Reason why a finger has no contact, though the object lies in its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unreached {
+    /// The hand had stopped: the contact is farther behind the first one than the stroke.
+    Stroke,
+    /// The hand had turned back without a contact: the object is farther away than the travel.
+    Travel,
+}
+
+impl Probe {
+    /// The stroke as a time: the latest contact after the first one, in microseconds. None without a stroke.
+    pub fn window(&self) -> Option<u32> {
+        let micros = |stroke: f64| (stroke / self.speed * 1e6).round().clamp(0.0, f64::from(u32::MAX - 1)) as u32;
+        self.stroke.map(micros)
+    }
+
+    /// The distances of an approach without those behind the end of the travel: all, if the first contact is. The second
+    /// value is true for an approach that ends there.
+    pub fn within_travel(&self, distances: [Option<f64>; FINGERS]) -> ([Option<f64>; FINGERS], bool) {
+        let first = distances.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        match self.travel {
+            Some(travel) if first.is_finite() && first > travel => ([None; FINGERS], true),
+            _ => (distances, false),
+        }
+    }
+}
+
+/// The fingers whose contact in a touch is later than `window` microseconds.
+pub fn late(touch: &Touch, window: Option<u32>) -> [bool; FINGERS] {
+    let is_late = |time: ContactTime| time.micros().zip(window).is_some_and(|(micros, window)| micros > window);
+    touch.times().map(is_late)
+}
+
+/// The touch without the contacts that are later than `window` microseconds; the same without a window.
+#[must_use]
+pub fn within(touch: &Touch, window: Option<u32>) -> Touch {
+    let late = late(touch, window);
+    if late == [false; FINGERS] {
+        return *touch;
+    }
+    let mut times = touch.times();
+    times.iter_mut().zip(late).filter(|(_, late)| *late).for_each(|(time, _)| *time = ContactTime::MISSING);
+    let kept = Touch::new(times);
+    touch.pose().map_or(kept, |pose| kept.with_pose(pose))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_contact_later_than_the_stroke_is_missing_and_one_at_its_end_is_not() {
+        let probe = Probe { stroke: Some(3.0), ..Probe::default() };
+        assert_eq!(probe.window(), Some(300_000));
+        let touch = Touch::from_micros([300_001, 0, 300_000]);
+        assert_eq!(late(&touch, probe.window()), [true, false, false]);
+        assert_eq!(within(&touch, probe.window()).times().map(|time| time.micros()), [None, Some(0), Some(300_000)]);
+        assert_eq!(within(&touch, Probe::default().window()), touch);
+    }
+
+    #[test]
+    fn an_approach_whose_first_contact_is_behind_the_travel_is_a_miss() {
+        let probe = Probe { travel: Some(12.0), ..Probe::default() };
+        let reached = [Some(12.0), None, Some(15.0)];
+        assert_eq!(probe.within_travel(reached), (reached, false), "the hand goes on after a contact");
+        assert_eq!(probe.within_travel([Some(12.1), None, Some(15.0)]), ([None; FINGERS], true));
+        assert_eq!(probe.within_travel([None; FINGERS]), ([None; FINGERS], false));
+        assert_eq!(Probe::default().within_travel([Some(1e6), None, None]).0, [Some(1e6), None, None]);
+    }
+
+    #[test]
+    fn strokes_that_cannot_be_are_refused() {
+        for (stroke, travel) in
+            [(0.0, 9.0), (-1.0, 9.0), (f64::NAN, 9.0), (1e-9, 9.0), (3.0, 0.0), (3.0, f64::INFINITY)]
+        {
+            let probe = Probe { stroke: Some(stroke), travel: Some(travel), ..Probe::default() };
+            assert!(probe.check(10.0).is_err(), "{stroke} {travel}");
+        }
+        assert!(Probe { stroke: Some(0.5), travel: Some(30.0), ..Probe::default() }.check(10.0).is_ok());
+    }
+}

@@ -1,0 +1,103 @@
+//! A stroke from the probe through the model to touches that are recorded: what is the same passes, what differs is refused
+//! with both values.
+
+use crate::capture::in_memory;
+use crate::ensemble::train::{self, train};
+use crate::ensemble::{Ensemble, StatedProbe};
+use crate::error::ProbeProblem;
+use crate::evaluate::{Candidate, Margins};
+use crate::mesh::{Mesh, Object};
+use crate::probe::{Probe, hand};
+use crate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source};
+
+/// Two objects whose contacts come up to a second apart.
+fn captured(stroke: Option<f64>, seed: u64) -> Dataset {
+    let objects = [("rod", [1.0, 0.15, 0.15]), ("slab", [1.0, 0.6, 0.2])]
+        .map(|(name, shape)| Object::new(name, Mesh::globe(12).stretched(shape)));
+    let probe = Probe { stroke, ..Probe::default() };
+    let origin = Origin { touches: 3_000, approaches: true, seed, probe, ..Origin::default() };
+    in_memory(&objects, &origin.into(), &()).unwrap().0
+}
+
+/// The same touches from lines that state nothing.
+fn lines(dataset: &Dataset) -> Dataset {
+    let bare = |own: &ObjectTouches| ObjectTouches::new(&own.name, own.touches().to_vec(), Source::Object);
+    Dataset::new(dataset.objects.iter().map(bare).collect())
+}
+
+/// The same touches as a recording, whose probe states its stroke or none.
+fn recorded(dataset: &Dataset, stroke: Option<f64>) -> Dataset {
+    let one = |own: &ObjectTouches| {
+        let source = Source::Recording(Recorded { object: own.name.clone(), ..Recorded::default() });
+        ObjectTouches::new(&own.name, own.touches().to_vec(), source)
+    };
+    let probe = Probe { stroke, ..Probe::default() };
+    let origin = Origin::recorded(probe, palpate_shared::format::Length::Tenth, false);
+    Dataset { origin: Some(origin), ..Dataset::new(dataset.objects.iter().map(one).collect()) }
+}
+
+/// A model of touches with this stroke.
+fn model(stroke: Option<f64>) -> Ensemble {
+    let dataset = captured(stroke, 1);
+    let recipe = train::Settings { rounds: 3, probe: StatedProbe::of(&dataset), ..train::Settings::compact() };
+    train(&dataset, &recipe, &()).unwrap()
+}
+
+fn verdict(model: &Ensemble, dataset: &Dataset) -> Result<(), ProbeProblem> {
+    let found = Margins::new(Candidate::Full(model), dataset).map(|_| ());
+    found.map_err(|error| error.problem::<ProbeProblem>().unwrap_or_else(|| panic!("{error}")).clone())
+}
+
+#[test]
+fn touches_of_the_models_stroke_are_taken_and_of_another_refused_with_both_values() {
+    let (long, short) = (captured(None, 2), captured(Some(2.0), 2));
+    let [unlimited, limited] = [None, Some(2.0)].map(model);
+    for (model, dataset) in [(&unlimited, &long), (&limited, &short)] {
+        for same in [dataset.clone(), lines(dataset), recorded(dataset, None)] {
+            assert_eq!(verdict(model, &same), Ok(()));
+        }
+    }
+    assert_eq!(verdict(&limited, &recorded(&short, Some(2.0))), Ok(()));
+    // Stated.
+    for (model, dataset, said) in [
+        (&unlimited, &short, "stroke none and 2"),
+        (&limited, &long, "stroke 2 and none"),
+        (&limited, &recorded(&short, Some(3.0)), "stroke 2 and 3"),
+        (&unlimited, &recorded(&short, Some(2.0)), "stroke none and 2"),
+    ] {
+        let problem = verdict(model, dataset).unwrap_err();
+        assert!(matches!(problem, ProbeProblem::Differs { .. }) && problem.to_string().contains(said), "{problem}");
+    }
+    // Estimated.
+    for (model, dataset, parts) in [
+        (&unlimited, lines(&short), ["the model has no stroke", "no contact is later than 0.2"]),
+        (&unlimited, recorded(&short, None), ["the model has no stroke", "no contact is later than 0.2"]),
+        (&limited, lines(&long), ["a stroke of 2 (0.200 s)", "contacts come up to "]),
+        (&limited, recorded(&long, None), ["a stroke of 2 (0.200 s)", "contacts come up to "]),
+        (&limited, lines(&captured(Some(1.0), 2)), ["a stroke of 2 (0.200 s)", "no contact is later than 0.1"]),
+    ] {
+        let problem = verdict(model, &dataset).unwrap_err();
+        assert!(matches!(problem, ProbeProblem::OtherStroke { .. }), "{problem}");
+        assert!(parts.iter().all(|part| problem.to_string().contains(part)), "{problem}");
+    }
+}
+
+#[test]
+fn a_recorded_contact_a_little_after_the_stroke_is_missing_as_on_the_chip() {
+    let limited = model(Some(2.0));
+    let late = lines(&captured(Some(2.0), 2))
+        .each(|own| own.changed(|touch| if touch.spread() > 190_000 { stretched(touch) } else { *touch }));
+    assert!(late.touches().any(|touch| touch.spread() > 200_000));
+    let cut = late.each(|own| own.changed(|touch| hand::within(touch, Some(200_000))));
+    let accuracy = |dataset: &Dataset| {
+        let margins = Margins::new(Candidate::Full(&limited), dataset).unwrap();
+        margins.confusion(5, 500, 1).unwrap()
+    };
+    assert_eq!(accuracy(&late), accuracy(&cut));
+}
+
+/// The same touch on a clock that is 1.5 % slow.
+fn stretched(touch: &palpate_shared::Touch) -> palpate_shared::Touch {
+    let slow = |micros: u32| palpate_shared::ContactTime::from_micros(micros + micros * 3 / 200);
+    palpate_shared::Touch::new(touch.times().map(|time| time.micros().map_or(time, slow)))
+}
