@@ -23,6 +23,12 @@ impl Edges {
         self.edge(3, false, at);
     }
 
+    /// The signal that no approach is under way comes, and goes again.
+    pub fn over(&mut self, from: u32, to: u32) {
+        self.edge(5, true, from);
+        self.edge(5, false, to);
+    }
+
     /// The power goes, and comes back.
     pub fn cut(&mut self, at: u32) {
         self.wait(at);

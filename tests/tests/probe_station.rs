@@ -33,6 +33,8 @@ struct Bench {
     /// Poses, and when they are announced.
     poses: Vec<(u32, Pose)>,
     asked: u32,
+    /// From when to when a signal says that no approach is under way.
+    over: Vec<(u32, u32)>,
 }
 
 impl Board for Bench {
@@ -64,9 +66,19 @@ impl Board for Bench {
         let announced = self.poses.iter().rev().find(|(at, _)| *at <= self.now);
         announced.map(|(at, pose)| (*pose, self.now - at))
     }
+
+    fn is_over(&mut self) -> bool {
+        self.over.iter().any(|(from, to)| (*from..*to).contains(&self.now))
+    }
 }
 
 impl Bench {
+    /// The next change of the signal.
+    fn changes(&self) -> Option<u32> {
+        let changes = self.over.iter().flat_map(|(from, to)| [*from, *to]);
+        changes.filter(|at| *at > self.now).min()
+    }
+
     /// The fingers touch at these times after `at`, and let go `held` after that.
     fn approach(&mut self, at: u32, times: [Option<u32>; 3], held: u32) {
         let contacts = Finger::ALL.into_iter().zip(times).filter_map(|(finger, time)| Some((finger, at + time?)));
@@ -102,7 +114,7 @@ fn run<S: Storage>(station: &mut Station<S>, bench: &mut Bench, end: u32) -> Vec
         }
         let wait = station.wait(bench.now);
         assert!(wait <= LONGEST_WAIT);
-        let edge = bench.edges.front().map_or(end, |edge| edge.at);
+        let edge = bench.edges.front().map_or(end, |edge| edge.at).min(bench.changes().unwrap_or(end));
         bench.now = end.min(edge).min(bench.now + wait.max(1));
     }
 }
@@ -322,6 +334,76 @@ fn a_pose_is_none_where_the_touch_was_over_before_anybody_looked_and_another_was
     bench.approach(start, [Some(0), Some(300_000), None], 500_000);
     let happened = run(&mut station, &mut bench, start + APPROACH);
     assert_eq!(posed(&happened), [(None, None)]);
+}
+
+/// An approach from `at` on whose end is signaled for a while.
+fn approach(bench: &mut Bench, at: u32, times: [Option<u32>; 3]) {
+    bench.approach(at, times, 300_000);
+    bench.over.push((at + APPROACH - 400_000, at + APPROACH - 200_000));
+}
+
+#[test]
+fn an_approach_that_ends_without_a_contact_is_told_as_a_touch_without_any() {
+    let (mut station, mut bench) = started();
+    let miss = Touch::new([palpate_shared::ContactTime::MISSING; 3]);
+    let mut expected = Vec::new();
+    // Nobody knows what was before the first signal.
+    for (index, times) in
+        [[None; 3], [None; 3], [Some(0), None, None], [None; 3], [Some(3), Some(0), Some(9)], [None; 3], [None; 3]]
+            .into_iter()
+            .enumerate()
+    {
+        let at = bench.now;
+        bench.poses.push((at, POSES[index % 2]));
+        approach(&mut bench, at, times);
+        let happened = run(&mut station, &mut bench, at + APPROACH);
+        let told = touches(&happened);
+        expected.push(told.len());
+        if times == [None; 3] && index > 0 {
+            let [(touch, outcome)] = told[..] else { panic!("{index}: {happened:?}") };
+            assert_eq!(touch, miss.with_pose(POSES[index % 2]), "{index}");
+            assert!(outcome.is_err(), "the model was not trained on such approaches: {outcome:?}");
+            assert_eq!(posed(&happened), [(Some(POSES[index % 2]), Some(APPROACH - 400_000))]);
+        }
+    }
+    assert_eq!(expected, [0, 1, 1, 1, 1, 1, 1]);
+    let told = bench.told();
+    let misses =
+        told.iter().filter(|event| matches!(event, Event::Refused { touch, .. } if Touch::from(touch).is_empty()));
+    assert_eq!((told.len(), misses.count()), (6, 4));
+}
+
+#[test]
+fn no_approach_without_a_contact_is_told_where_there_may_have_been_one() {
+    let (mut station, mut bench) = started();
+    let at = bench.now;
+    approach(&mut bench, at, [None; 3]);
+    run(&mut station, &mut bench, at + APPROACH);
+    let end = |bench: &mut Bench, from: u32, to: u32| bench.over.push((from, to));
+    // A touch that is still going on when its approach is over, and a miss after it.
+    let at = bench.now;
+    bench.approach(at + 100_000, [Some(0), None, None], 900_000);
+    end(&mut bench, at + 200_000, at + 400_000);
+    end(&mut bench, at + 1_700_000, at + 1_800_000);
+    let happened = run(&mut station, &mut bench, at + APPROACH);
+    let contacts: Vec<bool> = touches(&happened).iter().map(|(touch, _)| touch.is_empty()).collect();
+    assert_eq!(contacts, [false, true]);
+    // A button that bounces when it is pressed, and when it is let go.
+    let at = bench.now;
+    for (from, to) in [(0, 900), (2_000, 2_500), (4_000, 500_000), (501_000, 501_800), (503_000, 503_100)] {
+        end(&mut bench, at + from, at + to);
+    }
+    let happened = run(&mut station, &mut bench, at + APPROACH);
+    assert_eq!(touches(&happened).len(), 1, "{happened:?}");
+    // A finger that is stuck, from before the approach on.
+    let at = bench.now;
+    bench.edges.push_back(Edge::new(Finger::Last, true, at));
+    for number in 1..=6 {
+        end(&mut bench, at + number * APPROACH - 400_000, at + number * APPROACH - 200_000);
+    }
+    let happened = run(&mut station, &mut bench, at + 6 * APPROACH);
+    assert!(touches(&happened).iter().all(|(touch, _)| !touch.is_empty()), "{happened:?}");
+    assert!(happened.iter().any(|happened| matches!(happened, Happened::Faulty(_))), "{happened:?}");
 }
 
 #[test]

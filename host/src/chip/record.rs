@@ -26,7 +26,7 @@ pub enum Heard<'a> {
     },
     /// The line broke; it is tried again and again.
     Lost(&'a Error),
-    /// A touch was recorded.
+    /// A touch was recorded, or an approach that ended without a contact.
     Touch {
         /// The touch.
         touch: Touch,
@@ -61,8 +61,8 @@ pub struct RecordSummary {
     pub touches: u64,
     /// Touches of the object that the data set holds now.
     pub all_touches: u64,
-    /// Number of the recorded touches with one, two and three contacts.
-    pub contacts: [u64; 3],
+    /// Number of the recorded touches with no, one, two and three contacts.
+    pub contacts: [u64; 4],
     /// Touches that were not recorded because they lack the pose.
     pub without_pose: u64,
     /// Reports of the chip that were lost on the way, touches or others.
@@ -180,7 +180,7 @@ fn listen(
     recording.add(&touch)?;
     summary.touches += 1;
     let contacts = touch.times().iter().filter(|time| !time.is_missing()).count();
-    if let Some(counted) = contacts.checked_sub(1).and_then(|place| summary.contacts.get_mut(place)) {
+    if let Some(counted) = summary.contacts.get_mut(contacts) {
         *counted += 1;
     }
     each(&Heard::Touch { touch, number: recording.all_touches(), verdict })

@@ -4,7 +4,8 @@
 //!
 //! The host sends six bytes for each edge over the second UART: finger (0, 1, 2), level (0, 1), time in microseconds (u32,
 //! little endian). The time counts as the clock's, the level is put into the port register, and the pin interrupt is
-//! pended, as a port does. Finger 3 is no edge: time passes. Finger 4 is none either: the power goes, and comes back.
+//! pended, as a port does. Finger 3 is no edge: time passes. Finger 4 is none either: the power goes, and comes back. Finger 5
+//! is the signal that no approach is under way.
 
 use crate::chip::{self, PIN_CHANGED, SWITCHES};
 use crate::uart::{Port, Uart};
@@ -20,6 +21,10 @@ use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 static TIME: AtomicU32 = AtomicU32::new(0);
 /// True while the pin interrupt still has to look at an edge.
 static EDGE: AtomicBool = AtomicBool::new(false);
+/// The pin of the signal that no approach is under way.
+const OVER: u8 = 5;
+/// True once that signal has changed, until the main loop has looked.
+static SIGNALED: AtomicBool = AtomicBool::new(false);
 /// When the main loop last found that nothing more had happened.
 static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);
 
@@ -73,9 +78,15 @@ pub fn sense() -> Sensed {
     sensed
 }
 
+/// True while no approach is under way, as a robot's controller would say.
+pub fn is_over() -> bool {
+    SIGNALED.store(false, Ordering::Relaxed);
+    SWITCHES.load(Ordering::Relaxed) >> OVER & 1 == 1
+}
+
 /// True if the pins have no message.
 pub fn is_idle() -> bool {
-    with(|watcher| watcher.is_idle()).unwrap_or(true)
+    !SIGNALED.load(Ordering::Relaxed) && with(|watcher| watcher.is_idle()).unwrap_or(true)
 }
 
 fn with<T>(act: impl FnOnce(&mut Watcher<Pin, Pin, Pin>) -> T) -> Option<T> {
@@ -148,9 +159,12 @@ impl Player {
         self.count = 0;
         self.passes = finger == 3;
         TIME.store(u32::from_le_bytes([t0, t1, t2, t3]), Ordering::Relaxed);
-        if finger < 3 {
+        if finger < 3 || finger == OVER {
             let levels = SWITCHES.load(Ordering::Relaxed) & !(1 << finger);
             SWITCHES.store(levels | u32::from(level & 1) << finger, Ordering::Relaxed);
+            if finger == OVER {
+                SIGNALED.store(true, Ordering::Relaxed);
+            }
             EDGE.store(true, Ordering::Relaxed);
             NVIC::pend(PIN_CHANGED);
         }

@@ -108,6 +108,11 @@ impl Effector {
         self.state
     }
 
+    /// The time of the last call, in microseconds on the clock; none before the first. Cannot fail.
+    pub const fn now(&self) -> Option<u32> {
+        self.now
+    }
+
     /// Microseconds from the first contact of the touch in progress, or else of the last one that was returned, to the last
     /// call.
     pub fn since_contact(&self) -> u32 {

@@ -6,7 +6,7 @@ use crate::Model;
 use crate::effector::{Effector, Fault, Scale, Sensed, Settings, State, drain};
 use core::fmt;
 use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Refusal, TouchMessage, VerdictMessage};
-use palpate_shared::{Pose, Touch};
+use palpate_shared::{ContactTime, Pose, Touch};
 
 /// Interface of a board to a [`ProbeStation`].
 pub trait Board {
@@ -33,6 +33,70 @@ pub trait Board {
     /// step that sees it begin: when an approach is over, the next one may have been announced.
     fn pose(&mut self) -> Option<(Pose, u32)> {
         None
+    }
+
+    /// True while the robot's controller says that no approach is under way, or a button is pressed that ends one: asked for in
+    /// each step, so a change has to wake the main loop. An approach that ends without a contact is a touch with none, which
+    /// no switch can report. Without such a signal those approaches are not told.
+    fn is_over(&mut self) -> bool {
+        false
+    }
+}
+
+/// The signal that no approach is under way.
+#[derive(Clone, Copy, Debug)]
+enum Signal {
+    /// Not there, for longer than a button bounces.
+    Gone,
+    /// There.
+    There,
+    /// Not there any more, since this time.
+    Going(u32),
+}
+
+/// Whether the approach that is under way has had a contact.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    signal: Signal,
+    /// True if it had, or may have had: at power-up nobody knows, nor after a fault.
+    has_contact: bool,
+    /// True if the touch in progress is that of the approach before.
+    is_late: bool,
+}
+
+impl Course {
+    /// At power-up.
+    const UNKNOWN: Self = Self { signal: Signal::Gone, has_contact: true, is_late: false };
+
+    /// Takes in the signal; true if an approach is over that had no contact. A signal that comes back within `pause`
+    /// microseconds bounces. Some instructions.
+    fn ends_without(&mut self, is_over: bool, effector: &Effector, pause: u32) -> bool {
+        let Some(now) = effector.now() else { return false };
+        let (signal, ends) = match (is_over, self.signal) {
+            (true, Signal::Gone) => (Signal::There, true),
+            (true, Signal::Going(since)) => (Signal::There, now.wrapping_sub(since) >= pause),
+            (true, Signal::There) => (Signal::There, false),
+            (false, Signal::There) => (Signal::Going(now), false),
+            (false, Signal::Going(since)) if now.wrapping_sub(since) < pause => (Signal::Going(since), false),
+            (false, _) => (Signal::Gone, false),
+        };
+        self.signal = signal;
+        if !ends {
+            return false;
+        }
+        self.is_late = effector.state() == State::Touching;
+        // With a finger that is closed, or after a dropped touch, there may have been one.
+        !core::mem::replace(&mut self.has_contact, false) && effector.state() == State::Waiting
+    }
+
+    /// A touch is over.
+    fn touched(&mut self) {
+        self.has_contact |= !core::mem::take(&mut self.is_late);
+    }
+
+    /// A finger is faulty, and a touch may have been dropped.
+    fn is_lost(&mut self) {
+        (self.has_contact, self.is_late) = (true, false);
     }
 }
 
@@ -69,11 +133,12 @@ impl Default for ProbeSettings {
 pub enum Happened {
     /// Bytes came from the host and were dealt with.
     Heard,
-    /// The probe touched.
+    /// The probe touched, or ended an approach without a contact.
     Touched {
-        /// The touch, as the model takes it; with a pose if one was announced.
+        /// The touch, as the model takes it; with a pose if one was announced. Without a contact where an approach ended
+        /// so ([`Board::is_over`]).
         touch: Touch,
-        /// Microseconds from the announcement of the pose to the first contact.
+        /// Microseconds from the announcement of the pose to the first contact, or to the end of an approach without one.
         pose_age: Option<u32>,
         /// The verdict so far, or the reason why the touch was not counted. A decision ends an object: the next touch
         /// begins another.
@@ -158,6 +223,7 @@ pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
     /// The announcement before the touch in progress, and the time between the two; known once a step has seen it
     /// begin.
     announced: Option<Option<(Pose, u32)>>,
+    course: Course,
     started: bool,
 }
 
@@ -171,7 +237,16 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         station.set_program(settings.program);
         let end = DeviceEnd::new(progress, settings.boot.wrapping_add(starts));
         let effector = Effector::new(settings.effector);
-        let mut probe = Self { effector, station, end, settings, model: 0, announced: None, started: false };
+        let mut probe = Self {
+            effector,
+            station,
+            end,
+            settings,
+            model: 0,
+            announced: None,
+            course: Course::UNKNOWN,
+            started: false,
+        };
         probe.follow_model();
         Ok(probe)
     }
@@ -214,9 +289,19 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         let heard = (!bytes.is_empty()).then_some(Happened::Heard);
         let sensed = drain(&mut self.effector, || line.board.sense());
         let happened = match sensed {
-            Ok(Some(touch)) => Some(self.touched(&touch, &mut line)),
-            Ok(None) => heard,
+            Ok(Some(touch)) => {
+                self.course.touched();
+                Some(self.touched(&touch, &mut line))
+            }
+            Ok(None) => {
+                let (is_over, pause) = (line.board.is_over(), self.settings.effector.release);
+                match self.course.ends_without(is_over, &self.effector, pause) {
+                    true => Some(self.missed(&mut line)),
+                    false => heard,
+                }
+            }
             Err(fault) => {
+                self.course.is_lost();
                 self.end.tell(fault.into(), |frame| line.send(frame));
                 Some(Happened::Faulty(fault))
             }
@@ -233,12 +318,23 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
     }
 
     fn touched<B: Board>(&mut self, touch: &Touch, line: &mut Line<'_, B>) -> Happened {
-        let mut touch = self.settings.scale.apply(touch);
+        let touch = self.settings.scale.apply(touch);
         // Where the whole touch has passed since the last step, nobody has seen it begin.
         let announced = self.announced.take().unwrap_or_else(|| self.ask_pose(line.board));
-        if let Some((pose, _)) = announced {
-            touch = touch.with_pose(pose);
-        }
+        self.tell(touch, announced, line)
+    }
+
+    /// An approach without a contact. Its pose may be older than that of a touch, by as much as the probe takes to pass an
+    /// object.
+    fn missed<B: Board>(&mut self, line: &mut Line<'_, B>) -> Happened {
+        let lasts = self.settings.pose_lasts.saturating_add(self.settings.effector.timeout);
+        let announced = line.board.pose().filter(|(_, age)| *age <= lasts);
+        self.tell(Touch::new([ContactTime::MISSING; 3]), announced, line)
+    }
+
+    /// Takes a touch into account and tells the host.
+    fn tell<B: Board>(&mut self, touch: Touch, announced: Option<(Pose, u32)>, line: &mut Line<'_, B>) -> Happened {
+        let touch = announced.map_or(touch, |(pose, _)| touch.with_pose(pose));
         let pose_age = announced.map(|(_, age)| age);
         // Touches from the host may have decided: one that counts begins another object.
         if self.station.has_decided() && self.station.model().is_some_and(|model| model.accepts(&touch).is_ok()) {

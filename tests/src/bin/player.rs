@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Each line of standard input names a file of touches, which are played on the chip's pins, one approach after the other,
-//! by switches that bounce. The end of standard input ends the chip.
+//! by switches that bounce, and a signal at the end of each. The end of standard input ends the chip.
 
 use palpate::touches::text;
 use palpate_tests::pins::{APPROACH, Edges, edges};
@@ -43,7 +43,12 @@ fn play(image: &str, address: &str) -> Result<(), Box<dyn Error>> {
     let played = (|| {
         let (mut pins, _) = listener.accept()?;
         println!("the chip is at {address}");
-        let mut hands = Hands { rng: ChaCha8Rng::seed_from_u64(1), now: 150_000 };
+        let mut hands = Hands { rng: ChaCha8Rng::seed_from_u64(1), now: 400_000 };
+        // The chip tells misses from the first signal on.
+        let mut ready = Edges::default();
+        ready.over(200_000, 250_000);
+        ready.wait(hands.now);
+        pins.write_all(&ready.bytes)?;
         for line in std::io::stdin().lock().lines() {
             let line = line?;
             let count = hands.touch(Path::new(line.trim()), &mut pins)?;
@@ -72,7 +77,9 @@ impl Hands {
             for (at, finger, closed) in edges(&touch?, &mut self.rng) {
                 played.edge(finger, closed, self.now.wrapping_add(at));
             }
-            self.now = self.now.wrapping_add(APPROACH);
+            let next = self.now.wrapping_add(APPROACH);
+            played.over(next.wrapping_sub(60_000), next.wrapping_sub(10_000));
+            self.now = next;
             played.wait(self.now);
             pins.write_all(&played.bytes)?;
             count += 1;

@@ -196,6 +196,12 @@ fn event(number: u32) -> Event {
     }
 }
 
+/// The chip's report of an approach without a contact.
+fn miss() -> Event {
+    let touch = TouchMessage::from(&Touch::new([ContactTime::MISSING; 3]));
+    Event::Refused { touch, refusal: Refusal::NoModel }
+}
+
 /// Answers the host until it has asked for everything, then reports these events.
 fn serve(stream: &mut TcpStream, end: &mut DeviceEnd, events: &[Event]) {
     let mut fingers = Fingers { greeted: Cell::new(false) };
@@ -231,20 +237,21 @@ fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
         end.tell(event(7), |_| ());
         let (mut stream, _) = listener.accept().unwrap();
         let fault = Event::Fault { kind: FaultKind::Silent, finger: 2 };
-        serve(&mut stream, &mut end, &[event(8), fault, event(9), event(10)]);
+        serve(&mut stream, &mut end, &[event(8), fault, miss(), event(9), event(10)]);
         wait(&mut stream);
     });
     let arguments =
-        ["data", "record", &port, "-o", data.to_str().unwrap(), "--object", "bowl", "--stop-after", "7", "--json"];
+        ["data", "record", &port, "-o", data.to_str().unwrap(), "--object", "bowl", "--stop-after", "8", "--json"];
     let output = run(arguments);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let summary = json(output);
     chip.join().unwrap();
-    // The tenth was told, but seven were wanted.
-    let expected: Vec<Touch> = (1..=5).chain(8..=9).map(touch).collect();
+    // The tenth was told, but eight were wanted.
+    let mut expected: Vec<Touch> = (1..=5).chain(8..=9).map(touch).collect();
+    expected.insert(6, Touch::new([ContactTime::MISSING; 3]));
     assert_eq!(Dataset::read_any(&data).unwrap().objects[0].touches(), expected);
     let expected = value!({
-        "object": "bowl", "touches": 7, "all_touches": 7, "contacts": [0, 3, 4], "without_pose": 0, "missed": 2,
+        "object": "bowl", "touches": 8, "all_touches": 8, "contacts": [1, 0, 3, 4], "without_pose": 0, "missed": 2,
         "faults": 1, "lost": 1, "firmware": "three fingers 1.0",
     });
     assert_eq!(summary, expected);
@@ -253,7 +260,7 @@ fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
     let stated = recorded(&data);
     assert_eq!(stated["recorded"].as_array().unwrap().len(), 1, "{stated}");
     assert_eq!(stated["recorded"][0]["firmware"], "three fingers 1.0");
-    assert_eq!((&stated["recorded"][0]["source"], &stated["objects"][0]["touches"]), (&value!(port), &value!(7)));
+    assert_eq!((&stated["recorded"][0]["source"], &stated["objects"][0]["touches"]), (&value!(port), &value!(8)));
 }
 
 #[test]
@@ -265,23 +272,24 @@ fn each_touch_is_printed_and_a_second_recording_of_the_object_is_added() {
         let port = format!("tcp://{}", listener.local_addr().unwrap());
         let chip = std::thread::spawn(move || {
             let (mut stream, _) = listener.accept().unwrap();
-            serve(&mut stream, &mut DeviceEnd::new(Progress::NONE, 1), &[event(1), event(4)]);
+            serve(&mut stream, &mut DeviceEnd::new(Progress::NONE, 1), &[event(1), event(4), miss()]);
             wait(&mut stream);
         });
         let directory = data.to_str().unwrap();
-        let text = stdout(run(["data", "record", &port, "-o", directory, "--object", "bowl", "--stop-after", "2"]));
+        let text = stdout(run(["data", "record", &port, "-o", directory, "--object", "bowl", "--stop-after", "3"]));
         chip.join().unwrap();
-        let [first, second, all] = [1, 2, 2].map(|number| number + 2 * round);
+        let [first, second, all] = [1, 2, 3].map(|number| number + 3 * round);
         let expected = format!(
-            "recording bowl into {directory}: three fingers 1.0; 2 touches\n\
+            "recording bowl into {directory}: three fingers 1.0; 3 touches\n\
              {first:5}     0.000     1.000    40.000 ms\n\
              {second:5}     0.000     4.000         - ms\n\
-             recorded 2 touches of bowl into {directory}, which holds {all} of it now\n\
-             contacts: 1 have three, 1 two, 0 one\n"
+             {all:5}         -         -         - ms\n\
+             recorded 3 touches of bowl into {directory}, which holds {all} of it now\n\
+             contacts: 1 have three, 1 two, 0 one, 1 none\n"
         );
         assert_eq!(text, expected);
     }
-    assert_eq!(Dataset::read_any(&data).unwrap().len(), 4);
+    assert_eq!(Dataset::read_any(&data).unwrap().len(), 6);
 }
 
 #[test]

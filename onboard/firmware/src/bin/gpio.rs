@@ -38,6 +38,10 @@ impl Board for Chip {
     fn send(&mut self, frame: &[u8]) -> Result<(), Infallible> {
         self.0.write_all(frame)
     }
+
+    fn is_over(&mut self) -> bool {
+        pins::is_over()
+    }
 }
 
 #[entry]

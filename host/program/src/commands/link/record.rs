@@ -86,8 +86,8 @@ pub(crate) fn from_chip(
     if json {
         return print_json(&summarized);
     }
-    let RecordSummary { contacts: [one, two, three], missed, without_pose, .. } = summarized;
-    let mut text = summary(&recording, directory, [0, one, two, three]);
+    let RecordSummary { contacts, missed, without_pose, .. } = summarized;
+    let mut text = summary(&recording, directory, contacts);
     if missed + without_pose > 0 {
         text += &format!("not recorded: {without_pose} touches without a pose, {missed} reports lost on the way\n");
     }

@@ -3,7 +3,7 @@
 #![no_main]
 
 use embassy_executor::Spawner;
-use embassy_futures::select::select3;
+use embassy_futures::select::select4;
 use embassy_rp::gpio::{Input, Pull};
 use embassy_rp::peripherals::UART0;
 use embassy_rp::uart::{BufferedInterruptHandler, BufferedUart, Config, Error};
@@ -36,6 +36,8 @@ impl Clock for Micros {
 /// The switches and the link.
 struct Pico {
     watcher: Watcher<Input<'static>, Input<'static>, Input<'static>>,
+    /// GP5, low while no approach is under way: from the robot's controller, or a button to ground.
+    over: Input<'static>,
     uart: BufferedUart,
     /// Bytes from the host that the station has not taken yet.
     received: [u8; 32],
@@ -62,16 +64,21 @@ impl Board for Pico {
         }
         Ok(())
     }
+
+    fn is_over(&mut self) -> bool {
+        self.over.is_low()
+    }
 }
 
 impl Pico {
-    /// Sleeps until a switch moves, a byte comes, or `wait` microseconds are over.
+    /// Sleeps until a switch moves, the signal changes, a byte comes, or `wait` microseconds are over.
     async fn sleep(&mut self, wait: u32) -> Result<(), Error> {
-        let Self { watcher, uart, received, count } = self;
+        let Self { watcher, over, uart, received, count } = self;
         // Levels and not edges: one that changed while nobody waited wakes at once.
         let [a, b, c] = watcher.is_high();
         let (first, middle, last) = watcher.pins();
-        let moved = select3(turn(first, a), turn(middle, b), turn(last, c));
+        let is_over = over.is_low();
+        let moved = select4(turn(first, a), turn(middle, b), turn(last, c), turn(over, !is_over));
         if let Some(bytes) = palpate_embassy::sleep(moved, uart.fill_buf(), wait).await {
             let bytes = bytes?;
             *count = bytes.len().min(received.len());
@@ -97,7 +104,8 @@ async fn main(_spawner: Spawner) {
     let (first, middle) = (Input::new(chip.PIN_2, Pull::Up), Input::new(chip.PIN_3, Pull::Up));
     let last = Input::new(chip.PIN_4, Pull::Up);
     let watcher = Watcher::start(Fingers::new(first, middle, last, Active::Low), &Micros);
-    let mut pico = Pico { watcher, uart, received: [0; 32], count: 0 };
+    let over = Input::new(chip.PIN_5, Pull::Up);
+    let mut pico = Pico { watcher, over, uart, received: [0; 32], count: 0 };
     let settings = ProbeSettings { boot: RoscRng.next_u32(), program: PROGRAM, ..ProbeSettings::default() };
     let Ok(mut station) = ProbeStation::<OBJECTS>::open(MODEL, NoStorage, settings) else { return };
     loop {

@@ -3,6 +3,7 @@
 //! | pin | what |
 //! |---|---|
 //! | GP2, GP3, GP4 | the three switches in their order along the row, each to ground |
+//! | GP5 | a button to ground that is pressed after an approach, or the robot's output that is low between approaches: those that touched nothing are told too. May stay open |
 //! | GP0, GP1 | UART to the host, 115,200 baud: `palpate link /dev/ttyUSB0 --watch` |
 //! | GP25 | the Pico's LED: lit from a recognition to the next touch |
 //!
@@ -62,6 +63,10 @@ impl Board for Pico {
         self.0.write_full_blocking(frame);
         Ok(())
     }
+
+    fn is_over(&mut self) -> bool {
+        shared::is_over()
+    }
 }
 
 #[hal::entry]
@@ -97,7 +102,7 @@ fn run() -> Option<Infallible> {
     let mut station = ProbeStation::<OBJECTS, _>::open(MODEL, storage, settings).ok()?;
     let switches = (pins.gpio2.reconfigure(), pins.gpio3.reconfigure(), pins.gpio4.reconfigure());
     let (reader, writer) = uart.split();
-    shared::start(switches, reader, timer.alarm_0()?, timer);
+    shared::start(switches, pins.gpio5.reconfigure(), reader, timer.alarm_0()?, timer);
     let mut pico = Pico(writer);
     loop {
         let Ok(happened) = station.step(&mut pico);

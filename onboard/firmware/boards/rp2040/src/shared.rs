@@ -2,9 +2,10 @@
 
 use core::cell::RefCell;
 use critical_section::{CriticalSection, Mutex};
+use embedded_hal::digital::InputPin;
 use hal::Timer;
 use hal::fugit::ExtU32;
-use hal::gpio::bank0::{Gpio0, Gpio1, Gpio2, Gpio3, Gpio4};
+use hal::gpio::bank0::{Gpio0, Gpio1, Gpio2, Gpio3, Gpio4, Gpio5};
 use hal::gpio::{FunctionSioInput, FunctionUart, Interrupt, Pin, PullDown, PullUp};
 use hal::pac::{self, UART0, interrupt};
 use hal::timer::{Alarm, Alarm0};
@@ -17,6 +18,8 @@ use rp2040_hal as hal;
 type Switch<G> = Pin<G, FunctionSioInput, PullUp>;
 /// The three switches.
 pub type Switches = (Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>);
+/// The signal that no approach is under way, to ground: from the robot's controller, or a button.
+pub type Over = Switch<Gpio5>;
 /// The link's wires.
 pub type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
 
@@ -35,6 +38,9 @@ impl Clock for Micros {
 
 struct Shared {
     watcher: Watcher<Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>>,
+    over: Over,
+    /// The signal as the main loop has last seen it.
+    was_over: bool,
     clock: Micros,
     reader: Reader<UART0, Wires>,
     received: Deque<u8, WAITING>,
@@ -53,8 +59,9 @@ fn within<T>(cs: CriticalSection<'_>, act: impl FnOnce(&mut Shared) -> T) -> Opt
 
 /// Begins to watch and to listen.
 #[allow(unsafe_code)]
-pub fn start(switches: Switches, mut reader: Reader<UART0, Wires>, mut alarm: Alarm0, timer: Timer) {
+pub fn start(switches: Switches, over: Over, mut reader: Reader<UART0, Wires>, mut alarm: Alarm0, timer: Timer) {
     for kind in [Interrupt::EdgeLow, Interrupt::EdgeHigh] {
+        over.set_interrupt_enabled(kind, true);
         switches.0.set_interrupt_enabled(kind, true);
         switches.1.set_interrupt_enabled(kind, true);
         switches.2.set_interrupt_enabled(kind, true);
@@ -64,7 +71,7 @@ pub fn start(switches: Switches, mut reader: Reader<UART0, Wires>, mut alarm: Al
     let clock = Micros(timer);
     let fingers = Fingers::new(switches.0, switches.1, switches.2, Active::Low);
     let watcher = Watcher::start(fingers, &clock);
-    let shared = Shared { watcher, clock, reader, received: Deque::new(), alarm };
+    let shared = Shared { watcher, over, was_over: false, clock, reader, received: Deque::new(), alarm };
     critical_section::with(|cs| SHARED.replace(cs, Some(shared)));
     for interrupt in [pac::Interrupt::IO_IRQ_BANK0, pac::Interrupt::UART0_IRQ, pac::Interrupt::TIMER_IRQ_0] {
         // SAFETY: no critical section of this program is made by masking an interrupt.
@@ -75,6 +82,15 @@ pub fn start(switches: Switches, mut reader: Reader<UART0, Wires>, mut alarm: Al
 /// Returns the messages of the switches.
 pub fn sense() -> Sensed {
     with(|shared| shared.watcher.sense(&shared.clock)).unwrap_or(Sensed::Nothing(0))
+}
+
+/// True while the signal says that no approach is under way.
+pub fn is_over() -> bool {
+    with(|shared| {
+        shared.was_over = shared.over.is_low().unwrap_or(false);
+        shared.was_over
+    })
+    .unwrap_or(false)
 }
 
 /// Reads bytes that the UART has received; returns their number.
@@ -104,7 +120,8 @@ pub fn sleep(wait: impl FnOnce(u32) -> u32) {
             // Never so soon that the alarm is missed.
             let wait = wait(shared.clock.micros()).max(20);
             let set = shared.alarm.schedule(wait.micros()).is_ok();
-            !(set && shared.watcher.is_idle() && shared.received.is_empty())
+            let is_seen = shared.over.is_low().unwrap_or(false) == shared.was_over;
+            !(set && is_seen && shared.watcher.is_idle() && shared.received.is_empty())
         });
         // With interrupts held back none can come between the look and the sleep; a pending one ends the sleep.
         if busy == Some(false) {
@@ -113,7 +130,7 @@ pub fn sleep(wait: impl FnOnce(u32) -> u32) {
     });
 }
 
-/// One of the switches has opened or closed.
+/// One of the switches has opened or closed, or the signal has changed.
 #[interrupt]
 fn IO_IRQ_BANK0() {
     with(|shared| {
@@ -123,6 +140,7 @@ fn IO_IRQ_BANK0() {
             first.clear_interrupt(kind);
             middle.clear_interrupt(kind);
             last.clear_interrupt(kind);
+            shared.over.clear_interrupt(kind);
         }
         shared.watcher.interrupt(&shared.clock);
     });
