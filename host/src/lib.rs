@@ -67,6 +67,7 @@
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
 //! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
+//! | `compare` | recorded with simulated touches, and what their difference costs | `compare::compare` |
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `teach` | objects that are learned from recorded touches | `teach::teach` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
@@ -82,7 +83,7 @@
 //! | feature | default | what it adds |
 //! |---|---|---|
 //! | none | | simulator, compiler, evaluator |
-//! | `train` | yes | `ensemble::train`, `fit`, `strangers`, `teach` and `tune` |
+//! | `train` | yes | `ensemble::train`, `fit`, `compare`, `strangers`, `teach` and `tune` |
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |
@@ -106,6 +107,8 @@ pub mod compile;
 pub mod evaluate;
 
 pub mod calibrate;
+#[cfg(feature = "train")]
+pub mod compare;
 
 #[cfg(feature = "train")]
 pub mod teach;

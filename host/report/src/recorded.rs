@@ -7,8 +7,8 @@ use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
+use palpate::compare::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::error::{EvaluateProblem, Result};
-use palpate::evaluate::recorded::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::progress;
 use palpate::touches::{Dataset, Origin, checksum, files};
 use std::path::Path;
@@ -33,8 +33,8 @@ pub(super) fn measure(context: &Context) -> Result<Option<Comparison>> {
         return Err(palpate::Error::from(EvaluateProblem::Incomparable { detail }).in_file(directory));
     }
     let groups = if settings.quick { 300 } else { 1_000 };
-    let compared = recorded::Settings { groups, seed: settings.seed, ..Default::default() };
-    recorded::compare(&recorded, &simulated, &compared, context.progress).map(Some)
+    let compared = compare::Settings { groups, seed: settings.seed, ..Default::default() };
+    compare::compare(&recorded, &simulated, &compared, context.progress).map(Some)
 }
 
 /// A checksum of the recorded touches' files: a report that is resumed with others starts again.
@@ -48,6 +48,16 @@ pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Resul
     let mut section = Section::new("recorded", "Accuracy of the simulation");
     let told = &compared.told_apart;
     section.text(compared.verdict());
+    if let Some(cost) = &compared.cost {
+        section.text(format!(
+            "Cost of the difference: a model of {} objects was trained on simulated touches. {} {} {}",
+            cost.known,
+            cost.sentence(),
+            cost.confusions(),
+            cost.promise.map(|promise| promise.sentence()).unwrap_or_default()
+        ));
+        section.figure(cost_figure(context, cost)?);
+    }
     section.text(format!(
         "Recorded touches of {} objects were compared with simulated ones of the same objects{}. A classifier trained \
          to distinguish the two is right {} of the time on touches that it was not trained on; 50 % is chance level.",
@@ -58,15 +68,6 @@ pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Resul
     section.figure(told_figure(context, compared)?);
     section.figure(features_figure(context, compared)?);
     section.table(words(context, compared));
-    if let Some(cost) = &compared.cost {
-        section.text(format!(
-            "Cost of the difference: a model of {} objects was trained on simulated touches. {} {}",
-            cost.known,
-            cost.sentence(),
-            cost.confusions()
-        ));
-        section.figure(cost_figure(context, cost)?);
-    }
     Ok(Some(section))
 }
 

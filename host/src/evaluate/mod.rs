@@ -46,8 +46,6 @@ mod noisy;
 pub mod parity;
 mod plan;
 mod promise;
-#[cfg(feature = "train")]
-pub mod recorded;
 mod sequential;
 mod strangers;
 mod switch;

@@ -7,11 +7,11 @@ use super::sequential::Outcome;
 use crate::probe::noise::Noise;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{Counted, Per};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Finding about a promise on test touches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Finding {
     /// The measured error rate is at most the promised one.
@@ -53,6 +53,9 @@ pub struct PromiseCheck {
     /// Differences from the calibration: with any of these the promise was made for other touches, and is void for
     /// these.
     pub void: Vec<String>,
+    /// Noise that the promise was made with, where recorded touches are tested, which hold the noise of their probe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<String>,
     /// Largest error rate by theory, whatever the priors and the objects, if posteriors can be believed: which they
     /// cannot with other noise than the calibration's.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -81,13 +84,9 @@ impl Margins<'_> {
         let (of, error) = worst.map_or((None, Wrong::default().estimate()), |(of, wrong)| (of, wrong.estimate()));
         let mut void = Vec::new();
         let simulated = Noise::of_promise(&promise.noise);
-        // Without noise they may have been recorded then, too.
-        if self.is_recorded && noise.is_none() && !simulated.is_none() {
-            void.push(format!(
-                "promised for simulated touches with {simulated}, tested on recorded ones, which have the noise of their \
-                 probe"
-            ));
-        } else if promise.noise != noise.promised() {
+        // Recorded touches hold the noise of their probe: the promise is tested on that, and is not void.
+        let is_own = self.is_recorded && noise.is_none();
+        if promise.noise != noise.promised() && !is_own {
             let on = if self.is_recorded { "on recorded touches with more noise:" } else { "with" };
             void.push(format!("promised with {simulated}, tested {on} {noise}"));
         }
@@ -123,6 +122,7 @@ impl Margins<'_> {
             exceeded_by: error.value - promise.rate,
             finding,
             void,
+            recorded: (is_own && !simulated.is_none()).then(|| simulated.to_string()),
             by_theory: (promise.noise == noise.promised()).then(|| by_theory(model)),
         })
     }

@@ -5,11 +5,12 @@
 //! meets: an object would be known from the mean of its meshes.
 
 use crate::calibrate::{self, Odds, Per, Supply, Until, follow};
+use crate::compare;
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::Ensemble;
 use crate::ensemble::train::{self, train};
 use crate::error::CalibrateProblem;
-use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings, recorded};
+use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings};
 use crate::probe::noise::Noise;
 use crate::tests::repetitions::{assert_rare, repetitions};
 use crate::tests::synthetic;
@@ -260,8 +261,8 @@ fn what_tune_states_is_what_its_model_does() {
 #[test]
 fn what_a_comparison_states_is_what_its_model_does() {
     let (recorded, simulated) = (touches(2_000, 7), touches(6_000, 8));
-    let settings = recorded::Settings { groups: 500, ..recorded::Settings::default() };
-    let compared = recorded::compare(&recorded, &simulated, &settings, &()).unwrap();
+    let settings = compare::Settings { groups: 500, ..compare::Settings::default() };
+    let compared = compare::compare(&recorded, &simulated, &settings, &()).unwrap();
     assert!(compared.told_apart.low < 0.51, "{:?}", compared.told_apart);
     let split = folds::split(&simulated, 0.25, settings.seed).unwrap();
     let ensemble = train(&split.train, &train::Settings::compact(), &()).unwrap();

@@ -117,6 +117,13 @@ fn promise_text(check: &PromiseCheck) -> String {
             Finding::Untested => "no name was given, so nothing is known of the promise".to_owned(),
         }
     );
+    if let Some(noise) = &check.recorded {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "It was made for simulated touches with {noise}; recorded ones hold the noise of their probe."
+        );
+    }
     if !check.void.is_empty() {
         // Writing to a string cannot fail.
         _ = writeln!(

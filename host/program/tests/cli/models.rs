@@ -475,6 +475,32 @@ fn a_calibrated_model_promises_and_evaluate_shows_whether_it_keeps_it() {
 }
 
 #[test]
+fn a_promise_made_with_noise_is_tested_on_recorded_touches_and_not_void_for_their_own() {
+    let directory = uncalibrated();
+    let at = directory.path();
+    let calibrate = ["calibrate", "model.palpate", "fresh", "-o", "noisy.palpate", "--error-rate", "5%"];
+    succeeds(at, &[&calibrate[..], &["--real", "noise=1ms"]].concat());
+    for object in ["bowl", "fork"] {
+        let lines = format!("unseen/{object}.txt");
+        succeeds(at, &["data", "record", &lines, "-o", "recorded", "--object", object]);
+    }
+    let evaluate = ["evaluate", "noisy.palpate", "recorded"];
+    let found: Value = serde_json::from_str(&succeeds(at, &[&evaluate[..], &["--json"]].concat())).unwrap();
+    let promise = &found["promise"];
+    assert_eq!(
+        (&promise["void"], &promise["recorded"]),
+        (&serde_json::json!([]), &"noise of 1 ms".into()),
+        "{promise}"
+    );
+    let text = succeeds(at, &evaluate);
+    let said = "It was made for simulated touches with noise of 1 ms; recorded ones hold the noise of their probe.";
+    assert!(text.contains(said) && !text.contains("void"), "{text}");
+    // More noise than they hold is another matter.
+    let text = succeeds(at, &[&evaluate[..], &["--real", "noise=9ms"]].concat());
+    assert!(text.contains("void: promised with noise of 1 ms, tested on recorded touches with more noise"), "{text}");
+}
+
+#[test]
 fn thresholds_by_name_are_stated_for_each_and_evaluated_for_each() {
     let directory = uncalibrated();
     let at = directory.path();

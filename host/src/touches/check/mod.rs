@@ -75,7 +75,8 @@ impl Check {
             }
         };
         let origin = listing.as_ref().map(|listing| listing.origin.clone());
-        let is_recorded = listing.as_ref().is_some_and(Listing::is_recorded);
+        // Files without a listing may be lines that a robot printed.
+        let is_recorded = listing.as_ref().is_none_or(Listing::is_recorded);
         let objects = match listing {
             Some(listing) => listed(directory, listing, &mut findings)?,
             None => found(directory, &mut findings)?,

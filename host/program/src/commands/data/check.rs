@@ -4,8 +4,8 @@ use crate::commands::Global;
 use crate::commands::numbers::sequences;
 use crate::commands::train::descriptor;
 use palpate::Result;
+use palpate::compare::Settings;
 use palpate::error::{Error, Place, TouchesProblem};
-use palpate::evaluate::recorded::Settings;
 use palpate::output;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
 use palpate_shared::Descriptor;
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Of one data set, every line that cannot be read is named, and what reads well but would train badly: a file that was appended to itself, one object under two names, times that are no seconds, a capture that is not complete. The exit code is 1 if training would be wrong; what may be meant is a note.
 
-Of two, a classifier is trained to tell recorded from simulated touches of an object, and tested on others: 50 % is guessing, so the simulation is right as far as the touches show. Every feature is compared as well, and the accuracy of a model that is trained on simulated touches.
+Of two, the verdict is what their difference costs a model that is trained on the simulated touches: the accuracy that it loses on recorded ones, the names that it confuses there, whether a promise made on simulated touches is kept. Below stands how often a classifier tells recorded from simulated touches (50 % is guessing), and how each feature differs.
 
 Examples:
   palpate data check recorded

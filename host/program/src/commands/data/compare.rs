@@ -3,7 +3,7 @@
 use crate::commands::progress::Bar;
 use crate::commands::{Global, checked, dataset, remark};
 use palpate::Result;
-use palpate::evaluate::recorded::{Comparison, Cost, Settings, Share, compare};
+use palpate::compare::{Comparison, Cost, Settings, Share, compare};
 use palpate::output;
 use palpate::touches::{Captured, Dataset};
 use std::fmt::Write as _;
@@ -32,21 +32,26 @@ fn percent(share: &Share) -> String {
     format!("{:.0} % ({:.0} to {:.0})", 100.0 * share.value, 100.0 * share.low, 100.0 * share.high)
 }
 
+/// The verdict, what it rests on, and below it the classifier that tells the two apart.
 fn text(compared: &Comparison) -> String {
     let told = &compared.told_apart;
-    let mut text = format!(
-        "{}\nA classifier distinguishes recorded from simulated touches with an accuracy of {:.1} % ({:.1} to {:.1} %). 50 % is guessing.\n",
-        compared.verdict(),
-        100.0 * told.value,
-        100.0 * told.low,
-        100.0 * told.high,
-    );
+    let mut text = compared.verdict() + "\n";
+    if let Some(cost) = &compared.cost {
+        text += &cost_text(cost);
+    }
     let width = compared.objects.iter().map(|own| own.name.len()).max().unwrap_or(0).max(6);
     // Writing to a string cannot fail.
     _ = writeln!(
         text,
-        "\n{:width$}  {:>8}  {:>9}  {:16}  by itself, each feature is",
-        "object", "recorded", "simulated", "accuracy"
+        "\nA classifier distinguishes recorded from simulated touches with an accuracy of {:.1} % ({:.1} to {:.1} %). 50 % is \
+         guessing.\n\n{:width$}  {:>8}  {:>9}  {:16}  by itself, each feature is",
+        100.0 * told.value,
+        100.0 * told.low,
+        100.0 * told.high,
+        "object",
+        "recorded",
+        "simulated",
+        "accuracy"
     );
     for own in &compared.objects {
         let [recorded, simulated] = own.touches;
@@ -58,9 +63,6 @@ fn text(compared: &Comparison) -> String {
             percent(&own.told_apart),
             features.collect::<Vec<_>>().join("; ")
         );
-    }
-    if let Some(cost) = &compared.cost {
-        text += &cost_text(cost);
     }
     text
 }
@@ -81,6 +83,14 @@ fn cost_text(cost: &Cost) -> String {
         }
     }
     text += &format!("\n{}\n", cost.sentence());
-    let confusions = cost.confusions();
-    if confusions.is_empty() { text } else { text + &confusions + "\n" }
+    let promise = match &cost.promise {
+        Some(promise) => promise.sentence(),
+        None => "No promise was tested: capture more simulated approaches, or record more.".into(),
+    };
+    for sentence in [cost.confusions(), promise] {
+        if !sentence.is_empty() {
+            text += &(sentence + "\n");
+        }
+    }
+    text
 }

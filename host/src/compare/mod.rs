@@ -6,17 +6,20 @@
 //! feature is compared by itself too, by the largest difference of its two distributions (Kolmogorov and Smirnov).
 //!
 //! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
-//! recorded ones, and how many more approaches it takes there to be right as often as on simulated ones.
+//! recorded ones, how many more approaches it takes there to be right as often as on simulated ones, and whether a promise
+//! that simulated touches support is kept.
 
 mod cost;
 mod features;
+mod promise;
 
 pub use cost::{Confused, Cost};
 pub use features::FeatureComparison;
+pub use promise::Promised;
 
-use super::Estimate;
 use crate::ensemble::{feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};
+use crate::evaluate::{Estimate, Finding};
 use crate::in_order::in_order;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, folds};
@@ -107,8 +110,9 @@ pub struct ObjectComparison {
 }
 
 impl Comparison {
-    /// Verdict on the simulation, in sentences: by the accuracy that a model trained on it loses on recorded touches, since a
-    /// difference that a classifier finds may cost nothing; by the classifier where there is no such loss to measure.
+    /// Verdict on the simulation, in sentences: by the accuracy that a model trained on it loses on recorded touches and by a
+    /// promise that it breaks, since a difference that a classifier finds may cost nothing; by the classifier where there is
+    /// no such loss to measure.
     pub fn verdict(&self) -> String {
         if self.told_apart.low <= 0.5 {
             return "No difference was found: the simulation agrees with the recordings.".into();
@@ -117,21 +121,30 @@ impl Comparison {
             points if points < 0.05 => format!("no accuracy is lost after {at} approaches"),
             points => format!("accuracy after {at} approaches is {points:.1} points lower on recorded touches"),
         };
+        let promise = self.cost.as_ref().and_then(|cost| cost.promise);
+        let is_broken = promise.is_some_and(|promise| promise.finding == Finding::Broken);
+        let broken = if is_broken { ", and a promise is broken" } else { "" };
         match self.cost.as_ref().and_then(Cost::loss) {
-            Some((at, loss)) if loss < NEARLY && at >= ENOUGH => {
+            Some((at, loss)) if loss < NEARLY && at >= ENOUGH && !is_broken => {
                 format!("The simulation is nearly correct: {}.", lost(at, loss))
             }
-            Some((at, loss)) if loss < NEARLY => {
+            Some((at, loss)) if loss < NEARLY && !is_broken => {
                 format!(
                     "They differ slightly: {}. Record {ENOUGH} approaches to each object to see what it costs then.",
                     lost(at, loss)
                 )
             }
             Some((at, loss)) if loss < STRONGLY => {
-                format!("They differ: {}. Fit the probe to recorded touches, or record more of them.", lost(at, loss))
+                format!(
+                    "They differ: {}{broken}. Fit the probe to recorded touches, or record more of them.",
+                    lost(at, loss)
+                )
             }
             Some((at, loss)) => {
-                format!("They differ strongly: {}. The simulated probe, a mesh or its size is wrong.", lost(at, loss))
+                format!(
+                    "They differ strongly: {}{broken}. The simulated probe, a mesh or its size is wrong.",
+                    lost(at, loss)
+                )
             }
             None if self.told_apart.value < 0.65 => {
                 "They differ: fit the probe to recorded touches. Two objects or more show what it costs.".into()
@@ -307,7 +320,22 @@ mod tests {
         let cost = compared.cost.unwrap();
         let needed = cost.needed.unwrap();
         assert!(needed < 1.8 * cost.after as f64, "{cost:?}");
-        assert_eq!(compare(&one, &other, &quick(), &()).unwrap().told_apart, compared.told_apart);
+        assert_ne!(cost.promise.map(|promise| promise.finding), Some(Finding::Broken), "{cost:?}");
+        let again = compare(&one, &other, &quick(), &()).unwrap();
+        assert_eq!((again.told_apart, again.cost.unwrap().promise), (compared.told_apart, cost.promise));
+    }
+
+    #[test]
+    fn a_promise_of_simulated_touches_is_tested_on_recorded_ones() {
+        let [one, other] = [1, 2].map(|seed| synthetic::dataset(&[3_000, 3_000, 3_000], seed));
+        let promise =
+            |recorded: &Dataset| compare(recorded, &other, &quick(), &()).unwrap().cost.unwrap().promise.unwrap();
+        let kept = promise(&one);
+        assert_eq!(kept.finding, Finding::Kept, "{kept:?}");
+        assert!(kept.names > 100.0 && kept.recorded.unwrap() <= kept.rate, "{kept:?}");
+        let bent = promise(&shifted(&one, &Noise { bent: [0.0, 40_000.0, 0.0], ..Noise::default() }));
+        assert_eq!(bent.finding, Finding::Broken, "{bent:?}");
+        assert!(bent.recorded > bent.simulated, "{bent:?}");
     }
 
     #[test]
@@ -326,7 +354,7 @@ mod tests {
     #[test]
     fn the_verdict_is_of_the_accuracy_lost_and_nearly_correct_takes_sixty_approaches_and_two_points() {
         let share = |value: f64| Share { value, low: value - 0.01, high: value + 0.01 };
-        let verdict = |told: f64, lost: Option<(usize, f64)>| {
+        let of = |told: f64, lost: Option<(usize, f64)>, broken: bool| {
             let cost = lost.map(|(at, loss)| Cost {
                 known: 2,
                 simulated: BTreeMap::from([(5, share(0.5)), (at, share(0.9))]),
@@ -334,9 +362,17 @@ mod tests {
                 after: 5,
                 needed: None,
                 confused: Vec::new(),
+                promise: broken.then_some(Promised {
+                    rate: 0.01,
+                    simulated: Some(0.01),
+                    recorded: Some(0.2),
+                    names: 100.0,
+                    finding: Finding::Broken,
+                }),
             });
             Comparison { descriptor: "times".into(), told_apart: share(told), objects: Vec::new(), cost }.verdict()
         };
+        let verdict = |told, lost| of(told, lost, false);
         assert!(verdict(0.5, Some((60, 0.5))).starts_with("No difference"));
         // A classifier that is hardly better than chance says nothing of the cost, nor does one that is nearly always right.
         for (told, at, loss, expected) in [
@@ -350,6 +386,9 @@ mod tests {
             let found = verdict(told, Some((at, loss)));
             assert!(found.starts_with(expected), "{found}");
         }
+        let broken = of(0.53, Some((60, 0.01)), true);
+        let expected = "They differ: accuracy after 60 approaches is 1.0 points lower on recorded touches, and a promise is broken.";
+        assert!(broken.starts_with(expected), "{broken}");
         assert!(verdict(0.53, None).starts_with("They differ: fit the probe"));
         assert!(verdict(0.7, None).starts_with("They differ strongly"));
     }

@@ -1,5 +1,6 @@
 //! The accuracy that a model trained on simulated touches loses on recorded ones.
 
+use super::promise::{Promised, promised};
 use super::{Settings, Share};
 use crate::ensemble::train;
 use crate::error::Result;
@@ -33,6 +34,9 @@ pub struct Cost {
     /// confused first.
     #[serde(default)]
     pub confused: Vec<Confused>,
+    /// Test of a promise; none if there are too few touches to make one, or to test it.
+    #[serde(default)]
+    pub promise: Option<Promised>,
 }
 
 /// An object that is mistaken for another one.
@@ -124,6 +128,7 @@ pub(super) fn cost(
         after,
         needed: needed(&other, wanted),
         confused: confused(&margins, [&tested, recorded], settings)?,
+        promise: promised(&model, [&split.test, recorded], settings.seed, progress)?,
     }))
 }
 
