@@ -47,7 +47,7 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
                 0 => "Press the probe on a flat plate 60 times, with half a turn after each, and give the file as the plate.".into(),
                 presses => format!("Press the plate more often than {presses} times."),
             };
-            warn(&format!("the {finger} finger's offset"), said(late, 1.0, 1, " ms late"), record);
+            warn(&format!("the {finger} finger's offset"), super::outcome::offset_between(late, 1), record);
         }
     }
     let coarse = fit.timer.is_some_and(|timer| fit.noise.high.is_some_and(|high| high < 0.35 * timer));

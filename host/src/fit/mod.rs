@@ -51,8 +51,8 @@ mod suspects;
 mod tests;
 mod timer;
 pub use error::FitProblem;
-pub use outcome::between;
 pub use outcome::{Estimate, Fit, Warning};
+pub use outcome::{between, offset, offset_between};
 pub use suspects::Suspect;
 
 use crate::capture;

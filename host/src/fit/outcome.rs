@@ -153,7 +153,7 @@ impl Fit {
             Length::Tenth => "# A unit is a tenth of the object's longest side.\nunit = \"unit\"\n",
             Length::Millimeter => "unit = \"mm\"\n",
         };
-        let offset = |late: &Estimate| -late.value / 1e3 * speed;
+        let stands_out = |late: &Estimate| -late.value / 1e3 * speed;
         let presses =
             if self.presses > 0 { format!(" and {} presses on a plate", self.presses) } else { String::new() };
         let mut text = format!(
@@ -183,15 +183,15 @@ impl Fit {
             text,
             "\n[real]\n\
              speed_factor = {:.4}  # {}\n\
-             # How far each finger stands out, relative to the first one. Late: {} ms and {} ms.\n\
+             # How far each finger stands out, relative to the first one. Second: {}; third: {}.\n\
              offsets = [0.0, {:.5}, {:.5}]\n\
              noise = \"{:.3}ms\"  # {} ms\n",
             self.speed_factor.value,
             between(&self.speed_factor, 1.0, 3),
             with_interval(&self.late[0]),
             with_interval(&self.late[1]),
-            offset(&self.late[0]),
-            offset(&self.late[1]),
+            stands_out(&self.late[0]),
+            stands_out(&self.late[1]),
             self.noise.value,
             between(&self.noise, 1.0, 2),
         );
@@ -207,8 +207,8 @@ impl Fit {
     }
 }
 
-fn with_interval(estimate: &Estimate) -> String {
-    format!("{:.2} ({})", estimate.value, between(estimate, 1.0, 2))
+fn with_interval(late: &Estimate) -> String {
+    format!("{} ({})", offset(late.value, 2), offset_between(late, 2))
 }
 
 /// An interval in words: "1.0 to 1.2", "at most 3".
@@ -227,5 +227,50 @@ pub fn between(estimate: &Estimate, scale: f64, digits: usize) -> String {
         (Some(low), None) => format!("at least {}", number(low)),
         (None, Some(high)) => format!("at most {}", number(high)),
         (None, None) => "not told".into(),
+    }
+}
+
+/// An offset in milliseconds in words: "4.3 ms late", "3.1 ms early".
+pub fn offset(late: f64, digits: usize) -> String {
+    let text = format!("{:.digits$} ms", late.abs());
+    let is_none = text.chars().all(|c| !matches!(c, '1'..='9'));
+    let side = if late > 0.0 { "late" } else { "early" };
+    if is_none { text } else { format!("{text} {side}") }
+}
+
+/// The interval of an offset in words: "2.9 to 4.7 ms late", "0.4 ms early to 0.8 ms late".
+pub fn offset_between(late: &Estimate, digits: usize) -> String {
+    match (late.low, late.high) {
+        (Some(low), Some(high)) if low >= 0.0 => format!("{low:.digits$} to {}", offset(high, digits)),
+        (Some(low), Some(high)) if high <= 0.0 => format!("{:.digits$} to {}", -high, offset(low, digits)),
+        (Some(low), Some(high)) => format!("{} to {}", offset(low, digits), offset(high, digits)),
+        (Some(low), None) => format!("{} or later", offset(low, digits)),
+        (None, Some(high)) => format!("{} or earlier", offset(high, digits)),
+        (None, None) => "not told".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_are_early_or_late_and_never_below_zero() {
+        let said = |value, low, high| {
+            let late = Estimate { value, low, high };
+            format!("{}; {}", offset(late.value, 1), offset_between(&late, 1))
+        };
+        for (value, low, high, expected) in [
+            (4.311, Some(2.9), Some(4.7), "4.3 ms late; 2.9 to 4.7 ms late"),
+            (-4.311, Some(-4.7), Some(-2.9), "4.3 ms early; 2.9 to 4.7 ms early"),
+            (0.2, Some(-0.4), Some(0.8), "0.2 ms late; 0.4 ms early to 0.8 ms late"),
+            (0.0, Some(0.0), Some(0.0), "0.0 ms; 0.0 to 0.0 ms"),
+            (-0.01, Some(-2.0), Some(0.0), "0.0 ms; 0.0 to 2.0 ms early"),
+            (1.0, None, Some(3.0), "1.0 ms late; 3.0 ms late or earlier"),
+            (1.0, Some(-1.0), None, "1.0 ms late; 1.0 ms early or later"),
+            (1.0, None, None, "1.0 ms late; not told"),
+        ] {
+            assert_eq!(said(value, low, high), expected);
+        }
     }
 }

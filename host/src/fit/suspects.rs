@@ -15,6 +15,7 @@ use super::Evidence;
 use super::candidate::Candidate;
 use super::density::Observed;
 use super::likelihood::Explained;
+use super::outcome::offset;
 use super::search::{self, Best};
 use crate::error::Result;
 use crate::in_order::in_order;
@@ -364,18 +365,19 @@ fn changed(sound: &Sound<'_>, rest: &Best, index: usize) -> Option<(Suspect, f64
 /// Describes the change in words.
 fn difference(before: &Candidate, after: &Candidate) -> String {
     let mut said = Vec::new();
-    let mut say = |what: &str, [before, after]: [f64; 2], least: f64, digits: usize, unit: &str| {
-        if (before - after).abs() > least {
-            said.push(format!("{what} {before:.digits$}{unit} and then {after:.digits$}{unit}"));
-        }
-    };
-    say("speed factor", [1.0 / before.factor, 1.0 / after.factor], 0.02, 2, "");
-    say("second finger late by", [before.late[1], after.late[1]], 1.0, 1, " ms");
-    say("third finger late by", [before.late[2], after.late[2]], 1.5, 1, " ms");
-    say("noise", [before.noise, after.noise], 1.0, 1, " ms");
+    let mut say = |is_there: bool, text: String| said.extend(is_there.then_some(text));
+    let [one, other] = [before, after].map(|probe| 1.0 / probe.factor);
+    say((one - other).abs() > 0.02, format!("speed factor {one:.2} and then {other:.2}"));
+    for (finger, name, least) in [(1, "second", 1.0), (2, "third", 1.5)] {
+        let [one, other] = [before, after].map(|probe| probe.late[finger]);
+        say((one - other).abs() > least, format!("{name} finger {} and then {}", offset(one, 1), offset(other, 1)));
+    }
+    let [one, other] = [before, after].map(|probe| probe.noise);
+    say((one - other).abs() > 1.0, format!("noise {one:.1} ms and then {other:.1} ms"));
     for finger in 0..3 {
-        let share = [before.missed[finger], after.missed[finger]].map(|share| 100.0 * share);
-        say(&format!("missed by finger {}", finger + 1), share, 3.0, 0, " %");
+        let [one, other] = [before, after].map(|probe| 100.0 * probe.missed[finger]);
+        let text = format!("missed by finger {} {one:.0} % and then {other:.0} %", finger + 1);
+        say((one - other).abs() > 3.0, text);
     }
     if said.is_empty() { "several small differences".into() } else { said.join(", ") }
 }

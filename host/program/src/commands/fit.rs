@@ -5,7 +5,7 @@ use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::{Global, remark};
 use palpate::error::{FitProblem, ProbeProblem};
-use palpate::fit::{Estimate, Fit, Settings, between, fit};
+use palpate::fit::{Fit, Settings, between, fit, offset, offset_between};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
 use palpate::{Error, Result};
@@ -96,36 +96,34 @@ fn table(found: &Fit) -> String {
     let [full, pairs] = found.contacts;
     let presses = if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() };
     let mut text = format!(
-        "{} approaches to {}: {full} with three contacts, {pairs} with two{presses}\n\n{:22}{:>10}  95 % interval\n",
+        "{} approaches to {}: {full} with three contacts, {pairs} with two{presses}\n\n{:22}{:>14}  95 % interval\n",
         found.recorded,
         found.objects.join(", "),
         "",
         "value"
     );
-    let mut line = |name: &str, estimate: &Estimate, scale: f64, digits: usize, unit: &str| {
+    let mut line = |name: &str, value: String, interval: String| {
         // Writing to a string cannot fail.
-        _ = writeln!(
-            text,
-            "{name:22}{:>10}  {}{unit}",
-            format!("{:.digits$}{unit}", scale * estimate.value),
-            between(estimate, scale, digits)
-        );
+        _ = writeln!(text, "{name:22}{value:>14}  {interval}");
     };
-    line("speed over nominal", &found.speed_factor, 1.0, 3, "");
-    let zero = Estimate { value: 0.0, low: Some(0.0), high: Some(0.0) };
-    line("first finger late", &zero, 1.0, 1, " ms");
-    line("second finger late", &found.late[0], 1.0, 1, " ms");
-    line("third finger late", &found.late[1], 1.0, 1, " ms");
-    line("noise", &found.noise, 1.0, 2, " ms");
+    let speed = &found.speed_factor;
+    line("speed over nominal", format!("{:.3}", speed.value), between(speed, 1.0, 3));
+    line("first finger", "0.0 ms".into(), "the others are compared with it".into());
+    for (name, late) in ["second finger", "third finger"].into_iter().zip(&found.late) {
+        line(name, offset(late.value, 1), offset_between(late, 1));
+    }
+    line("noise", format!("{:.2} ms", found.noise.value), between(&found.noise, 1.0, 2) + " ms");
     for (name, missed) in ["first", "second", "third"].into_iter().zip(found.missed.iter().flatten()) {
-        line(&format!("{name} finger misses"), missed, 100.0, 1, " %");
+        let interval = between(missed, 100.0, 1) + " %";
+        line(&format!("{name} finger misses"), format!("{:.1} %", 100.0 * missed.value), interval);
     }
     if let Some(stroke) = &found.stroke {
-        line("stroke", stroke, 1.0, 3, if found.unit == Length::Tenth { "" } else { " mm" });
+        let unit = if found.unit == Length::Tenth { "" } else { " mm" };
+        line("stroke", format!("{:.3}{unit}", stroke.value), between(stroke, 1.0, 3) + unit);
     }
     _ = match found.timer {
-        Some(timer) => writeln!(text, "{:22}{:>10}", "timer", format!("{timer} ms")),
-        None => writeln!(text, "{:22}{:>10}", "timer", "none found"),
+        Some(timer) => writeln!(text, "{:22}{:>14}", "timer", format!("{timer} ms")),
+        None => writeln!(text, "{:22}{:>14}", "timer", "none found"),
     };
     if found.stroke.is_some() {
         text += "\nThe stroke was not stated: no recorded contact is later, where many would be.";

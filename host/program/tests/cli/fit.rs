@@ -42,7 +42,7 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
     assert!(text.contains("speed_factor = 0.") && text.contains("timer = \"1ms\"") && text.contains(" to "), "{text}");
     let table = stdout(run(fit));
     assert!(
-        table.contains("second finger late") && table.contains("95 % interval") && table.contains("Wrote "),
+        table.contains("\nsecond finger ") && table.contains("95 % interval") && table.contains("Wrote "),
         "{table}"
     );
     assert_eq!(std::fs::read_to_string(&probe).unwrap(), text, "the same recordings give the same bytes");

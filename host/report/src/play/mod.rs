@@ -300,9 +300,9 @@ fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
                 legend { "Noise of the sensor" }
                 @for (id, label, least, largest, value) in [
                     ("noise", "Noise: up to", 0.0, 20.0, ms(settings.noise.deviation.largest)),
-                    ("bent1", "Finger 1 bent: early by", -20.0, 20.0, ms(bent[0])),
-                    ("bent2", "Finger 2 bent: early by", -20.0, 20.0, ms(bent[1])),
-                    ("bent3", "Finger 3 bent: early by", -20.0, 20.0, ms(bent[2])),
+                    ("bent1", "Finger 1 bent", -20.0, 20.0, ms(bent[0])),
+                    ("bent2", "Finger 2 bent", -20.0, 20.0, ms(bent[1])),
+                    ("bent3", "Finger 3 bent", -20.0, 20.0, ms(bent[2])),
                 ] {
                     div.slider {
                         label for=(id) { (label) }

@@ -252,9 +252,11 @@
 
   // What the sensor adds. Rounds under other conditions are another series.
   const showNoise = () => {
-    const text = (micros) => `${(micros / 1000).toFixed(1)} ms`;
+    const text = (micros) => `${(Math.abs(micros) / 1000).toFixed(1)} ms`;
+    const offset = (early) => (early === 0 ? text(early) : `${text(early)} ${early > 0 ? "early" : "late"}`);
     const outputs = [...document.querySelectorAll(".slider output")];
-    [noise.deviation.largest, ...noise.bent].forEach((micros, index) => { outputs[index].textContent = text(micros); });
+    outputs[0].textContent = text(noise.deviation.largest);
+    noise.bent.forEach((early, finger) => { outputs[finger + 1].textContent = offset(early); });
     const same = noise.deviation.largest === data.noise.deviation.largest && noise.bent.every((early, finger) => early === data.noise.bent[finger]);
     element("condition").textContent = same ? "As the expected numbers were measured."
       : "Not as the expected numbers were measured.";

@@ -144,7 +144,10 @@ impl fmt::Display for Noise {
         }
         for (finger, early) in (1..).zip(self.bent) {
             let side = if early > 0.0 { "early" } else { "late" };
-            say(early != 0.0, format!("finger {finger} {side} by {} ms", ms(early.abs())));
+            // Tenths of a millisecond are enough, unless there are fewer.
+            let tenths = (early.abs() / 100.0).round() * 100.0;
+            let shown = if tenths > 0.0 { tenths } else { early.abs() };
+            say(early != 0.0, format!("finger {finger} is {} ms {side}", ms(shown)));
         }
         say(self.speed != 1.0, format!("a speed of {} times the nominal one", self.speed));
         say(self.speed_error > 0.0, format!("speed off by up to {} % per touch", percent(self.speed_error)));

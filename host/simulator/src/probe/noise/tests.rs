@@ -211,14 +211,14 @@ fn noise_is_said_in_words() {
     let noise = Noise { bent: [0.0, 3_000.0, 0.0], speed_bias: 0.05, pose: 5.0, ..Noise::default() };
     assert_eq!(
         noise.to_string(),
-        "finger 2 early by 3 ms, speed off by up to 5 % per robot, a pose turned by 5° per touch"
+        "finger 2 is 3 ms early, speed off by up to 5 % per robot, a pose turned by 5° per touch"
     );
 }
 
 #[test]
 fn a_late_finger_is_not_said_to_be_early_by_a_negative_time() {
     let noise = Noise { bent: [0.0, -4_311.0, 2_000.0], ..Noise::default() };
-    assert_eq!(noise.to_string(), "finger 2 late by 4.311 ms, finger 3 early by 2 ms");
+    assert_eq!(noise.to_string(), "finger 2 is 4.3 ms late, finger 3 is 2 ms early");
 }
 
 #[test]
