@@ -242,7 +242,7 @@ pub fn offset(late: f64, digits: usize) -> String {
 pub fn offset_between(late: &Estimate, digits: usize) -> String {
     match (late.low, late.high) {
         (Some(low), Some(high)) if low >= 0.0 => format!("{low:.digits$} to {}", offset(high, digits)),
-        (Some(low), Some(high)) if high <= 0.0 => format!("{:.digits$} to {}", -high, offset(low, digits)),
+        (Some(low), Some(high)) if high <= 0.0 => format!("{:.digits$} to {}", high.abs(), offset(low, digits)),
         (Some(low), Some(high)) => format!("{} to {}", offset(low, digits), offset(high, digits)),
         (Some(low), None) => format!("{} or later", offset(low, digits)),
         (None, Some(high)) => format!("{} or earlier", offset(high, digits)),
