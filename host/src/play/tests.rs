@@ -154,11 +154,11 @@ fn a_finger_that_the_hand_does_not_reach_is_missing_with_the_reason() {
         let approached = game.touch_at_random(&mut round);
         assert_eq!(approached.touch, *captured);
         let way = approached.approach.distances(game.scene(0).unwrap(), &probe);
-        for finger in 0..FINGERS {
-            let is_missing = captured.times()[finger].is_missing();
-            assert_eq!(approached.unreached[finger].is_some(), way[finger].is_some() && is_missing);
-            assert_eq!(approached.distances[finger], way[finger].filter(|_| !is_missing));
-            match approached.unreached[finger] {
+        let fingers = captured.times().into_iter().zip(way).zip(approached.unreached).zip(approached.distances);
+        for (((time, way), unreached), distance) in fingers {
+            assert_eq!(unreached.is_some(), way.is_some() && time.is_missing());
+            assert_eq!(distance, way.filter(|_| !time.is_missing()));
+            match unreached {
                 Some(Unreached::Stroke) => reasons[0] += 1,
                 Some(Unreached::Travel) => reasons[1] += 1,
                 None => {}
