@@ -38,6 +38,8 @@ struct Pico {
     watcher: Watcher<Input<'static>, Input<'static>, Input<'static>>,
     /// GP5, low while no approach is under way: from the robot's controller, or a button to ground.
     over: Input<'static>,
+    /// That signal as the station has last seen it.
+    was_over: bool,
     uart: BufferedUart,
     /// Bytes from the host that the station has not taken yet.
     received: [u8; 32],
@@ -66,19 +68,19 @@ impl Board for Pico {
     }
 
     fn is_over(&mut self) -> bool {
-        self.over.is_low()
+        self.was_over = self.over.is_low();
+        self.was_over
     }
 }
 
 impl Pico {
     /// Sleeps until a switch moves, the signal changes, a byte comes, or `wait` microseconds are over.
     async fn sleep(&mut self, wait: u32) -> Result<(), Error> {
-        let Self { watcher, over, uart, received, count } = self;
+        let Self { watcher, over, was_over, uart, received, count } = self;
         // Levels and not edges: one that changed while nobody waited wakes at once.
         let [a, b, c] = watcher.is_high();
         let (first, middle, last) = watcher.pins();
-        let is_over = over.is_low();
-        let moved = select4(turn(first, a), turn(middle, b), turn(last, c), turn(over, !is_over));
+        let moved = select4(turn(first, a), turn(middle, b), turn(last, c), turn(over, !*was_over));
         if let Some(bytes) = palpate_embassy::sleep(moved, uart.fill_buf(), wait).await {
             let bytes = bytes?;
             *count = bytes.len().min(received.len());
@@ -105,7 +107,7 @@ async fn main(_spawner: Spawner) {
     let last = Input::new(chip.PIN_4, Pull::Up);
     let watcher = Watcher::start(Fingers::new(first, middle, last, Active::Low), &Micros);
     let over = Input::new(chip.PIN_5, Pull::Up);
-    let mut pico = Pico { watcher, over, uart, received: [0; 32], count: 0 };
+    let mut pico = Pico { watcher, over, was_over: false, uart, received: [0; 32], count: 0 };
     let settings = ProbeSettings { boot: RoscRng.next_u32(), program: PROGRAM, ..ProbeSettings::default() };
     let Ok(mut station) = ProbeStation::<OBJECTS>::open(MODEL, NoStorage, settings) else { return };
     loop {
