@@ -40,6 +40,7 @@
 #define PALPATE_GRID 4
 #define PALPATE_WIDE 8
 #define PALPATE_PATTERNS 16
+#define PALPATE_CODE 64 /* trees that are a function, which `palpate export` wrote too: not among the layouts by default */
 /* Types of leaves. */
 #define PALPATE_I8 1
 #define PALPATE_I16 2
@@ -122,7 +123,8 @@ typedef enum {
     PALPATE_NOT_UNDERSTOOD,  /* a section that must be understood, and is not */
     PALPATE_MARGIN_RANGE,    /* margins could overflow */
     PALPATE_NOT_BUILT_IN,    /* not in PALPATE_LAYOUTS (place 6) or PALPATE_LEAVES (place 7) */
-    PALPATE_TOO_MANY_OBJECTS /* more than PALPATE_MAX_OBJECTS (place 14) */
+    PALPATE_TOO_MANY_OBJECTS, /* more than PALPATE_MAX_OBJECTS (place 14) */
+    PALPATE_NEEDS_CODE       /* its trees are a function, which palpate_open_code takes */
 } palpate_error;
 
 /* Reasons why a touch or a row is no evidence. The input was not counted, and nothing has changed. */
@@ -175,6 +177,9 @@ typedef struct {
     uint8_t real;       /* 1: features are keys of f32 values, see palpate_key */
     uint8_t patterns;   /* contact patterns that count, bit by code */
     uint8_t needs_pose;
+#if PALPATE_LAYOUTS & PALPATE_CODE
+    void (*code)(const int32_t *features, int32_t *margins);
+#endif
 } palpate_model;
 
 /* State of recognition of the object that is touched. */
@@ -203,6 +208,7 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 #define PALPATE_IS_GRID_(model) PALPATE_IS_LAYOUT_(model, PALPATE_GRID, 2)
 #define PALPATE_IS_WIDE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_WIDE, 3)
 #define PALPATE_IS_PATTERNS_(model) PALPATE_IS_LAYOUT_(model, PALPATE_PATTERNS, 4)
+#define PALPATE_IS_CODE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_CODE, 6)
 /* True if leaves are indices into a table. */
 #define PALPATE_IS_SHARED_(model) (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && (model)->table_ != NULL)
 #define PALPATE_IS_I8_(model) PALPATE_IS_LEAF_(model, PALPATE_I8, 0)
@@ -459,6 +465,9 @@ static inline palpate_error palpate_check_axes_(palpate_model *model)
     if (PALPATE_IS_WIDE_(model) ? axis != model->part_[PALPATE_AXES_] || (palpate_between_(cuts, end) & 3) != 0 : cuts != end) {
         return palpate_wrong_(model, PALPATE_SECTION, cuts);
     }
+    if (PALPATE_IS_CODE_(model) && model->part_[PALPATE_AXES_] != end) {
+        return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_AXES_]);
+    }
     return PALPATE_OK;
 }
 
@@ -504,6 +513,9 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         if (group != splits) {
             return palpate_wrong_(model, PALPATE_SECTION, group);
         }
+    }
+    if (PALPATE_IS_CODE_(model) && group != splits) {
+        return palpate_wrong_(model, PALPATE_SECTION, group);
     }
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
         uint32_t trees = palpate_u32_(group + 4), leaf = PALPATE_AS_(uint32_t, palpate_leaf_size_(model)), length, table = 0;
@@ -605,7 +617,7 @@ static inline uint8_t palpate_wrong_number_(const uint8_t *bytes)
 static inline uint8_t palpate_wrong_header_(palpate_model *model)
 {
     const uint8_t *bytes = model->bytes;
-    if (model->layout_ > 4) {
+    if (model->layout_ > 4 && model->layout_ != 6) {
         return 6;
     }
     if (model->leaf_ > 2) {
@@ -626,9 +638,8 @@ static inline uint8_t palpate_wrong_header_(palpate_model *model)
     return model->real > 1 ? 13 : palpate_wrong_number_(bytes);
 }
 
-/* Opens a model, checking everything that is relied on later. `bytes` must stay as they are while it is used. On an error
- * `model->wrong` is its place, and the model must not be used. Cost: in proportion to the bytes, for the checksum. */
-PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *bytes, size_t length)
+/* Opens a model of any layout; of the layout code without its trees. */
+static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *bytes, size_t length)
 {
     uint32_t lengths[7], rest, i;
     const uint8_t *p;
@@ -692,6 +703,9 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     if (model->wrong != 0) {
         return PALPATE_FIELD;
     }
+    if ((PALPATE_LAYOUTS & PALPATE_CODE) != 0 && model->layout_ == 6 && model->leaf_ == 2) {
+        return palpate_wrong_(model, PALPATE_FIELD, bytes + 7);
+    }
     if ((PALPATE_LAYOUTS >> model->layout_ & 1) == 0) {
         return palpate_wrong_(model, PALPATE_NOT_BUILT_IN, bytes + 6);
     }
@@ -719,6 +733,32 @@ PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *byte
     }
     return error;
 }
+
+/* Opens a model, checking everything that is relied on later. `bytes` must stay as they are while it is used. On an error
+ * `model->wrong` is its place, and the model must not be used. Cost: in proportion to the bytes, for the checksum. */
+PALPATE_API palpate_error palpate_open(palpate_model *model, const uint8_t *bytes, size_t length)
+{
+    const palpate_error error = palpate_open_(model, bytes, length);
+    if ((PALPATE_LAYOUTS & PALPATE_CODE) != 0 && error == PALPATE_OK && PALPATE_IS_CODE_(model)) {
+        return palpate_wrong_(model, PALPATE_NEEDS_CODE, bytes + 6);
+    }
+    return error;
+}
+
+#if PALPATE_LAYOUTS & PALPATE_CODE
+/* Opens a model of the layout code in the same way, with the function that `palpate export` wrote with it: from a row of all
+ * features, as palpate_margins_of has them, to margins. */
+PALPATE_API palpate_error palpate_open_code(palpate_model *model, const uint8_t *bytes, size_t length,
+                                            void (*code)(const int32_t *features, int32_t *margins))
+{
+    const palpate_error error = palpate_open_(model, bytes, length);
+    if (error == PALPATE_OK && model->layout_ != 6) {
+        return palpate_wrong_(model, PALPATE_FIELD, bytes + 6);
+    }
+    model->code = code;
+    return error;
+}
+#endif
 
 /* An object's name, with 0 at its end, cut to `room` bytes together: its bytes in the model, meant as UTF-8. Empty for one
  * that the model does not know. Returns its length. */
@@ -1020,6 +1060,19 @@ static inline void palpate_shift_(const palpate_model *model, uint32_t *sums, ui
     }
 }
 
+#if PALPATE_LAYOUTS & PALPATE_CODE
+/* The sums of a model whose trees are code. */
+PALPATE_APART_ void palpate_call_(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *sums)
+{
+    int32_t row[256];
+    uint_fast16_t i;
+    for (i = 0; i < model->features; i++) {
+        row[i] = palpate_value_(model, features, count, PALPATE_AS_(uint8_t, i));
+    }
+    model->code(row, sums);
+}
+#endif
+
 /* The sums of a row of features, in units or as the bits of f32 values. */
 static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
 {
@@ -1032,6 +1085,12 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     uint8_t *ranks = PALPATE_AT_(uint8_t *, words);
     uint_fast16_t i;
     uint_fast8_t last;
+#if PALPATE_LAYOUTS & PALPATE_CODE
+    if (PALPATE_IS_CODE_(model)) {
+        palpate_call_(model, features, count, PALPATE_AT_(int32_t *, sums));
+        return;
+    }
+#endif
     for (i = 0; i < model->objects; i++) {
         /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
         sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));

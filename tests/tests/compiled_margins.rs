@@ -33,7 +33,7 @@ fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
 }
 
 fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
-    let layouts = std::iter::once(None).chain(Layout::ALL.iter().copied().map(Some));
+    let layouts = std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
     let settings = |layout| Settings { leaf, layout, ..Settings::default() };
     let plain = layouts.map(settings);
     // Of those that walk trees, one with shared leaves.

@@ -29,7 +29,7 @@ fn models() -> Vec<Vec<u8>> {
     let mut models = Vec::new();
     for each in [true, false] {
         for &leaf in Leaf::ALL {
-            for &layout in Layout::ALL {
+            for &layout in Layout::OF_DATA {
                 // Tables by contact pattern have no other descriptor.
                 let descriptor =
                     if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };

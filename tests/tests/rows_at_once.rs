@@ -27,7 +27,7 @@ fn shapes() -> impl Strategy<Value = Shape> {
 }
 
 fn models(ensemble: &Ensemble) -> Vec<Vec<u8>> {
-    let layouts = || std::iter::once(None).chain(Layout::ALL.iter().copied().map(Some));
+    let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
     let settings = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
     let compiled = settings.filter_map(|(leaf, layout)| {
         let settings = Settings { leaf, layout, ..Settings::default() };

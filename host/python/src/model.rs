@@ -349,7 +349,7 @@ pub(crate) fn compile(
     let ensemble = &ensemble.get().ensemble;
     let layouts = "compact, complete, grid, wide or patterns";
     let layout = layout.map(|name| {
-        let found = Layout::ALL.iter().copied().find(|layout| layout.name() == name);
+        let found = Layout::OF_DATA.iter().copied().find(|layout| layout.name() == name);
         found.ok_or_else(|| Error::setting("layout", name, layouts))
     });
     let counts = [

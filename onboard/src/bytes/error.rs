@@ -49,6 +49,8 @@ pub enum ModelError {
         /// The offset of what is missing: 6 for the layout, 7 for the type of leaf.
         offset: usize,
     },
+    /// The model's trees are code, which it has to be opened with.
+    NeedsCode,
 }
 
 /// Fault in a model whose bytes are as they were written, with its offset: an error that fits two registers.
@@ -85,6 +87,7 @@ impl ModelError {
             Self::Length { expected, found } => usize::try_from(expected).unwrap_or(found).min(found),
             Self::NotAModel => 0,
             Self::Version(_) => 4,
+            Self::NeedsCode => 6,
             Self::Checksum { .. } | Self::MarginRange => 8,
             Self::Field { offset }
             | Self::Section { offset }
@@ -116,6 +119,9 @@ impl fmt::Display for ModelError {
                 write!(f, "the model relies on section {tag}, which this program does not know: it needs a newer one")
             }
             Self::MarginRange => f.write_str("the model's margins could overflow"),
+            Self::NeedsCode => {
+                f.write_str("the model's trees are code, beside it, for a chip's program to be built with")
+            }
             Self::NotBuiltIn { offset } => {
                 let what = if *offset == 6 { "layout" } else { "type of leaf" };
                 write!(f, "this program was built without palpate-onboard's feature for the model's {what}")

@@ -11,6 +11,7 @@ pub(crate) const fn layout(layout: Layout) -> bool {
         Layout::Grid => cfg!(feature = "grid"),
         Layout::Wide => cfg!(feature = "wide"),
         Layout::Patterns => cfg!(feature = "patterns"),
+        Layout::Code => cfg!(feature = "code"),
     }
 }
 

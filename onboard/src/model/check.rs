@@ -22,7 +22,12 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
         return Err(Wrong::Field(offset));
     }
     let built_in = built_in::layout(model.layout);
-    if !built_in || !built_in::leaf(model.leaf) {
+    // Of code the type of leaves says only what they were rounded to.
+    let is_code = model.layout == Layout::Code;
+    if is_code && model.leaf == LeafType::F32 {
+        return Err(Wrong::Field(7));
+    }
+    if !built_in || !(is_code || built_in::leaf(model.leaf)) {
         return Err(Wrong::NotBuiltIn(if built_in { 7 } else { 6 }));
     }
     optional::check(model, optional, stated)?;
@@ -43,6 +48,10 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     if built_in::layout(Layout::Patterns) && model.layout == Layout::Patterns {
         let cells = patterns::cells(model).ok_or(Wrong::Section(model.offset(model.ranked)))?;
         section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
+        section(model.groups.is_empty(), model.groups)?;
+    }
+    if built_in::layout(Layout::Code) && model.layout == Layout::Code {
+        section(model.ranked.is_empty(), model.ranked)?;
         section(model.groups.is_empty(), model.groups)?;
     }
     // The largest leaf, as a power of two.

@@ -66,7 +66,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, Wrong> {
     let sections = Sections { bytes, margins, ranked, groups, nodes, leaves, axis_count, layout, leaf };
     let mut stated = Stated::new(descriptor);
     check::check(&sections, optional, &mut stated)?;
-    Ok(Model { sections, stated })
+    Ok(Model::of(sections, stated))
 }
 
 /// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.

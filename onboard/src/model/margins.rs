@@ -96,6 +96,10 @@ impl Model<'_> {
     }
 
     fn sum_as_they_are(&self, features: &[i32], margins: &mut [i32]) {
+        #[cfg(feature = "code")]
+        if self.layout() == Layout::Code {
+            return self.call(features, margins);
+        }
         if !self.read_table(features, margins) {
             self.sum_trees(features, margins);
         }

@@ -1,6 +1,8 @@
 //! Bytes to a model to the margins of a touch.
 
 mod check;
+#[cfg(feature = "code")]
+mod code;
 mod fixed;
 mod header;
 mod margins;
@@ -10,6 +12,8 @@ mod refused;
 #[cfg(feature = "rows")]
 mod rows;
 
+#[cfg(feature = "code")]
+pub use code::Code;
 pub use predict::inverse_link;
 pub use refused::Refused;
 
@@ -29,6 +33,9 @@ use palpate_shared::{Descriptor, Patterns};
 pub struct Model<'a> {
     sections: Sections<'a>,
     stated: Stated,
+    /// The trees of a model of the layout code.
+    #[cfg(feature = "code")]
+    code: Option<Code>,
 }
 
 /// Statements of a model that recognition depends on. Small, as [`Sections`] is: a model of more than 64 bytes is
@@ -87,7 +94,7 @@ impl Opened {
     /// The model in the bytes that it was opened from; `None` if there are fewer or more of them. Cost: a few
     /// instructions. Other bytes of the same length give wrong margins, nothing worse.
     pub(crate) fn model<'a>(&self, bytes: &'a [u8]) -> Option<Model<'a>> {
-        Some(Model { sections: Sections::at(bytes, &self.places)?, stated: self.stated })
+        Some(Model::of(Sections::at(bytes, &self.places)?, self.stated))
     }
 }
 
@@ -105,8 +112,28 @@ impl<'a> Model<'a> {
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
     #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
+        let model = Self::opened_with_code(bytes)?;
+        if built_in::layout(Layout::Code) && model.layout() == Layout::Code {
+            return Err(ModelError::NeedsCode);
+        }
+        Ok(model)
+    }
+
+    /// A model of any layout, also one without its trees.
+    #[inline(always)]
+    fn opened_with_code(bytes: &'a [u8]) -> Result<Self, ModelError> {
         header::whole(bytes)?;
         header::read(bytes).map_err(|wrong| wrong.in_model(bytes))
+    }
+
+    /// A model of sections that were checked.
+    const fn of(sections: Sections<'a>, stated: Stated) -> Self {
+        Self {
+            sections,
+            stated,
+            #[cfg(feature = "code")]
+            code: None,
+        }
     }
 
     /// The header.

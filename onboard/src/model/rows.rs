@@ -2,6 +2,7 @@
 
 use super::{Model, fixed};
 use crate::layouts::batch::{self, Batch};
+use palpate_shared::format::Layout;
 
 /// With fewer rows than this, one after the other is as fast.
 const FEW: usize = 16;
@@ -42,6 +43,7 @@ impl Model<'_> {
         }
         // Leaves that are numbers are not made ready, nor rows in which numbers stand for missing values.
         let is_special = self.shared_leaves().is_some() || self.sentinel().is_some();
+        let is_special = is_special || self.layout() == Layout::Code;
         if rows < FEW || !self.has_trees() || is_special || !batch::is_regular(&self.sections) {
             for (row, margins) in features.chunks_exact(width).zip(margins.chunks_exact_mut(objects)) {
                 margins.fill(0);

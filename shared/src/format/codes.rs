@@ -46,7 +46,14 @@ codes! {
         Wide = 3, "wide";
         /// A table of margins for each contact pattern, over the features that it has: no walk at all.
         Patterns = 4, "patterns";
+        /// No trees: they are a function of the program that reads the model.
+        Code = 6, "code";
     }
+}
+
+impl Layout {
+    /// Those whose trees are in the model.
+    pub const OF_DATA: &'static [Self] = &[Self::Compact, Self::Complete, Self::Grid, Self::Wide, Self::Patterns];
 }
 
 codes! {

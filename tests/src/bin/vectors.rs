@@ -145,7 +145,7 @@ fn snapshot(text: &mut String, recognizer: &Recognizer<'_, 256>) {
 fn layouts(text: &mut String) {
     for each in [true, false] {
         for &leaf in Leaf::ALL {
-            for &layout in Layout::ALL {
+            for &layout in Layout::OF_DATA {
                 let name = format!("{} {} {}", layout.name(), leaf.name(), if each { "each" } else { "one" });
                 let bytes = stated(&compiled(Shape { each, ..SHAPE }, 5, leaf, layout), ALL);
                 play(text, &name, &bytes, &touches(5, 1));

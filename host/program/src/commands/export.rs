@@ -4,7 +4,10 @@ use super::expected::PriorArguments;
 use super::numbers::error_rate;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
-use palpate::compile::{self, Candidate, CompiledModel, Goal, Instructions, Language, Layout, Leaf, Settings};
+use palpate::compile::code::{Form, Program};
+use palpate::compile::{
+    self, Candidate, Compiled, CompiledModel, Goal, Instructions, Language, Layout, Leaf, Settings,
+};
 use palpate::ensemble::{Ensemble, Inputs};
 use palpate::error::Error;
 use palpate::output;
@@ -21,7 +24,9 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). `palpate verify` compares the model with it. A compiled model is written as source code, with --emit.
 
-Without a layout of its own (compact, complete, grid, wide, patterns), --layout says what it is chosen for: balanced, m4f or m0+ for the fastest of at most three times the smallest, speed, or size.
+Without a layout of its own (compact, complete, grid, wide, patterns, code), --layout says what it is chosen for: balanced, m4f or m0+ for the fastest of at most three times the smallest, speed, or size.
+
+With --emit thumb, thumb-m4f or c-code the trees are code, several times as fast: assembly for any Cortex-M, or for a Cortex-M4F, with a Rust module that includes it; or C in model.h. The model itself has no trees then. With c or rust as well, code is one of the choices; c also declares assembly for C.
 
 Examples:
   palpate export ensemble.json -o model.palpate
@@ -30,6 +35,7 @@ Examples:
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
   palpate export xgboost.json -o model.palpate --missing -999
   palpate export sure.palpate -o sure.palpate --emit c     # sure.h alone
+  palpate export forest.onnx -o forest.palpate --emit thumb
   palpate export lightgbm.txt -o model.palpate --emit json # model.json too")]
 pub(crate) struct Arguments {
     /// An ensemble that `palpate train` or another library saved, or a compiled model to be written as source code
@@ -58,7 +64,7 @@ pub(crate) struct Arguments {
     /// Give up after this many touches
     #[arg(long, default_value = "200", value_name = "N")]
     max_touches: u32,
-    /// Write beside it: c, rust (source code) or json (the trees, as XGBoost's)
+    /// Write beside it: c, rust (source code), thumb, thumb-m4f, c-code (trees as code) or json (the trees, as XGBoost's)
     #[arg(long, value_name = "KIND,…", value_delimiter = ',', value_parser = emitted)]
     emit: Vec<Emitted>,
     /// From a regression's margin to its value: identity, logistic, exponential, square or softplus [default: the file's]
@@ -111,15 +117,20 @@ struct Sharing(Option<bool>);
 enum Emitted {
     /// The compiled model as source code.
     Source(Language),
+    /// Its trees as code.
+    Code(Form),
     /// The ensemble that it was compiled from.
     Ensemble,
 }
 
 impl Emitted {
-    const fn extension(self) -> &'static str {
+    /// Extensions of its files.
+    fn extensions(self) -> &'static [&'static str] {
         match self {
-            Self::Source(language) => language.extension(),
-            Self::Ensemble => "json",
+            Self::Source(Language::C) | Self::Code(Form::C) => &["h"],
+            Self::Source(Language::Rust) => &["rs"],
+            Self::Code(Form::Thumb(_)) => &["s", "rs"],
+            Self::Ensemble => &["json"],
         }
     }
 }
@@ -128,6 +139,9 @@ impl Emitted {
 struct Exported {
     bytes: usize,
     layout: &'static str,
+    /// The form of code, of the layout code.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    form: Option<&'static str>,
     leaf: &'static str,
     /// Number of different leaves, if equal ones are stored once.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -185,13 +199,15 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let mut ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
     set_link(&mut ensemble, arguments.link)?;
     let (scales, fitted) = scales(&arguments, &ensemble)?;
+    let (layout, forms) = arguments.code()?;
     let usual = match ensemble.inputs {
         Inputs::Touches(_) => Settings::for_touches(ensemble.objects.len()),
         Inputs::Rows(_) => Settings::default(),
     };
     let settings = Settings {
         leaf: arguments.leaf.unwrap_or(usual.leaf),
-        layout: arguments.layout.layout(),
+        layout,
+        forms,
         goal: arguments.layout.goal(),
         shared_leaves: arguments.shared_leaves.0,
         error_rate: arguments.error_rate,
@@ -205,7 +221,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         _ => error,
     })?;
     output::write_bytes(&arguments.output, &compiled.bytes)?;
-    write_emitted(&emitted, &compiled.bytes, &ensemble)?;
+    let written = write_emitted(&emitted, &compiled, &ensemble, &arguments.output)?;
     let imported = ensemble.origin.imported.as_ref();
     let exported = Exported {
         bytes: compiled.bytes.len(),
@@ -232,7 +248,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             .as_ref()
             .map(|scales| scales::effects(&ensemble, scales, fitted.as_ref()))
             .unwrap_or_default(),
-        sources: emitted.iter().filter(|(kind, _)| *kind != Emitted::Ensemble).map(|(_, path)| path.clone()).collect(),
+        form: compiled.code.as_ref().map(|(_, form)| form.name()),
+        sources: written,
         ensemble: emitted.into_iter().find(|(kind, _)| *kind == Emitted::Ensemble).map(|(_, path)| path),
     };
     if global.json {
@@ -242,6 +259,30 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 }
 
 impl Arguments {
+    /// The layout that is asked for, and the forms of code that may be chosen.
+    fn code(&self) -> Result<(Option<Layout>, Vec<Form>)> {
+        let form = |emitted: &Emitted| if let Emitted::Code(form) = emitted { Some(*form) } else { None };
+        let forms: Vec<Form> = self.emit.iter().filter_map(form).collect();
+        let layout = self.layout.layout();
+        if layout == Some(Layout::Code) && forms.is_empty() {
+            return Err(Error::setting(
+                "layout",
+                "code",
+                "it with --emit thumb, thumb-m4f or c-code: code is not in a model",
+            ));
+        }
+        if let Some(layout) = layout.filter(|layout| *layout != Layout::Code && !forms.is_empty()) {
+            return Err(Error::setting(
+                "layout",
+                layout.name(),
+                "code, or a goal, with trees that are written as code",
+            ));
+        }
+        let has_data = self.emit.iter().any(|emitted| matches!(emitted, Emitted::Source(_)));
+        let is_code = !forms.is_empty() && !has_data;
+        Ok((if is_code { Some(Layout::Code) } else { layout }, forms))
+    }
+
     /// The files that are read, none of which may be written.
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
         std::iter::once(&self.ensemble).chain(self.rows())
@@ -296,6 +337,9 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
     if arguments.emit.contains(&Emitted::Ensemble) {
         return refuse("emit", "json");
     }
+    if arguments.emit.iter().any(|emitted| matches!(emitted, Emitted::Code(_))) {
+        return refuse("emit", "code");
+    }
     let emitted = places(arguments)?;
     // The model itself may be what the source code is to stand beside.
     if output::refuse_input(&arguments.output, [model]).is_ok() {
@@ -324,35 +368,74 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
 fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
     let (output, mut places) = (&arguments.output, Vec::new());
     for &emitted in &arguments.emit {
-        let path = output.with_extension(emitted.extension());
-        let taken = path == *output || path.file_name().is_some_and(|name| name == HEADER);
-        if output::is_stdout(output) || taken {
-            return Err(Error::setting(
-                "output",
-                output.display(),
-                format!(
-                    "a file beside which another one can have the extension .{} (but not {HEADER}), for --emit",
-                    emitted.extension()
-                ),
-            ));
+        for extension in emitted.extensions() {
+            let path = output.with_extension(extension);
+            let taken = path == *output || path.file_name().is_some_and(|name| name == HEADER);
+            if output::is_stdout(output) || taken {
+                return Err(Error::setting(
+                    "output",
+                    output.display(),
+                    format!(
+                        "a file beside which another one can have the extension .{extension} (but not {HEADER}), for --emit"
+                    ),
+                ));
+            }
+            output::refuse_input(&path, arguments.inputs())?;
+            places.push((emitted, path));
         }
-        output::refuse_input(&path, arguments.inputs())?;
-        places.push((emitted, path));
     }
     Ok(places)
 }
 
+/// Where using code is described.
+const GUIDE: &str = "docs/guide/code.md";
 /// The header that reads models in C.
 const HEADER: &str = "palpate.h";
 
-fn write_emitted(emitted: &[(Emitted, PathBuf)], bytes: &[u8], ensemble: &Ensemble) -> Result<()> {
+fn write_emitted(
+    emitted: &[(Emitted, PathBuf)],
+    compiled: &Compiled,
+    ensemble: &Ensemble,
+    output: &Path,
+) -> Result<Vec<PathBuf>> {
+    let mut written = Vec::new();
     for (emitted, path) in emitted {
         match emitted {
             Emitted::Ensemble => ensemble.save(path)?,
-            Emitted::Source(_) => write_source(*emitted, path, bytes)?,
+            Emitted::Source(_) if compiled.code.is_none() => {
+                write_source(*emitted, path, &compiled.bytes)?;
+                written.push(path.clone());
+            }
+            Emitted::Source(_) | Emitted::Code(_) => {}
         }
     }
-    Ok(())
+    if let Some((program, form)) = &compiled.code {
+        written = write_code(emitted, compiled, (program, *form), output)?;
+    }
+    Ok(written)
+}
+
+/// Writes trees as code, and what a program needs of the model beside it.
+fn write_code(
+    emitted: &[(Emitted, PathBuf)],
+    compiled: &Compiled,
+    (program, form): (&Program, Form),
+    output: &Path,
+) -> Result<Vec<PathBuf>> {
+    let language =
+        |(emitted, _): &(Emitted, _)| if let Emitted::Source(language) = emitted { Some(*language) } else { None };
+    let languages: Vec<Language> = emitted.iter().filter_map(language).collect();
+    let name = output.file_stem().unwrap_or_default().to_string_lossy();
+    let mut written = Vec::new();
+    for (extension, text) in compile::emit_code(&compiled.bytes, program, form, &name, &languages)? {
+        let path = output.with_extension(extension);
+        output::write_bytes(&path, text.as_bytes())?;
+        if extension == "h" {
+            output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
+        }
+        written.push(path);
+    }
+    Ok(written)
 }
 
 /// Writes a model as source code; in C with the header that reads it.
@@ -370,8 +453,9 @@ fn emitted(name: &str) -> Result<Emitted, String> {
     if name == "json" {
         return Ok(Emitted::Ensemble);
     }
-    let language = Language::ALL.into_iter().find(|language| language.name() == name);
-    language.map(Emitted::Source).ok_or_else(|| "use c, rust or json".to_owned())
+    let language = Language::ALL.into_iter().find(|language| language.name() == name).map(Emitted::Source);
+    let form = || Form::ALL.into_iter().find(|form| form.name() == name).map(Emitted::Code);
+    language.or_else(form).ok_or_else(|| "use c, rust, thumb, thumb-m4f, c-code or json".to_owned())
 }
 
 /// Names from the command line: a file's lines, if there is such a file, else what commas separate.
@@ -509,11 +593,13 @@ fn text(path: &Path, exported: &Exported) -> String {
     if exported.candidates.len() > 1 {
         _ = writeln!(text, "{:16} {:>9} {:>12} {:>12}", "layout", "bytes", "Cortex-M4F", "Cortex-M0+");
         for candidate in &exported.candidates {
-            let Candidate { layout, shared_leaves, bytes, instructions, .. } = candidate;
+            let Candidate { layout, form, shared_leaves, bytes, instructions, .. } = candidate;
             let m0_plus = instructions.m0_plus.map_or_else(|| "unknown".into(), |number| number.to_string());
-            let is_chosen = layout.name() == exported.layout && *shared_leaves == exported.shared_leaves.is_some();
+            let is_layout = layout.name() == exported.layout && *form == exported.form;
+            let is_chosen = is_layout && *shared_leaves == exported.shared_leaves.is_some();
             let mark = if is_chosen { " *" } else { "" };
-            let name = format!("{}{}", layout.name(), if *shared_leaves { ", shared" } else { "" });
+            let shared = if *shared_leaves { ", shared" } else { "" };
+            let name = format!("{}{shared}{}", layout.name(), form.map_or(String::new(), |form| format!(", {form}")));
             _ = writeln!(text, "{name:16} {bytes:>9} {:>12} {m0_plus:>12}{mark}", instructions.m4f);
         }
     }
@@ -536,6 +622,10 @@ fn text(path: &Path, exported: &Exported) -> String {
     }
     for note in &exported.notes {
         _ = writeln!(text, "Note: {note}");
+    }
+    if let Some(form) = exported.form {
+        _ = writeln!(text, "The trees are code ({form}), which the model has to be built with; see {}", GUIDE);
+        return text;
     }
     let has_sentinel = exported.predicts.as_ref().is_some_and(|predicts| predicts.missing.is_some());
     let features = features(exported.layout, exported.leaf, exported.shared_leaves.is_some());

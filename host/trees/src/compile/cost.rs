@@ -92,6 +92,8 @@ impl Memory {
                 Layout::Grid => 468,
                 Layout::Patterns => 572,
                 Layout::Complete | Layout::Compact | Layout::Wide => 1_116,
+                // A whole row of features, and the columns' numbers.
+                Layout::Code => 1_500,
             };
         Self { model_flash: model.bytes().len(), code_flash: code_flash(core, model), ram, stack }
     }
@@ -106,6 +108,8 @@ fn code_flash(core: Core, model: &Model<'_>) -> usize {
         (Core::M4F, Layout::Compact) => [6_516, 6_528, 6_940],
         (Core::M4F, Layout::Complete) => [7_984, 7_548, 7_756],
         (Core::M4F, Layout::Wide) => [6_516, 6_484, 6_892],
+        // Without the trees.
+        (Core::M4F | Core::M0Plus, Layout::Code) => [5_600; 3],
         (Core::M0Plus, Layout::Grid) => [5_476, 5_508, 5_604],
         (Core::M0Plus, Layout::Patterns) => [5_624, 5_656, 5_748],
         (Core::M0Plus, Layout::Compact) => [6_216, 6_224, 7_168],
@@ -207,6 +211,8 @@ impl Costs {
         let trees = match shape.layout {
             Layout::Grid => return (self.grid.0 + self.grid.1 * shape.objects) as u64,
             Layout::Patterns => return (self.grid.0 + self.patterns + self.grid.1 * shape.objects) as u64,
+            // Its instructions are counted where they are written.
+            Layout::Code => return 0,
             Layout::Complete => {
                 let groups = shape.groups.iter().enumerate();
                 groups.map(|(index, group)| self.complete_group(group, shape, index > 0)).sum()

@@ -1,5 +1,8 @@
 //! A compiled model as source code, for programs that have no files.
 
+use super::code::{Form, Program};
+use super::model::open_any;
+use crate::error::Result;
 use palpate_onboard::Model;
 use std::fmt::Write as _;
 
@@ -33,12 +36,43 @@ impl Language {
     }
 }
 
+/// The files of trees as code, and of the model beside it: their extensions and texts. `name`, the
+/// files' own without an extension, is what the array and the functions are called after.
+///
+/// `languages` are the ones that the model is written in as well: for C, what of the code C needs to know is with it.
+///
+/// # Errors
+/// None for what [`compile`](super::compile) returned.
+pub fn emit_code(
+    bytes: &[u8],
+    program: &Program,
+    form: Form,
+    name: &str,
+    languages: &[Language],
+) -> Result<Vec<(&'static str, String)>> {
+    let model = open_any(bytes)?;
+    let (file, name) = (name, identifier(name));
+    let mut files = match form {
+        // C is one file with the model's array.
+        Form::C => Vec::new(),
+        Form::Thumb(_) => program.sources(&name, file, form),
+    };
+    if form == Form::C || languages.contains(&Language::C) {
+        let functions = match form {
+            Form::C => program.c_functions(&name),
+            Form::Thumb(_) => program.c_declaration(&name),
+        };
+        files.push(("h", c(&model, &name, &(functions + &program.c_opening(&name)))));
+    }
+    Ok(files)
+}
+
 /// The model as an array in a source file, `name` being what the array is called after. Characters that an identifier
 /// cannot have become `_`.
 pub fn emit(model: &Model<'_>, name: &str, language: Language) -> String {
     let name = identifier(name);
     match language {
-        Language::C => c(model, &name),
+        Language::C => c(model, &name, ""),
         Language::Rust => rust(model, &name),
     }
 }
@@ -46,7 +80,7 @@ pub fn emit(model: &Model<'_>, name: &str, language: Language) -> String {
 /// Bytes in a line.
 const LINE: usize = 20;
 
-fn c(model: &Model<'_>, name: &str) -> String {
+fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
     let guard = format!("{}_MODEL_H", name.to_uppercase());
     let layout = model.layout().name().to_uppercase();
     let leaf = model.leaf_type().name().to_uppercase();
@@ -67,13 +101,17 @@ fn c(model: &Model<'_>, name: &str) -> String {
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
          {checks}\n\
-         /* palpate_open(&model, {name}_model, sizeof {name}_model) */\n\
+         /* {open} */\n\
          static const uint8_t {name}_model[{length}]\n\
          #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
-         {array}}};\n\n#endif\n",
+         {array}}};\n\n{functions}#endif\n",
         about = about(model).replace("*/", "* /"),
         checks = checks(&name.to_uppercase(), &layout, &leaf, [strangers, shared, sentinel], objects),
         array = array(model.bytes()),
+        open = match functions {
+            "" => format!("palpate_open(&model, {name}_model, sizeof {name}_model)"),
+            _ => format!("{name}_open(&model)"),
+        },
     )
 }
 

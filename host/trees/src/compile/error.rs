@@ -101,6 +101,7 @@ fn limit(layout: Layout) -> &'static str {
         Layout::Patterns => {
             "its descriptor is not contacts-curvature, it has more than 255 thresholds of a feature, or its margins are too large for a byte"
         }
+        Layout::Code => "its leaves are f32, it has more thresholds than 256 columns hold, or leaves beyond two bytes",
         Layout::Compact | Layout::Wide => "it has more thresholds than 65,536, or a tree with more splits than that",
     }
 }

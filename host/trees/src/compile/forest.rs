@@ -4,6 +4,7 @@ use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output,
 use crate::error::{CompileProblem, Error, Result, TreeProblem};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{Key, f32_key};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 /// Margins beyond ± this many nats are refused: e^16384 is sure enough.
@@ -15,7 +16,7 @@ const MAX_DEPTH: usize = 256;
 /// A checked ensemble.
 pub(super) struct Forest<'a> {
     pub(super) base: &'a [f32],
-    names: &'a [String],
+    pub(super) names: &'a [String],
     pub(super) trees: Vec<Branches<'a>>,
     pub(super) features: usize,
     pub(super) key: Key,
@@ -23,6 +24,7 @@ pub(super) struct Forest<'a> {
 }
 
 /// A tree of a checked ensemble.
+#[derive(Clone)]
 pub(super) struct Branches<'a> {
     pub(super) root: Branch<'a>,
     pub(super) output: Output,
@@ -33,12 +35,14 @@ pub(super) struct Branches<'a> {
 }
 
 /// A split or a leaf.
+#[derive(Clone)]
 pub(super) enum Branch<'a> {
-    Leaf(&'a [f32]),
+    Leaf(Cow<'a, [f32]>),
     Split(Box<Split<'a>>),
 }
 
 /// A split: left if the feature's key is below `cut`.
+#[derive(Clone)]
 pub(super) struct Split<'a> {
     pub(super) feature: u8,
     pub(super) cut: i32,
@@ -111,7 +115,7 @@ impl<'a> Forest<'a> {
         let leaves = std::iter::from_fn(move || {
             loop {
                 match open.pop()? {
-                    Branch::Leaf(values) => return Some(*values),
+                    Branch::Leaf(values) => return Some(values.as_ref()),
                     Branch::Split(split) => open.extend([&split.left, &split.right]),
                 }
             }
@@ -187,7 +191,7 @@ impl<'a> Reader<'a, '_> {
             Node::Leaf(values) => {
                 check_leaf(index, values, self.values)?;
                 self.largest = values.iter().fold(self.largest, |largest, value| largest.max(value.abs()));
-                Ok((Branch::Leaf(values), 0, 0))
+                Ok((Branch::Leaf(Cow::Borrowed(values)), 0, 0))
             }
             &Node::Split { feature, threshold, missing_left, left, right } => {
                 let features = self.features;

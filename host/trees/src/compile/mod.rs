@@ -38,12 +38,14 @@
 mod axes;
 mod budget;
 mod cells;
+pub mod code;
 mod cost;
 mod emit;
 mod error;
 mod forest;
 mod groups;
 mod layout;
+mod merge;
 mod model;
 mod parts;
 mod quantize;
@@ -59,9 +61,10 @@ mod write;
 
 pub use budget::compile_within;
 pub use cost::{Core, Instructions, Memory};
-pub use emit::{Language, emit};
+pub use emit::{Language, emit, emit_code};
 pub use error::CompileProblem;
 pub use groups::leaves_of_trees;
+pub use merge::Source;
 pub use model::{CompiledModel, longest_time, names, open};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
@@ -69,8 +72,8 @@ pub use share::{different_leaves, unshared};
 
 use crate::ensemble::Ensemble;
 use crate::error::{Error, Result};
-use axes::Axes;
 use cells::Cells;
+use code::{Form, Program, Statements};
 use forest::Forest;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{TrainedNoise, TrainedProbe};
@@ -93,6 +96,8 @@ pub struct Settings {
     pub max_touches: u32,
     /// Prior probability of each object, in any common unit; `None` makes all equal.
     pub priors: Option<Vec<f64>>,
+    /// Forms of code that may be chosen beside the layouts of data; of one that is chosen the model has no trees.
+    pub forms: Vec<Form>,
     /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
     /// feature's scale; `None` compares f32 values.
     pub scales: Option<Vec<f32>>,
@@ -132,6 +137,7 @@ impl Default for Settings {
             error_rate: 0.01,
             max_touches: 200,
             priors: None,
+            forms: Vec::new(),
             scales: None,
             stated: Stated::default(),
         }
@@ -168,9 +174,12 @@ pub struct Candidate {
     /// The layout.
     #[serde(serialize_with = "name_of")]
     pub layout: Layout,
+    /// The form of code, of the layout code.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<&'static str>,
     /// True if equal leaves are stored once.
     pub shared_leaves: bool,
-    /// Bytes of the model.
+    /// Bytes of the model, and of the code beside it.
     pub bytes: usize,
     /// About how many instructions a touch takes.
     pub instructions: Instructions,
@@ -202,6 +211,8 @@ pub struct Compiled {
     pub instructions: Instructions,
     /// All layouts that were tried.
     pub candidates: Vec<Candidate>,
+    /// The trees as code, and its form, if that was chosen: the bytes are a model without trees then.
+    pub code: Option<(Program, Form)>,
 }
 
 /// When recognizers stop.
@@ -228,32 +239,67 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     write::check_sentinel(ensemble, settings)?;
-    let axes = Axes::new(&forest);
     let cells = Cells::new(&forest);
-    let made =
-        layout::candidates(&forest, &axes, cells.as_ref(), settings.leaf, settings.layout, settings.shared_leaves)?;
+    let wants_code = settings.layout == Some(Layout::Code);
+    let made = if wants_code {
+        Vec::new()
+    } else {
+        layout::candidates(&forest, cells.as_ref(), settings.leaf, settings.layout, settings.shared_leaves)?
+    };
+    let may_be_code = !settings.forms.is_empty() && (wants_code || settings.layout.is_none());
+    let code = if may_be_code {
+        layout::code(&forest, cells.as_ref(), settings.leaf, &stated(ensemble, settings))
+    } else {
+        None
+    };
     let overhead = write::overhead(ensemble, settings, &forest)?;
-    let candidate = |(layout, parts): &(Layout, parts::Parts)| Candidate {
-        layout: *layout,
+    let scale = f64::from(ensemble.prediction().scale);
+    let candidate = |layout: Layout, parts: &parts::Parts| Candidate {
+        layout,
+        form: None,
         shared_leaves: parts.shared.is_some(),
         bytes: parts.bytes() + overhead,
         instructions: parts.instructions,
-        margin_error: rounding::round_up(f64::from(parts.margin_error) * f64::from(ensemble.prediction().scale)),
+        margin_error: rounding::round_up(f64::from(parts.margin_error) * scale),
     };
-    let candidates: Vec<Candidate> = made.iter().map(candidate).collect();
-    let chosen = chosen(&candidates, settings.goal);
-    let Some((layout, mut parts)) = chosen.and_then(|chosen| made.into_iter().nth(chosen)) else {
-        return Err(CompileProblem::FitsNoLayout.into());
+    let mut candidates: Vec<Candidate> = made.iter().map(|(layout, parts)| candidate(*layout, parts)).collect();
+    if let Some((program, parts)) = &code {
+        candidates.extend(settings.forms.iter().map(|&form| {
+            let cost = program.cost(form);
+            let model = candidate(Layout::Code, parts);
+            let bytes = model.bytes + cost.bytes;
+            Candidate { form: Some(form.name()), bytes, instructions: cost.instructions, ..model }
+        }));
+    }
+    let Some(chosen) = chosen(&candidates, settings.goal) else {
+        return Err(match wants_code {
+            true => CompileProblem::DoesNotFit { layout: Layout::Code }.into(),
+            false => CompileProblem::FitsNoLayout.into(),
+        });
     };
-    let instructions = parts.instructions;
+    let instructions = candidates[chosen].instructions;
+    let form = settings.forms.iter().copied().find(|form| Some(form.name()) == candidates[chosen].form);
+    let (layout, mut parts, code) = match (code.zip(form), made.into_iter().nth(chosen)) {
+        (Some(((program, parts), form)), _) => (Layout::Code, parts, Some((program, form))),
+        (None, Some((layout, parts))) => (layout, parts, None),
+        (None, None) => return Err(CompileProblem::FitsNoLayout.into()),
+    };
     let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
-    let scale = f64::from(ensemble.prediction().scale);
     parts.margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding / scale);
     let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
     let (splits, leaves) = (forest.splits(), forest.leaves());
     let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
     let margin_error = rounding::round_up(f64::from(parts.margin_error) * scale);
-    Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates })
+    Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates, code })
+}
+
+/// Statements of the model that code depends on.
+fn stated(ensemble: &Ensemble, settings: &Settings) -> Statements {
+    Statements {
+        sentinel: write::sentinel(ensemble, settings),
+        known: ensemble.known_count(),
+        last_of_ties: ensemble.prediction().last_of_ties,
+    }
 }
 
 /// The best of the candidates.
@@ -277,10 +323,19 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
     best.map(|(index, _)| index)
 }
 
-/// The ensemble's trees in the order in which a model with such leaves has them.
-pub fn order_of_trees(ensemble: &Ensemble, leaf: Leaf) -> Result<Vec<usize>> {
+/// The trees of a model with such leaves, in its order, and which trees of the ensemble each stands for.
+///
+/// # Errors
+/// As [`compile`].
+pub fn order_of_trees(ensemble: &Ensemble, leaf: Leaf) -> Result<Vec<Source>> {
     let ensemble = range::scaled(ensemble);
     let forest = Forest::new(&ensemble, None)?;
     let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
-    Ok(trees::order(&forest, leaf, &scale))
+    Ok(match merge::merge(&forest, leaf, &scale) {
+        Some(merged) => {
+            let order = trees::order(&merged.forest, leaf, &merged.scale);
+            order.into_iter().map(|tree| merged.sources[tree].clone()).collect()
+        }
+        None => trees::order(&forest, leaf, &scale).into_iter().map(Source::of).collect(),
+    })
 }

@@ -91,6 +91,15 @@ pub fn open(bytes: &[u8]) -> Result<Model<'_>> {
     Model::new(bytes).map_err(|error: ModelError| CompileProblem::Model(error).into())
 }
 
+/// Opens a model of any layout; of the layout code, whose trees are elsewhere, margins are not to be asked for.
+pub(super) fn open_any(bytes: &[u8]) -> Result<Model<'_>> {
+    match Model::new(bytes) {
+        Err(ModelError::NeedsCode) => Model::with_code(bytes, |_, _| {}),
+        other => other,
+    }
+    .map_err(|error| CompileProblem::Model(error).into())
+}
+
 /// The names of the objects that a model knows, in its order.
 pub fn names(model: &Model<'_>) -> Vec<String> {
     (0..model.object_count()).map(|object| model.object_name(object).to_owned()).collect()

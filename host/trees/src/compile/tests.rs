@@ -308,7 +308,7 @@ fn estimates_from_a_models_bytes_are_those_of_its_compilation() {
     let kinds = [(Descriptor::Curvature, trees), (Descriptor::Oriented, many), (Descriptor::ContactsCurvature, some)];
     for (descriptor, trees) in kinds {
         let ensemble = ensemble(descriptor, trees);
-        for &layout in Layout::ALL {
+        for &layout in Layout::OF_DATA {
             for kind in [Leaf::I8, Leaf::I16, Leaf::F32] {
                 let Ok(compiled) = compile(&ensemble, &with(Some(layout), kind)) else { continue };
                 let model = open(&compiled.bytes).unwrap();
@@ -326,7 +326,7 @@ fn what_is_read_from_a_model_is_found_behind_its_optional_sections() {
     let ensemble = ensemble(Descriptor::Curvature, trees);
     let probe =
         TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth, stroke: None, travel: None };
-    for &layout in Layout::ALL {
+    for &layout in Layout::OF_DATA {
         let compiled = |probe| {
             let stated = Stated { probe, ..Stated::default() };
             compile(&ensemble, &Settings { stated, ..with(Some(layout), Leaf::I16) })

@@ -137,16 +137,22 @@ fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
         // Whoever does not know it would take scaled margins for values.
         write_section(Tag::Prediction, prediction.scale != 1.0, &prediction.to_bytes(), &mut put);
     }
-    if let Some([low, high]) = imported.sentinel {
-        let ends = |scale: Option<f32>| match scale {
-            None => [f32_key(low), f32_key(high)],
-            Some(scale) => [whole(low, scale), whole(high, scale)],
-        };
-        // The same for every feature, which was checked.
-        let [low, high] = ends(settings.scales.as_ref().and_then(|scales| scales.first().copied()));
-        write_section(Tag::Sentinel, true, &Sentinel { low, high }.to_bytes(), &mut put);
+    if let Some(sentinel) = sentinel(ensemble, settings) {
+        write_section(Tag::Sentinel, true, &sentinel.to_bytes(), &mut put);
     }
     bytes
+}
+
+/// The features that stand for a missing value in a model over rows.
+pub(super) fn sentinel(ensemble: &Ensemble, settings: &Settings) -> Option<Sentinel> {
+    let imported = ensemble.origin.imported.as_ref().filter(|_| ensemble.descriptor().is_none())?;
+    let [low, high] = imported.sentinel?;
+    // The same for every feature, which was checked.
+    let [low, high] = match settings.scales.as_ref().and_then(|scales| scales.first().copied()) {
+        None => [f32_key(low), f32_key(high)],
+        Some(scale) => [whole(low, scale), whole(high, scale)],
+    };
+    Some(Sentinel { low, high })
 }
 
 /// The section that says which touches it was trained on; nothing where that is not known.

@@ -28,28 +28,33 @@ pub(super) fn first_different_tree(
     let encoded = reference.encoder.row(row);
     // Of shares of votes.
     let scale = ensemble.prediction().scale;
-    let mut different = order.iter().zip(&leaves).filter_map(|(&number, leaves)| {
+    let mut different = order.iter().zip(&leaves).filter_map(|(source, leaves)| {
+        // Trees that were merged are of one object.
+        let &number = source.trees.first()?;
         let tree = ensemble.trees.get(number)?;
+        let unit = reference::unit(model) * f64::from(leaves.shift).exp2();
         let bytes = isolated(model, &leaves.bytes);
         let own = reference::margins(&Model::new(&bytes).ok()?, &encoded);
-        let leaf = reference.leaf(number, row, &encoded);
-        // Half a unit of the tree's leaves, or nothing.
+        let leaf = |object: usize| {
+            let own = |&number: &usize| f64::from(reference.leaf(number, row, &encoded)[object] * scale);
+            source.trees.iter().map(own).sum::<f64>() - f64::from(source.offset) * unit
+        };
+        // Half a unit of the leaf of each tree, or nothing.
         let slack = match model.leaf_type() {
             LeafType::F32 => 0.0,
-            LeafType::I8 | LeafType::I16 => 0.501 * reference::unit(model) * f64::from(leaves.shift).exp2(),
+            LeafType::I8 | LeafType::I16 => 0.501 * unit * source.trees.len() as f64,
         };
         let expected = |object: usize| match tree.output {
             Output::One(own) => {
                 if own == object {
-                    leaf[0]
+                    leaf(0)
                 } else {
                     0.0
                 }
             }
-            Output::Each => leaf[object],
+            Output::Each => leaf(object),
         };
-        let differs =
-            own.iter().enumerate().any(|(object, own)| (own - f64::from(expected(object) * scale)).abs() > slack);
+        let differs = own.iter().enumerate().any(|(object, own)| (own - expected(object)).abs() > slack);
         differs.then_some(number)
     });
     let first = different.next()?;

@@ -1,0 +1,213 @@
+//! Trees over columns of ranks, with leaves in units: what every form of code is written from.
+
+use super::super::axes::Axes;
+use super::super::forest::{Branch, Forest};
+use super::super::quantize::Scale;
+use super::columns::{Column, Columns};
+use crate::ensemble::Output;
+use palpate_shared::format::{Key, Sentinel};
+
+/// A program that adds up trees: from a row of features to margins in units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    /// Features of a row.
+    pub(super) features: usize,
+    /// Type of the features: whole numbers, or f32 values.
+    pub(super) key: Key,
+    /// Features that stand for a missing value.
+    pub(super) sentinel: Option<Sentinel>,
+    /// Margins before any tree, in units; one for each object.
+    pub(super) base: Vec<i32>,
+    /// Objects that can be named: all but a background.
+    pub(super) known: usize,
+    /// True if of several classes with the largest margin the last one counts.
+    pub(super) last_of_ties: bool,
+    /// What splits compare, in the order in which it is stored.
+    pub(super) columns: Vec<Column>,
+    /// The trees, in any order.
+    pub(super) trees: Vec<CodeTree>,
+}
+
+/// A tree.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct CodeTree {
+    /// The object whose margin its leaves add to; `None` where they have a value for each.
+    pub(super) object: Option<usize>,
+    pub(super) root: CodeNode,
+}
+
+/// A split or a leaf.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum CodeNode {
+    /// Values in units.
+    Leaf(Vec<i32>),
+    Split(Box<CodeSplit>),
+}
+
+/// A split: left where the column's rank is at most `at`, which is where its key is below `cut`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct CodeSplit {
+    pub(super) column: usize,
+    pub(super) at: u8,
+    pub(super) cut: i32,
+    pub(super) left: CodeNode,
+    pub(super) right: CodeNode,
+}
+
+/// Statements of a model that its code depends on.
+pub(crate) struct Statements {
+    pub(crate) sentinel: Option<Sentinel>,
+    pub(crate) known: usize,
+    pub(crate) last_of_ties: bool,
+}
+
+impl Program {
+    /// The program of walked trees; `None` where there are more than 256 columns.
+    pub(in super::super) fn new(
+        forest: &Forest<'_>,
+        scale: &Scale,
+        base: Vec<i32>,
+        stated: &Statements,
+    ) -> Option<Self> {
+        let axes = Axes::new(forest);
+        if axes.columns > 256 {
+            return None;
+        }
+        let columns = Columns::new(forest, &axes, stated.sentinel.is_some());
+        let trees = forest.trees.iter().zip(&scale.shifts).map(|(tree, &shift)| CodeTree {
+            object: if let Output::One(object) = tree.output { Some(object) } else { None },
+            root: node(&tree.root, scale, shift, &axes, &columns),
+        });
+        let trees: Vec<CodeTree> = trees.collect();
+        // Values of a vector are stored in two bytes.
+        let mut fits = true;
+        for tree in trees.iter().filter(|tree| tree.object.is_none()) {
+            tree.root.leaves(1.0, &mut |values, _| fits &= values.iter().all(|value| i16::try_from(*value).is_ok()));
+        }
+        fits.then_some(Self {
+            features: forest.features,
+            key: forest.key,
+            sentinel: stated.sentinel,
+            base,
+            known: stated.known,
+            last_of_ties: stated.last_of_ties,
+            columns: columns.columns,
+            trees,
+        })
+    }
+
+    /// Number of objects.
+    pub fn objects(&self) -> usize {
+        self.base.len()
+    }
+
+    /// Number of trees.
+    pub fn trees(&self) -> usize {
+        self.trees.len()
+    }
+
+    /// The trees of one object, and those with a value for each.
+    pub(super) fn has_vectors(&self) -> bool {
+        self.trees.iter().any(|tree| tree.object.is_none())
+    }
+
+    /// The value of leaves that are one class's, if most leaves with a value for each object are such: votes. All others
+    /// are short lists then.
+    pub(super) fn vote(&self) -> Option<i32> {
+        if self.objects() > 64 {
+            return None;
+        }
+        let (mut of_one, mut all): (std::collections::BTreeMap<i32, usize>, usize) = Default::default();
+        let mut fits = true;
+        for tree in self.trees.iter().filter(|tree| tree.object.is_none()) {
+            tree.root.leaves(1.0, &mut |values, _| {
+                all += 1;
+                fits &= values.iter().all(|value| (0..1 << 16).contains(value));
+                let mut others = values.iter().filter(|value| **value != 0);
+                if let (Some(&value), None) = (others.next(), others.next()) {
+                    *of_one.entry(value).or_default() += 1;
+                }
+            });
+        }
+        let (value, count) = of_one.into_iter().max_by_key(|(_, count)| *count)?;
+        (fits && 4 * count >= all).then_some(value)
+    }
+
+    /// Margins of a row of keys (missing: the least number), as the code computes them.
+    pub fn margins(&self, keys: &[i32]) -> Vec<i32> {
+        let ranks = self.ranks(keys);
+        let mut margins = self.base.clone();
+        for tree in &self.trees {
+            tree.add(&ranks, &mut margins);
+        }
+        margins
+    }
+
+    /// The rank of every column.
+    pub(super) fn ranks(&self, keys: &[i32]) -> Vec<u8> {
+        let missing = palpate_shared::MISSING_FEATURE;
+        let known = |key: i32| self.sentinel.map_or(key, |sentinel| sentinel.or_missing(key));
+        let key = |feature: u8| keys.get(usize::from(feature)).map_or(missing, |&key| known(key));
+        self.columns.iter().map(|column| column.rank(key(column.feature))).collect()
+    }
+}
+
+impl CodeTree {
+    /// Adds the leaf that is reached.
+    pub(super) fn add(&self, ranks: &[u8], margins: &mut [i32]) {
+        let mut node = &self.root;
+        loop {
+            match node {
+                CodeNode::Split(split) => {
+                    node = if ranks[split.column] <= split.at { &split.left } else { &split.right };
+                }
+                CodeNode::Leaf(values) => {
+                    let first = self.object.unwrap_or(0);
+                    margins[first..].iter_mut().zip(values).for_each(|(margin, value)| *margin += value);
+                    return;
+                }
+            }
+        }
+    }
+}
+
+impl CodeNode {
+    /// Calls `see` on every leaf, from left to right, with its chance where either side of a split is as likely.
+    pub(super) fn leaves<'n>(&'n self, chance: f64, see: &mut impl FnMut(&'n [i32], f64)) {
+        match self {
+            Self::Leaf(values) => see(values, chance),
+            Self::Split(split) => {
+                split.left.leaves(chance / 2.0, see);
+                split.right.leaves(chance / 2.0, see);
+            }
+        }
+    }
+
+    /// Calls `see` on every split with its chance.
+    pub(super) fn splits<'n>(&'n self, chance: f64, see: &mut impl FnMut(&'n CodeSplit, f64)) {
+        if let Self::Split(split) = self {
+            see(split, chance);
+            split.left.splits(chance / 2.0, see);
+            split.right.splits(chance / 2.0, see);
+        }
+    }
+}
+
+fn node(branch: &Branch<'_>, scale: &Scale, shift: u8, axes: &Axes, columns: &Columns) -> CodeNode {
+    match branch {
+        Branch::Leaf(values) => {
+            CodeNode::Leaf(values.iter().map(|&value| scale.integer(value, shift) << shift).collect())
+        }
+        Branch::Split(split) => {
+            let (column, index) = axes.place(split);
+            let column = columns.place(column);
+            CodeNode::Split(Box::new(CodeSplit {
+                column,
+                at: columns.columns[column].at(index),
+                cut: split.cut,
+                left: node(&split.left, scale, shift, axes, columns),
+                right: node(&split.right, scale, shift, axes, columns),
+            }))
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! The file that makes a safe function of a program in assembly.
+
+use super::program::Program;
+use palpate_shared::format::Key;
+
+/// `model.rs`, to be a module of a crate that allows unsafe code.
+pub(super) fn text(program: &Program, name: &str, file: &str) -> String {
+    let (features, objects) = (program.features, program.objects());
+    let real = program.key == Key::Real;
+    let row = if real { "f32" } else { "i32" };
+    let what =
+        if real { "f32 values, NaN where one is missing" } else { "whole numbers, `i32::MIN` where one is missing" };
+    let bits = if real {
+        format!(
+            "\n/// The same function, for the bits of f32 values.\n\
+             #[allow(clashing_extern_declarations)]\n\
+             mod bits {{\n    \
+             // SAFETY: as above; an f32 and its bits are the same in memory.\n    \
+             unsafe extern \"C\" {{\n        \
+             #[link_name = \"{name}_margins\"]\n        \
+             pub(super) safe fn margins(row: &[i32; {features}], margins: &mut [i32; {objects}]);\n    \
+             }}\n}}\n"
+        )
+    } else {
+        String::new()
+    };
+    let function = if real { "bits::margins".to_owned() } else { format!("{name}_margins") };
+    format!(
+        "// {trees} trees as instructions, beside `{file}.s`. Written by `palpate export`; not to be edited. Features of palpate-onboard: code.\n\
+         // A module of a crate that allows unsafe code, for a Cortex-M.\n\n\
+         core::arch::global_asm!(include_str!(\"{file}.s\"), options(raw));\n\n\
+         // SAFETY: the assembly reads {features} features, writes {objects} margins, and keeps to the calling convention.\n\
+         unsafe extern \"C\" {{\n    \
+         /// The margins of a row of {what}, in units.\n    \
+         pub safe fn {name}_margins(row: &[{row}; {features}], margins: &mut [i32; {objects}]);\n\
+         }}\n{bits}\n\
+         /// What [`Model::with_code`](palpate_onboard::Model::with_code) takes.\n\
+         pub fn margins(row: &[i32], margins: &mut [i32]) {{\n    \
+         if let (Some(row), Some(margins)) = (row.first_chunk(), margins.first_chunk_mut()) {{\n        \
+         {function}(row, margins);\n    }}\n}}\n",
+        trees = program.trees.len(),
+    )
+}

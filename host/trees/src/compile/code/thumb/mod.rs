@@ -1,0 +1,122 @@
+//! Thumb assembly: one function from a row of features to margins.
+//!
+//! For each level of a tree a rank is loaded, compared with eight bits, and branched on. A leaf of one value adds to two
+//! sums, 256 · high + low, so that no value takes a constant in memory. The ranks that an object's trees compare most stay
+//! in registers. Of two subtrees the smaller one comes first, so that few branches are far.
+
+mod assembler;
+mod ranks;
+mod trees;
+mod vectors;
+
+use super::program::Program;
+use assembler::Assembler;
+use std::fmt::Write as _;
+
+/// A processor whose instructions are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Chip {
+    /// Cortex-M0+, whose instructions every Cortex-M has.
+    M0Plus,
+    /// Cortex-M4 with a float unit, and later ones: M7, M33.
+    M4F,
+}
+
+/// The program as assembly, for GNU's assembler and for `global_asm!`.
+pub(super) fn text(program: &Program, name: &str, chip: Chip) -> String {
+    let written = write(program, chip);
+    let mut text = String::new();
+    let what = match chip {
+        Chip::M0Plus => "any Cortex-M (ARMv6-M)",
+        Chip::M4F => "a Cortex-M4F (ARMv7E-M with a float unit)",
+    };
+    let row = if program.key == palpate_shared::format::Key::Real { "float" } else { "int32_t" };
+    // Writing to a string cannot fail.
+    _ = writeln!(
+        text,
+        "@ {} trees for {what}. Written by `palpate export`; not to be edited.\n\
+         @ void {name}_margins(const {row} row[{}], int32_t margins[{}])",
+        program.trees.len(),
+        program.features,
+        program.base.len(),
+    );
+    _ = writeln!(text, "\t.syntax unified\n\t.thumb\n\t.section .text.{name}_margins,\"ax\",%progbits\n\t.balign 4");
+    written.print(name, &mut text);
+    text
+}
+
+/// Bytes of code and tables, and about how many instructions a row takes.
+pub(super) fn cost(program: &Program, chip: Chip) -> (usize, u64) {
+    let written = write(program, chip);
+    (written.bytes(), written.instructions.round() as u64)
+}
+
+fn write(program: &Program, chip: Chip) -> Assembler {
+    let mut out = Assembler::new(chip);
+    let frame = Frame::new(program);
+    out.global("margins");
+    frame.enter(&mut out, chip);
+    ranks::write(&mut out, program, &frame);
+    trees::write(&mut out, program, &frame);
+    frame.leave(&mut out, chip);
+    out.finish();
+    out
+}
+
+/// What is on the stack: the columns' numbers, then words; above them the registers that are restored, the first of which is
+/// where margins go.
+pub(super) struct Frame {
+    /// Bytes for the columns.
+    pub(super) columns: usize,
+    /// All bytes.
+    pub(super) length: usize,
+}
+
+impl Frame {
+    fn new(program: &Program) -> Self {
+        let columns = program.columns.len().next_multiple_of(4);
+        Self { columns, length: columns.next_multiple_of(8).max(8) }
+    }
+
+    /// Saves registers and makes room. The second argument, the margins' address, stays on the stack.
+    pub(super) fn enter(&self, out: &mut Assembler, chip: Chip) {
+        match chip {
+            Chip::M0Plus => {
+                out.ins("push {r1, r4-r7, lr}", 2);
+                // Six registers so far: with these two it is a multiple of eight bytes, too.
+                out.ins("mov r4, r8", 2);
+                out.ins("mov r5, r9", 2);
+                out.ins("mov r6, r10", 2);
+                out.ins("mov r7, r11", 2);
+                out.ins("push {r4-r7}", 2);
+            }
+            Chip::M4F => out.ins("push.w {r1, r4-r11, lr}", 4),
+        }
+        self.room(out, "sub");
+    }
+
+    /// Undoes it, and returns.
+    pub(super) fn leave(&self, out: &mut Assembler, chip: Chip) {
+        self.room(out, "add");
+        match chip {
+            Chip::M0Plus => {
+                out.ins("pop {r4-r7}", 2);
+                out.ins("mov r8, r4", 2);
+                out.ins("mov r9, r5", 2);
+                out.ins("mov r10, r6", 2);
+                out.ins("mov r11, r7", 2);
+                out.ins("pop {r1, r4-r7, pc}", 2);
+            }
+            Chip::M4F => out.ins("pop.w {r1, r4-r11, pc}", 4),
+        }
+    }
+
+    fn room(&self, out: &mut Assembler, what: &str) {
+        out.ins(&format!("{what} sp, #{}", self.length), 2);
+    }
+
+    /// Where the address of the margins is, from the stack pointer.
+    pub(super) fn margins(&self, chip: Chip) -> usize {
+        self.length + if chip == Chip::M0Plus { 16 } else { 0 }
+    }
+}
