@@ -80,6 +80,8 @@ pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use exponential::exp2_negative;
 #[cfg(feature = "rows")]
 pub use layouts::batch::Batch;
+#[cfg(feature = "code")]
+pub use model::Code;
 pub use model::{Model, Refused, inverse_link};
 pub use palpate_shared as shared;
 

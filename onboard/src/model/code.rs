@@ -35,17 +35,28 @@ impl<'a> Model<'a> {
     }
 
     /// Calls the function for a row of features, or keys of f32 values.
-    // Apart: only such a model takes the room for its features on the stack.
-    #[inline(never)]
     pub(super) fn call(&self, features: &[i32], margins: &mut [i32]) {
-        let mut row = [MISSING_FEATURE; 256];
+        let (Some(code), count) = (self.code, self.feature_count()) else { return };
+        match features.get(..count) {
+            Some(row) if self.key() == Key::Whole => code(row, margins),
+            // Room for a row is cleared, which takes longer than most models: as little as does.
+            _ if count <= 16 => self.call_in::<16>(code, features, margins),
+            _ if count <= 64 => self.call_in::<64>(code, features, margins),
+            _ => self.call_in::<256>(code, features, margins),
+        }
+    }
+
+    /// The same for a row that has to be made, of up to `N` features.
+    // Apart: only such a model takes the room on the stack.
+    #[inline(never)]
+    fn call_in<const N: usize>(&self, code: Code, features: &[i32], margins: &mut [i32]) {
+        let mut row = [MISSING_FEATURE; N];
+        let Some(row) = row.get_mut(..self.feature_count()) else { return };
         row.iter_mut().zip(features).for_each(|(value, &feature)| *value = feature);
         if self.key() == Key::Real {
             row.iter_mut().for_each(|value| *value = bits(*value));
         }
-        if let (Some(code), Some(row)) = (self.code, row.get(..self.feature_count())) {
-            code(row, margins);
-        }
+        code(row, margins);
     }
 }
 

@@ -1,7 +1,7 @@
 """Exporters of tree ensembles on two emulated chips: bytes, instructions per row, and classes that differ from the library's.
 
     cargo build --release
-    python3.11 tests/peers/exporters/compare.py target/release/palpate [wine digits synthetic touches forest]
+    python3.11 tests/peers/exporters/compare.py target/release/palpate [wine digits synthetic touches forest forest30]
 
 Makes an environment with the packages of requirements.txt beside itself (`venv`, not committed) and runs itself in it. Needs
 gcc-arm-none-eabi with newlib and libstdc++, qemu-system-arm, and Rust's targets thumbv7em-none-eabihf and thumbv6m-none-eabi.
@@ -45,7 +45,7 @@ def image(chip, directory, source, libraries=LIBRARIES):
     common = ["-mthumb", *flags, "-Os", "-ffunction-sections", "-fdata-sections", "-DNDEBUG", "-w", *source.flags]
     common += ["-I", directory, "-I", ROOT / "onboard/c"]
     objects = []
-    for path in [*source.files, HERE / "harness.c"]:
+    for path in [*source.files, *source.by_chip.get(chip[0], []), HERE / "harness.c"]:
         objects.append(directory / f"{target}-{path.name}.o")
         is_cpp = path.suffix == ".cc"
         compiler = ["arm-none-eabi-g++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics"]
@@ -123,6 +123,8 @@ def main():
         for leaf, goal in [("i16", "speed"), ("i16", "size"), ("i8", "balanced"), ("f32", "balanced")]
         for language, function in [("Rust", exporters.ours_rust), ("C", exporters.ours_c)]
     }
+    ours["ours i16, code (assembly)"] = partial(exporters.ours_code, palpate=palpate, is_assembly=True)
+    ours["ours i16, code (C)"] = partial(exporters.ours_code, palpate=palpate, is_assembly=False)
     peers = {
         "TL2cgen": partial(exporters.tl2cgen, quantize=False),
         "TL2cgen, quantized": partial(exporters.tl2cgen, quantize=True),

@@ -33,8 +33,10 @@ class Refused(Exception):
 class Source:
     """What is compiled: files, flags, and a static library to link; the rows' classes if the ensemble is the exporter's own."""
 
-    def __init__(self, files, flags=(), library=None, expected=None):
+    def __init__(self, files, flags=(), library=None, expected=None, by_chip=None):
         self.files, self.flags, self.library, self.expected = files, list(flags), library, expected
+        # Files that only one chip's image has, by the chip's name.
+        self.by_chip = by_chip or {}
 
 
 def write(directory, name, text):
@@ -47,7 +49,7 @@ def tl2cgen(ensemble, directory, quantize):
     import tl2cgen as exporter
     import treelite
 
-    if ensemble.name == "forest":
+    if ensemble.is_forest:
         raise Refused("see touches")
     model = treelite.frontend.load_xgboost_model(ensemble.path)
     exporter.generate_c_code(model, dirpath=directory, params={"quantize": int(quantize)})
@@ -107,7 +109,7 @@ def micromlgen(ensemble, directory):
     if ensemble.model is None:
         raise Refused("takes objects of Python, not files")
     code = port(ensemble.model)
-    name = "RandomForest" if ensemble.name == "forest" else "XGBClassifier"
+    name = "RandomForest" if ensemble.is_forest else "XGBClassifier"
     wrapper = f"""#include <stdint.h>
 {code}
 extern "C" {START}
@@ -121,7 +123,7 @@ extern "C" int peer_class(const float *row)
 
 
 def timber(ensemble, directory):
-    if ensemble.name == "forest":
+    if ensemble.is_forest:
         raise Refused("see touches")
     command = [Path(sys.executable).with_name("timber"), "compile", "--model", ensemble.path, "--out", directory]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -150,7 +152,7 @@ int peer_class(const float *row)
 def emlearn(ensemble, directory, method, dtype="int16_t", leaf_bits=8):
     import emlearn as exporter
 
-    if ensemble.name != "forest":
+    if not ensemble.is_forest:
         # Of all its variants the first one says so.
         raise Refused("no boosted trees" if method == "loadable" else "see touches")
     converted = exporter.convert(ensemble.model, method=method, dtype=dtype, leaf_bits=leaf_bits)
@@ -203,7 +205,7 @@ extern "C" int peer_class(const float *row)
 
 
 def irithyll(ensemble, directory):
-    if ensemble.name == "forest":
+    if ensemble.is_forest:
         raise Refused("see touches")
     learner = json.loads(ensemble.path.read_text())["learner"]
     forest = learner["gradient_booster"]["model"]
@@ -265,6 +267,45 @@ int peer_class(const float *row)
 }}
 """
     return Source([write(directory, "peer.c", wrapper)])
+
+
+def ours_code(ensemble, directory, palpate, is_assembly):
+    by_chip, emits = {}, {"model": "c-code"}
+    if is_assembly:
+        emits = {"model": "thumb,c", "model4": "thumb-m4f,c"}
+    for name, emit in emits.items():
+        path = directory / f"{name}.palpate"
+        command = [palpate, "export", ensemble.path, "-o", path, "--layout", "code", "--emit", emit, "--json"]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise Refused(done.stderr.strip().splitlines()[0])
+        exported = json.loads(done.stdout)
+        features = ensemble.rows.shape[1]
+        call = f"    {name}_margins(row, margins);\n"
+        if "features" not in exported:  # whole numbers
+            call = f"    int32_t whole[{features}];\n    for (i = 0; i < {features}; i++) {{\n        "
+            call += f"whole[i] = row[i] == row[i] ? (int32_t)row[i] : INT32_MIN;\n    }}\n    {name}_margins(whole, margins);\n"
+        wrapper = f"""#include "{name}.h"
+{START}
+int peer_class(const float *row)
+{{
+    int32_t margins[{ensemble.outputs}];
+    int i, best = 0;
+{call}    for (i = 1; i < {ensemble.outputs}; i++) {{
+        if (margins[i] > margins[best]) {{
+            best = i;
+        }}
+    }}
+    return best;
+}}
+"""
+        files = [write(directory, f"{name}.c", wrapper)]
+        if is_assembly:
+            files.append(directory / f"{name}.s")
+        by_chip["M4F" if name == "model4" else "M0+"] = files
+    if not is_assembly:
+        by_chip["M4F"] = by_chip["M0+"]
+    return Source([], by_chip=by_chip)
 
 
 def ours_rust(ensemble, directory, palpate, leaf, goal):

@@ -254,7 +254,7 @@ fn programs_give_the_margins_of_the_layouts_of_data_at_every_threshold() {
     for case in cases() {
         let compiled = case.compiled(Some(Form::C));
         let program = program(&compiled);
-        let rows: Vec<Vec<i32>> = case.rows(400).iter().map(|row| keys(row, program.key)).collect();
+        let rows: Vec<Vec<i32>> = case.rows(150).iter().map(|row| keys(row, program.key)).collect();
         let expected = expected(&case.compiled(None), &rows);
         for (row, expected) in rows.iter().zip(expected) {
             assert_eq!(program.margins(row), expected, "{}: {row:?}", case.name);
