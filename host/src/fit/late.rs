@@ -3,8 +3,8 @@
 //! A late contact is censored. A touch with two recorded contacts may be one of three, of which the last came too late; how
 //! often that is, and how far the other two are then apart, is known from the simulated touches at any stroke. The stroke is a
 //! time on the recording's clock, so that a candidate's factor moves it: tables are made for a few strokes about the recorded
-//! one and read with interpolation. What is recorded lies within the stroke, where nothing changes. Noise and offsets, a
-//! hundredth of a stroke, are left out at its end.
+//! one and read with interpolation. What is recorded lies within the stroke, where nothing changes. Noise, a hundredth of
+//! a stroke, is left out at its end, and offsets where only one contact was recorded.
 
 use super::density::{FULL, LEVELS, Line, OUTER, Observed, mirrored};
 use palpate_shared::Touch;

@@ -103,13 +103,16 @@ impl<'a> Explained<'a> {
             density += share * times[usize::from(touched == FULL)];
         }
         if let Some(window) = self.window() {
-            // The third finger would have touched too, later than the stroke.
-            let late = |which, late: f64| self.smoothed.late(window / factor, which, late / factor) / factor;
+            // The third finger would have touched too, later than the stroke, which began with the first of these two.
+            let late = |which: usize, apart: f64, [from, to, third]: [f64; 3]| {
+                let began = if x > 0.0 { from } else { to };
+                self.smoothed.late((window - third + began) / factor, which, apart / factor) / factor
+            };
             density += product(fingers, fingers, &missed)
                 * match fingers {
-                    0b011 => late(0, x - (middle - first)),
-                    0b110 => late(0, third - middle - x),
-                    OUTER => late(1, x - (third - first)),
+                    0b011 => late(0, x - (middle - first), [first, middle, third]),
+                    0b110 => late(0, third - middle - x, [middle, third, first]),
+                    OUTER => late(1, x - (third - first), [first, third, middle]),
                     _ => 0.0,
                 };
         }
