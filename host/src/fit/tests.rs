@@ -362,7 +362,7 @@ fn a_stroke_is_found_and_contacts_later_than_it_bend_no_estimate() {
     for (late, expected) in found.late.iter().zip([3.0, -4.0]) {
         assert!((late.value - expected).abs() < 1.5, "{:?}", found.late);
     }
-    // Each finger lost a tenth of its contacts to the stroke, and these do not count as missed.
+    // Each finger lost tens of contacts to the stroke, and these do not count as missed.
     for (missed, share) in found.missed.iter().flatten().zip(BENT.missed) {
         assert!((missed.value - share).abs() < 0.05, "{:?}", found.missed);
     }
@@ -370,7 +370,7 @@ fn a_stroke_is_found_and_contacts_later_than_it_bend_no_estimate() {
         let missing = |dataset: &Dataset| dataset.touches().filter(|touch| touch.times()[finger].is_missing()).count();
         missing(&short) - missing(&recorded(&objects(), 400, 1, &BENT))
     };
-    assert!((0..3).all(|finger| lost(finger) > 60), "{:?}", [lost(0), lost(1), lost(2)]);
+    assert!((0..3).all(|finger| lost(finger) > 50), "{:?}", [lost(0), lost(1), lost(2)]);
     let text = found.toml();
     assert!(text.contains("stroke = 2.") && text.contains("no recorded contact is later"), "{text}");
     let file = crate::probe::file::ProbeFile::parse(&text, "probe.toml".as_ref()).unwrap();
