@@ -9,7 +9,7 @@ use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
-use palpate::calibrate::{self, Odds, Per, Sequence, Supply, Terms, Until, choose, follow, margin_of, odds_of};
+use palpate::calibrate::{self, Odds, Per, Sequence, Terms, Until, choose, follow, margin_of, odds_of};
 use palpate::compile;
 use palpate::error::{CalibrateProblem, Result};
 use palpate::probe::scene::Scene;
@@ -153,10 +153,9 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64, kept: &mut calibra
         ..calibrate::Settings::default()
     };
     let origin = Origin { seed, approaches: false, ..context.settings.capture.clone() };
-    let dataset = calibrate::fresh(model, &objects, &origin, &settings, kept, context.progress)?;
+    let captured = calibrate::fresh(model, &objects, &origin, &settings, kept, context.progress)?;
     // The model's objects are the context's, in the same order.
-    let mut supplies: Vec<Supply<'_>> =
-        (0..names.len()).zip(&dataset.objects).map(|(object, of)| Supply::new(object, of, seed)).collect();
+    let mut supplies = captured.supplies(&(0..names.len()).collect::<Vec<_>>(), seed);
     let wanted = vec![settings.sequences / names.len().max(1); names.len()];
     let until = Until { margin: strictest(), max_touches: MAX_TOUCHES };
     follow(model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, context.progress)

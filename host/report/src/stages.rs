@@ -13,6 +13,7 @@ use palpate::capture;
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
+use palpate::evaluate::recorded::Comparison;
 use palpate::mesh::{Object, source};
 use palpate::output::write_json;
 use palpate::progress::{self, Progress};
@@ -21,6 +22,7 @@ use serde::de::DeserializeOwned;
 use serde_json::json;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Files that were written, and the time that it took.
@@ -45,10 +47,39 @@ pub struct Existing {
     pub replace: bool,
 }
 
+/// The progress of a report: whatever begins within a stage is named after it.
+struct Named<'a> {
+    progress: &'a dyn Progress,
+    stage: Mutex<String>,
+}
+
+impl Named<'_> {
+    /// The stage of all that begins from here on.
+    fn enter(&self, stage: &str) {
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage.into();
+        self.progress.begin(stage, None);
+    }
+}
+
+impl Progress for Named<'_> {
+    fn begin(&self, part: &str, total: Option<u64>) {
+        let stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        self.progress.begin(&format!("{stage}: {part}"), total);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.progress.advance(steps);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.progress.is_cancelled()
+    }
+}
+
 /// Stages that are measured, or were before.
 struct Stages<'a> {
     cache: &'a Cache,
-    progress: &'a dyn Progress,
+    progress: &'a Named<'a>,
     /// Names and seconds of those that are there.
     seconds: Vec<(String, f64)>,
 }
@@ -57,7 +88,7 @@ impl Stages<'_> {
     /// The result of the stage; progress is told its name before it begins.
     fn stage<T: Serialize + DeserializeOwned>(&mut self, name: &str, measure: impl FnOnce() -> Result<T>) -> Result<T> {
         progress::check(self.progress)?;
-        self.progress.begin(name, None);
+        self.progress.enter(name);
         let stage = self.cache.stage(name, measure)?;
         self.seconds.push((name.to_string(), stage.seconds));
         Ok(stage.result)
@@ -106,66 +137,16 @@ pub fn report_on(
     );
     let recorded = settings.recorded.as_deref().map(recorded::fingerprint).transpose()?;
     let cache = Cache::open(directory, &(&made_from, presets, recorded), &objects, existing.resume)?;
+    let progress = &Named { progress, stage: Mutex::new("objects".into()) };
     let context = Context::new(settings, &objects, &cache, progress)?;
     let mut stages = Stages { cache: &cache, progress, seconds: Vec::new() };
-
-    let folds = stages.stage("cross-validation", || cross_validation::measure(&context))?;
-    let noisy = stages.stage("noise", || noise::measure(&context))?;
-    // The large capture is needed by four stages, and by none if all were measured before.
-    let large = OnceCell::new();
-    let get_large = || get_or_try(&large, || limit::large(&context));
-    let limit = stages.stage("limit", || limit::measure(&context, get_large()?))?;
-    let sequences = stages.stage("sequential", || sequential::measure(&context, get_large()?))?;
-    let calibration = stages.stage("calibration", || calibration::measure(&context, get_large()?))?;
-    let promised = stages.stage("promises", || promises::measure(&context, get_large()?))?;
-    let members = stages.stage("cost", || cost::measure(&context, get_large()?))?;
-    drop(large);
-    let by_approach = stages.stage("approaches", || approaches::measure(&context))?;
-    let plans = stages.stage("plan", || plan::measure(&context))?;
-    let unknown = stages.stage("strangers", || strangers::measure(&context))?;
-    let compared = match settings.recorded {
-        Some(_) => stages.stage("recorded", || recorded::measure(&context))?,
-        None => None,
-    };
-    let engines = stages.stage("simulator", || simulator::measure(&context))?;
-    let grown = if settings.growth {
-        let growth = stages.stage("growth", || growth::measure(&context))?;
-        let instances = stages.stage("generalization", || generalization::measure(&context))?;
-        vec![growth::section(&context, &growth)?, generalization::section(&context, &instances)?]
-    } else {
-        vec![growth::left_out()]
-    };
+    let measured = measured(&context, &mut stages)?;
     let stages = stages.seconds;
-    progress.begin("drawing", None);
+    progress.enter("drawing");
 
-    let summary = published::summary(&context, &folds, &noisy, &limit, &sequences);
-    let mut first = Section::new("summary", "The paper's numbers compared with ours");
-    let damaged = objects::to_repair(&context);
-    if !damaged.is_empty() {
-        first.warning(format!(
-            "the figures are of meshes that should be repaired first: {}. The section on the objects says why.",
-            damaged.join(", ")
-        ));
-    }
-    first.table(published::table(&context, &summary));
-    let mut costs = cost::section(&context, &members)?;
-    simulator::add(&context, &engines, &mut costs)?;
-    let mut sections = vec![
-        first,
-        objects::section(&context)?,
-        cross_validation::section(&context, &folds)?,
-        approaches::section(&context, &by_approach)?,
-        plan::section(&context, &plans)?,
-        noise::section(&context, &noisy)?,
-        limit::section(&context, &limit)?,
-        sequential::section(&context, &sequences)?,
-        calibration::section(&context, &calibration)?,
-        promises::section(&context, &promised)?,
-        strangers::section(&context, &unknown)?,
-        costs,
-    ];
-    sections.extend(recorded::section(&context, compared.as_ref())?);
-    sections.extend(grown);
+    let Measured { folds, noisy, limit, sequences, .. } = &measured;
+    let summary = published::summary(&context, folds, noisy, limit, sequences);
+    let sections = sections(&context, &measured, &summary)?;
     let sentence = published::sentence(&summary);
     let page = Page {
         title: "Recognizing objects by touch".into(),
@@ -188,6 +169,105 @@ pub fn report_on(
     files.extend(page.write(&directory.join("index.html"))?);
     let summary = results::json("summary", &everything)?;
     Ok(Report { files, stages, sentence, summary })
+}
+
+/// What the sections show.
+struct Measured {
+    folds: Vec<cross_validation::Fold>,
+    noisy: Vec<noise::Fold>,
+    limit: limit::Limit,
+    sequences: sequential::Sequences,
+    calibration: calibration::Calibration,
+    promises: promises::Promises,
+    members: Vec<cost::Member>,
+    approaches: approaches::ByApproach,
+    plans: plan::Plans,
+    strangers: strangers::Measured,
+    recorded: Option<Comparison>,
+    engines: Vec<simulator::Engine>,
+    /// None if the settings leave it out.
+    growth: Option<(growth::Growth, Vec<generalization::Instances>)>,
+}
+
+/// Measures all stages.
+fn measured(context: &Context, stages: &mut Stages<'_>) -> Result<Measured> {
+    let folds = stages.stage("cross-validation", || cross_validation::measure(context))?;
+    let noisy = stages.stage("noise", || noise::measure(context))?;
+    // The large capture is needed by five stages, and by none if all were measured before.
+    let large = OnceCell::new();
+    let get_large = || get_or_try(&large, || limit::large(context));
+    let limit = stages.stage("limit", || limit::measure(context, get_large()?))?;
+    let sequences = stages.stage("sequential", || sequential::measure(context, get_large()?))?;
+    let calibration = stages.stage("calibration", || calibration::measure(context, get_large()?))?;
+    let promises = stages.stage("promises", || promises::measure(context, get_large()?))?;
+    let members = stages.stage("cost", || cost::measure(context, get_large()?))?;
+    drop(large);
+    let approaches = stages.stage("approaches", || approaches::measure(context))?;
+    let plans = stages.stage("plan", || plan::measure(context))?;
+    let strangers = stages.stage("strangers", || strangers::measure(context))?;
+    let recorded = match context.settings.recorded {
+        Some(_) => stages.stage("recorded", || recorded::measure(context))?,
+        None => None,
+    };
+    let engines = stages.stage("simulator", || simulator::measure(context))?;
+    let growth = if context.settings.growth {
+        let growth = stages.stage("growth", || growth::measure(context))?;
+        Some((growth, stages.stage("generalization", || generalization::measure(context))?))
+    } else {
+        None
+    };
+    Ok(Measured {
+        folds,
+        noisy,
+        limit,
+        sequences,
+        calibration,
+        promises,
+        members,
+        approaches,
+        plans,
+        strangers,
+        recorded,
+        engines,
+        growth,
+    })
+}
+
+/// The page's sections, in order.
+fn sections(context: &Context, measured: &Measured, summary: &published::Summary) -> Result<Vec<Section>> {
+    let mut first = Section::new("summary", "The paper's numbers compared with ours");
+    let damaged = objects::to_repair(context);
+    if !damaged.is_empty() {
+        first.warning(format!(
+            "the figures are of meshes that should be repaired first: {}. The section on the objects says why.",
+            damaged.join(", ")
+        ));
+    }
+    first.table(published::table(context, summary));
+    let mut costs = cost::section(context, &measured.members)?;
+    simulator::add(context, &measured.engines, &mut costs)?;
+    let mut sections = vec![
+        first,
+        objects::section(context)?,
+        cross_validation::section(context, &measured.folds)?,
+        approaches::section(context, &measured.approaches)?,
+        plan::section(context, &measured.plans)?,
+        noise::section(context, &measured.noisy)?,
+        limit::section(context, &measured.limit)?,
+        sequential::section(context, &measured.sequences)?,
+        calibration::section(context, &measured.calibration)?,
+        promises::section(context, &measured.promises)?,
+        strangers::section(context, &measured.strangers)?,
+        costs,
+    ];
+    sections.extend(recorded::section(context, measured.recorded.as_ref())?);
+    match &measured.growth {
+        Some((growth, instances)) => {
+            sections.extend([growth::section(context, growth)?, generalization::section(context, instances)?]);
+        }
+        None => sections.push(growth::left_out()),
+    }
+    Ok(sections)
 }
 
 /// Contents of `summary.json`.
@@ -335,9 +415,10 @@ mod tests {
     #[test]
     fn a_cancelled_report_resumes_where_it_was_and_one_on_own_meshes_leaves_out_built_in_ones() {
         /// Cancels as soon as the stage begins.
-        struct CancelAt(&'static str, AtomicBool);
+        struct CancelAt(&'static str, AtomicBool, Mutex<Vec<String>>);
         impl Progress for CancelAt {
             fn begin(&self, stage: &str, _: Option<u64>) {
+                self.2.lock().unwrap().push(stage.into());
                 if stage == self.0 {
                     self.1.store(true, Ordering::Relaxed);
                 }
@@ -349,10 +430,16 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let settings = Settings { growth: false, ..tiny(meshes(&place.path().join("meshes"))) };
         let directory = place.path().join("report");
-        let cancel = CancelAt("noise", AtomicBool::new(false));
+        let cancel = CancelAt("noise", AtomicBool::new(false), Mutex::default());
         let error = report(&settings, &directory, Existing::default(), &cancel).unwrap_err();
         assert!(matches!(error, palpate::Error::Cancelled), "{error}");
         assert!(!directory.join("index.html").exists());
+        // What is long is named with its stage.
+        let named = cancel.2.into_inner().unwrap();
+        let is_of = |name: &&String, stage: &str| name.split(": ").next() == Some(stage);
+        let stages = ["objects", "cross-validation", "noise"];
+        assert!(named.iter().all(|name| stages.iter().any(|stage| is_of(&name, stage))), "{named:?}");
+        assert!(named.iter().any(|name| name.starts_with("cross-validation: train")), "{named:?}");
         let kept = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
         let kept = kept.into_iter().find(|path| path.to_string_lossy().contains("cross-validation-")).unwrap();
         let kept: serde_json::Value = serde_json::from_slice(&std::fs::read(kept).unwrap()).unwrap();

@@ -1,5 +1,7 @@
 //! Margins of the touches that come next, computed together: that is several times as fast as one by one.
 
+use super::demand::Demand;
+use crate::error::Result;
 use crate::evaluate::together::{AT_ONCE, Together};
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
@@ -7,6 +9,35 @@ use palpate_shared::format::TrainedTouches;
 
 /// As many touches as a robot's sequence often needs; each robot makes only one.
 const AT_ONCE_OF_A_ROBOT: usize = 128;
+
+/// Where a supply's touches come from.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Feed<'d> {
+    /// They are there.
+    Given(&'d [Touch]),
+    /// They are captured when they are needed.
+    Captured(&'d Demand<'d>),
+}
+
+impl Feed<'_> {
+    /// The touches at these positions.
+    fn touches(&self, positions: &[u32]) -> Result<Vec<Touch>> {
+        match self {
+            Self::Given(touches) => {
+                Ok(positions.iter().filter_map(|&position| touches.get(position as usize).copied()).collect())
+            }
+            Self::Captured(demand) => demand.touches(positions),
+        }
+    }
+
+    /// The touch at this position, if it is there without a capture.
+    pub(super) fn given(&self, position: u32) -> Option<&Touch> {
+        match self {
+            Self::Given(touches) => touches.get(position as usize),
+            Self::Captured(_) => None,
+        }
+    }
+}
 
 /// The margins of the next touches of each of a supply's pools.
 pub(super) struct Ahead<'m> {
@@ -23,6 +54,7 @@ pub(super) struct Ahead<'m> {
 struct Block {
     /// Position of the first one in the pool's order.
     first: usize,
+    touches: Vec<Touch>,
     /// For each touch the row of its margins; none if it is no evidence.
     rows: Vec<Option<usize>>,
     margins: Vec<i32>,
@@ -40,22 +72,32 @@ impl<'m> Ahead<'m> {
         }
     }
 
-    /// The margins of the touch at position `next` of the order of pool `pool`, as [`Model::margins`]; none if it is no
-    /// evidence to the model.
-    pub(super) fn margins(&mut self, pool: usize, next: usize, order: &[u32], touches: &[Touch]) -> Option<&[i32]> {
-        let block = self.blocks.get_mut(pool)?;
+    /// The touch at position `next` of the order of pool `pool`, if there is one, and its margins, as [`Model::margins`];
+    /// none if it is no evidence to the model.
+    pub(super) fn next<'s>(
+        &'s mut self,
+        pool: usize,
+        next: usize,
+        order: &[u32],
+        feed: &'s Feed<'_>,
+    ) -> Result<Option<(&'s Touch, Option<&'s [i32]>)>> {
+        let Some(block) = self.blocks.get_mut(pool) else { return Ok(None) };
         if !(block.first..block.first + block.rows.len()).contains(&next) {
-            let coming = order.get(next..order.len().min(next + self.size))?;
-            let coming = coming.iter().filter_map(|&touch| touches.get(touch as usize));
-            let is_evidence = |touch: &Touch| Refused::check(&self.trained, touch).is_ok();
+            let Some(coming) = order.get(next..order.len().min(next + self.size)) else { return Ok(None) };
+            let is_evidence = |touch: &&Touch| Refused::check(&self.trained, touch).is_ok();
             let mut row = 0..;
             block.first = next;
-            block.rows = coming.clone().map(|touch| if is_evidence(touch) { row.next() } else { None }).collect();
-            let evidence: Vec<&Touch> = coming.filter(|touch| is_evidence(touch)).collect();
+            block.touches = feed.touches(coming)?;
+            block.rows =
+                block.touches.iter().map(|touch| if is_evidence(&touch) { row.next() } else { None }).collect();
+            let evidence: Vec<&Touch> = block.touches.iter().filter(is_evidence).collect();
             block.margins.resize(evidence.len() * self.model.object_count(), 0);
             self.together.touches(self.model, &evidence, &mut block.margins);
         }
-        let row = block.rows.get(next - block.first).copied().flatten()?;
-        block.margins.chunks_exact(self.model.object_count()).nth(row)
+        let given = order.get(next).and_then(|&position| feed.given(position));
+        let Some(touch) = given.or(block.touches.get(next - block.first)) else { return Ok(None) };
+        let row = block.rows.get(next - block.first).copied().flatten();
+        let margins = row.and_then(|row| block.margins.chunks_exact(self.model.object_count()).nth(row));
+        Ok(Some((touch, margins)))
     }
 }

@@ -1,6 +1,7 @@
 //! Sequences of a data set's touches: whole ones, no touch in two of them.
 
-use super::ahead::Ahead;
+use super::ahead::{Ahead, Feed};
+use super::demand::Demand;
 use super::sequence::{Sequence, odds_of};
 use crate::error::{EvaluateProblem, Result};
 use crate::in_order::in_order;
@@ -41,7 +42,7 @@ pub struct Until {
 #[derive(Debug)]
 pub struct Supply<'d> {
     object: usize,
-    touches: &'d [Touch],
+    feed: Feed<'d>,
     /// One for each source and robot: a sequence is of touches of one pool.
     pools: Vec<Pool>,
     /// The pool of the next sequence.
@@ -66,16 +67,27 @@ impl<'d> Supply<'d> {
     /// instance, by one robot. Where robots differ, every robot makes one sequence, so that the sequences' biases are
     /// independent.
     pub fn new(object: usize, touched: &'d ObjectTouches, seed: u64) -> Self {
+        let pools = touched.pools().into_iter().map(|pool| pool.touches).collect();
+        let supply = Self::of(object, Feed::Given(touched.touches()), pools);
         let is_once = touched.has_robots();
-        let pool = |(turn, pool): (u64, crate::touches::Pool)| {
-            let mut order = pool.touches;
-            if !is_once {
-                order.shuffle(&mut random::generator(seed, Purpose::Calibration, &touched.name, turn));
-            }
-            Pool { order, ..Pool::default() }
-        };
-        let pools = (0..).zip(touched.pools()).map(pool).collect();
-        Self { object, touches: touched.touches(), pools, next: 0, is_once, candidates: Vec::new() }
+        if is_once { Self { is_once, ..supply } } else { supply.shuffled(&touched.name, seed) }
+    }
+
+    /// The same touches as if they were all captured before.
+    pub(super) fn on_demand(object: usize, demand: &'d Demand<'d>, seed: u64) -> Self {
+        Self::of(object, Feed::Captured(demand), demand.pools()).shuffled(demand.name(), seed)
+    }
+
+    fn of(object: usize, feed: Feed<'d>, pools: Vec<Vec<u32>>) -> Self {
+        let pools = pools.into_iter().map(|order| Pool { order, ..Pool::default() }).collect();
+        Self { object, feed, pools, next: 0, is_once: false, candidates: Vec::new() }
+    }
+
+    fn shuffled(mut self, name: &str, seed: u64) -> Self {
+        for (turn, pool) in (0..).zip(&mut self.pools) {
+            pool.order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, turn));
+        }
+        self
     }
 
     /// Splits off one in `parts` of the touches as a supply of its own; where there are robots, one in `parts` of them.
@@ -97,6 +109,7 @@ impl<'d> Supply<'d> {
     /// there.
     fn follow<const N: usize, G: FnMut(&Moment<'_>) -> bool>(
         &mut self,
+        ahead: &mut Ahead<'_>,
         model: &Model<'_>,
         wanted: usize,
         until: Until,
@@ -106,20 +119,19 @@ impl<'d> Supply<'d> {
         // Models have at most 256 objects, and the caller makes room for as many.
         let never = Stopping::from_odds(0, u32::MAX);
         let Ok(mut recognizer) = Recognizer::<N>::new(model, never) else { return Ok(Vec::new()) };
-        let mut ahead = Ahead::new(model, self.pools.len(), self.is_once);
         let mut sequences = Vec::new();
         while sequences.len() < wanted {
             progress::advance(progress, 1)?;
             let Some(pool) = self.pools.get_mut(self.next) else { break };
             let mut order = Order {
-                touches: self.touches,
+                feed: &self.feed,
                 candidates: &self.candidates,
-                ahead: &mut ahead,
+                ahead: &mut *ahead,
                 turn: self.next,
                 next: pool.used,
                 pool,
             };
-            let (sequence, is_whole) = one(self.object, &mut recognizer, &mut order, until, gate());
+            let (sequence, is_whole) = one(self.object, &mut recognizer, &mut order, until, gate())?;
             if !is_whole && (!self.is_once || pool.order.is_empty()) {
                 break;
             }
@@ -136,7 +148,7 @@ impl<'d> Supply<'d> {
 
 /// A pool's touches, one after the other, as they are pushed.
 struct Order<'o, 'd, 'm> {
-    touches: &'d [Touch],
+    feed: &'o Feed<'d>,
     candidates: &'o [u16],
     ahead: &'o mut Ahead<'m>,
     pool: &'o mut Pool,
@@ -146,21 +158,28 @@ struct Order<'o, 'd, 'm> {
     next: usize,
 }
 
-impl<'d> Order<'_, 'd, '_> {
+impl Order<'_, '_, '_> {
     /// Pushes the next touch, if there is one; it, and whether it is evidence.
-    fn push<const N: usize>(&mut self, recognizer: &mut Recognizer<'_, N>) -> Option<(&'d Touch, bool)> {
+    fn push<const N: usize>(&mut self, recognizer: &mut Recognizer<'_, N>) -> Result<Option<(&Touch, bool)>> {
         if !self.pool.by_pose.is_empty() {
-            let pose = recognizer.next_approach(self.candidates.iter().copied())?.pose;
-            let touch = &self.touches[self.pool.by_pose.get_mut(usize::from(pose))?.pop()? as usize];
-            return Some((touch, recognizer.push(touch).is_ok()));
+            let Some(touch) = self.proposed(recognizer) else { return Ok(None) };
+            return Ok(Some((touch, recognizer.push(touch).is_ok())));
         }
-        let touch = &self.touches[*self.pool.order.get(self.next)? as usize];
-        let margins = self.ahead.margins(self.turn, self.next, &self.pool.order, self.touches);
+        let Some((touch, margins)) = self.ahead.next(self.turn, self.next, &self.pool.order, self.feed)? else {
+            return Ok(None);
+        };
         self.next += 1;
         if let Some(margins) = margins {
             recognizer.push_margins(margins);
         }
-        Some((touch, margins.is_some()))
+        Ok(Some((touch, margins.is_some())))
+    }
+
+    /// The next touch in the pose that the recognizer proposes.
+    fn proposed<const N: usize>(&mut self, recognizer: &mut Recognizer<'_, N>) -> Option<&Touch> {
+        let pose = recognizer.next_approach(self.candidates.iter().copied())?.pose;
+        let position = self.pool.by_pose.get_mut(usize::from(pose))?.pop()?;
+        self.feed.given(position)
     }
 }
 
@@ -178,7 +197,7 @@ pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_
             for &touch in pool.order.iter().rev() {
                 let no_pose =
                     || EvaluateProblem::NoPoseOf { object: names.get(supply.object).cloned().unwrap_or_default() };
-                let pose = supply.touches[touch as usize].pose().ok_or_else(no_pose)?;
+                let pose = supply.feed.given(touch).and_then(Touch::pose).ok_or_else(no_pose)?;
                 by_pose[usize::from(poses.number_of(&pose))].push(touch);
             }
             pool.by_pose = by_pose;
@@ -198,12 +217,12 @@ fn one<const N: usize>(
     order: &mut Order<'_, '_, '_>,
     until: Until,
     mut gate: impl FnMut(&Moment<'_>) -> bool,
-) -> (Sequence, bool) {
+) -> Result<(Sequence, bool)> {
     let strictest = odds_of(until.margin);
     let mut sequence = Sequence::new(object);
     recognizer.reset();
     for approaches in 1_u32.. {
-        let Some((touch, is_evidence)) = order.push(recognizer) else { break };
+        let Some((touch, is_evidence)) = order.push(recognizer)? else { break };
         if !is_evidence {
             // No evidence: it cost an approach.
             sequence.end(approaches);
@@ -216,11 +235,14 @@ fn one<const N: usize>(
             gate(&Moment { touch, evidence, best, touches, approaches }) && familiarity == Familiarity::Known;
         let odds = sequence.push(recognizer, approaches, may_name);
         if (may_name && odds <= strictest) || familiarity == Familiarity::Stranger || touches >= until.max_touches {
-            return (sequence, true);
+            return Ok((sequence, true));
         }
     }
-    (sequence, false)
+    Ok((sequence, false))
 }
+
+/// Parts of the sequences wanted, after each of which it is seen whether a supply has ended.
+const ROUNDS: u128 = 16;
 
 /// Follows sequences of all objects' touches, `wanted` of each supply's, in parallel; `gate` makes for each sequence what
 /// says after each touch whether a name may be given. Every supply then has as many sequences of those wanted as the one
@@ -236,12 +258,26 @@ pub fn follow<G: FnMut(&Moment<'_>) -> bool>(
     gate: impl Fn() -> G + Sync,
     progress: &dyn Progress,
 ) -> Result<Vec<Sequence>> {
-    let of = |(supply, &wanted): (&mut Supply<'_>, &usize)| match model.object_count() {
-        0..=16 => supply.follow::<16, G>(model, wanted, until, &gate, progress),
-        17..=64 => supply.follow::<64, G>(model, wanted, until, &gate, progress),
-        _ => supply.follow::<256, G>(model, wanted, until, &gate, progress),
+    let of = |((supply, ahead), wanted): ((&mut Supply<'_>, &mut Ahead<'_>), usize)| match model.object_count() {
+        0..=16 => supply.follow::<16, G>(ahead, model, wanted, until, &gate, progress),
+        17..=64 => supply.follow::<64, G>(ahead, model, wanted, until, &gate, progress),
+        _ => supply.follow::<256, G>(ahead, model, wanted, until, &gate, progress),
     };
-    let mut found = in_order(supplies.par_iter_mut().zip(wanted).map(of))?;
+    let ahead = |supply: &Supply<'_>| Ahead::new(model, supply.pools.len(), supply.is_once);
+    let mut ahead: Vec<Ahead<'_>> = supplies.iter().map(ahead).collect();
+    let mut found: Vec<Vec<Sequence>> = vec![Vec::new(); supplies.len()];
+    // Side by side: once a supply has ended, what the others had beyond its share would be left out again.
+    for round in 1..=ROUNDS {
+        let goal = |wanted: usize| (wanted as u128 * round).div_ceil(ROUNDS) as usize;
+        let wanted: Vec<usize> = found.iter().zip(wanted).map(|(found, &wanted)| goal(wanted) - found.len()).collect();
+        let more = supplies.par_iter_mut().zip(&mut ahead).zip(wanted.par_iter().copied()).map(of);
+        let more = in_order(more)?;
+        let has_ended = more.iter().zip(&wanted).any(|(more, &wanted)| more.len() < wanted);
+        found.iter_mut().zip(more).for_each(|(found, more)| found.extend(more));
+        if has_ended {
+            break;
+        }
+    }
     let share = |(found, wanted): (&Vec<Sequence>, &usize)| (*wanted > 0).then(|| found.len() as f64 / *wanted as f64);
     let share = found.iter().zip(wanted).filter_map(share).fold(1.0, f64::min);
     for (found, &wanted) in found.iter_mut().zip(wanted) {

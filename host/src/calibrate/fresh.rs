@@ -1,20 +1,24 @@
 //! Calibrating on touches that are captured for it.
 
+use super::demand::Demand;
 use super::draw::{Supply, Until, follow};
-use super::model::{Calibrated, Settings, calibrate};
-use crate::capture;
+use super::model::{Calibrated, Drawn, Settings, calibrate, calibrate_drawn, material, noise_seed};
+use super::temperature::temperature_on_demand;
+use crate::capture::{self, Sampler};
 use crate::error::Result;
 use crate::evaluate::{Candidate, OfTouches};
 use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::Progress;
-use crate::touches::{Dataset, ObjectTouches, Origin, Source};
+use crate::touches::{Dataset, ObjectTouches, Origin};
 use palpate_onboard::{Model, Refused, Stopping};
+use palpate_shared::Touch;
+use std::sync::OnceLock;
 
 /// Samples of each object from which it is estimated how many a sequence takes.
 const FIRST: u64 = 2_000;
 /// The most samples of an object.
-const MOST: u64 = 4_000_000;
+const MOST: usize = 4_000_000;
 /// Amount captured, relative to the amount expected to be used.
 const SPARE: f64 = 1.15;
 
@@ -23,20 +27,54 @@ const SPARE: f64 = 1.15;
 #[derive(Debug, Default)]
 pub struct Fresh {
     origin: Option<Origin>,
-    /// From sample [`FIRST`] on.
-    objects: Vec<ObjectTouches>,
+    /// The samples before [`FIRST`].
+    first: Vec<ObjectTouches>,
+    /// From sample [`FIRST`] on, as far as they were needed.
+    rest: Vec<Vec<OnceLock<Touch>>>,
 }
 
 impl Fresh {
-    /// The touches kept of these objects, touched like this, in their order.
-    fn of(&mut self, objects: &[(&str, &[Scene])], origin: &Origin) -> &mut [ObjectTouches] {
-        let names = self.objects.iter().map(|object| object.name.as_str());
-        if self.origin.as_ref() != Some(origin) || !names.eq(objects.iter().map(|(name, _)| *name)) {
-            self.origin = Some(origin.clone());
-            let none = |(name, _): &(&str, &[Scene])| ObjectTouches::new(*name, Vec::new(), Source::Object);
-            self.objects = objects.iter().map(none).collect();
+    /// Forgets what it keeps unless it is of these objects, touched like this. The first samples are there then.
+    fn begin(&mut self, objects: &[(&str, &[Scene])], origin: &Origin, progress: &dyn Progress) -> Result<()> {
+        let names = self.first.iter().map(|object| object.name.as_str());
+        if self.origin.as_ref() == Some(origin) && names.eq(objects.iter().map(|(name, _)| *name)) {
+            return Ok(());
         }
-        &mut self.objects
+        *self = Self::default();
+        let touch = |(name, scenes): &(&str, &[Scene])| {
+            crate::progress::check(progress)?;
+            capture::touches(scenes, name, origin, 0..FIRST)
+        };
+        self.first = objects.iter().map(touch).collect::<Result<_>>()?;
+        self.rest = objects.iter().map(|_| Vec::new()).collect();
+        self.origin = Some(origin.clone());
+        Ok(())
+    }
+}
+
+/// Touches of objects to calibrate on, each captured when it is needed.
+#[derive(Debug)]
+pub struct Captured<'a> {
+    /// The first samples of each object, on which nothing is calibrated.
+    first: Dataset,
+    demands: Vec<Demand<'a>>,
+    instances: Vec<Vec<String>>,
+    window: Option<u32>,
+}
+
+impl Captured<'_> {
+    /// The supplies of the objects' touches; `known` are the objects' indices in the model.
+    pub fn supplies(&self, known: &[usize], seed: u64) -> Vec<Supply<'_>> {
+        self.demands.iter().zip(known).map(|(demand, &object)| Supply::on_demand(object, demand, seed)).collect()
+    }
+
+    /// Captures all of them.
+    fn all(self) -> Result<Dataset> {
+        let all = |(demand, instances): (&Demand<'_>, &Vec<String>)| -> Result<ObjectTouches> {
+            Ok(ObjectTouches::in_turn(demand.name(), demand.all()?, instances, FIRST).of_stroke(self.window))
+        };
+        let objects = self.demands.iter().zip(&self.instances).map(all).collect::<Result<_>>()?;
+        Ok(Dataset { objects, ..self.first })
     }
 }
 
@@ -60,47 +98,62 @@ pub fn calibrate_fresh(
     let scenes = capture::scenes(&objects, origin, progress)?;
     let named: Vec<(&str, &[Scene])> =
         objects.iter().zip(&scenes).map(|(object, scenes)| (object.name.as_str(), scenes.as_slice())).collect();
-    let dataset = fresh(model, &named, origin, settings, kept, progress)?;
-    calibrate(model, dataset, settings, progress)
+    let mut captured = fresh(model, &named, origin, settings, kept, progress)?;
+    // Where touches are chosen by their poses, or robots differ, all of them must be there.
+    if settings.active || settings.noise.has_bias() {
+        return calibrate(model, captured.all()?, settings, progress);
+    }
+    let seed = noise_seed(settings);
+    captured.demands.iter_mut().for_each(|demand| demand.add_noise(&settings.noise, seed));
+    let material = material(model, &captured.first, settings)?;
+    let drawn = Drawn {
+        dataset: &captured.first,
+        fewest: captured.demands.iter().map(|demand| demand.len() as u64).min().unwrap_or(0),
+        supplies: captured.supplies(&material.known, settings.seed),
+    };
+    let temperature = || temperature_on_demand(model, &captured.demands, &material.known);
+    calibrate_drawn(model, &material, drawn, settings, None, temperature, progress)
 }
 
-/// The touches of objects, by name and instances' scenes, that [`calibrate_fresh`] calibrates on.
+/// The touches of objects, by name and instances' scenes, that [`calibrate_fresh`] calibrates on; the first samples, from
+/// which it is estimated how many these are, are captured here.
 ///
 /// # Errors
 /// As [`calibrate_fresh`].
-pub fn fresh(
+pub fn fresh<'a>(
     model: &Model<'_>,
-    objects: &[(&str, &[Scene])],
-    origin: &Origin,
+    objects: &[(&'a str, &'a [Scene])],
+    origin: &'a Origin,
     settings: &Settings,
-    kept: &mut Fresh,
+    kept: &'a mut Fresh,
     progress: &dyn Progress,
-) -> Result<Dataset> {
+) -> Result<Captured<'a>> {
     progress.begin("touching, to calibrate", None);
-    let touch = |(name, scenes): &(&str, &[Scene]), samples| -> Result<ObjectTouches> {
-        crate::progress::check(progress)?;
-        capture::touches(scenes, name, origin, samples)
-    };
-    let first: Vec<ObjectTouches> = objects.iter().map(|object| touch(object, 0..FIRST)).collect::<Result<_>>()?;
-    let dataset = Dataset { origin: Some(Origin { touches: FIRST, ..origin.clone() }), ..Dataset::new(first) };
-    let means = means(model, &dataset, settings)?;
+    kept.begin(objects, origin, progress)?;
+    let origin_of_first = Some(Origin { touches: FIRST, ..origin.clone() });
+    let first = Dataset { origin: origin_of_first, ..Dataset::new(kept.first.clone()) };
+    let means = means(model, &first, settings)?;
     let wanted = settings.sequences as f64 / objects.len().max(1) as f64;
     let counts = means.into_iter().map(|Lengths { longest, pools }| {
         // A few standard errors more, as if lengths were exponentially distributed. Instances get equally many.
         let wanted = wanted / pools as f64;
         let count = SPARE * longest * (wanted + 3.0 * wanted.sqrt()) * pools as f64;
-        (count.ceil() as u64).clamp(1, MOST)
+        (count.ceil() as usize).clamp(1, MOST)
     });
-    let more = objects.iter().zip(counts).zip(kept.of(objects, origin)).map(|((object, count), kept)| {
-        let has = kept.len() as u64;
-        if has < count {
-            kept.append(&touch(object, FIRST + has..FIRST + count)?);
-        }
-        // As many as there are, if that is fewer than a machine counts.
-        let count = usize::try_from(count).unwrap_or(usize::MAX).min(kept.len());
-        Ok(kept.select(0..count))
-    });
-    Ok(Dataset { objects: more.collect::<Result<_>>()?, ..dataset })
+    let demand =
+        |((&(name, scenes), count), kept): ((&(&'a str, &'a [Scene]), usize), &'a mut Vec<OnceLock<Touch>>)| {
+            kept.resize_with(count.max(kept.len()), OnceLock::new);
+            Demand::new(
+                Sampler::of_instances(scenes, name, origin),
+                FIRST,
+                scenes.len(),
+                origin.probe.window(),
+                &kept[..count],
+            )
+        };
+    let demands = objects.iter().zip(counts).zip(&mut kept.rest).map(demand).collect();
+    let instances = objects.iter().map(|(_, scenes)| capture::numbered(scenes)).collect();
+    Ok(Captured { first, demands, instances, window: origin.probe.window() })
 }
 
 /// Lengths of the sequences of an object.
@@ -138,4 +191,63 @@ fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Ve
         Ok(Lengths { longest: (0..pools).map(mean).fold(0.0, f64::max), pools })
     };
     dataset.objects.iter().zip(&known).map(mean).collect()
+}
+
+#[cfg(all(test, feature = "train"))]
+mod tests {
+    use super::*;
+    use crate::compile::{self, CompiledModel, compile};
+    use crate::ensemble::train;
+    use crate::mesh::{Instance, Mesh};
+    use crate::probe::approach::Probe;
+    use crate::probe::noise::Noise;
+
+    #[test]
+    fn what_is_captured_when_it_is_needed_calibrates_as_if_all_had_been_captured_before() {
+        let shape = |sides: [f32; 3]| Mesh::globe(8).stretched(sides);
+        let of_two = [("flat", 0.2), ("thick", 0.4)]
+            .map(|(name, height)| Instance { name: name.into(), mesh: shape([1.0, 1.0, height]) });
+        let objects = [
+            Object::new("ball", shape([1.0; 3])),
+            Object::new("cigar", shape([1.0, 0.3, 0.3])),
+            Object::of_instances("disc", of_two.to_vec()).unwrap(),
+        ];
+        let scenes = |origin: &Origin| capture::scenes(&objects.each_ref(), origin, &()).unwrap();
+        for (approaches, stroke) in [(false, None), (true, None), (true, Some(0.5))] {
+            let probe = Probe { stroke, ..Probe::default() };
+            let origin = Origin { touches: 1_000, approaches, probe, ..Origin::default() };
+            let (dataset, _) = capture::in_memory(&objects, &origin.clone().into(), &()).unwrap();
+            let settings = train::Settings { rounds: 8, depth: 3, eta: 0.3, ..train::Settings::compact() };
+            let ensemble = train::train(&dataset, &settings, &()).unwrap();
+            let compiled = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+            let compiled = CompiledModel::from_bytes(compiled).unwrap();
+            let model = compiled.model();
+            let origin = Origin { seed: 2, ..origin };
+            let settings = Settings {
+                rate: 0.1,
+                sequences: 2_400,
+                max_touches: Some(40),
+                noise: Noise::switch(),
+                ..Settings::default()
+            };
+
+            let scenes = scenes(&origin);
+            let named: Vec<(&str, &[Scene])> =
+                objects.iter().zip(&scenes).map(|(object, scenes)| (object.name.as_str(), scenes.as_slice())).collect();
+            let mut kept = Fresh::default();
+            let all = fresh(&model, &named, &origin, &settings, &mut kept, &()).unwrap().all().unwrap();
+            let captured = |kept: &Fresh| kept.rest.iter().flatten().filter(|touch| touch.get().is_some()).count();
+            assert_eq!(captured(&kept), all.len());
+            let expected = calibrate(&model, all, &settings, &()).unwrap();
+
+            let mut on_demand = Fresh::default();
+            let once = calibrate_fresh(&model, &objects, &origin, &settings, &mut on_demand, &()).unwrap();
+            assert_eq!((&once.model, once.sequences), (&expected.model, expected.sequences));
+            let needed = captured(&on_demand);
+            assert!(needed < captured(&kept), "{needed} of {}", captured(&kept));
+            // None is captured again.
+            let twice = calibrate_fresh(&model, &objects, &origin, &settings, &mut on_demand, &()).unwrap();
+            assert_eq!((&twice.model, captured(&on_demand)), (&expected.model, needed));
+        }
+    }
 }

@@ -34,6 +34,7 @@
 
 mod ahead;
 mod choose;
+mod demand;
 mod draw;
 mod error;
 mod fresh;
@@ -47,8 +48,7 @@ mod walk;
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
 pub use error::{CalibrateProblem, Supplied};
-pub use fresh::fresh;
-pub use fresh::{Fresh, calibrate_fresh};
+pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub use model::{Calibrated, OfObject, Settings, Worse, added_bytes, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{STRICTEST, add_noise, calibrate_from};

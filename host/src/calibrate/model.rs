@@ -173,11 +173,34 @@ pub(crate) fn calibrate_from(
     strictest: Option<f64>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
+    let material = material(model, &dataset, settings)?;
+    add_noise(model, &mut dataset, &settings.noise, material.max_touches, noise_seed(settings));
+    let touched = dataset.objects.iter().zip(&material.known);
+    let drawn = Drawn {
+        dataset: &dataset,
+        fewest: dataset.objects.iter().map(|object| object.len() as u64).min().unwrap_or(0),
+        supplies: touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect(),
+    };
+    let temperature = || Ok(temperature(model, &dataset, &material.known));
+    calibrate_drawn(model, &material, drawn, settings, strictest, temperature, progress)
+}
+
+/// What a model can be calibrated on.
+pub(super) struct Material {
+    /// The names that it gives.
+    names: Vec<String>,
+    /// The data set's objects' indices in the model.
+    pub(super) known: Vec<usize>,
+    max_touches: u32,
+}
+
+/// Refuses settings, models and data sets of which there is no calibration.
+pub(super) fn material(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Material> {
     check(settings)?;
     let own = Stopping::from_model(model).max_touches();
     let max_touches = settings.max_touches.unwrap_or(own);
     compile::stopping(settings.rate, max_touches)?;
-    let (_, known) = Candidate::Compiled(model).of(&dataset)?;
+    let (_, known) = Candidate::Compiled(model).of(dataset)?;
     let mut names = compile::names(model);
     // A background is not touched, and never named.
     names.truncate(model.known_count());
@@ -189,20 +212,43 @@ pub(crate) fn calibrate_from(
     if !missing.is_empty() {
         return Err(CalibrateProblem::Missing { objects: missing }.into());
     }
-    // Another seed than those of training and tests.
-    add_noise(model, &mut dataset, &settings.noise, max_touches, settings.seed.wrapping_add(0x9e37_79b9));
-    let touched = dataset.objects.iter().zip(&known);
-    let mut supplies: Vec<Supply<'_>> =
-        touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect();
+    Ok(Material { names, known, max_touches })
+}
+
+/// Seed of the noise of the touches: another than those of training and tests.
+pub(super) fn noise_seed(settings: &Settings) -> u64 {
+    settings.seed.wrapping_add(0x9e37_79b9)
+}
+
+/// Touches that a model is calibrated on.
+pub(super) struct Drawn<'d> {
+    /// A data set of touches that were made in the same way, if not of these.
+    pub(super) dataset: &'d Dataset,
+    /// The fewest touches of an object.
+    pub(super) fewest: u64,
+    /// One of each object, with noise.
+    pub(super) supplies: Vec<Supply<'d>>,
+}
+
+/// Calibrates on touches drawn from supplies; `temperature` finds the temperature.
+pub(super) fn calibrate_drawn(
+    model: &Model<'_>,
+    Material { names, known, max_touches }: &Material,
+    Drawn { dataset, fewest, mut supplies }: Drawn<'_>,
+    settings: &Settings,
+    strictest: Option<f64>,
+    temperature: impl FnOnce() -> Result<f64>,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let naive = ((1.0 - settings.rate) / settings.rate).ln();
-    let shares = shares(model, &known);
+    let shares = shares(model, known);
     let wanted = |count: usize| -> Vec<usize> {
         shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
     };
     let draw = |supplies: &mut [Supply<'_>], count: usize, margin: f64| {
-        let until = Until { margin, max_touches };
+        let until = Until { margin, max_touches: *max_touches };
         follow(model, supplies, &wanted(count), until, || |_: &Moment<'_>| true, progress)
     };
     let mut first: Vec<Supply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
@@ -211,8 +257,8 @@ pub(crate) fn calibrate_from(
         if !dataset.holds_approaches() {
             return Err(EvaluateProblem::NoApproaches.into());
         }
-        follow_plan(&mut first, &names, &plan)?;
-        follow_plan(&mut supplies, &names, &plan)?;
+        follow_plan(&mut first, names, &plan)?;
+        follow_plan(&mut supplies, names, &plan)?;
     }
     let strictest = match strictest {
         Some(margin) => margin,
@@ -223,13 +269,10 @@ pub(crate) fn calibrate_from(
         }
     };
     let sequences = draw(&mut supplies, settings.sequences, strictest)?;
-    let supplied = (sequences.len() < wanted(settings.sequences).iter().sum()).then(|| Supplied {
-        approaches: dataset.holds_approaches(),
-        fewest: dataset.objects.iter().map(|object| object.len() as u64).min().unwrap_or(0),
-    });
-    let chosen = chosen(&sequences, &names, strictest, &terms, supplied)?;
-    let temperature = temperature(model, &dataset, &known);
-    finished(model, &dataset, settings, max_touches, &names, &chosen, temperature)
+    let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
+        .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
+    let chosen = chosen(&sequences, names, strictest, &terms, supplied)?;
+    finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }
 
 fn check(settings: &Settings) -> Result<()> {

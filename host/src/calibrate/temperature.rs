@@ -1,5 +1,7 @@
 //! One temperature, so that the posterior that is shown is one to believe (Guo and others, 2017, arXiv 1706.04599).
 
+use super::demand::Demand;
+use crate::error::Result;
 use crate::evaluate::together::margins_of_touches;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
@@ -15,17 +17,40 @@ const HALVINGS: usize = 24;
 /// negative log-likelihood, each object weighted equally. `known` are the indices of the data set's objects in the
 /// model. 1 if no touch is evidence.
 pub fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
-    let rows = |(touched, &object): (&ObjectTouches, &usize)| {
-        let evidence = touched.touches().iter().filter(|touch| model.accepts(touch).is_ok());
-        let evidence: Vec<&Touch> = evidence.take(MOST).collect();
+    let evidence = |touched: &ObjectTouches| -> Vec<Touch> {
+        touched.touches().iter().filter(|touch| model.accepts(touch).is_ok()).take(MOST).copied().collect()
+    };
+    temperature_of(model, &dataset.objects.iter().map(evidence).collect::<Vec<_>>(), known)
+}
+
+/// The same on touches that are captured for it.
+pub(super) fn temperature_on_demand(model: &Model<'_>, demands: &[Demand<'_>], known: &[usize]) -> Result<f64> {
+    let evidence = |demand: &Demand<'_>| -> Result<Vec<Touch>> {
+        let mut evidence = Vec::new();
+        let positions: Vec<u32> = (0..demand.len() as u32).collect();
+        for positions in positions.chunks(MOST) {
+            evidence.extend(demand.touches(positions)?.into_iter().filter(|touch| model.accepts(touch).is_ok()));
+            if evidence.len() >= MOST {
+                break;
+            }
+        }
+        evidence.truncate(MOST);
+        Ok(evidence)
+    };
+    Ok(temperature_of(model, &demands.iter().map(evidence).collect::<Result<Vec<_>>>()?, known))
+}
+
+/// The same on these touches of each object, which are all evidence.
+fn temperature_of(model: &Model<'_>, evidence: &[Vec<Touch>], known: &[usize]) -> f64 {
+    let rows = |(evidence, &object): (&Vec<Touch>, &usize)| {
         let row = |margins: &[i32]| {
             let own = margins.get(object).copied().unwrap_or(0);
             // Ahead of the right object, in nats.
             margins.iter().map(|margin| f64::from(margin - own) * f64::from(model.unit())).collect::<Vec<_>>()
         };
-        margins_of_touches(model, &evidence).chunks_exact(model.object_count()).map(row).collect::<Vec<_>>()
+        margins_of_touches(model, evidence).chunks_exact(model.object_count()).map(row).collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<Vec<f64>>> = dataset.objects.par_iter().zip(known).map(rows).collect();
+    let rows: Vec<Vec<Vec<f64>>> = evidence.par_iter().zip(known).map(rows).collect();
     if rows.iter().all(Vec::is_empty) {
         return 1.0;
     }

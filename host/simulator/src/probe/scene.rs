@@ -89,11 +89,6 @@ impl Scene {
     pub fn all_contacts<const N: usize>(&self, origins: [DVec3; N], direction: DVec3, radius: f64) -> Option<[f64; N]> {
         self.surface.all_contacts(origins, direction, radius)
     }
-
-    /// True if the sphere's path meets the bounding box; if not, it never touches. Much cheaper than a cast.
-    pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
-        self.surface.may_touch(origin, direction, radius)
-    }
 }
 
 fn corners(mesh: &Mesh) -> Result<Vec<Triangle>, MeshProblem> {

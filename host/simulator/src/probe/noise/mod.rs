@@ -372,19 +372,36 @@ impl Noise {
         // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
         // version 0.1.0, and no other setting changes it.
         let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
-        let is_gaussian = Self { deviation: self.deviation.least.into(), ..Self::default() } == *self;
         let one = |(touch, index): (&Touch, u64)| {
             let normal: [f64; FINGERS] = std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
-            if is_gaussian {
-                return timed(touch, |finger, time| time + self.deviation.least * normal[finger]);
-            }
-            let mut sensor = random::generator(seed, Purpose::Sensor, name, index);
-            let own = Draw::new(&mut sensor);
-            let robot =
-                self.has_bias().then(|| Draw::new(&mut random::generator(seed, Purpose::Robot, "", robot(index))));
-            self.one(&self.given_way(touch, &mut sensor), normal, &own, &robot.unwrap_or_default())
+            self.at(touch, normal, (seed, name, index), || robot(index))
         };
         touches.iter().zip(0..).map(one).collect()
+    }
+
+    /// The same noise as [`add`](Self::add), for the first `count` touches of an object in any order. Only for noise without a
+    /// bias.
+    pub fn by_position(&self, name: &str, count: usize, seed: u64) -> ByPosition {
+        let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
+        let mut normal = || std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
+        ByPosition { noise: *self, name: name.into(), seed, normals: (0..count).map(|_| normal()).collect() }
+    }
+
+    /// Adds it to touch `index` of the object `name`.
+    fn at(
+        &self,
+        touch: &Touch,
+        normal: [f64; FINGERS],
+        (seed, name, index): (u64, &str, u64),
+        robot: impl Fn() -> u64,
+    ) -> Touch {
+        if (Self { deviation: self.deviation.least.into(), ..Self::default() }) == *self {
+            return timed(touch, |finger, time| time + self.deviation.least * normal[finger]);
+        }
+        let mut sensor = random::generator(seed, Purpose::Sensor, name, index);
+        let own = Draw::new(&mut sensor);
+        let robot = self.has_bias().then(|| Draw::new(&mut random::generator(seed, Purpose::Robot, "", robot())));
+        self.one(&self.given_way(touch, &mut sensor), normal, &own, &robot.unwrap_or_default())
     }
 
     fn one(&self, touch: &Touch, normal: [f64; FINGERS], own: &Draw, robot: &Draw) -> Touch {
@@ -409,6 +426,23 @@ impl Noise {
             }
             _ => noisy,
         }
+    }
+}
+
+/// The noise of an object's touches, in any order.
+#[derive(Debug)]
+pub struct ByPosition {
+    noise: Noise,
+    name: String,
+    seed: u64,
+    /// For each touch its Gaussian numbers, which come from one stream.
+    normals: Vec<[f64; FINGERS]>,
+}
+
+impl ByPosition {
+    /// Adds it to the touch at this position, below the count that it was made for.
+    pub fn add(&self, touch: &Touch, position: usize) -> Touch {
+        self.noise.at(touch, self.normals[position], (self.seed, &self.name, position as u64), || position as u64)
     }
 }
 

@@ -145,13 +145,6 @@ impl Surface {
         Some(Start { motion, skipped, length: if moves { length } else { f64::INFINITY } })
     }
 
-    /// True if the sphere's path meets the mesh's box: a cheap necessary condition for a contact.
-    pub fn may_touch(&self, origin: DVec3, direction: DVec3, radius: f64) -> bool {
-        let motion =
-            Motion { origin: (origin - self.center) * self.per_unit, direction, radius: radius * self.per_unit };
-        self.entry(&motion).is_some()
-    }
-
     /// Distance that the sphere can move toward the mesh's box without any contact; none when it never gets there. This
     /// saves the digits that a start from far away would cost.
     fn entry(&self, motion: &Motion) -> Option<f64> {

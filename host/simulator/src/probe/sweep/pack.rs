@@ -7,7 +7,7 @@
 
 use super::budget::BOX;
 use super::narrow::{Motion, Triangle};
-use glam::{DVec3, Vec3, Vec4};
+use glam::{BVec4A, DVec3, Vec3, Vec4};
 
 /// Number of triangles in a pack.
 pub(super) const LANES: usize = 2 * WIDTH;
@@ -73,6 +73,18 @@ impl Earliest {
         Self { places: [0.0; LANES], left: all(count) }
     }
 
+    /// True if a triangle is left.
+    #[inline]
+    pub(super) fn has_some(&self) -> bool {
+        self.left != 0
+    }
+
+    /// Leaves out what the other excludes, which was made with a lower limit.
+    #[inline]
+    pub(super) fn retain(&mut self, other: &Self) {
+        self.left &= other.left;
+    }
+
     /// The triangle with the least distance, if that is at most `limit`. Each is returned only once.
     #[inline]
     pub(super) fn pop(&mut self, limit: f32) -> Option<usize> {
@@ -120,15 +132,35 @@ fn half_earliest(corners: &[[Vec4; 3]; 3], ray: &Ray, limit: f32) -> Vec4 {
         out |= beyond.cmpgt(zero) & (beyond * beyond).cmpgt(margin_squared * (eu * eu + ev * ev));
     }
     if limit < f32::INFINITY {
-        // Seen from the sphere at the limit, in the direction of the triangle's middle: if that points forward and all of
-        // the triangle lies beyond the radius, the sphere does not touch it there, nor before.
-        let ends = ws.map(|w| w - limit);
-        let (mu, mv, mw) = (us[0] + us[1] + us[2], vs[0] + vs[1] + vs[2], ends[0] + ends[1] + ends[2]);
-        let nearest = least([0, 1, 2].map(|corner| us[corner] * mu + vs[corner] * mv + ends[corner] * mw));
-        let square = mu * mu + mv * mv + mw * mw;
-        out |= mw.cmpge(zero) & nearest.cmpgt(zero) & (nearest * nearest).cmpgt(margin_squared * square);
+        out |= apart([us, vs, ws.map(|w| w - limit)], margin_squared);
     }
     Vec4::select(out, infinite, (least(ws) - reach.max(zero).sqrt()).max(zero))
+}
+
+/// The triangles that a sphere at the origin of these coordinates does not touch there, nor before, moving along the third axis:
+/// in a direction that points forward, all of the triangle lies beyond the radius. Two directions are tried: to the middle of
+/// the triangle, and to the point closest to the sphere on the line from there to the corner that lies nearest in it.
+#[inline]
+fn apart(corners: [[Vec4; 3]; 3], margin_squared: Vec4) -> BVec4A {
+    let [us, vs, ws] = corners;
+    // How far each corner lies in a direction, times its length.
+    let depths = |[u, v, w]: [Vec4; 3]| [0, 1, 2].map(|corner| us[corner] * u + vs[corner] * v + ws[corner] * w);
+    let separates = |[u, v, w]: [Vec4; 3], nearest: Vec4| {
+        let square = u * u + v * v + w * w;
+        w.cmpge(Vec4::ZERO) & nearest.cmpgt(Vec4::ZERO) & (nearest * nearest).cmpgt(margin_squared * square)
+    };
+    let middle = corners.map(|[a, b, c]| (a + b + c) / 3.0);
+    let from_middle = depths(middle);
+    let nearest = least(from_middle);
+    let is_first = from_middle[0].cmple(nearest);
+    let is_second = from_middle[1].cmple(nearest);
+    let corner = corners.map(|[a, b, c]| Vec4::select(is_first, a, Vec4::select(is_second, b, c)));
+    let way = [0, 1, 2].map(|axis| corner[axis] - middle[axis]);
+    let dot = |a: &[Vec4; 3], b: &[Vec4; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let share = -dot(&middle, &way) / dot(&way, &way).max(Vec4::splat(f32::MIN_POSITIVE));
+    let share = share.min(Vec4::ONE).max(Vec4::ZERO);
+    let closest = [0, 1, 2].map(|axis| middle[axis] + way[axis] * share);
+    separates(middle, nearest) | separates(closest, least(depths(closest)))
 }
 
 /// A motion as the f32 tests need it.

@@ -257,6 +257,9 @@ impl Search {
                     *touched = pack.first as usize + lane;
                     *limit = limit_after(*first, motion, ray);
                     touches = true;
+                    if earliest.has_some() {
+                        earliest.retain(&pack.earliest(ray, *limit));
+                    }
                 }
             }
             if PAUSES && touches {
