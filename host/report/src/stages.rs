@@ -10,10 +10,10 @@ use super::{
 use crate::error::ReportProblem;
 use crate::page::document::{Page, Section};
 use palpate::capture;
+use palpate::compare::Comparison;
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
-use palpate::evaluate::recorded::Comparison;
 use palpate::mesh::{Object, source};
 use palpate::output::write_json;
 use palpate::progress::{self, Progress};
