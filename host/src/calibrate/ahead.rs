@@ -39,6 +39,9 @@ impl Feed<'_> {
     }
 }
 
+/// A touch and its margins; no margins if it is no evidence.
+type Next<'s> = (&'s Touch, Option<&'s [i32]>);
+
 /// The margins of the next touches of each of a supply's pools.
 pub(super) struct Ahead<'m> {
     model: &'m Model<'m>,
@@ -80,7 +83,7 @@ impl<'m> Ahead<'m> {
         next: usize,
         order: &[u32],
         feed: &'s Feed<'_>,
-    ) -> Result<Option<(&'s Touch, Option<&'s [i32]>)>> {
+    ) -> Result<Option<Next<'s>>> {
         let Some(block) = self.blocks.get_mut(pool) else { return Ok(None) };
         if !(block.first..block.first + block.rows.len()).contains(&next) {
             let Some(coming) = order.get(next..order.len().min(next + self.size)) else { return Ok(None) };

@@ -140,18 +140,12 @@ pub fn fresh<'a>(
         let count = SPARE * longest * (wanted + 3.0 * wanted.sqrt()) * pools as f64;
         (count.ceil() as usize).clamp(1, MOST)
     });
-    let demand =
-        |((&(name, scenes), count), kept): ((&(&'a str, &'a [Scene]), usize), &'a mut Vec<OnceLock<Touch>>)| {
-            kept.resize_with(count.max(kept.len()), OnceLock::new);
-            Demand::new(
-                Sampler::of_instances(scenes, name, origin),
-                FIRST,
-                scenes.len(),
-                origin.probe.window(),
-                &kept[..count],
-            )
-        };
-    let demands = objects.iter().zip(counts).zip(&mut kept.rest).map(demand).collect();
+    let mut demands = Vec::with_capacity(objects.len());
+    for ((&(name, scenes), count), kept) in objects.iter().zip(counts).zip(&mut kept.rest) {
+        kept.resize_with(count.max(kept.len()), OnceLock::new);
+        let sampler = Sampler::of_instances(scenes, name, origin);
+        demands.push(Demand::new(sampler, FIRST, scenes.len(), origin.probe.window(), &kept[..count]));
+    }
     let instances = objects.iter().map(|(_, scenes)| capture::numbered(scenes)).collect();
     Ok(Captured { first, demands, instances, window: origin.probe.window() })
 }

@@ -1,5 +1,4 @@
-//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer; fingers that
-//! bend aside at flat angles, and objects that give way.
+//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer.
 //!
 //! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many
 //! times, with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches'
@@ -41,7 +40,6 @@ mod candidate;
 mod density;
 mod error;
 mod late;
-mod layer;
 mod likelihood;
 mod outcome;
 mod posed;
@@ -53,7 +51,7 @@ mod suspects;
 mod tests;
 mod timer;
 pub use error::FitProblem;
-pub use outcome::{Estimate, Fit, GrazingEstimate, Warning};
+pub use outcome::{Estimate, Fit, Warning};
 pub use outcome::{between, offset, offset_between};
 pub use suspects::Suspect;
 
@@ -61,14 +59,14 @@ use crate::capture;
 use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::probe::approach::Probe;
-use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::{Dataset, Origin};
+use crate::touches::{Dataset, ObjectTouches, Origin};
 use candidate::{Candidate, Kept};
 use density::{Densities, FULL, Observed};
 use likelihood::{Explained, Plate};
 use palpate_shared::Touch;
+use rayon::prelude::*;
 use recording::Recording;
 use search::Best;
 use stroke::Stroke;
@@ -132,49 +130,43 @@ impl Evidence<'_> {
 pub fn fit(
     recorded: &Dataset,
     objects: &[Object],
-    pressed: Option<&[Touch]>,
+    plate: Option<&[Touch]>,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
     let of: Vec<usize> = recorded.objects.iter().map(|own| place(&own.name, objects)).collect::<Result<_>>()?;
     let touches = || recorded.touches();
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
-    let found = touches().chain(pressed.into_iter().flatten()).filter(useful).count();
+    let found = touches().chain(plate.into_iter().flatten()).filter(useful).count();
     if found < LEAST {
         return Err(FitProblem::FewRecorded { touches: found, least: LEAST }.into());
     }
-    if settings.approaches < 1_000 {
-        return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
-    }
-    let origin = Origin { real: Noise::default(), ..settings.origin.clone() };
-    let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
+    let (simulated, scenes) = simulated(objects, settings, progress)?;
     let kept = kept(recorded);
-    let recordings = recorded.objects.iter().map(|own| Recording {
+    let of_recorded: Vec<&ObjectTouches> = of.iter().map(|&object| &simulated[object]).collect();
+    let stroke = stroke::stroke(recorded, &of_recorded, kept, &settings.origin.probe)?;
+    let densities = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
+    let objects: Vec<Densities> = simulated.iter().map(densities).collect();
+    let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
         name: &own.name,
         touches: own.touches().iter().map(Observed::of).collect(),
-        in_poses: Vec::new(),
+        in_poses: posed::in_poses(&own.name, own.touches(), &scenes[object], settings),
         kept,
     });
-    let mut recordings: Vec<Recording<'_>> = recordings.collect();
-    let plate = pressed.map(|touches| Plate::new(touches.iter().map(Observed::of)));
+    let evidence = Evidence {
+        recordings: recordings.collect(),
+        objects,
+        of,
+        plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
+        stroke,
+    };
     progress.begin("fitting", None);
-    let known: Vec<(&str, &[Scene])> =
-        of.iter().map(|&object| (objects[object].name.as_str(), &scenes[object][..])).collect();
-    let samples = layer::samples(&known, settings);
-    let rigid: Vec<Vec<Touch>> = samples.iter().map(|samples| samples.touches(&Noise::default())).collect();
-    let stroke = stroke::stroke(recorded, &rigid, kept, &settings.origin.probe)?;
-    let layer = layer::layer(&recordings, samples, plate.as_ref(), stroke, progress)?;
-    for ((recording, own), &object) in recordings.iter_mut().zip(&recorded.objects).zip(&of) {
-        recording.in_poses = posed::in_poses(&own.name, own.touches(), &scenes[object], &layer.real, settings);
-    }
-    let objects = simulated(objects, &scenes, &layer.real, stroke.window, settings, progress)?;
-    let evidence = Evidence { recordings, objects, of, plate, stroke };
-    progress.begin("fitting", None);
-    let timer = timer::timer(touches().chain(pressed.into_iter().flatten()));
-    let (best, ends) = searched(&evidence, &layer, progress)?;
+    evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
+    let timer = timer::timer(touches().chain(plate.into_iter().flatten()));
+    let (best, ends) = searched(&evidence, progress)?;
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
-    let mut fit = outcome::outcome(&evidence, &best, &ends, &layer, timer, suspects, settings);
+    let mut fit = outcome::outcome(&evidence, &best, &ends, timer, suspects, settings);
     fit.warnings = advice::warnings(&fit, timer);
     Ok(fit)
 }
@@ -198,44 +190,43 @@ fn kept(recorded: &Dataset) -> Kept {
     }
 }
 
-/// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend and objects that give
-/// way; with the stroke of the recordings as a time in milliseconds.
+/// Each object, touched by the probe as it should be whose hand goes on past it, and the scenes of its instances.
 fn simulated(
     objects: &[Object],
-    scenes: &[Vec<Scene>],
-    layer: &Noise,
-    window: Option<f64>,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<Vec<Densities>> {
-    let Settings { approaches, seed, .. } = *settings;
+) -> Result<(Vec<ObjectTouches>, Vec<Vec<Scene>>)> {
+    if settings.approaches < 1_000 {
+        return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
+    }
+    let real = crate::probe::noise::Noise::default();
     // What the hand does not reach is left out later, when a candidate says how fast it is.
     let probe = Probe { stroke: None, ..settings.origin.probe };
-    let origin = Origin { approaches: true, touches: approaches, seed, real: *layer, probe, ..settings.origin.clone() };
+    let (touches, seed) = (settings.approaches, settings.seed);
+    let origin = Origin { approaches: true, touches, seed, real, probe, ..settings.origin.clone() };
+    let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
     progress.begin("touching", Some(objects.len() as u64));
     let one = |(object, scenes): (&Object, &Vec<_>)| {
-        let touches = capture::touches(scenes, &object.name, &origin, 0..approaches)?;
+        let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
         progress::advance(progress, 1)?;
-        Ok(Densities::new(&object.name, touches.touches(), window))
+        Ok(touches)
     };
-    objects.iter().zip(scenes).map(one).collect()
+    let simulated = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
+    Ok((simulated, scenes))
 }
 
 /// The best candidate, and its intervals, number by number.
-fn searched(
-    evidence: &Evidence<'_>,
-    layer: &layer::Layer,
-    progress: &dyn Progress,
-) -> Result<(Best, Vec<search::Ends>)> {
+fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, Vec<search::Ends>)> {
     let likelihood = |candidate: &Candidate| match progress.is_cancelled() {
         // As bad as can be, and so soon over.
         true => f64::NEG_INFINITY,
         false => evidence.log_likelihood(candidate, |_| true),
     };
-    let mut best = search::near(&likelihood, &layer.candidate);
+    let mut best = search::best(&likelihood, None);
     for _ in 0..4 {
         progress::check(progress)?;
-        let ends = search::intervals(&likelihood, &best);
+        let interval = |index: usize| search::interval(&likelihood, &best, index);
+        let ends: Vec<search::Ends> = (0..candidate::NUMBERS).into_par_iter().map(interval).collect();
         let better = ends.iter().filter_map(|end| end.better);
         let Some(better) = better.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)) else {
             return Ok((best, ends));
@@ -243,7 +234,8 @@ fn searched(
         best = search::near(&likelihood, &better.candidate);
     }
     progress::check(progress)?;
-    let ends = search::intervals(&likelihood, &best);
+    let ends =
+        (0..candidate::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
     Ok((best, ends))
 }
 

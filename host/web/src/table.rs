@@ -107,7 +107,6 @@ impl Table {
             speed_bias,
             pose,
             pose_bias,
-            ..Noise::default()
         };
         self.game.as_mut()?.set_noise(noise).ok().map(|()| 0)
     }

@@ -299,14 +299,12 @@ fn node(
     node(out, walk, second, have, is_last, end, chance / 2.0);
 }
 
+/// Writes what a leaf with these values does, `true` if it is the last one before the end, and says how many instructions that
+/// takes.
+type Put<'a> = &'a dyn Fn(&mut Assembler, &[i32], bool, Label) -> f64;
+
 /// Walks a tree of vectors; `put` writes what a leaf does, and says how many instructions that takes.
-pub(in super::super) fn vector(
-    out: &mut Assembler,
-    pins: &Pins,
-    tree: &CodeTree,
-    put: &dyn Fn(&mut Assembler, &[i32], bool, Label) -> f64,
-    end: Label,
-) {
+pub(in super::super) fn vector(out: &mut Assembler, pins: &Pins, tree: &CodeTree, put: Put<'_>, end: Label) {
     let values = |at: &CodeNode| match at {
         CodeNode::Leaf(values) => values.clone(),
         CodeNode::Split(_) => Vec::new(),

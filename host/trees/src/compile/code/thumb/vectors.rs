@@ -149,7 +149,7 @@ impl Lists {
             offsets.push((flat.len() / 2) as u16);
             for (index, &(object, value)) in list.iter().enumerate() {
                 let end = if index + 1 == list.len() { 0x8000 } else { 0 };
-                flat.extend([4 * object as u16 | end, value as u16]);
+                flat.extend([(4 * object as u16) | end, value as u16]);
             }
             if list.is_empty() {
                 // Adds nothing to the first object.
