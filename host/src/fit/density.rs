@@ -15,7 +15,6 @@ use crate::random::{self, Purpose};
 use palpate_shared::Touch;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
-use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Standard deviations of the tables begin at the least of [`NOISE`]: how much larger each is than the one before, and how
@@ -295,11 +294,6 @@ impl Densities {
             Kept::Full => observed.fingers == FULL,
         };
         self.some.iter().map(again).filter(is_kept).collect()
-    }
-
-    /// Makes the tables of usual noise, side by side; those of other noise are made when they are needed.
-    pub(super) fn prepare(&self) {
-        (5..17).into_par_iter().for_each(|level| _ = self.level(level));
     }
 
     fn level(&self, level: usize) -> &Level {

@@ -1,13 +1,13 @@
-//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer.
+//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer; fingers that
+//! bend aside at flat angles, and objects that give way.
 //!
 //! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many
 //! times, with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches'
 //! density, which is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum
-//! likelihood with a weak preference for probes with small errors, by Nelder–Mead from several starts). Full and
+//! likelihood with a weak preference for probes with small errors, by a quasi-Newton method from several starts). Full and
 //! partial touches count, and approaches that touched nothing; where the pose was recorded, each touch is compared with
 //! approaches in its pose. Intervals are those of 95 % by profile likelihood (Wilks' theorem), made wider by
-//! experience: the tables are simulated and smoothed. What the simulation does not know, such as a finger that is bent
-//! aside, is in no interval.
+//! experience: the tables are simulated and smoothed. What the simulation does not know is in no interval.
 //!
 //! Only differences of contact times are recorded, so an offset of all three fingers alike cannot be told, and changes
 //! nothing: offsets are relative to the first finger's.
@@ -15,8 +15,8 @@
 //! A contact that came later than the hand's stroke is missing, and counts as such: the likelihood is that of censored
 //! times. Where the probe states no stroke, it is estimated from the recordings.
 //!
-//! Presses on a flat plate, the probe rolled by half a turn after each, say more about offsets and noise than touches of
-//! objects do: κ is 0 on a plate, and the slope changes its sign.
+//! Presses on a flat plate, the probe rolled by half a turn after each, say more about offsets than touches of objects do: κ
+//! is 0 on a plate, and the slope changes its sign. They have a noise of their own, since they repeat far better.
 //!
 //! Recordings that look wrong ([`Suspect`]) are named: another object than their name says, two objects in one file, a
 //! probe that was changed on the way.
@@ -40,6 +40,7 @@ mod candidate;
 mod density;
 mod error;
 mod late;
+mod layer;
 mod likelihood;
 mod outcome;
 mod posed;
@@ -51,7 +52,7 @@ mod suspects;
 mod tests;
 mod timer;
 pub use error::FitProblem;
-pub use outcome::{Estimate, Fit, Warning};
+pub use outcome::{Estimate, Fit, GrazingEstimate, Warning};
 pub use outcome::{between, offset, offset_between};
 pub use suspects::Suspect;
 
@@ -59,6 +60,7 @@ use crate::capture;
 use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::probe::approach::Probe;
+use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, Origin};
@@ -66,7 +68,6 @@ use candidate::{Candidate, Kept};
 use density::{Densities, FULL, Observed};
 use likelihood::{Explained, Plate};
 use palpate_shared::Touch;
-use rayon::prelude::*;
 use recording::Recording;
 use search::Best;
 use stroke::Stroke;
@@ -130,43 +131,53 @@ impl Evidence<'_> {
 pub fn fit(
     recorded: &Dataset,
     objects: &[Object],
-    plate: Option<&[Touch]>,
+    pressed: Option<&[Touch]>,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
     let of: Vec<usize> = recorded.objects.iter().map(|own| place(&own.name, objects)).collect::<Result<_>>()?;
     let touches = || recorded.touches();
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
-    let found = touches().chain(plate.into_iter().flatten()).filter(useful).count();
+    let found = touches().chain(pressed.into_iter().flatten()).filter(useful).count();
     if found < LEAST {
         return Err(FitProblem::FewRecorded { touches: found, least: LEAST }.into());
     }
-    let (simulated, scenes) = simulated(objects, settings, progress)?;
+    if settings.approaches < 1_000 {
+        return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
+    }
+    let origin = Origin { real: Noise::default(), ..settings.origin.clone() };
+    let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
+    let mut touched = simulated(objects, &scenes, &Noise::default(), settings, progress)?;
     let kept = kept(recorded);
-    let of_recorded: Vec<&ObjectTouches> = of.iter().map(|&object| &simulated[object]).collect();
+    let of_recorded: Vec<&ObjectTouches> = of.iter().map(|&object| &touched[object]).collect();
     let stroke = stroke::stroke(recorded, &of_recorded, kept, &settings.origin.probe)?;
-    let densities = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
-    let objects: Vec<Densities> = simulated.iter().map(densities).collect();
-    let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
+    let recordings = recorded.objects.iter().map(|own| Recording {
         name: &own.name,
         touches: own.touches().iter().map(Observed::of).collect(),
-        in_poses: posed::in_poses(&own.name, own.touches(), &scenes[object], settings),
+        in_poses: Vec::new(),
         kept,
     });
-    let evidence = Evidence {
-        recordings: recordings.collect(),
-        objects,
-        of,
-        plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
-        stroke,
-    };
+    let mut recordings: Vec<Recording<'_>> = recordings.collect();
+    let plate = pressed.map(|touches| Plate::new(touches.iter().map(Observed::of)));
     progress.begin("fitting", None);
-    evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
-    let timer = timer::timer(touches().chain(plate.into_iter().flatten()));
-    let (best, ends) = searched(&evidence, progress)?;
+    let known: Vec<(&str, &[Scene])> =
+        of.iter().map(|&object| (objects[object].name.as_str(), &scenes[object][..])).collect();
+    let layer = layer::layer(&recordings, &known, plate.as_ref(), &stroke, settings, progress)?;
+    for ((recording, own), &object) in recordings.iter_mut().zip(&recorded.objects).zip(&of) {
+        recording.in_poses = posed::in_poses(&own.name, own.touches(), &scenes[object], &layer.real, settings);
+    }
+    if !layer.real.is_none() {
+        touched = simulated(objects, &scenes, &layer.real, settings, progress)?;
+    }
+    let densities = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
+    let objects = touched.iter().map(densities).collect();
+    let evidence = Evidence { recordings, objects, of, plate, stroke };
+    progress.begin("fitting", None);
+    let timer = timer::timer(touches().chain(pressed.into_iter().flatten()));
+    let (best, ends) = searched(&evidence, &layer, progress)?;
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
-    let mut fit = outcome::outcome(&evidence, &best, &ends, timer, suspects, settings);
+    let mut fit = outcome::outcome(&evidence, &best, &ends, &layer, timer, suspects, settings);
     fit.warnings = advice::warnings(&fit, timer);
     Ok(fit)
 }
@@ -190,43 +201,43 @@ fn kept(recorded: &Dataset) -> Kept {
     }
 }
 
-/// Each object, touched by the probe as it should be whose hand goes on past it, and the scenes of its instances.
+/// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend and objects that
+/// give way.
 fn simulated(
     objects: &[Object],
+    scenes: &[Vec<Scene>],
+    layer: &Noise,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<(Vec<ObjectTouches>, Vec<Vec<Scene>>)> {
-    if settings.approaches < 1_000 {
-        return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
-    }
-    let real = crate::probe::noise::Noise::default();
+) -> Result<Vec<ObjectTouches>> {
     // What the hand does not reach is left out later, when a candidate says how fast it is.
     let probe = Probe { stroke: None, ..settings.origin.probe };
-    let (touches, seed) = (settings.approaches, settings.seed);
-    let origin = Origin { approaches: true, touches, seed, real, probe, ..settings.origin.clone() };
-    let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
+    let (approaches, seed, real) = (settings.approaches, settings.seed, *layer);
+    let origin = Origin { approaches: true, touches: approaches, seed, real, probe, ..settings.origin.clone() };
     progress.begin("touching", Some(objects.len() as u64));
     let one = |(object, scenes): (&Object, &Vec<_>)| {
-        let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
+        let touches = capture::touches(scenes, &object.name, &origin, 0..approaches)?;
         progress::advance(progress, 1)?;
         Ok(touches)
     };
-    let simulated = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
-    Ok((simulated, scenes))
+    objects.iter().zip(scenes).map(one).collect()
 }
 
 /// The best candidate, and its intervals, number by number.
-fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, Vec<search::Ends>)> {
+fn searched(
+    evidence: &Evidence<'_>,
+    layer: &layer::Layer,
+    progress: &dyn Progress,
+) -> Result<(Best, Vec<search::Ends>)> {
     let likelihood = |candidate: &Candidate| match progress.is_cancelled() {
         // As bad as can be, and so soon over.
         true => f64::NEG_INFINITY,
         false => evidence.log_likelihood(candidate, |_| true),
     };
-    let mut best = search::best(&likelihood, None);
+    let mut best = search::near(&likelihood, &layer.candidate);
     for _ in 0..4 {
         progress::check(progress)?;
-        let interval = |index: usize| search::interval(&likelihood, &best, index);
-        let ends: Vec<search::Ends> = (0..candidate::NUMBERS).into_par_iter().map(interval).collect();
+        let ends = search::intervals(&likelihood, &best);
         let better = ends.iter().filter_map(|end| end.better);
         let Some(better) = better.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)) else {
             return Ok((best, ends));
@@ -234,8 +245,7 @@ fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, V
         best = search::near(&likelihood, &better.candidate);
     }
     progress::check(progress)?;
-    let ends =
-        (0..candidate::NUMBERS).into_par_iter().map(|index| search::interval(&likelihood, &best, index)).collect();
+    let ends = search::intervals(&likelihood, &best);
     Ok((best, ends))
 }
 

@@ -16,6 +16,11 @@ pub(super) struct Recording<'a> {
 }
 
 impl Recording<'_> {
+    /// The same as if no pose had been recorded.
+    pub(super) fn without_poses(&self) -> Self {
+        Self { name: self.name, touches: self.touches.clone(), in_poses: Vec::new(), kept: self.kept }
+    }
+
     /// The logarithm of its likelihood, of the object and under the candidate that explain it; poses count where there are some.
     pub(super) fn log_likelihood(&self, explained: &Explained<'_>) -> f64 {
         if self.in_poses.is_empty() {

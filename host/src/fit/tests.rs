@@ -4,6 +4,7 @@ use super::*;
 
 use crate::mesh::builtin;
 use crate::touches::{ObjectTouches, Source};
+use crate::probe::noise::Grazing;
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
@@ -66,7 +67,12 @@ fn other(name: &str) -> Object {
 
 /// Approaches to an object, with what is wrong with the probe.
 fn approaches(object: &Object, count: usize, seed: u64, probe: &Crooked) -> Vec<Touch> {
-    let origin = Origin { approaches: true, seed: 1_000 + seed, ..Origin::default() };
+    approaches_of(object, count, seed, probe, Noise::default())
+}
+
+/// The same with fingers that bend and objects that give way.
+fn approaches_of(object: &Object, count: usize, seed: u64, probe: &Crooked, real: Noise) -> Vec<Touch> {
+    let origin = Origin { approaches: true, seed: 1_000 + seed, real, ..Origin::default() };
     let scenes = capture::scenes(&[object], &origin, &()).unwrap();
     let touches = capture::touches(&scenes[0], &object.name, &origin, 0..count as u64).unwrap();
     let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ object.name.len() as u64);
@@ -120,6 +126,33 @@ fn a_crooked_probe_is_found_from_touches_and_a_plate() {
     assert!(found.speed_factor.holds(1.0 / BENT.longer) && !found.speed_factor.holds(1.0), "{:?}", found.speed_factor);
     assert!(!found.late[0].holds(0.0) && !found.late[1].holds(0.0), "{:?}", found.late);
     assert!(found.late.iter().all(|late| late.width().unwrap() < 3.0), "{:?}", found.late);
+}
+
+#[test]
+fn a_plate_that_repeats_better_than_touches_leaves_their_noise_alone() {
+    let steady = Crooked { noise: 0.1, missed: [0.0; 3], ..BENT };
+    let touches = recorded(&objects(), 400, 20, &BENT);
+    let found = fitted(&touches, Some(&plate(60, &steady)));
+    near(&found, &BENT, [0.04, 1.0, 0.35]);
+    assert!(found.late.iter().all(|late| late.width().unwrap() < 1.5), "{:?}", found.late);
+}
+
+#[test]
+fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
+    let grazing = Grazing { angle: 20.0, bend: 10_000.0 };
+    let real = Noise { grazing, ..Noise::default() };
+    let one = |object: &Object| {
+        ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object)
+    };
+    let soft = Dataset::new(objects().iter().map(one).collect());
+    let found = fitted(&soft, Some(&plate(60, &BENT)));
+    near(&found, &BENT, [0.05, 1.5, 0.5]);
+    let GrazingEstimate { bend, .. } = found.grazing.expect("fingers that bend");
+    assert!((4.0..25.0).contains(&bend.value), "{bend:?}");
+    let file = crate::probe::file::ProbeFile::parse(&found.toml(), "probe.toml".as_ref()).unwrap();
+    assert!((file.real.grazing.bend / found.real().grazing.bend - 1.0).abs() < 1e-2, "{:?}", file.real);
+    let rigid = fitted(&recorded(&objects(), 300, 21, &BENT), Some(&plate(60, &BENT)));
+    assert_eq!((rigid.grazing, rigid.give), (None, None));
 }
 
 #[test]

@@ -121,6 +121,13 @@ fn table(found: &Fit) -> String {
         let unit = if found.unit == Length::Tenth { "" } else { " mm" };
         line("stroke", format!("{:.3}{unit}", stroke.value), between(stroke, 1.0, 3) + unit);
     }
+    if let Some(give) = &found.give {
+        line("object gives way", give, 1.0, 2, " ms");
+    }
+    if let Some(grazing) = &found.grazing {
+        line("fingers bend beyond", &grazing.angle, 1.0, 0, "°");
+        line("aside by", &grazing.bend, 1.0, 2, " ms");
+    }
     _ = match found.timer {
         Some(timer) => writeln!(text, "{:22}{:>14}", "timer", format!("{timer} ms")),
         None => writeln!(text, "{:22}{:>14}", "timer", "none found"),
