@@ -6,10 +6,10 @@
 
 use super::candidate::Candidate;
 use super::density::Densities;
+use super::likelihood::Plate;
 use super::recording::Recording;
 use super::search::{self, Best};
 use super::stroke::Stroke;
-use super::likelihood::Plate;
 use super::{Evidence, Settings};
 use crate::capture::Sampler;
 use crate::error::Result;
@@ -210,7 +210,7 @@ pub(super) fn layer(
         search::best(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), None)
     };
     // What gives way is tried first: it takes no casts. Fingers bend only if that says more still.
-    let (mut numbers, mut best, mut open) = (NOTHING, plain, &[] as &[usize]);
+    let (mut numbers, mut best, mut open): (Numbers, Best, &[usize]) = (NOTHING, plain, &[]);
     let (giving, with) = layers.climb((numbers, best), &[2])?;
     if with.log_likelihood > best.log_likelihood + CERTAIN {
         (numbers, best, open) = (giving, with, &[2]);

@@ -3,8 +3,8 @@
 use super::*;
 
 use crate::mesh::builtin;
-use crate::touches::{ObjectTouches, Source};
 use crate::probe::noise::Grazing;
+use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
@@ -141,9 +141,8 @@ fn a_plate_that_repeats_better_than_touches_leaves_their_noise_alone() {
 fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
     let grazing = Grazing { angle: 20.0, bend: 10_000.0 };
     let real = Noise { grazing, ..Noise::default() };
-    let one = |object: &Object| {
-        ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object)
-    };
+    let one =
+        |object: &Object| ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object);
     let soft = Dataset::new(objects().iter().map(one).collect());
     let found = fitted(&soft, Some(&plate(60, &BENT)));
     near(&found, &BENT, [0.05, 1.5, 0.5]);

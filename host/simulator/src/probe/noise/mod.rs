@@ -332,7 +332,8 @@ impl Noise {
             return *touch;
         }
         let times = touch.times().map(|time| time.micros());
-        let earlier = |finger: usize, other: usize| times[other].is_some() && (times[other], other) < (times[finger], finger);
+        let earlier =
+            |finger: usize, other: usize| times[other].is_some() && (times[other], other) < (times[finger], finger);
         timed(touch, |finger, time| {
             let given = (0..FINGERS).filter(|other| earlier(finger, *other)).map(|other| gives[other]);
             time + self.give * given.sum::<f64>()

@@ -252,7 +252,8 @@ fn an_object_that_gives_way_is_touched_later_by_every_finger_but_the_first() {
     assert!((mean(0) - 32_000.0).abs() < 60.0, "{}", mean(0));
     assert!((mean(2) - 64_000.0).abs() < 85.0, "{}", mean(2));
     // A contact that is missing moves nothing.
-    let pair = noise.add("fork", &[Touch::new([ContactTime::MISSING, ContactTime::from_micros(0), ContactTime::MISSING])], 1);
+    let pair =
+        noise.add("fork", &[Touch::new([ContactTime::MISSING, ContactTime::from_micros(0), ContactTime::MISSING])], 1);
     assert_eq!(pair[0].times()[1].micros(), Some(0));
 }
 

@@ -94,7 +94,7 @@ impl Surface {
         let Start { motion, skipped, length } = self.start(origin, direction, radius)?;
         let (way, triangle) = Search::new(&self.tree, &motion).first_triangle(&self.tree, &self.triangles, &motion)?;
         let center = motion.origin + motion.direction * way;
-        let away = center - narrow::nearest_point(&self.triangles[triangle], center);
+        let away = center - nearest_point(&self.triangles[triangle], center);
         Some(Contact { distance: (skipped + way) * self.unit / length, normal: away.normalize_or(-motion.direction) })
     }
 
@@ -182,6 +182,29 @@ pub struct Contact {
     /// Unit vector from the point of contact to the sphere's center; against the direction where the sphere starts on the
     /// surface.
     pub normal: DVec3,
+}
+
+/// The point of a triangle that is nearest to `point`. Where the triangle is none, a point of one of its edges. Method:
+/// Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
+fn nearest_point([a, b, c]: &Triangle, point: DVec3) -> DVec3 {
+    let edges = [(*a, b - a), (*b, c - b), (*c, a - c)];
+    let normal = edges[0].1.cross(edges[1].1);
+    let is_above = |(corner, edge): &(DVec3, DVec3)| edge.cross(point - corner).dot(normal) >= 0.0;
+    let square = normal.length_squared();
+    if square > 0.0 && edges.iter().all(is_above) {
+        return point - normal * ((point - a).dot(normal) / square);
+    }
+    let on_edge = |(corner, edge): (DVec3, DVec3)| {
+        let length_squared = edge.length_squared();
+        let along =
+            if length_squared > 0.0 { ((point - corner).dot(edge) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
+        corner + edge * along
+    };
+    let [one, two, three] = edges.map(on_edge);
+    let nearer = |one: DVec3, other: DVec3| {
+        if one.distance_squared(point) <= other.distance_squared(point) { one } else { other }
+    };
+    nearer(nearer(one, two), three)
 }
 
 /// A cast in the frame of the casts, with its start at the mesh's box.

@@ -463,7 +463,7 @@ fn the_normal_of_a_contact_leads_from_the_nearest_point_of_the_mesh_to_the_cente
         found += 1;
         let touched = origin + direction * distance - normal * 0.15;
         assert!((normal.length() - 1.0).abs() < 1e-9 && normal.dot(direction) < 1e-6, "{normal}");
-        let away = |triangle: &narrow::Triangle| narrow::nearest_point(triangle, touched).distance(touched);
+        let away = |triangle: &narrow::Triangle| nearest_point(triangle, touched).distance(touched);
         let nearest = triangles.iter().map(away).fold(f64::INFINITY, f64::min);
         assert!(nearest < 1e-7, "{nearest}");
     }
