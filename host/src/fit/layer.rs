@@ -9,6 +9,7 @@ use super::density::Densities;
 use super::likelihood::Plate;
 use super::recording::Recording;
 use super::search::{self, Best};
+use super::slopes;
 use super::stroke::Stroke;
 use super::{Evidence, Settings};
 use crate::capture::Sampler;
@@ -134,7 +135,7 @@ impl Layers<'_> {
     fn explained(&self, numbers: Numbers, from: &Candidate) -> Result<Best> {
         progress::check(self.progress)?;
         let evidence = self.evidence(&real_of(numbers));
-        Ok(search::again(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), from))
+        Ok(slopes::again(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), from))
     }
 
     /// Compass search: a step to either side of each number, and half of it where none is better.

@@ -47,6 +47,7 @@ mod outcome;
 mod posed;
 mod recording;
 mod search;
+mod slopes;
 mod stroke;
 mod suspects;
 #[cfg(all(test, feature = "objects"))]
@@ -232,7 +233,7 @@ fn searched(
         true => f64::NEG_INFINITY,
         false => evidence.log_likelihood(candidate, |_| true),
     };
-    let mut best = search::near(&likelihood, &layer.candidate);
+    let mut best = search::best(&likelihood, Some(layer.candidate));
     for _ in 0..4 {
         progress::check(progress)?;
         let ends = search::intervals(&likelihood, &best);
