@@ -138,14 +138,15 @@ fn wide(x: f64) -> f64 {
 }
 
 /// Presses on a flat plate: curvature is 0 but for the probe, and the slope is the plate's, with the other sign after each
-/// half turn. They say how late fingers are, and nothing else: a press square to a plate repeats far better than a touch of
-/// an object, and misses nothing, so its noise and its missed contacts are its own.
+/// half turn. They say how late fingers are. A press square to a plate repeats better than a touch of an object and misses
+/// less, so its noise and its misses are its own: at most those of touches.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plate {
     /// Full touches of presses in one direction of the row, and in the other.
     pub(super) presses: Vec<(f64, Observed)>,
-    /// Number of presses.
+    /// Number of presses, and the number of them that each finger missed.
     pub(super) count: usize,
+    pub(super) missed: [usize; 3],
 }
 
 /// The least noise of a press, in milliseconds.
@@ -156,6 +157,9 @@ impl Plate {
         let mut plate = Self::default();
         for (turn, observed) in [1.0, -1.0].into_iter().cycle().zip(touches) {
             plate.count += 1;
+            for (finger, missed) in plate.missed.iter_mut().enumerate() {
+                *missed += usize::from(observed.fingers >> finger & 1 == 0);
+            }
             if observed.fingers == FULL {
                 plate.presses.push((turn, observed));
             }
@@ -163,14 +167,14 @@ impl Plate {
         plate
     }
 
-    /// Their log-likelihood, at the slope of the plate and the noise that suit them best.
+    /// Their log-likelihood, at the slope of the plate, the noise and the misses that suit them best.
     pub(super) fn log_likelihood(&self, candidate: &Candidate) -> f64 {
-        let [first, middle, third] = candidate.late;
+        let Candidate { late: [first, middle, third], noise: most, missed, .. } = *candidate;
         let [curvature, slope] = [first - 2.0 * middle + third, third - first];
         let count = self.presses.len().max(1) as f64;
         let tilt: f64 = self.presses.iter().map(|(turn, press)| turn * (press.second - slope)).sum::<f64>() / count;
         let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt());
-        // For each press the two deviations in units of the noise, squared and added, and how likely it is as an odd one.
+        // For each press its two deviations in units of the noise, and how likely it is as an odd one.
         let presses = self.presses.iter().map(|(turn, press)| {
             let [one, other] = [press.first - curvature, press.second - slope - turn * tilt];
             (one / 6.0_f64.sqrt(), other / 2.0_f64.sqrt(), ODD * wide(press.first) * wide(press.second))
@@ -181,7 +185,7 @@ impl Plate {
             (times, times + odd)
         };
         // Expectation and maximization: the noise of the presses that are not odd.
-        let mut noise = super::candidate::NOISE[1];
+        let mut noise = most;
         for _ in 0..12 {
             let (mut square, mut weight) = (0.0, 0.0);
             for press in &presses {
@@ -189,8 +193,15 @@ impl Plate {
                 square += times / all * (press.0.powi(2) + press.1.powi(2));
                 weight += times / all;
             }
-            noise = (square / (2.0 * weight).max(1e-9)).sqrt().clamp(LEAST_NOISE, super::candidate::NOISE[1]);
+            noise = (square / (2.0 * weight).max(1e-9)).sqrt().clamp(LEAST_NOISE.min(most), most);
         }
-        presses.iter().map(|press| of(noise, press).1.ln()).sum()
+        let all = self.count.max(1) as f64;
+        let contacts = |(&count, most): (&usize, f64)| {
+            let count = count as f64;
+            let share = (count / all).min(most).clamp(1e-6, 1.0 - 1e-6);
+            count * share.ln() + (self.count as f64 - count) * (1.0 - share).ln()
+        };
+        let contacts: f64 = self.missed.iter().zip(missed).map(contacts).sum();
+        presses.iter().map(|press| of(noise, press).1.ln()).sum::<f64>() + contacts
     }
 }
