@@ -171,7 +171,7 @@ pub fn report_on(
     Ok(Report { files, stages, sentence, summary })
 }
 
-/// What the sections show.
+/// Results that the sections show.
 struct Measured {
     folds: Vec<cross_validation::Fold>,
     noisy: Vec<noise::Fold>,

@@ -185,7 +185,7 @@ pub(crate) fn calibrate_from(
     calibrate_drawn(model, &material, drawn, settings, strictest, temperature, progress)
 }
 
-/// What a model can be calibrated on.
+/// Touches that a model can be calibrated on.
 pub(super) struct Material {
     /// The names that it gives.
     names: Vec<String>,

@@ -228,7 +228,7 @@ pub(super) struct Densities {
     /// Contact times of some of the approaches, in milliseconds.
     some: Vec<[Option<f64>; 3]>,
     levels: [OnceLock<Level>; LEVELS],
-    /// What a stroke makes of them, if the recordings have one.
+    /// The same as a stroke makes them, if the recordings have one.
     pub(super) late: Option<Late>,
 }
 

@@ -54,7 +54,7 @@ enum Signal {
     Going(u32),
 }
 
-/// Whether the approach that is under way has had a contact.
+/// True if the approach that is under way has had a contact.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     signal: Signal,

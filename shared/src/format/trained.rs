@@ -83,9 +83,9 @@ pub struct TrainedProbe {
     pub speed: f32,
     /// Unit of a length.
     pub length: Length,
-    /// How far the hand goes on after the first contact, in lengths; none: past the object.
+    /// Way that the hand goes on after the first contact, in lengths; none: past the object.
     pub stroke: Option<f32>,
-    /// How far it goes from its start before an approach is a miss, in lengths; none: past the object.
+    /// Way that it goes from its start before an approach is a miss, in lengths; none: past the object.
     pub travel: Option<f32>,
 }
 

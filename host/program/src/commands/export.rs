@@ -22,21 +22,19 @@ use std::path::{Path, PathBuf};
 /// Compile an ensemble to the bytes that the chip reads.
 #[derive(clap::Args)]
 #[command(after_help = "\
-ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). `palpate verify` compares the model with it. A compiled model is written as source code, with --emit.
+ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). `palpate verify` compares the model with it.
 
 Without a layout of its own (compact, complete, grid, wide, patterns, code), --layout says what it is chosen for: balanced, m4f or m0+ for the fastest of at most three times the smallest, speed, or size.
 
-With --emit thumb, thumb-m4f or c-code the trees are code, several times as fast: assembly for any Cortex-M, or for a Cortex-M4F, with a Rust module that includes it; or C in model.h. The model itself has no trees then. With c or rust as well, code is one of the choices; c also declares assembly for C.
+With --emit thumb, thumb-m4f or c-code the trees are code, and the model has none: docs/guide/code.md.
 
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
   palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
   palpate export forest.onnx -o model.palpate --scale width=100,height=10
-  palpate export xgboost.json -o model.palpate --missing -999
-  palpate export sure.palpate -o sure.palpate --emit c     # sure.h alone
-  palpate export forest.onnx -o forest.palpate --emit thumb
-  palpate export lightgbm.txt -o model.palpate --emit json # model.json too")]
+  palpate export sure.palpate -o sure.palpate --emit c  # sure.h alone
+  palpate export forest.onnx -o forest.palpate --emit thumb")]
 pub(crate) struct Arguments {
     /// An ensemble that `palpate train` or another library saved, or a compiled model to be written as source code
     ensemble: PathBuf,

@@ -27,11 +27,11 @@ pub struct Probe {
     pub speed: f64,
     /// Largest tilt of the row of fingers from the perpendicular to the motion, in degrees, to either side.
     pub tilt: f64,
-    /// How far the hand goes on after the first contact, in units, at the nominal speed: a contact that comes later than it
+    /// Way that the hand goes on after the first contact, in units, at the nominal speed: a contact that comes later than it
     /// takes for that is missing. None: as far as any finger needs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stroke: Option<f64>,
-    /// How far the hand goes from its start before an approach without a contact counts as a miss, in units. None: past the
+    /// Way that the hand goes from its start before an approach without a contact counts as a miss, in units. None: past the
     /// object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub travel: Option<f64>,

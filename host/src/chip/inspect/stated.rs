@@ -100,9 +100,9 @@ pub struct Probe {
     pub speed: f32,
     /// Unit of lengths: "unit", a tenth of the object's longest side, or "mm".
     pub unit: &'static str,
-    /// How far the hand goes on after the first contact; null: past the object.
+    /// Way that the hand goes on after the first contact; null: past the object.
     pub stroke: Option<f32>,
-    /// How far it goes from its start before an approach is a miss; null: past the object.
+    /// Way that it goes from its start before an approach is a miss; null: past the object.
     pub travel: Option<f32>,
     /// True if the model states its probe; otherwise the published one is assumed.
     pub stated: bool,

@@ -101,7 +101,7 @@ pub(super) fn code(
     Some((program, parts))
 }
 
-/// What layouts of trees walk.
+/// Trees that layouts walk.
 struct Walk<'f> {
     forest: &'f Forest<'f>,
     /// `None` where leaves do not fit their type.

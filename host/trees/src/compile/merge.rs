@@ -29,7 +29,7 @@ pub(super) struct Merged<'a> {
 pub struct Source {
     /// Their numbers.
     pub trees: Vec<usize>,
-    /// What the model's tree adds less than they do, in units times 2^shift of its leaves; the base has it.
+    /// Amount that the model's tree adds less than they do, in units times 2^shift of its leaves; the base has it.
     pub offset: i32,
 }
 
@@ -164,7 +164,7 @@ impl Steps {
         (1..=MAX_CUTS).contains(&self.cuts.len()) && largest - least <= 2 * most
     }
 
-    /// What leaves have to have less to fit.
+    /// Amount that leaves have to have less to fit.
     fn offset(&self, most: i64) -> i64 {
         let (least, largest) = self.range();
         if least < -most || largest > most { (least + largest).div_euclid(2) } else { 0 }

@@ -19,7 +19,7 @@ mod bits {
     }
 }
 
-/// What [`Model::with_code`](palpate_onboard::Model::with_code) takes.
+/// The function that [`Model::with_code`](palpate_onboard::Model::with_code) takes.
 pub fn margins(row: &[i32], margins: &mut [i32]) {
     if let (Some(row), Some(margins)) = (row.first_chunk(), margins.first_chunk_mut()) {
         bits::margins(row, margins);

@@ -188,7 +188,7 @@ impl<'p> Writer<'p> {
          key = both.bits;"
     }
 
-    /// What is done with the features of one run of columns.
+    /// Operations on the features of one run of columns.
     fn run(&mut self, number: usize, columns: &[Column]) -> String {
         let (program, name) = (self.program, self.name);
         let first = &columns[0];
@@ -420,7 +420,7 @@ fn splits(node: &CodeNode) -> usize {
     count
 }
 
-/// What adds a value to 256 · high + low.
+/// Text that adds a value to 256 · high + low.
 fn halves(value: i32) -> String {
     let (high, low) = (value >> 8, value & 255);
     let mut text = match high {

@@ -1,4 +1,4 @@
-//! What splits compare: numbers of eight bits, made of the features once for all trees.
+//! Columns that splits compare: numbers of eight bits, made of the features once for all trees.
 
 use super::super::axes::{Axes, visit};
 use super::super::forest::Forest;

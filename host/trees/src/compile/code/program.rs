@@ -22,7 +22,7 @@ pub struct Program {
     pub(super) known: usize,
     /// True if of several classes with the largest margin the last one counts.
     pub(super) last_of_ties: bool,
-    /// What splits compare, in the order in which it is stored.
+    /// Columns that splits compare, in the order in which it is stored.
     pub(super) columns: Vec<Column>,
     /// The trees, in any order.
     pub(super) trees: Vec<CodeTree>,

@@ -34,7 +34,7 @@ pub(super) fn text(program: &Program, name: &str, file: &str) -> String {
          /// The margins of a row of {what}, in units.\n    \
          pub safe fn {name}_margins(row: &[{row}; {features}], margins: &mut [i32; {objects}]);\n\
          }}\n{bits}\n\
-         /// What [`Model::with_code`](palpate_onboard::Model::with_code) takes.\n\
+         /// The function that [`Model::with_code`](palpate_onboard::Model::with_code) takes.\n\
          pub fn margins(row: &[i32], margins: &mut [i32]) {{\n    \
          if let (Some(row), Some(margins)) = (row.first_chunk(), margins.first_chunk_mut()) {{\n        \
          {function}(row, margins);\n    }}\n}}\n",

@@ -37,7 +37,7 @@ struct Case {
     leaf: Leaf,
 }
 
-/// How random trees are made.
+/// Settings of random trees.
 struct Random {
     inputs: Inputs,
     objects: usize,
@@ -161,7 +161,7 @@ fn few() -> Vec<Case> {
     cases
 }
 
-/// What other libraries trained.
+/// Models that other libraries trained.
 fn imported() -> Vec<Case> {
     let folder = Path::new(ROOT).join("tests/data/import");
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();

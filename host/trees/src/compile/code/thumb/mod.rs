@@ -63,7 +63,7 @@ fn write(program: &Program, chip: Chip) -> Assembler {
     out
 }
 
-/// What is on the stack: the columns' numbers, then words; above them the registers that are restored, the first of which is
+/// Contents of the stack: the columns' numbers, then words; above them the registers that are restored, the first of which is
 /// where margins go.
 pub(super) struct Frame {
     /// Bytes for the columns.

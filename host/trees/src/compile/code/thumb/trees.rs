@@ -13,7 +13,7 @@ pub(in super::super) struct Pins {
     has_second: bool,
 }
 
-/// What a walk has at hand.
+/// Data that a walk uses.
 struct Walk<'w> {
     pins: &'w Pins,
     put: &'w dyn Fn(&mut Assembler, &CodeNode, bool, Label) -> f64,
