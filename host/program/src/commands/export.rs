@@ -30,9 +30,6 @@ With --emit thumb, thumb-m4f or c-code the trees are code, and the model has non
 
 Examples:
   palpate export ensemble.json -o model.palpate
-  palpate export ensemble.json -o small.palpate --leaf i8 --layout compact
-  palpate export xgboost.ubj -o model.palpate --names cup,jug,pan --leaf f32
-  palpate export forest.onnx -o model.palpate --scale width=100,height=10
   palpate export sure.palpate -o sure.palpate --emit c  # sure.h alone
   palpate export forest.onnx -o forest.palpate --emit thumb")]
 pub(crate) struct Arguments {
