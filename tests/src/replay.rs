@@ -179,6 +179,7 @@ const fn code(error: &ModelError) -> u8 {
         ModelError::Section { .. } => 6,
         ModelError::NotUnderstood { .. } => 7,
         ModelError::MarginRange => 8,
+        ModelError::NeedsCode => 11,
         _ => 9,
     }
 }

@@ -128,7 +128,7 @@ fn tally(sequences: &[Sequence], margin: f64) -> Tally {
     })
 }
 
-/// The finding on a share of wrong names among about so many that are independent.
+/// The finding on a share of wrong names among about that many independent ones.
 fn finding(share: Option<f64>, names: f64, rate: f64) -> Finding {
     let Some(share) = share else { return Finding::Untested };
     if share <= rate {

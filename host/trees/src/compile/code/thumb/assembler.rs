@@ -120,7 +120,7 @@ impl Assembler {
         self.items.push(Item::Global(name));
     }
 
-    /// An instruction of so many bytes.
+    /// An instruction of this many bytes.
     pub(in super::super) fn ins(&mut self, text: &str, bytes: usize) {
         self.items.push(Item::Instruction(text.to_owned(), bytes));
         self.position += bytes;
