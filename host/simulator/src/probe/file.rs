@@ -238,8 +238,12 @@ mod tests {
         let file = parse(&format!("{MEASURES}stroke = 30\ntravel = 200.5\n")).unwrap();
         assert_eq!((file.probe.stroke, file.probe.travel), (Some(30.0), Some(200.5)));
         assert_eq!(file.probe.window(), Some(300_000));
-        for (text, named) in [("stroke = 0", "stroke"), ("travel = -3", "travel"), ("stroke = \"3\"", "floating point")]
-        {
+        let wrong = [
+            ("stroke = 0", "stroke"),
+            ("travel = -3", "travel"),
+            ("stroke = \"3\"", "4: not a usable probe file: invalid type: string \"3\""),
+        ];
+        for (text, named) in wrong {
             let error = parse(&format!("{MEASURES}{text}\n")).unwrap_err().to_string();
             assert!(error.starts_with("probe.toml:") && error.contains(named), "{error}");
         }
