@@ -1,5 +1,7 @@
 //! Meshes and files for the tests of all formats.
 
+#[cfg(feature = "objects")]
+mod far;
 pub(super) mod samples;
 
 use crate::mesh::Mesh;

@@ -1,8 +1,8 @@
 //! An ensemble in f64, as most libraries have it, on the way to f32.
 
+use super::options::{default_names, named};
 use super::votes;
-use super::{Imported, default_names, named};
-use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree};
+use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Prediction;
 use std::collections::BTreeSet;
@@ -60,7 +60,7 @@ impl Draft {
         }
         let base = self.base.clone();
         let leaves = self.leaves();
-        if let Some(scale) = votes::count(&mut self) {
+        if let Some(scale) = self.count_votes() {
             self.prediction.scale = scale;
         }
         let scale = f64::from(self.prediction.scale);
@@ -100,6 +100,19 @@ impl Draft {
             DraftNode::Leaf(_) => None,
         });
         features.collect::<BTreeSet<_>>().len()
+    }
+
+    /// Turns shares of votes into whole numbers, if all trees vote and start from nothing: see [`votes::count`].
+    fn count_votes(&mut self) -> Option<f32> {
+        let starts = self.base.iter().any(|&base| base != 0.0);
+        if starts || self.trees.iter().any(|tree| tree.output != Output::Each) {
+            return None;
+        }
+        let trees = self.trees.len();
+        let nodes = self.trees.iter_mut().flat_map(|tree| &mut tree.nodes);
+        let leaves = nodes.filter_map(|node| if let DraftNode::Leaf(values) = node { Some(values) } else { None });
+        let mut leaves: Vec<_> = leaves.collect();
+        votes::count(self.base.len(), trees, &mut leaves)
     }
 
     /// The values of all leaves, tree by tree.

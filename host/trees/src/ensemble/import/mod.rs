@@ -19,27 +19,18 @@ mod catboost;
 mod draft;
 mod lightgbm;
 mod onnx;
+pub(super) mod options;
 mod parts;
 mod ubjson;
 mod votes;
 
+pub use options::Options;
 pub use parts::{PartTree, Parts};
 
-use super::{Ensemble, Imported, xgboost};
+use super::{Ensemble, xgboost};
 use crate::error::{EnsembleProblem, Error, Place, Result};
+use options::MISSING_UNKNOWN;
 use std::path::Path;
-
-/// Facts that a file of another library does not state, or that a user wants otherwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Options<'a> {
-    /// Other names for the objects: one for each class, or for the one output of a regression.
-    pub names: Option<&'a [String]>,
-    /// True to take all trees where the file says that training stopped early, and not those up to the best iteration.
-    pub all_trees: bool,
-    /// The number that stood for a missing value in training, beside NaN: XGBoost's `missing`, which no file holds. NaN if
-    /// there was none.
-    pub missing: Option<f32>,
-}
 
 impl Ensemble {
     /// Reads an ensemble: XGBoost's JSON, which [`Ensemble::save`] and `palpate train` write, over features of touches
@@ -108,11 +99,6 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
     }
     Ok(ensemble)
 }
-
-/// Note about every file of XGBoost.
-pub(super) const MISSING_UNKNOWN: &str = "The file does not state the number that stood for a missing value in \
-                                          training (XGBoost's `missing=`): only NaN counts as missing. State the \
-                                          number if there was another.";
 
 fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let names = options.names;
@@ -222,18 +208,4 @@ fn json_kind(bytes: &[u8]) -> JsonKind {
 /// A kind of file, or something in one, that is refused.
 fn unsupported(what: impl Into<String>, way: impl Into<String>) -> EnsembleProblem {
     EnsembleProblem::Unsupported { what: what.into(), way: way.into() }
-}
-
-/// The names of outputs that have none: the labels 0, 1 and so on, or the value of a regression.
-pub(super) fn default_names(outputs: usize) -> Vec<String> {
-    if outputs == 1 { vec!["value".into()] } else { (0..outputs).map(|label| label.to_string()).collect() }
-}
-
-/// The given names, if there are some, instead of a file's own.
-pub(super) fn named(given: Option<&[String]>, own: Vec<String>) -> Result<Vec<String>, EnsembleProblem> {
-    match given {
-        None => Ok(own),
-        Some(given) if given.len() == own.len() => Ok(given.to_vec()),
-        Some(given) => Err(EnsembleProblem::Names { names: given.len(), outputs: own.len() }),
-    }
 }

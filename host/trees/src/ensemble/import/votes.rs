@@ -1,9 +1,6 @@
 //! Forests whose trees vote: shares of votes as whole numbers, which f32 adds without rounding, so that classes that the
 //! library finds to have equally many votes have equally many here.
 
-use super::draft::{Draft, DraftNode};
-use crate::ensemble::Output;
-
 /// Sums of all trees stay at most this: far enough below 2^24 that sums that differ still differ as shares in f32.
 const LIMIT: f64 = 4_194_304.0;
 /// Largest distance of a share from the fraction that it stands for: files hold shares in f32, divided by the number of
@@ -12,47 +9,27 @@ const SLACK: f64 = 2e-7;
 /// The largest denominator of a fraction that is told from others by a share in f32.
 const LARGEST: u64 = 1000;
 
-/// Turns the shares into whole numbers of votes times a power of two if every leaf of the draft holds shares of the
-/// classes whose sum over all trees is 1. Returns what their sums have to be multiplied by to be shares again.
+/// Turns shares into whole numbers of votes times a power of two if every leaf of every tree holds shares of the classes
+/// whose sum over all trees is 1. Returns the factor that turns their sums into shares again.
 ///
 /// The number of votes of a tree is the least common denominator of all shares, where the sums still fit; otherwise shares
 /// are rounded to a power of two of them.
-pub(super) fn count(draft: &mut Draft) -> Option<f32> {
-    let (trees, classes) = (draft.trees.len() as f64, draft.base.len());
-    if classes < 2 || draft.trees.is_empty() || draft.base.iter().any(|&base| base != 0.0) {
-        return None;
-    }
+pub(super) fn count(classes: usize, trees: usize, leaves: &mut [&mut Vec<f64>]) -> Option<f32> {
+    let trees = trees as f64;
     let is_vote = |values: &[f64]| {
         let sum: f64 = values.iter().sum();
         values.iter().all(|&value| value >= 0.0) && (sum * trees - 1.0).abs() <= SLACK * classes as f64
     };
-    let leaves = |draft: &Draft| -> Vec<f64> {
-        let nodes = draft.trees.iter().flat_map(|tree| &tree.nodes);
-        nodes
-            .filter_map(|node| if let DraftNode::Leaf(values) = node { Some(values) } else { None })
-            .flatten()
-            .copied()
-            .collect()
-    };
-    let all_vote = draft.trees.iter().all(|tree| {
-        tree.output == Output::Each
-            && tree.nodes.iter().all(|node| match node {
-                DraftNode::Leaf(values) => is_vote(values),
-                DraftNode::Split { .. } => true,
-            })
-    });
-    if !all_vote {
+    if classes < 2 || leaves.is_empty() || !leaves.iter().all(|values| is_vote(values)) {
         return None;
     }
     let most = (LIMIT / trees).floor();
-    let votes = denominator(leaves(draft).into_iter().map(|share| share * trees), most)
-        .unwrap_or_else(|| most.log2().floor().max(0.0).exp2());
+    let shares = leaves.iter().flat_map(|values| values.iter()).map(|share| share * trees);
+    let votes = denominator(shares, most).unwrap_or_else(|| most.log2().floor().max(0.0).exp2());
     // Sums are at most 1, and every leaf is a whole multiple of the power of two.
     let unit = (votes * trees).log2().ceil().exp2().recip();
-    for node in draft.trees.iter_mut().flat_map(|tree| &mut tree.nodes) {
-        if let DraftNode::Leaf(values) = node {
-            values.iter_mut().for_each(|value| *value = (*value * trees * votes).round() * unit);
-        }
+    for value in leaves.iter_mut().flat_map(|values| values.iter_mut()) {
+        *value = (*value * trees * votes).round() * unit;
     }
     Some((1.0 / (votes * trees * unit)) as f32)
 }

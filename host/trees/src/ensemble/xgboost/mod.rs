@@ -25,7 +25,7 @@ mod trees;
 mod write;
 
 use super::Ensemble;
-use super::import::Options;
+use super::import::options::Options;
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use crate::output;
 use schema::Document;

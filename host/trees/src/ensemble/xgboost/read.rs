@@ -4,7 +4,7 @@ use super::objective::{Kind, Objective};
 use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, tree};
 use crate::ensemble::check::check_names;
-use crate::ensemble::import::{MISSING_UNKNOWN, Options, default_names, named};
+use crate::ensemble::import::options::{MISSING_UNKNOWN, Options, default_names, named};
 use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, Node, Origin};
 use crate::error::EnsembleProblem;
 use palpate_shared::Descriptor;

@@ -8,6 +8,7 @@ mod assembler;
 mod ranks;
 mod trees;
 mod vectors;
+mod walk;
 
 use super::program::Program;
 use assembler::Assembler;

@@ -3,7 +3,7 @@
 use super::super::program::{CodeTree, Program};
 use super::Chip;
 use super::assembler::{Assembler, Condition, Label};
-use super::trees::{self, Pins};
+use super::walk::{self, Pins};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,7 +13,7 @@ const LANES: usize = 10;
 const MOST: usize = 256;
 
 /// Adds up trees with a value for each object, to margins whose address is on the stack.
-pub(in super::super) fn walk(out: &mut Assembler, program: &Program, trees: &[&CodeTree], address: usize) {
+pub(super) fn write(out: &mut Assembler, program: &Program, trees: &[&CodeTree], address: usize) {
     out.ins(&format!("ldr r7, [sp, #{address}]"), 2);
     if let Some(vote) = program.vote() {
         return votes(out, program, trees, vote);
@@ -72,7 +72,7 @@ fn votes(out: &mut Assembler, program: &Program, trees: &[&CodeTree], vote: i32)
             out.branch(None, target);
             20.0 + 9.0 * length as f64
         };
-        trees::vector(out, &pins, tree, &put, end);
+        walk::vector(out, &pins, tree, &put, end);
         let highs = highs.into_inner();
         let last = highs.keys().next_back().copied();
         for (high, label) in highs {
@@ -216,7 +216,7 @@ fn lanes(out: &mut Assembler, program: &Program, trees: &[&CodeTree], shift: u32
             rows.borrow_mut().extend(row(values, shift));
             (out.count() - count) as f64
         };
-        trees::vector(out, &pins, tree, &put, end);
+        walk::vector(out, &pins, tree, &put, end);
         out.place(end);
         out.call(add);
         let mut step = 12 * *number.borrow() as usize;
@@ -318,7 +318,7 @@ fn rows(out: &mut Assembler, program: &Program, trees: &[&CodeTree], address: us
             rows.borrow_mut().extend(values.iter().map(|value| *value as i16 as u16));
             (out.count() - count) as f64
         };
-        trees::vector(out, &pins, tree, &put, end);
+        walk::vector(out, &pins, tree, &put, end);
         out.place(end);
         out.call(add);
         let step = 2 * objects as u32 * *number.borrow();

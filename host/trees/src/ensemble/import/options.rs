@@ -1,0 +1,34 @@
+//! Facts that files of other libraries do not state, and the names that they leave out.
+
+use crate::error::EnsembleProblem;
+
+/// Facts that a file of another library does not state, or that a user wants otherwise.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options<'a> {
+    /// Other names for the objects: one for each class, or for the one output of a regression.
+    pub names: Option<&'a [String]>,
+    /// True to take all trees where the file says that training stopped early, and not those up to the best iteration.
+    pub all_trees: bool,
+    /// The number that stood for a missing value in training, beside NaN: XGBoost's `missing`, which no file holds. NaN if
+    /// there was none.
+    pub missing: Option<f32>,
+}
+
+/// Note about every file of XGBoost.
+pub(in crate::ensemble) const MISSING_UNKNOWN: &str = "The file does not state the number that stood for a missing value in \
+                                          training (XGBoost's `missing=`): only NaN counts as missing. State the \
+                                          number if there was another.";
+
+/// The names of outputs that have none: the labels 0, 1 and so on, or the value of a regression.
+pub(in crate::ensemble) fn default_names(outputs: usize) -> Vec<String> {
+    if outputs == 1 { vec!["value".into()] } else { (0..outputs).map(|label| label.to_string()).collect() }
+}
+
+/// The given names, if there are some, instead of a file's own.
+pub(in crate::ensemble) fn named(given: Option<&[String]>, own: Vec<String>) -> Result<Vec<String>, EnsembleProblem> {
+    match given {
+        None => Ok(own),
+        Some(given) if given.len() == own.len() => Ok(given.to_vec()),
+        Some(given) => Err(EnsembleProblem::Names { names: given.len(), outputs: own.len() }),
+    }
+}
