@@ -108,14 +108,21 @@ pub struct Calibrated {
 
 /// The margins of one object's touches that are evidence, in the order in which they are used.
 #[derive(Debug, Default)]
-struct Supply {
+pub(crate) struct Supply {
     /// For each source, such as an instance, and each robot one row after the other, in units.
     pools: Vec<Vec<i32>>,
     /// True if a pool is a robot's, which makes one sequence.
     is_once: bool,
+    /// True if pools are short: how far their means are apart says more of their length than of what differs between them.
+    is_short: bool,
 }
 
 impl Supply {
+    /// Of sequences of rows: the evidence of each, row after row, in units.
+    pub(crate) fn of_rows(pools: Vec<Vec<i32>>) -> Self {
+        Self { pools, is_once: true, is_short: true }
+    }
+
     /// A quarter of the touches, or of the robots, to learn from, and the rest to test on.
     fn divided(mut self, objects: usize) -> [Self; 2] {
         let is_once = self.is_once;
@@ -124,7 +131,8 @@ impl Supply {
         } else {
             self.pools.iter_mut().map(|rows| rows.split_off(rows.len() / objects / 4 * objects)).collect()
         };
-        [self, Self { pools: rest, is_once }]
+        let is_short = self.is_short;
+        [self, Self { pools: rest, is_once, is_short }]
     }
 }
 
@@ -146,11 +154,22 @@ pub fn calibrate(
 ) -> Result<Calibrated> {
     check(settings)?;
     let supplies = supplies(model, dataset, settings.seed)?;
+    calibrate_supplies(model, supplies, &of_shapes(model, shapes), settings)
+}
+
+/// The same of margins: of each known object, and the mean ones of other shapes.
+pub(crate) fn calibrate_supplies(
+    model: &Model<'_>,
+    supplies: Vec<Supply>,
+    shapes: &[Vec<f64>],
+    settings: &Settings,
+) -> Result<Calibrated> {
+    check(settings)?;
     let objects = model.object_count();
     let unit = f64::from(model.unit());
     let (learn, test) = learned_and_tested(supplies, objects);
     let known = model.known_count();
-    let moments = Moments::new(&learn, &of_shapes(model, shapes), known, objects, unit);
+    let moments = Moments::new(&learn, shapes, known, objects, unit);
     let misfits = misfit::misfits(&moments, None)
         .ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
     let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
@@ -265,7 +284,7 @@ fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Suppl
             }
             margins_of_touches(model, &touches)
         };
-        Ok(Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once })
+        Ok(Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false })
     };
     known.iter().map(supply).collect()
 }
