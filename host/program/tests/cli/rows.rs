@@ -457,11 +457,11 @@ fn targets_of_millions_are_no_object_of_a_million_nats() {
 }
 
 /// Sequences of rows of a model's own classes, five of six rows such that the model itself takes for the class; as CSV.
-fn sequences(model: &str, rows: &str, count: usize, first: usize) -> String {
-    let text = std::fs::read_to_string(rows).unwrap();
+fn sequences(model: &str, file: &str, count: usize, first: usize) -> String {
+    let text = std::fs::read_to_string(file).unwrap();
     let (header, rows) = text.split_once('\n').unwrap();
     let rows: Vec<&str> = rows.lines().collect();
-    let said = stdout(run(["recognize", model, rows, "--features", "--json"]));
+    let said = stdout(run(["recognize", model, file, "--features", "--json"]));
     let class = |line: &str| serde_json::from_str::<Value>(line).unwrap()["class"].as_str().unwrap().to_owned();
     let classes: Vec<String> = said.lines().map(class).collect();
     let mut text = format!("id,kind,{header}\n");
