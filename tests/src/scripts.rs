@@ -40,7 +40,7 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     let temperature = Temperature::new(rng.random_range(0.1..10.0)).expect("a temperature");
     let mut sections = Vec::new();
     let mut put = |bytes: &[u8]| sections.extend_from_slice(bytes);
-    let own = model.optional_sections().filter(|section| section.tag < Tag::ThresholdsByObject.code());
+    let own = model.optional_sections().filter(|section| section.tag < Tag::Weights.code());
     own.for_each(|section| section.write(&mut put));
     if rng.random_bool(0.6) {
         write_section(Tag::Weights, true, &weights(rng), &mut put);
