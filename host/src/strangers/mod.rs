@@ -64,6 +64,8 @@ const MOST_HELD: u32 = 120;
 /// Between two thresholds that are tried, in nats, and how many are.
 const STEP: f64 = 0.05;
 const STEPS: usize = 400;
+/// Above the loosest threshold, in nats: the most that is tried.
+const MOST_BEYOND: f64 = 1_000.0;
 /// 2^-16 nats.
 const NAT: f64 = 65_536.0;
 
@@ -186,9 +188,12 @@ pub(crate) fn calibrate_supplies(
         Held::Certain => found_out(&left_out).min(free.last()).max(FIRST),
     };
     let loosest = rough - below(settings.held);
+    let to_the_end = Policy { until: follow::Until::Touches(model.header().max_touches()), least: FIRST };
+    let is_short = learn.iter().any(|supply| supply.is_short);
+    let strictest = strictest(is_short.then(|| follow(&learn, &to_the_end)), settings, loosest);
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
-    let kept = threshold(&sequences, settings, loosest, least, known)?;
+    let kept = threshold(&sequences, settings, [loosest, strictest], least, known)?;
     let terms = MisfitTerms { sequences: kept.sequences, ..terms(kept.threshold, least) };
     let bytes = stated(model, &terms, &misfits)?;
     let names = compile::names(model);
@@ -377,10 +382,25 @@ struct Kept {
     mean_touches_without: f64,
 }
 
+/// The threshold from which looser ones are tested. Rows of a sequence that depend on each other make a misfit that goes on
+/// growing: then where those that were learned from have half as many false alarms as are allowed, if that is beyond.
+fn strictest(learned: Option<Vec<Vec<Sequence>>>, settings: &Settings, loosest: f64) -> f64 {
+    let own = loosest + STEP * STEPS as f64;
+    let few = learned.map_or(own, |learned| follow::quantile(&learned, 1.0 - 0.5 * settings.alarms));
+    few.max(own).min(loosest + MOST_BEYOND)
+}
+
 /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): from strict to loose, up to the last
 /// threshold before the first at which the observed number of false alarms would not be unlikely if the promise were
 /// broken.
-fn threshold(sequences: &[Vec<Sequence>], settings: &Settings, loosest: f64, least: u32, known: usize) -> Result<Kept> {
+fn threshold(
+    sequences: &[Vec<Sequence>],
+    settings: &Settings,
+    [loosest, strictest]: [f64; 2],
+    least: u32,
+    known: usize,
+) -> Result<Kept> {
+    let steps = ((strictest - loosest) / STEP).round() as usize;
     let all = equally_many(sequences);
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
     let Settings { alarms, confidence, .. } = *settings;
@@ -394,8 +414,8 @@ fn threshold(sequences: &[Vec<Sequence>], settings: &Settings, loosest: f64, lea
     let few = || EvaluateProblem::TooFewForAlarms { object_sequences: fewest, needed };
     let allowed = allowed.ok_or_else(few)?;
     let mut kept = None;
-    for step in 0..STEPS {
-        let threshold = loosest + STEP * (STEPS - 1 - step) as f64;
+    for step in 0..steps {
+        let threshold = loosest + STEP * (steps - 1 - step) as f64;
         let (alarms, touches) = ends(threshold);
         if alarms as u64 > allowed {
             break;

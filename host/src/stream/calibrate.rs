@@ -3,7 +3,7 @@
 use super::shape::{self, Fitted, Gain, STRICTEST};
 use super::{Rows, check, follow};
 use crate::calibrate::{
-    Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Worse, choose_groups,
+    Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Worse, binomial_tail, choose_groups,
     choose_independent, margin_of, needed, odds_of, worse,
 };
 use crate::compile::{self, Restated, restate};
@@ -21,8 +21,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// One sequence, or group, in this many is learned from, and not tested on.
 const LEARNED: usize = 4;
-/// Beyond the posterior's own threshold, in nats: where a walk begins, and where those that are too close begin.
-const BEGIN: [f64; 2] = [2.5, 10.0];
+/// Beyond the posterior's own threshold, in nats: where a walk may begin.
+const BEGIN: [f64; 9] = [2.5, 4.0, 6.0, 8.0, 10.0, 14.0, 18.0, 24.0, f64::INFINITY];
+/// A walk begins where those that were learned from would be so few wrong with at most this probability, at the promised
+/// rate.
+const CLEARLY: f64 = 1e-3;
+/// Otherwise it begins as strictly as leaves this share of the names.
+const NAMED: f64 = 0.9;
 
 /// Settings of a promise.
 #[derive(Clone, Debug, PartialEq)]
@@ -317,19 +322,28 @@ fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> 
 }
 
 /// The margin in nats at which the walk begins: the least at which those that were learned from are clearly wrong less often
-/// than promised.
+/// than promised; if there are too few of them to say so, the strictest at which nearly as many are named.
 fn strictest(model: &Model<'_>, rows: &Rows<'_>, learned: &[&RowSequence], rate: f64, max_rows: u32) -> f64 {
     let naive = ((1.0 - rate) / rate).ln();
     let until = Until { margin: STRICTEST, max_touches: max_rows };
     let followed = follow(model, rows, learned, until);
-    let is_enough = |margin: &f64| {
-        let odds = Odds::All(odds_of(*margin));
-        let given = followed.iter().filter_map(|sequence| Some((sequence.object, sequence.given(&odds)?.name)));
-        let (wrong, given) =
-            given.fold((0_u32, 0_u32), |(wrong, all), (object, name)| (wrong + u32::from(object != name), all + 1));
-        f64::from(wrong) <= 0.5 * rate * f64::from(given)
+    // Of groups, sequences of each of which resemble each other, as many as there are groups.
+    let groups: BTreeSet<usize> = learned.iter().filter_map(|sequence| sequence.group).collect();
+    let share = if groups.is_empty() { 1.0 } else { groups.len() as f64 / learned.len() as f64 };
+    let tally = |margin: f64| {
+        let odds = Odds::All(odds_of(margin));
+        let given = followed.iter().filter_map(|sequence| Some(sequence.object != sequence.given(&odds)?.name));
+        let (wrong, all) = given.fold((0_u64, 0_u64), |(wrong, all), own| (wrong + u64::from(own), all + 1));
+        Tally { wrong: (wrong as f64 * share).ceil() as u64, all: (all as f64 * share) as u64 }
     };
-    BEGIN.map(|beyond| naive + beyond).into_iter().find(is_enough).unwrap_or(STRICTEST)
+    let margins = BEGIN.map(|beyond| (naive + beyond).min(STRICTEST));
+    let is_clear = |margin: &f64| binomial_tail(tally(*margin), rate) <= CLEARLY;
+    if let Some(margin) = margins.into_iter().find(is_clear) {
+        return margin;
+    }
+    let least = NAMED * tally(margins[0]).all as f64;
+    let is_named = |margin: &f64| followed.is_empty() || tally(*margin).all as f64 >= least;
+    margins.into_iter().take_while(is_named).last().filter(|_| !followed.is_empty()).unwrap_or(margins[0])
 }
 
 /// The loosest margin, from strict to loose, before the first at which more names are wrong than the rate.

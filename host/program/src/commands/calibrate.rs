@@ -24,7 +24,7 @@ Calibrate on touches that the model was not trained on, made and disturbed as th
 
 With --strangers the model also tests whether touches fit any object that it knows. With --plan it gets a plan of approaches instead, and DIR holds approaches with pose.
 
-Of a model over rows of features, DIR is a file of sequences of rows: CSV, or Parquet. Rows of a sequence may resemble each other as they like; sequences must be independent of each other, or belong to groups that are.
+Of a model over rows, DIR is a file of sequences of rows: CSV or Parquet. Rows of a sequence may depend on each other; sequences, or with --group-column groups, must not.
 
 Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3
@@ -33,7 +33,7 @@ Examples:
   palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
   palpate calibrate planned.palpate fresh -o calibrated.palpate --active
-  palpate calibrate gestures.palpate rows.csv --label gesture --sequence-column id -o sure.palpate")]
+  palpate calibrate a.palpate a.csv --label a --sequence-column id -o b.palpate")]
 pub(crate) struct Arguments {
     /// Compiled model
     model: PathBuf,

@@ -36,7 +36,7 @@ Examples:
   palpate evaluate model.palpate unseen --unknown others
   palpate evaluate planned.palpate unseen --active
   palpate evaluate model.palpate rows.csv --label kind
-  palpate evaluate sure.palpate rows.csv --label kind --sequence-column id --page page.html")]
+  palpate evaluate sure.palpate rows.csv --label kind --sequence-column id")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     directory: PathBuf,
     #[command(flatten)]
     sequences_of_rows: SequenceArguments,
-    /// Write a page: rows to a verdict against the error rate, and how evidence grows
+    /// Write a page about sequences of rows
     #[arg(long, value_name = "HTML", requires = "sequence_column")]
     page: Option<PathBuf>,
     /// Touches of objects that the model does not know: how many are detected

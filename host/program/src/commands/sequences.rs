@@ -20,14 +20,14 @@ use std::path::{Path, PathBuf};
 /// Columns of a file of rows that are no features.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct SequenceArguments {
-    /// Column of the rows' classes, or a regression's numbers
-    #[arg(long, value_name = "COLUMN")]
+    /// Column of the classes, or a regression's numbers
+    #[arg(long, value_name = "COL")]
     pub(crate) label: Option<String>,
-    /// Column of the sequence that a row belongs to; its rows follow each other, and are of one class
-    #[arg(long, value_name = "COLUMN", requires = "label")]
+    /// Column that says which rows are one sequence
+    #[arg(long, value_name = "COL", requires = "label")]
     pub(crate) sequence_column: Option<String>,
-    /// Column of what a sequence belongs to, such as a person; without it sequences must be independent
-    #[arg(long, value_name = "COLUMN", requires = "sequence_column")]
+    /// Column of groups of sequences, such as persons
+    #[arg(long, value_name = "COL", requires = "sequence_column")]
     pub(crate) group_column: Option<String>,
 }
 
