@@ -7,6 +7,9 @@
 //!                       └─ the rest ───► sequences (follow) ──► its threshold, by Learn-then-Test
 //! ```
 //!
+//! Where there are recordings, one half of them is like another instance of the simulated objects, and the other half tests the
+//! threshold too ([`calibrate_recorded`]).
+//!
 //! The misfit of n touches is half of the log-likelihood ratio of two normal distributions of the mean evidence: that of
 //! other shapes, N(μ + s, B + C/n), and that of the leading object's touches, N(μ, C/n). The first is learned on shapes of
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
@@ -25,6 +28,7 @@ mod found;
 mod leave_one_out;
 mod misfit;
 mod promised;
+mod recorded;
 #[cfg(feature = "objects")]
 mod shapes;
 #[cfg(test)]
@@ -33,6 +37,7 @@ mod tests;
 pub use found::Found;
 pub use leave_one_out::{LeftOut, Sets, leave_one_out};
 pub use promised::calibrate_with_promise;
+pub use recorded::{Alarms, OnRecordings};
 #[cfg(feature = "objects")]
 pub use shapes::captured;
 
@@ -104,6 +109,8 @@ pub struct Calibrated {
     /// For each known object the share of its sequences that are detected after 30, 60 and 120 touches when the model
     /// does not use its column: an estimate of what happens to strangers.
     pub left_out: BTreeMap<String, BTreeMap<u32, f64>>,
+    /// Results of recorded sequences, where there are recordings.
+    pub recorded: Option<OnRecordings>,
 }
 
 /// The margins of one object's touches that are evidence, in the order in which they are used.
@@ -144,13 +151,45 @@ pub fn calibrate(
     shapes: &[ObjectTouches],
     settings: &Settings,
 ) -> Result<Calibrated> {
+    calibrate_on(model, dataset, None, shapes, settings)
+}
+
+/// The same, with `recorded` touches of every object: half of them say, beside the simulated ones of `dataset`, what touches
+/// of each object give, and the other half tests the threshold too. The stricter threshold of both is taken. Where the
+/// recordings are too few for the share of `settings`, the share that the model states is the one that they support.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_recorded(
+    model: &Model<'_>,
+    dataset: &Dataset,
+    recorded: &Dataset,
+    shapes: &[ObjectTouches],
+    settings: &Settings,
+) -> Result<Calibrated> {
+    let simulated = calibrate(model, dataset, shapes, settings)?;
+    let before = recorded::alarms(&compile::open(&simulated.bytes)?, recorded, settings)?;
+    let mut calibrated = calibrate_on(model, dataset, Some(recorded), shapes, settings)?;
+    calibrated.recorded.iter_mut().for_each(|found| found.before = before.clone());
+    Ok(calibrated)
+}
+
+fn calibrate_on(
+    model: &Model<'_>,
+    dataset: &Dataset,
+    recorded: Option<&Dataset>,
+    shapes: &[ObjectTouches],
+    settings: &Settings,
+) -> Result<Calibrated> {
     check(settings)?;
-    let supplies = supplies(model, dataset, settings.seed)?;
+    let given = supplies(model, dataset, settings.seed)?;
     let objects = model.object_count();
     let unit = f64::from(model.unit());
-    let (learn, test) = learned_and_tested(supplies, objects);
+    let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
-    let moments = Moments::new(&learn, &of_shapes(model, shapes), known, objects, unit);
+    let recorded = recorded.map(|recorded| supplies(model, recorded, settings.seed)).transpose()?;
+    let (recorded_learn, recorded_test) = recorded.map(|all| recorded::halves(all, objects)).unzip();
+    let moments = Moments::new(&learn, recorded_learn.as_deref(), &of_shapes(model, shapes), known, objects, unit);
     let misfits = misfit::misfits(&moments, None)
         .ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
     let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
@@ -169,23 +208,47 @@ pub fn calibrate(
     let loosest = rough - below(settings.held);
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
-    let kept = threshold(&sequences, settings, loosest, least, known)?;
-    let terms = MisfitTerms { sequences: kept.sequences, ..terms(kept.threshold, least) };
+    let all = equally_many(&sequences);
+    let tried = Tried { loosest, least, gap: doubt(settings.held) };
+    let simulated = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
+        let needed = needed(settings.alarms, settings.confidence).div_ceil(known.max(1) as u64);
+        EvaluateProblem::TooFewForAlarms { object_sequences: all.len() / known.max(1), needed }
+    })?;
+    let on_recordings = match &recorded_test {
+        Some(test) => Some(recorded::tested(&follow(test, &policy), &tried, simulated, settings)?),
+        None => None,
+    };
+    let threshold = on_recordings.as_ref().map_or(simulated, |(threshold, _)| *threshold);
+    let found = on_recordings.map(|(_, found)| found);
+    let [alarms, touches] = tried.ends(&all, threshold);
+    let count = found.as_ref().map_or(all.len(), |found| found.sequences);
+    let terms = MisfitTerms {
+        sequences: u32::try_from(count).unwrap_or(u32::MAX),
+        alarms: millionths(found.as_ref().map_or(settings.alarms, |found| found.supported)),
+        ..terms(threshold, least)
+    };
     let bytes = stated(model, &terms, &misfits)?;
     let names = compile::names(model);
     let at = |path: &[f64], touches: u32| path.get(touches as usize - 1).or(path.last()).copied().unwrap_or(0.0);
+    let mean = |touches: u64| touches as f64 / all.len().max(1) as f64;
     Ok(Calibrated {
         bytes,
         terms,
-        alarms: kept.alarms,
-        mean_touches: kept.mean_touches,
-        mean_touches_without: kept.mean_touches_without,
+        alarms: found.as_ref().map_or(alarms as usize, |found| found.alarms),
+        mean_touches: mean(touches),
+        mean_touches_without: mean(all.iter().map(|sequence| u64::from(sequence.decided_after())).sum()),
         left_out: names
             .into_iter()
             .zip(&left_out)
             .map(|(name, path)| (name, [30, 60, 120].map(|touches| (touches, at(path, touches))).into()))
             .collect(),
+        recorded: found,
     })
+}
+
+/// `as` saturates.
+fn millionths(share: f64) -> u32 {
+    (share * 1e6).round() as u32
 }
 
 /// Takes the test out of a model, and what the model promises with it; a background stays.
@@ -313,8 +376,6 @@ fn below(held: Held) -> f64 {
 }
 
 fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64, least: u32) -> MisfitTerms {
-    // `as` saturates.
-    let millionths = |share: f64| (share * 1e6).round() as u32;
     MisfitTerms {
         held: settings.held,
         rivals: misfits.first().map_or(0, |misfit| misfit.rivals.len() as u8),
@@ -349,48 +410,27 @@ fn found_out(left_out: &[Vec<f64>]) -> u32 {
     (0..longest).position(|touches| mean(touches) >= FOUND_OUT).map_or(MOST_HELD, |touches| touches as u32 + 1)
 }
 
-/// A threshold that keeps the promise, and what came of it.
-struct Kept {
-    threshold: f64,
-    alarms: usize,
-    sequences: u32,
-    mean_touches: f64,
-    mean_touches_without: f64,
+/// Thresholds that are tried, from strict to loose.
+struct Tried {
+    loosest: f64,
+    least: u32,
+    /// By how much a misfit must be below the threshold for a name, in nats.
+    gap: f64,
 }
 
-/// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): from strict to loose, up to the last
-/// threshold before the first at which the observed number of false alarms would not be unlikely if the promise were
-/// broken.
-fn threshold(sequences: &[Vec<Sequence>], settings: &Settings, loosest: f64, least: u32, known: usize) -> Result<Kept> {
-    let all = equally_many(sequences);
-    let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
-    let Settings { alarms, confidence, .. } = *settings;
-    let allowed = allowed(all.len() as u64, alarms, confidence);
-    let gap = doubt(settings.held);
-    let ends = |threshold: f64| {
-        let ends = all.par_iter().map(|sequence| sequence.end(threshold, threshold - gap, least));
-        ends.map(|end| (usize::from(end.is_alarm), end.touches)).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
-    };
-    let needed = needed(alarms, confidence).div_ceil(known.max(1) as u64);
-    let few = || EvaluateProblem::TooFewForAlarms { object_sequences: fewest, needed };
-    let allowed = allowed.ok_or_else(few)?;
-    let mut kept = None;
-    for step in 0..STEPS {
-        let threshold = loosest + STEP * (STEPS - 1 - step) as f64;
-        let (alarms, touches) = ends(threshold);
-        if alarms as u64 > allowed {
-            break;
-        }
-        kept = Some((threshold, alarms, touches));
+impl Tried {
+    /// False alarms of sequences at a threshold, and their touches.
+    fn ends(&self, sequences: &[&Sequence], threshold: f64) -> [u64; 2] {
+        let ends = sequences.par_iter().map(|sequence| sequence.end(threshold, threshold - self.gap, self.least));
+        ends.map(|end| [u64::from(end.is_alarm), end.touches]).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
-    let (threshold, alarms, touches) = kept.ok_or_else(few)?;
-    let mean = |touches: u64| touches as f64 / all.len().max(1) as f64;
-    let without = all.iter().map(|sequence| u64::from(sequence.decided_after())).sum();
-    Ok(Kept {
-        threshold,
-        alarms,
-        sequences: u32::try_from(all.len()).unwrap_or(u32::MAX),
-        mean_touches: mean(touches),
-        mean_touches_without: mean(without),
-    })
+
+    /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): the last threshold before the first at
+    /// which the observed number of false alarms would not be unlikely if the promise were broken. None if there are too few
+    /// sequences, or too many alarms at the strictest.
+    fn threshold(&self, sequences: &[&Sequence], alarms: f64, confidence: f64) -> Option<f64> {
+        let allowed = allowed(sequences.len() as u64, alarms, confidence)?;
+        let thresholds = (0..STEPS).map(|step| self.loosest + STEP * (STEPS - 1 - step) as f64);
+        thresholds.take_while(|&threshold| self.ends(sequences, threshold)[0] <= allowed).last()
+    }
 }

@@ -6,13 +6,14 @@ use super::progress::Bar;
 use super::real::RealArguments;
 use super::strangers::StrangersArguments;
 use palpate::Result;
-use palpate::calibrate::{self, Calibrated, Per, Settings, Worse};
+use palpate::calibrate::{self, Calibrated, OfRecorded, Per, Settings, Worse};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::strangers::{self, Found};
+use palpate::touches::Dataset;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -21,12 +22,13 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. Wrong names break it; a sequence without a name is undecided, neither right nor wrong. docs/reference/options.md says how thresholds are found, and how many touches that takes.
 
-With --strangers the model also tests whether touches fit any object that it knows. With --plan it gets a plan of approaches instead, and DIR holds approaches with pose.
+With --recorded thresholds are found on the touches of DIR and tested on recorded ones, for which the promise then holds; that takes fewer recordings than a calibration on them alone. With --strangers the model also tests whether touches fit any object that it knows. With --plan it gets a plan of approaches instead, and DIR holds approaches with pose.
 
 Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
   palpate calibrate model.palpate fresh -o names.palpate --per name
+  palpate calibrate model.palpate fresh -o robot.palpate --recorded robot
   palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
   palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
@@ -36,6 +38,9 @@ pub(crate) struct Arguments {
     /// Touches to calibrate on: a directory that `palpate capture` filled
     #[arg(value_name = "DIR")]
     directory: PathBuf,
+    /// Test the thresholds on these recorded touches, or calibrate --strangers on them; a directory
+    #[arg(long, value_name = "DIR", conflicts_with = "plan")]
+    recorded: Option<PathBuf>,
     /// Where to write; the calibrated model
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
@@ -78,13 +83,12 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return plan::run(&Wanted { model, directory, output, rolls, probe, real }, global);
     }
     output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
-    let compiled = CompiledModel::read(&arguments.model)?;
-    let dataset = super::dataset(&arguments.directory)?;
-    let trained_on = compiled_trained_on(&compiled, &dataset);
-    if !trained_on.is_empty() {
-        let objects = trained_on.into_iter().map(String::from).collect();
-        return Err(Error::at(Place::file(&arguments.directory), CalibrateProblem::TrainedOn { objects }));
+    if let Some(recorded) = &arguments.recorded {
+        output::refuse_input(&arguments.output, super::files_of(recorded))?;
     }
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let dataset = untrained(&compiled, &arguments.directory)?;
+    let recorded = arguments.recorded.as_ref().map(|recorded| untrained(&compiled, recorded)).transpose()?;
     let file = arguments.probe.read()?;
     arguments.probe.of_dataset(file.as_ref(), &dataset)?;
     let settings = Settings {
@@ -97,11 +101,18 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         active: arguments.active,
         seed: global.seed(),
     };
-    let wrong = |error: palpate::Error| error.in_file(&arguments.directory);
+    let wrong = |error: palpate::Error| match (error.problem(), &arguments.recorded) {
+        (Some(CalibrateProblem::NotSupported { .. }), Some(recorded)) => error.in_file(recorded),
+        _ => error.in_file(&arguments.directory),
+    };
     let (calibrated, found) = match arguments.strangers.held() {
         None => {
             let untested = strangers::without(&compiled.model())?;
-            let calibrated = calibrate::calibrate(&compile::open(&untested)?, dataset, &settings, &Bar::new());
+            let model = compile::open(&untested)?;
+            let calibrated = match &recorded {
+                Some(recorded) => calibrate::calibrate_recorded(&model, dataset, recorded, &settings, &Bar::new()),
+                None => calibrate::calibrate(&model, dataset, &settings, &Bar::new()),
+            };
             (calibrated.map_err(wrong)?, None)
         }
         Some(held) => {
@@ -113,8 +124,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
                 ..Default::default()
             };
             let shapes = arguments.strangers.shapes(&dataset)?;
+            let (model, recorded) = (compiled.model(), recorded.as_ref());
             let both =
-                strangers::calibrate_with_promise(&compiled.model(), &dataset, &shapes, &test, &settings, &Bar::new());
+                strangers::calibrate_with_promise(&model, &dataset, recorded, &shapes, &test, &settings, &Bar::new());
             let (calibrated, tested) = both.map_err(wrong)?;
             (calibrated, Some(Found::new(&test, &tested)))
         }
@@ -126,6 +138,17 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let strangers = found.map_or_else(String::new, |found| super::strangers::text(&found) + "\n");
     let text = format!("{}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
     output::print_about(&arguments.output, &text)
+}
+
+/// Touches that the model was not trained on.
+fn untrained(compiled: &CompiledModel, directory: &PathBuf) -> Result<Dataset> {
+    let dataset = super::dataset(directory)?;
+    let trained_on = compiled_trained_on(compiled, &dataset);
+    if trained_on.is_empty() {
+        return Ok(dataset);
+    }
+    let objects = trained_on.into_iter().map(String::from).collect();
+    Err(Error::at(Place::file(directory), CalibrateProblem::TrainedOn { objects }))
 }
 
 /// Results of both calibrations.
@@ -177,7 +200,27 @@ fn text(calibrated: &Calibrated) -> String {
         _ = writeln!(text, "Uncalibrated, names are given at {:.2} nats.", calibrated.uncalibrated_margin);
     }
     _ = writeln!(text, "Temperature of the posteriors that are shown: {:.2}", calibrated.temperature);
-    text + &worse(calibrated)
+    text + &calibrated.recorded.as_ref().map_or_else(String::new, |recorded| of_recorded(recorded, calibrated))
+        + &worse(calibrated)
+}
+
+/// Statements about a promise that was tested on recordings.
+fn of_recorded(recorded: &OfRecorded, calibrated: &Calibrated) -> String {
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let text = format!(
+        "Tested on recorded touches, {} approaches to each object or more. Of the simulated names {} are wrong at this threshold.\n",
+        recorded.approaches,
+        percent(recorded.simulated_error)
+    );
+    match recorded.recordings {
+        Some(recordings) => format!(
+            "{text}note: the {} sequences are of {recordings} recordings. Sequences of one recording are not independent, so that the \
+             promise may hold with a lower probability than {} %: record on several days.\n",
+            calibrated.sequences,
+            super::percent(calibrated.confidence)
+        ),
+        None => text,
+    }
 }
 
 /// A warning of objects that a rate of other names hides.
