@@ -12,6 +12,8 @@ const STEP: f64 = 0.01;
 pub(super) const LOOSEST: f64 = 0.05;
 /// Steps at once where names have thresholds of their own.
 const NAMES_STEP: usize = 2;
+/// Steps at once where sequences are cut anew at each.
+const RECORDED_STEP: usize = 5;
 /// Thresholds by name are learned on one in this many sequences, and tested on the others.
 const LEARNED: usize = 3;
 /// From how much stricter than the learned thresholds by name to how much looser the tested ones are, in nats.
@@ -104,7 +106,7 @@ fn kept<'s>(
         Per::Average | Per::Object => {
             let margins = grid(strictest, LOOSEST).map(|margin| Odds::All(odds_of(margin)));
             let steps = margins.map(|odds| {
-                let tallies = tallies(&tested, &odds, if per == Per::Average { By::All } else { By::Touched(count) });
+                let tallies = tallies(&tested, &odds, By::of(per, count));
                 (odds, tallies)
             });
             walk(steps, rate, confidence)
@@ -148,6 +150,21 @@ fn stored(margin: f64) -> u64 {
     odds_of(margin) >> 24 << 24
 }
 
+/// Thresholds from strict to loose that are walked over on recordings: one for all names, or one for each, learned on
+/// `sequences` that are not tested on.
+pub(super) fn steps(sequences: &[Sequence], objects: usize, strictest: f64, terms: &Terms) -> Vec<Odds> {
+    match terms.per {
+        Per::Average | Per::Object => {
+            let margins = grid(strictest, LOOSEST).step_by(RECORDED_STEP);
+            margins.map(|margin| Odds::All(odds_of(margin))).collect()
+        }
+        Per::Name => {
+            let learn: Vec<&Sequence> = sequences.iter().collect();
+            around(&learned(&learn, objects, strictest, terms.rate), strictest)
+        }
+    }
+}
+
 /// Cases that names are counted by.
 #[derive(Clone, Copy)]
 pub(super) enum By {
@@ -164,6 +181,15 @@ impl By {
         match self {
             Self::All => 1,
             Self::Touched(objects) | Self::Named(objects) => objects,
+        }
+    }
+
+    /// The cases that a rate is promised of.
+    pub(super) fn of(per: Per, objects: usize) -> Self {
+        match per {
+            Per::Average => Self::All,
+            Per::Object => Self::Touched(objects),
+            Per::Name => Self::Named(objects),
         }
     }
 }

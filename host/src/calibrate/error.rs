@@ -1,5 +1,6 @@
 //! Problems with calibrating.
 
+use super::walk::Tally;
 use crate::error::Problem;
 
 /// Problems with calibrating.
@@ -70,6 +71,21 @@ pub enum CalibrateProblem {
         /// Classes that the model knows and no sequence is of.
         objects: Vec<String>,
     },
+    /// Recordings do not support the rate.
+    #[error("{}", not_supported(object, *rate, *tally, *needed, forecast))]
+    NotSupported {
+        /// The object that is named, or touched, if the promise is for each.
+        object: Option<String>,
+        /// The promised rate.
+        rate: f64,
+        /// Wrong names of those given on the recordings at the first threshold that is tested; the most names given at any,
+        /// where they are too few.
+        tally: Tally,
+        /// Names needed, if none is wrong.
+        needed: u64,
+        /// What would be enough.
+        forecast: Forecast,
+    },
     /// The data set lacks objects of the model.
     #[error("the data set has no touches of {}", objects.join(", "))]
     Missing {
@@ -96,6 +112,18 @@ pub struct Supplied {
     pub fewest: u64,
 }
 
+/// Rates that recordings support, and recordings that a rate takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Approaches that were recorded to the object with the fewest.
+    pub approaches: usize,
+    /// The lowest rate that so many are likely to support, where one is known.
+    pub supported: Option<f64>,
+    /// The approaches to each object that are likely to support the rate, as far as the simulation is right; none where it
+    /// says of no number that it is enough.
+    pub enough: Option<u64>,
+}
+
 impl Problem for CalibrateProblem {
     fn fix(&self) -> String {
         match self {
@@ -112,6 +140,11 @@ impl Problem for CalibrateProblem {
             Self::NotKept { .. } => {
                 "Train the model for the noise of these touches, or promise a higher error rate; more touches of the \
                  calibration may also help."
+            }
+            Self::NotSupported { tally, needed, .. } if tally.all < *needed => "Record more, or promise a higher error rate.",
+            Self::NotSupported { .. } => {
+                "Promise a higher error rate, record more, or bring the simulation nearer to the recordings: fit the probe \
+                 (`palpate probe fit`), or adjust the model to other recordings (`palpate train --teach`)."
             }
             Self::Missing { .. } => "Capture them too, with another seed than the training's.",
             Self::TrainedOn { .. } => "Calibrate on others: capture them with another seed (--seed), or record more.",
@@ -148,10 +181,39 @@ fn in_touches(supplied: Option<Supplied>, found: u64, needed: u64) -> String {
         return format!(", and {fewest} {what} of an object give no name");
     }
     let enough = fewest as f64 * needed as f64 / found as f64;
-    // Two digits: it is no more than an estimate.
-    let digit = 10.0_f64.powf((enough.max(1.0).log10().floor() - 1.0).max(0.0));
-    let enough = (enough / digit).ceil() * digit;
-    format!(", which takes about {enough:.0} {what} of each object or more; there are {fewest} of one")
+    // Of as many names, none wrong, with the usual confidence.
+    let supported = 1.0 - 0.05_f64.powf(1.0 / found as f64);
+    format!(
+        ", which takes about {} {what} of each object or more; there are {fewest} of one, which support {} % at best",
+        two_digits(enough),
+        percent((supported * 1e3).ceil() / 1e3)
+    )
+}
+
+/// An estimate, rounded up to two digits.
+pub(super) fn two_digits(number: f64) -> u64 {
+    let digit = 10.0_f64.powf((number.max(1.0).log10().floor() - 1.0).max(0.0));
+    ((number / digit).ceil() * digit) as u64
+}
+
+fn not_supported(object: &Option<String>, rate: f64, tally: Tally, needed: u64, forecast: &Forecast) -> String {
+    let (of, rate) = (of_object(object), percent(rate));
+    let what = match tally.all < needed {
+        true => format!(
+            "{} names given{of} on the recordings are too few to promise {rate} %: at least {needed} are needed, none of them wrong",
+            tally.all
+        ),
+        false => format!(
+            "{} of {} names given{of} on the recordings are wrong, too many to promise {rate} %",
+            tally.wrong, tally.all
+        ),
+    };
+    let supported = forecast.supported.map(|supported| {
+        format!("; {} recorded approaches to each object support about {} %", forecast.approaches, percent(supported))
+    });
+    let enough =
+        forecast.enough.map(|enough| format!("; {rate} % takes about {enough} to each, if the simulation is right"));
+    format!("{what}{}{}", supported.unwrap_or_default(), enough.unwrap_or_default())
 }
 
 fn of_object(object: &Option<String>) -> String {

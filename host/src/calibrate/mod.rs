@@ -40,6 +40,9 @@ mod error;
 mod fresh;
 mod groups;
 mod model;
+mod recorded;
+#[cfg(all(test, feature = "train"))]
+mod recorded_tests;
 mod sequence;
 mod temperature;
 #[cfg(all(test, feature = "train"))]
@@ -48,7 +51,7 @@ mod walk;
 
 pub use choose::{Chosen, Terms, choose, choose_independent};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
-pub use error::{CalibrateProblem, Supplied};
+pub use error::{CalibrateProblem, Forecast, Supplied};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub use groups::{Grouped, choose_groups};
 pub(crate) use model::worse;
@@ -56,6 +59,7 @@ pub use model::{Calibrated, OfObject, Settings, Worse, added_bytes, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{STRICTEST, add_noise, calibrate_from};
 pub use palpate_shared::format::Per;
+pub use recorded::{OfRecorded, calibrate_recorded};
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
 pub use temperature::temperature;
 /// The cases that the promised rate refers to, in words.

@@ -2,6 +2,7 @@
 
 use super::choose::{Chosen, Terms, chosen};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
+use super::recorded::OfRecorded;
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
 use super::{Per, Tally, binomial_tail};
@@ -96,6 +97,9 @@ pub struct Calibrated {
     pub objects: BTreeMap<String, OfObject>,
     /// Divisor of the evidence before it is shown as a posterior.
     pub temperature: f64,
+    /// Where the thresholds were tested on recordings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<OfRecorded>,
 }
 
 /// Figures of an object under the thresholds, in the sequences that the promise rests on.
@@ -200,18 +204,7 @@ pub(super) fn material(model: &Model<'_>, dataset: &Dataset, settings: &Settings
     let own = Stopping::from_model(model).max_touches();
     let max_touches = settings.max_touches.unwrap_or(own);
     compile::stopping(settings.rate, max_touches)?;
-    let (_, known) = Candidate::Compiled(model).of(dataset)?;
-    let mut names = compile::names(model);
-    // A background is not touched, and never named.
-    names.truncate(model.known_count());
-    if names.len() < 2 {
-        return Err(CalibrateProblem::OneObject.into());
-    }
-    let missing: Vec<String> =
-        (0..names.len()).filter(|object| !known.contains(object)).map(|object| names[object].clone()).collect();
-    if !missing.is_empty() {
-        return Err(CalibrateProblem::Missing { objects: missing }.into());
-    }
+    let (names, known) = named(model, dataset)?;
     Ok(Material { names, known, max_touches })
 }
 
@@ -275,7 +268,24 @@ pub(super) fn calibrate_drawn(
     finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }
 
-fn check(settings: &Settings) -> Result<()> {
+/// The names that a model gives, and the objects of a data set, which has all of them, by their indices in the model.
+pub(super) fn named(model: &Model<'_>, dataset: &Dataset) -> Result<(Vec<String>, Vec<usize>)> {
+    let (_, known) = Candidate::Compiled(model).of(dataset)?;
+    let mut names = compile::names(model);
+    // A background is not touched, and never named.
+    names.truncate(model.known_count());
+    if names.len() < 2 {
+        return Err(CalibrateProblem::OneObject.into());
+    }
+    let missing: Vec<String> =
+        (0..names.len()).filter(|object| !known.contains(object)).map(|object| names[object].clone()).collect();
+    match missing.is_empty() {
+        true => Ok((names, known)),
+        false => Err(CalibrateProblem::Missing { objects: missing }.into()),
+    }
+}
+
+pub(super) fn check(settings: &Settings) -> Result<()> {
     let Settings { rate, confidence, sequences, .. } = *settings;
     if !(1e-9..0.5).contains(&rate) {
         return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
@@ -308,7 +318,7 @@ pub(crate) fn add_noise(model: &Model<'_>, dataset: &mut Dataset, noise: &Noise,
 }
 
 /// Share of the touches that each object of the data set gets, by its prior.
-fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
+pub(super) fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
     let weights: Vec<f64> =
         known.iter().map(|&object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect();
     let sum: f64 = weights.iter().sum();
@@ -331,7 +341,7 @@ pub fn added_bytes(noise: &Noise) -> usize {
     2 * SECTION_HEADER_LENGTH + promise + Temperature::LENGTH
 }
 
-fn finished(
+pub(super) fn finished(
     model: &Model<'_>,
     dataset: &Dataset,
     settings: &Settings,
@@ -406,5 +416,6 @@ fn finished(
         errors,
         objects: names.iter().zip(chosen.touched.iter().zip(&chosen.named)).map(of_object).collect(),
         temperature: stated.value(),
+        recorded: None,
     })
 }

@@ -21,6 +21,8 @@ pub struct TouchOrigin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
+    /// The same of recorded touches that the ensemble was adjusted to.
+    pub adjusted: BTreeMap<String, u64>,
     /// The capture that made them, where that is known.
     pub captured: Option<Captured>,
 }
@@ -29,11 +31,12 @@ impl TouchOrigin {
     const PROBE: &str = "palpate_probe";
     const NOISE: &str = "palpate_noise";
     const TOUCHES: &str = "palpate_touches";
+    const ADJUSTED: &str = "palpate_adjusted";
     const CAPTURED: &str = "palpate_captured";
 
     /// Statements of touches about themselves, and the probe that they were made with.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
-        Self { probe, touches: fingerprints(dataset), captured: Captured::of(dataset), noise: None }
+        Self { probe, touches: fingerprints(dataset), captured: Captured::of(dataset), ..Self::default() }
     }
 
     /// Statements of `origin`.
@@ -42,33 +45,37 @@ impl TouchOrigin {
     /// [`EnsembleProblem::Attribute`] for an attribute that is not what this crate writes.
     pub fn of(origin: &Origin) -> Result<Self, EnsembleProblem> {
         let attributes = &origin.attributes;
-        let touches: Option<BTreeMap<String, String>> =
-            parsed(attributes, Self::TOUCHES, "a JSON object of hexadecimal numbers")?;
-        let number = |(object, text): (String, String)| match u64::from_str_radix(&text, 16) {
-            Ok(number) => Ok((object, number)),
-            Err(error) => Err(EnsembleProblem::Attribute {
-                name: Self::TOUCHES,
-                expected: "a JSON object of hexadecimal numbers",
-                detail: error.to_string(),
-            }),
+        let numbers = |name: &'static str| -> Result<BTreeMap<String, u64>, EnsembleProblem> {
+            let expected = "a JSON object of hexadecimal numbers";
+            let read: Option<BTreeMap<String, String>> = parsed(attributes, name, expected)?;
+            let number = |(object, text): (String, String)| match u64::from_str_radix(&text, 16) {
+                Ok(number) => Ok((object, number)),
+                Err(error) => Err(EnsembleProblem::Attribute { name, expected, detail: error.to_string() }),
+            };
+            read.into_iter().flatten().map(number).collect()
         };
         Ok(Self {
             probe: parsed(attributes, Self::PROBE, "a JSON object of radius, spacing, speed, tilt and length")?,
             noise: parsed(attributes, Self::NOISE, "a JSON object of what was added to the touches in training")?,
-            touches: touches.into_iter().flatten().map(number).collect::<Result<_, _>>()?,
+            touches: numbers(Self::TOUCHES)?,
+            adjusted: numbers(Self::ADJUSTED)?,
             captured: parsed(attributes, Self::CAPTURED, "a JSON object of settings, samples and objects")?,
         })
     }
 
     /// Makes `origin` state this.
     pub fn state(&self, origin: &mut Origin) {
-        let hexadecimal = self.touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
-        let hexadecimal = Some(hexadecimal.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
+        let hexadecimal = |touches: &BTreeMap<String, u64>| {
+            let numbers = touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
+            let numbers = Some(numbers.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
+            numbers.and_then(|numbers| serde_json::to_string(&numbers).ok())
+        };
         // Numbers and strings are always JSON.
         let statements = [
             (Self::PROBE, self.probe.and_then(|probe| serde_json::to_string(&probe).ok())),
             (Self::NOISE, self.noise.and_then(|noise| serde_json::to_string(&noise).ok())),
-            (Self::TOUCHES, hexadecimal.and_then(|touches| serde_json::to_string(&touches).ok())),
+            (Self::TOUCHES, hexadecimal(&self.touches)),
+            (Self::ADJUSTED, hexadecimal(&self.adjusted)),
             (Self::CAPTURED, self.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok())),
         ];
         for (name, statement) in statements {
@@ -109,9 +116,11 @@ impl TouchOrigin {
         let stated: Vec<u16> = objects.iter().map(stated).collect();
         let (settings, samples) = captured.map_or((0, 0..u32::MAX), Captured::stated);
         let is_known = stated.iter().any(|&object| object != 0);
+        let of = |name: &String| self.adjusted.get(name).map_or(0, |&fingerprint| short(fingerprint));
+        let adjusted = objects.iter().map(of).filter(|_| !self.adjusted.is_empty());
         is_known.then(|| {
             let head = palpate_shared::format::TrainedCapture::head(settings, samples).into_iter();
-            head.chain(stated.iter().flat_map(|object| object.to_le_bytes())).collect()
+            head.chain(stated.into_iter().chain(adjusted).flat_map(u16::to_le_bytes)).collect()
         })
     }
 
@@ -123,7 +132,10 @@ impl TouchOrigin {
         let captured = self.captured.as_ref().zip(Captured::of(dataset));
         let shared: Vec<String> = captured
             .map_or_else(Vec::new, |(trained, tested)| trained.shared(&tested).into_iter().map(String::from).collect());
-        let begins = |name: &&str| own.get(*name).is_some_and(|own| self.touches.get(*name) == Some(own));
+        let begins = |name: &&str| {
+            let of = |touches: &BTreeMap<String, u64>| touches.get(*name) == own.get(*name);
+            own.contains_key(*name) && (of(&self.touches) || of(&self.adjusted))
+        };
         let same = |name: &&str| begins(name) || shared.iter().any(|shared| shared == name);
         dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
     }
@@ -306,7 +318,8 @@ pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -
         let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));
         let is_captured = is_near && captured.as_ref().and_then(|captured| captured.stated_of(name)) == object;
         let begins = fingerprints.get(*name).map(|&fingerprint| short(fingerprint));
-        object.is_some() && (is_captured || begins == object)
+        let adjusted = names.iter().position(|own| own == name).and_then(|object| stated.adjusted(object));
+        object.is_some() && (is_captured || begins == object || (begins.is_some() && begins == adjusted))
     };
     dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
 }

@@ -1,6 +1,6 @@
 //! Findings of a calibration of strangers, as they are shown.
 
-use super::{Calibrated, Settings};
+use super::{Calibrated, OnRecordings, Settings};
 
 /// A calibrated test of strangers in figures.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -21,6 +21,9 @@ pub struct Found {
     pub mean_touches_without: f64,
     /// Share of known objects' sequences detected after 30, 60 and 120 touches when their columns are not used.
     pub left_out: std::collections::BTreeMap<String, std::collections::BTreeMap<u32, f64>>,
+    /// Results of recorded sequences, where the test was calibrated on recordings too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<OnRecordings>,
 }
 
 impl Found {
@@ -29,13 +32,14 @@ impl Found {
         let terms = &calibrated.terms;
         Self {
             held: settings.held.name(),
-            promised: settings.alarms,
+            promised: calibrated.recorded.as_ref().map_or(settings.alarms, |recorded| recorded.supported),
             false_alarms: calibrated.alarms as f64 / f64::from(terms.sequences.max(1)),
             sequences: terms.sequences,
             least_touches: terms.least,
             mean_touches: calibrated.mean_touches,
             mean_touches_without: calibrated.mean_touches_without,
             left_out: calibrated.left_out.clone(),
+            recorded: calibrated.recorded.clone(),
         }
     }
 }

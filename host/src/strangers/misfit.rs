@@ -41,8 +41,16 @@ pub(super) struct Misfit {
 }
 
 impl Moments {
-    /// Of rows of margins in units, for each known object; `shapes` are mean rows.
-    pub(super) fn new(supplies: &[Supply], shapes: &[Vec<f64>], known: usize, objects: usize, unit: f64) -> Self {
+    /// Of rows of margins in units, for each known object, and of recorded ones where there are some: recorded touches
+    /// take the place of another instance. `shapes` are mean rows.
+    pub(super) fn new(
+        supplies: &[Supply],
+        recorded: Option<&[Supply]>,
+        shapes: &[Vec<f64>],
+        known: usize,
+        objects: usize,
+        unit: f64,
+    ) -> Self {
         let of_rows = |rows: &Vec<i32>| {
             let count = (rows.len() / objects).max(1) as f64;
             let mut mean = DVector::zeros(objects);
@@ -56,12 +64,13 @@ impl Moments {
             }
             (mean, covariance)
         };
-        let of = supplies.par_iter().map(|supply| {
+        let of = supplies.par_iter().enumerate().map(|(object, supply)| {
             if supply.is_short {
                 return of_short(&supply.pools, objects, unit);
             }
+            let recorded = recorded.and_then(|recorded| recorded.get(object)).map(|supply| supply.pools.concat());
             let pools: Vec<(DVector<f64>, DMatrix<f64>)> =
-                supply.pools.iter().filter(|rows| !rows.is_empty()).map(of_rows).collect();
+                supply.pools.iter().chain(&recorded).filter(|rows| !rows.is_empty()).map(of_rows).collect();
             let share = 1.0 / pools.len().max(1) as f64;
             let (mut mean, mut covariance) = (DVector::zeros(objects), DMatrix::zeros(objects, objects));
             for (own_mean, own_covariance) in &pools {

@@ -7,6 +7,9 @@
 //!                       └─ the rest ───► sequences (follow) ──► its threshold, by Learn-then-Test
 //! ```
 //!
+//! Where there are recordings, one half of them is like another instance of the simulated objects, and the other half tests the
+//! threshold too ([`calibrate_recorded`]).
+//!
 //! The misfit of n touches is half of the log-likelihood ratio of two normal distributions of the mean evidence: that of
 //! other shapes, N(μ + s, B + C/n), and that of the leading object's touches, N(μ, C/n). The first is learned on shapes of
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
@@ -25,6 +28,7 @@ mod found;
 mod leave_one_out;
 mod misfit;
 mod promised;
+mod recorded;
 #[cfg(feature = "objects")]
 mod shapes;
 #[cfg(test)]
@@ -33,6 +37,7 @@ mod tests;
 pub use found::Found;
 pub use leave_one_out::{LeftOut, Sets, leave_one_out};
 pub use promised::calibrate_with_promise;
+pub use recorded::{Alarms, OnRecordings};
 #[cfg(feature = "objects")]
 pub use shapes::captured;
 
@@ -106,6 +111,8 @@ pub struct Calibrated {
     /// For each known object the share of its sequences that are detected after 30, 60 and 120 touches when the model
     /// does not use its column: an estimate of what happens to strangers.
     pub left_out: BTreeMap<String, BTreeMap<u32, f64>>,
+    /// Results of recorded sequences, where there are recordings.
+    pub recorded: Option<OnRecordings>,
 }
 
 /// The margins of one object's touches that are evidence, in the order in which they are used.
@@ -154,24 +161,57 @@ pub fn calibrate(
     shapes: &[ObjectTouches],
     settings: &Settings,
 ) -> Result<Calibrated> {
-    check(settings)?;
-    let supplies = supplies(model, dataset, settings.seed)?;
-    calibrate_supplies(model, supplies, &of_shapes(model, shapes), settings)
+    calibrate_on(model, dataset, None, shapes, settings)
 }
 
-/// The same of margins: of each known object, and the mean ones of other shapes.
+/// The same, with `recorded` touches of every object: half of them say, beside the simulated ones of `dataset`, what touches
+/// of each object give, and the other half tests the threshold too. The stricter threshold of both is taken. Where the
+/// recordings are too few for the share of `settings`, the share that the model states is the one that they support.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_recorded(
+    model: &Model<'_>,
+    dataset: &Dataset,
+    recorded: &Dataset,
+    shapes: &[ObjectTouches],
+    settings: &Settings,
+) -> Result<Calibrated> {
+    let simulated = calibrate(model, dataset, shapes, settings)?;
+    let before = recorded::alarms(&compile::open(&simulated.bytes)?, recorded, settings)?;
+    let mut calibrated = calibrate_on(model, dataset, Some(recorded), shapes, settings)?;
+    calibrated.recorded.iter_mut().for_each(|found| found.before = before.clone());
+    Ok(calibrated)
+}
+
+fn calibrate_on(
+    model: &Model<'_>,
+    dataset: &Dataset,
+    recorded: Option<&Dataset>,
+    shapes: &[ObjectTouches],
+    settings: &Settings,
+) -> Result<Calibrated> {
+    check(settings)?;
+    let given = supplies(model, dataset, settings.seed)?;
+    let recorded = recorded.map(|recorded| supplies(model, recorded, settings.seed)).transpose()?;
+    calibrate_supplies(model, given, recorded, &of_shapes(model, shapes), settings)
+}
+
+/// The same of margins: of each known object, recorded ones too if there are some, and the mean ones of other shapes.
 pub(crate) fn calibrate_supplies(
     model: &Model<'_>,
-    supplies: Vec<Supply>,
+    given: Vec<Supply>,
+    recorded: Option<Vec<Supply>>,
     shapes: &[Vec<f64>],
     settings: &Settings,
 ) -> Result<Calibrated> {
     check(settings)?;
     let objects = model.object_count();
     let unit = f64::from(model.unit());
-    let (learn, test) = learned_and_tested(supplies, objects);
+    let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
-    let moments = Moments::new(&learn, shapes, known, objects, unit);
+    let (recorded_learn, recorded_test) = recorded.map(|all| recorded::halves(all, objects)).unzip();
+    let moments = Moments::new(&learn, recorded_learn.as_deref(), shapes, known, objects, unit);
     let misfits = misfit::misfits(&moments, None)
         .ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
     let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
@@ -193,23 +233,47 @@ pub(crate) fn calibrate_supplies(
     let strictest = strictest(is_short.then(|| follow(&learn, &to_the_end)), settings, loosest);
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
-    let kept = threshold(&sequences, settings, [loosest, strictest], least, known)?;
-    let terms = MisfitTerms { sequences: kept.sequences, ..terms(kept.threshold, least) };
+    let all = equally_many(&sequences);
+    let tried = Tried { loosest, strictest, least, gap: doubt(settings.held) };
+    let simulated = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
+        let needed = needed(settings.alarms, settings.confidence).div_ceil(known.max(1) as u64);
+        EvaluateProblem::TooFewForAlarms { object_sequences: all.len() / known.max(1), needed }
+    })?;
+    let on_recordings = match &recorded_test {
+        Some(test) => Some(recorded::tested(&follow(test, &policy), &tried, simulated, settings)?),
+        None => None,
+    };
+    let threshold = on_recordings.as_ref().map_or(simulated, |(threshold, _)| *threshold);
+    let found = on_recordings.map(|(_, found)| found);
+    let [alarms, touches] = tried.ends(&all, threshold);
+    let count = found.as_ref().map_or(all.len(), |found| found.sequences);
+    let terms = MisfitTerms {
+        sequences: u32::try_from(count).unwrap_or(u32::MAX),
+        alarms: millionths(found.as_ref().map_or(settings.alarms, |found| found.supported)),
+        ..terms(threshold, least)
+    };
     let bytes = stated(model, &terms, &misfits)?;
     let names = compile::names(model);
     let at = |path: &[f64], touches: u32| path.get(touches as usize - 1).or(path.last()).copied().unwrap_or(0.0);
+    let mean = |touches: u64| touches as f64 / all.len().max(1) as f64;
     Ok(Calibrated {
         bytes,
         terms,
-        alarms: kept.alarms,
-        mean_touches: kept.mean_touches,
-        mean_touches_without: kept.mean_touches_without,
+        alarms: found.as_ref().map_or(alarms as usize, |found| found.alarms),
+        mean_touches: mean(touches),
+        mean_touches_without: mean(all.iter().map(|sequence| u64::from(sequence.decided_after())).sum()),
         left_out: names
             .into_iter()
             .zip(&left_out)
             .map(|(name, path)| (name, [30, 60, 120].map(|touches| (touches, at(path, touches))).into()))
             .collect(),
+        recorded: found,
     })
+}
+
+/// `as` saturates.
+fn millionths(share: f64) -> u32 {
+    (share * 1e6).round() as u32
 }
 
 /// Takes the test out of a model, and what the model promises with it; a background stays.
@@ -337,8 +401,6 @@ fn below(held: Held) -> f64 {
 }
 
 fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64, least: u32) -> MisfitTerms {
-    // `as` saturates.
-    let millionths = |share: f64| (share * 1e6).round() as u32;
     MisfitTerms {
         held: settings.held,
         rivals: misfits.first().map_or(0, |misfit| misfit.rivals.len() as u8),
@@ -373,15 +435,6 @@ fn found_out(left_out: &[Vec<f64>]) -> u32 {
     (0..longest).position(|touches| mean(touches) >= FOUND_OUT).map_or(MOST_HELD, |touches| touches as u32 + 1)
 }
 
-/// A threshold that keeps the promise, and what came of it.
-struct Kept {
-    threshold: f64,
-    alarms: usize,
-    sequences: u32,
-    mean_touches: f64,
-    mean_touches_without: f64,
-}
-
 /// The threshold from which looser ones are tested. Rows of a sequence that depend on each other make a misfit that goes on
 /// growing: then where those that were learned from have half as many false alarms as are allowed, if that is beyond.
 fn strictest(learned: Option<Vec<Vec<Sequence>>>, settings: &Settings, loosest: f64) -> f64 {
@@ -390,46 +443,29 @@ fn strictest(learned: Option<Vec<Vec<Sequence>>>, settings: &Settings, loosest: 
     few.max(own).min(loosest + MOST_BEYOND)
 }
 
-/// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): from strict to loose, up to the last
-/// threshold before the first at which the observed number of false alarms would not be unlikely if the promise were
-/// broken.
-fn threshold(
-    sequences: &[Vec<Sequence>],
-    settings: &Settings,
-    [loosest, strictest]: [f64; 2],
+/// Thresholds that are tried, from strict to loose.
+struct Tried {
+    loosest: f64,
+    strictest: f64,
     least: u32,
-    known: usize,
-) -> Result<Kept> {
-    let steps = ((strictest - loosest) / STEP).round() as usize;
-    let all = equally_many(sequences);
-    let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
-    let Settings { alarms, confidence, .. } = *settings;
-    let allowed = allowed(all.len() as u64, alarms, confidence);
-    let gap = doubt(settings.held);
-    let ends = |threshold: f64| {
-        let ends = all.par_iter().map(|sequence| sequence.end(threshold, threshold - gap, least));
-        ends.map(|end| (usize::from(end.is_alarm), end.touches)).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
-    };
-    let needed = needed(alarms, confidence).div_ceil(known.max(1) as u64);
-    let few = || EvaluateProblem::TooFewForAlarms { object_sequences: fewest, needed };
-    let allowed = allowed.ok_or_else(few)?;
-    let mut kept = None;
-    for step in 0..steps {
-        let threshold = loosest + STEP * (steps - 1 - step) as f64;
-        let (alarms, touches) = ends(threshold);
-        if alarms as u64 > allowed {
-            break;
-        }
-        kept = Some((threshold, alarms, touches));
+    /// By how much a misfit must be below the threshold for a name, in nats.
+    gap: f64,
+}
+
+impl Tried {
+    /// False alarms of sequences at a threshold, and their touches.
+    fn ends(&self, sequences: &[&Sequence], threshold: f64) -> [u64; 2] {
+        let ends = sequences.par_iter().map(|sequence| sequence.end(threshold, threshold - self.gap, self.least));
+        ends.map(|end| [u64::from(end.is_alarm), end.touches]).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
-    let (threshold, alarms, touches) = kept.ok_or_else(few)?;
-    let mean = |touches: u64| touches as f64 / all.len().max(1) as f64;
-    let without = all.iter().map(|sequence| u64::from(sequence.decided_after())).sum();
-    Ok(Kept {
-        threshold,
-        alarms,
-        sequences: u32::try_from(all.len()).unwrap_or(u32::MAX),
-        mean_touches: mean(touches),
-        mean_touches_without: mean(without),
-    })
+
+    /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): the last threshold before the first at
+    /// which the observed number of false alarms would not be unlikely if the promise were broken. None if there are too few
+    /// sequences, or too many alarms at the strictest.
+    fn threshold(&self, sequences: &[&Sequence], alarms: f64, confidence: f64) -> Option<f64> {
+        let allowed = allowed(sequences.len() as u64, alarms, confidence)?;
+        let steps = ((self.strictest - self.loosest) / STEP).round() as usize;
+        let thresholds = (0..steps).map(|step| self.loosest + STEP * (steps - 1 - step) as f64);
+        thresholds.take_while(|&threshold| self.ends(sequences, threshold)[0] <= allowed).last()
+    }
 }

@@ -12,7 +12,7 @@
 //!
 //! A looser threshold gives a name no later, in every single sequence, so there are no more false alarms than were tested.
 
-use super::{Calibrated, Settings, calibrate, tested_means, without};
+use super::{Calibrated, Settings, calibrate, calibrate_recorded, tested_means, without};
 use crate::calibrate::{self, STRICTEST, add_noise, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
@@ -34,13 +34,15 @@ const EVEN: f64 = 0.5;
 
 /// Gives a model a misfit test, or replaces the one that it has, and thresholds that keep a promised error rate with that
 /// test: a sequence that ends as unknown is one without a name, and a name is given when the test lets it be. `promise.noise`
-/// is added to touches and shapes. Each of the two shares is kept with its own confidence.
+/// is added to touches and shapes. Each of the two shares is kept with its own confidence. `recorded` touches calibrate the test,
+/// as [`calibrate_recorded`] says; the error rate is promised for the simulated ones all the same.
 ///
 /// # Errors
 /// As [`strangers::calibrate`](fn@super::calibrate) and [`calibrate::calibrate`](fn@crate::calibrate::calibrate).
 pub fn calibrate_with_promise(
     model: &Model<'_>,
     dataset: &Dataset,
+    recorded: Option<&Dataset>,
     shapes: &[ObjectTouches],
     settings: &Settings,
     promise: &calibrate::Settings,
@@ -68,7 +70,11 @@ pub fn calibrate_with_promise(
     };
     let shapes: Vec<ObjectTouches> =
         if promise.noise.is_none() { shapes.to_vec() } else { shapes.iter().map(noisy).collect() };
-    let tested = calibrate(&compile::open(&begun)?, &learned, &shapes, settings)?;
+    let begun = compile::open(&begun)?;
+    let tested = match recorded {
+        Some(recorded) => calibrate_recorded(&begun, &learned, recorded, &shapes, settings)?,
+        None => calibrate(&begun, &learned, &shapes, settings)?,
+    };
     let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(strictest), progress)?;
     let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
     let tested = Calibrated { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };

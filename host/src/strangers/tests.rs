@@ -71,7 +71,7 @@ fn the_chip_computes_the_misfit_that_was_learned() {
         let model = compile::open(bytes).unwrap();
         let (objects, unit) = (model.object_count(), f64::from(model.unit()));
         let supplies = supplies(&model, &of(0..KNOWN, 4_000, 2), 1).unwrap();
-        let moments = Moments::new(&supplies, &of_shapes(&model, &shapes()), model.known_count(), objects, unit);
+        let moments = Moments::new(&supplies, None, &of_shapes(&model, &shapes()), model.known_count(), objects, unit);
         let misfits = misfit::misfits(&moments, None).unwrap();
         let settings = Settings::default();
         let tested = stated(&model, &terms(&settings, &misfits, 0.0, FIRST), &misfits).unwrap();
@@ -174,7 +174,8 @@ fn promised(seed: u64, held: Held, rate: f64) -> (crate::calibrate::Calibrated, 
     let model = compile::open(&MODELS[0]).unwrap();
     let promise = crate::calibrate::Settings { rate, max_touches: Some(60), seed, ..Default::default() };
     let settings = Settings { held, alarms: 0.05, seed, ..Settings::default() };
-    calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), &shapes(), &settings, &promise, &()).unwrap()
+    calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), None, &shapes(), &settings, &promise, &())
+        .unwrap()
 }
 
 /// Results of a model on sequences of touches that nothing was made from, each touch in one of them: shares of the
@@ -245,4 +246,53 @@ fn both_shares_promised_are_kept_in_all_but_one_of_twenty_calibrations() {
     }
     assert_rare("wrong names", wrong, repetitions, 0.05);
     assert_rare("false alarms", alarms, repetitions, 0.05);
+}
+
+/// Touches of the known objects as a robot makes them of which the simulation knows nothing.
+fn of_robot(count: usize, seed: u64) -> Dataset {
+    let mut dataset = of(0..KNOWN, count, seed);
+    dataset.add_noise(
+        &crate::probe::noise::Noise { speed: 1.25, ..crate::probe::noise::Noise::gaussian(10_000.0) },
+        seed,
+        1,
+    );
+    dataset
+}
+
+#[test]
+fn a_test_that_is_calibrated_on_recordings_keeps_its_false_alarms_on_them_and_warns_where_simulated_ones_do_not() {
+    let model = compile::open(&MODELS[0]).unwrap();
+    let (simulated, robot) = (of(0..KNOWN, 30_000, 2), of_robot(2_000, 5));
+    let settings = Settings { held: Held::Certain, ..Settings::default() };
+    let alarms = |calibrated: &Calibrated, seed| {
+        let model = compile::open(&calibrated.bytes).unwrap();
+        let alarms = recorded::alarms(&model, &of_robot(20_000, seed), &settings).unwrap();
+        alarms.all() as f64 / alarms.sequences as f64
+    };
+    let alone = calibrate(&model, &simulated, &shapes(), &settings).unwrap();
+    assert!(alarms(&alone, 6) > 0.04, "{}", alarms(&alone, 6));
+    let both = calibrate_recorded(&model, &simulated, &robot, &shapes(), &settings).unwrap();
+    let found = both.recorded.clone().unwrap();
+    assert!(found.before.differs && found.before.objects.len() == KNOWN, "{found:?}");
+    assert!(found.alarms as f64 <= found.supported * found.sequences as f64, "{found:?}");
+    assert!(alarms(&both, 6) < found.supported + 0.005, "{} {found:?}", alarms(&both, 6));
+    assert_eq!(
+        (both.terms.sequences as usize, f64::from(both.terms.alarms) * 1e-6),
+        (found.sequences, found.supported)
+    );
+    // Recordings that are like the simulation raise no warning.
+    let same = calibrate_recorded(&model, &simulated, &of(0..KNOWN, 2_000, 5), &shapes(), &settings).unwrap();
+    assert!(!same.recorded.unwrap().before.differs);
+}
+
+#[test]
+fn few_recordings_state_the_share_of_false_alarms_that_they_support() {
+    let model = compile::open(&MODELS[0]).unwrap();
+    let settings = Settings::default();
+    let few = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(300, 5), &shapes(), &settings).unwrap();
+    let found = few.recorded.unwrap();
+    assert!((10..149).contains(&found.sequences) && found.alarms == 0, "{found:?}");
+    assert!((found.supported - (1.0 - 0.05_f64.powf(1.0 / found.sequences as f64))).abs() < 2e-6, "{found:?}");
+    let none = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(4, 5), &shapes(), &settings);
+    assert!(none.unwrap_err().to_string().contains("sequences of an object"), "none at all");
 }

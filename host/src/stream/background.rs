@@ -82,7 +82,7 @@ pub(super) fn test<'s>(
             .collect()
     };
     let shapes: Vec<Vec<f64>> = wanted.background.iter().filter(|margins| !margins.is_empty()).map(mean).collect();
-    let tested = strangers::calibrate_supplies(&begun, supplies, &shapes, &wanted.settings)?;
+    let tested = strangers::calibrate_supplies(&begun, supplies, None, &shapes, &wanted.settings)?;
     let found = Found::new(&wanted.settings, &tested);
     Ok((tested.bytes, parts, begin, Some(found)))
 }

@@ -110,6 +110,13 @@ impl Groups {
         others.iter().map(right).sum::<f64>() / others.len().max(1) as f64
     }
 
+    /// The share of groups that are recognized, of all objects.
+    pub(super) fn right(&self, constants: &[f64]) -> f64 {
+        let objects: Vec<usize> = (0..self.of.len()).filter(|object| Some(*object) != self.background).collect();
+        let right = |&object: &usize| self.share(object, constants, |name| name == object);
+        objects.iter().map(right).sum::<f64>() / objects.len().max(1) as f64
+    }
+
     /// The constants with which errors balance; where a range of them does, the nearest to 0.
     pub(super) fn balanced(&self) -> Vec<f64> {
         let mut constants = vec![0.0; self.taught.len()];
@@ -180,6 +187,14 @@ impl Judged {
     /// The share of groups that are recognized, of all objects that were not taught.
     pub(super) fn others(&self) -> f64 {
         self.0.iter().map(|(groups, constants)| groups.others(constants)).sum::<f64>() / self.0.len() as f64
+    }
+
+    /// The share of groups that are recognized, of all objects, with this share of the constants.
+    pub(super) fn right(&self, share: f64) -> f64 {
+        let right = |(groups, constants): &(Groups, Vec<f64>)| {
+            groups.right(&constants.iter().map(|constant| share * constant).collect::<Vec<_>>())
+        };
+        self.0.iter().map(right).sum::<f64>() / self.0.len() as f64
     }
 }
 

@@ -38,6 +38,40 @@ pub(super) fn check(
     Ok(descriptor)
 }
 
+/// Refuses what a model cannot be adjusted to, all of it before the work begins.
+pub(super) fn adjustable(
+    ensemble: &Ensemble,
+    known: &Dataset,
+    recorded: &Dataset,
+    settings: &Settings,
+) -> Result<Descriptor> {
+    self::settings(settings)?;
+    ensemble.check()?;
+    let descriptor = ensemble.descriptor().ok_or(TeachProblem::NotOfTouches)?;
+    if ensemble.trees.iter().any(|tree| tree.output != Output::Each) {
+        return Err(TeachProblem::OneValue.into());
+    }
+    let is_known = |name: &String| ensemble.objects[..ensemble.known_count()].contains(name);
+    if recorded.objects.is_empty() {
+        return Err(TeachProblem::Nothing.into());
+    }
+    if let Some(object) = recorded.objects.iter().find(|object| !is_known(&object.name)) {
+        return Err(TeachProblem::NotKnown { object: object.name.clone() }.into());
+    }
+    let has_touches = |name: &&String| {
+        known.objects.iter().chain(&recorded.objects).any(|object| object.name == **name && !object.is_empty())
+    };
+    let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
+    if !missing.is_empty() {
+        return Err(TeachProblem::Missing { objects: missing }.into());
+    }
+    let stated = TouchOrigin::of(&ensemble.origin)?.probe.or_else(|| StatedProbe::of(known));
+    same_probe(stated, ensemble.trained_touches().largest_spread, recorded)?;
+    approaches(ensemble.trained_touches().counted, recorded)?;
+    poses(descriptor, recorded)?;
+    Ok(descriptor)
+}
+
 /// Names that the ensemble, with the recorded objects, can have.
 fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
     if recorded.objects.is_empty() {

@@ -29,6 +29,12 @@ pub enum TeachProblem {
         /// The name.
         object: String,
     },
+    /// A model is adjusted to objects that it knows.
+    #[error("{object} is not known: a model is adjusted to recorded touches of the objects that it knows")]
+    NotKnown {
+        /// The name.
+        object: String,
+    },
     /// Partial touches are evidence, but none were recorded.
     #[error(
         "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never \
@@ -77,10 +83,10 @@ impl Problem for TeachProblem {
                 "Give the data set that the ensemble was trained on, or another one of the same objects."
             }
             Self::Known { .. } => {
-                "Teaching adds objects and does not adjust known ones: to train for the probe that made the recordings, fit it \
-                 (`palpate probe fit`) and capture with the file; to learn the object from the recordings alone, leave it out \
-                 of the simulated touches; or rename its recording to teach it as another object."
+                "Adjust the model to the recorded touches of objects that it knows, or rename the recording to teach it as \
+                 another object."
             }
+            Self::NotKnown { .. } => "Teach it as a new object.",
             Self::FullTouches { .. } => {
                 "Record every approach, also those that missed a finger, or train on full touches."
             }

@@ -86,7 +86,7 @@ pub(super) fn places(name: &str, count: usize, seed: u64) -> Vec<f64> {
 }
 
 /// Where a touch of an object that the trees know is: spread evenly, by the golden ratio.
-fn known_place(source: u32) -> f64 {
+pub(super) fn known_place(source: u32) -> f64 {
     (f64::from(source) * 0.618_033_988_749_894_9).fract()
 }
 
@@ -146,7 +146,7 @@ impl Material {
         });
         let parts: Vec<Part<'_>> = known.chain(recorded).collect();
         let priors: Vec<f64> = smoothings.iter().map(|smoothing| smoothing.prior).collect();
-        fit(&self.leaves, &parts, &priors)
+        fit(&self.leaves, &parts, &priors, &vec![None; priors.len()])
     }
 
     /// The columns of all recorded objects, fitted on all touches.

@@ -4,11 +4,16 @@
 //! more. A few hundred touches suffice where new trees would need thousands, and the values of the other objects do not
 //! change. [`alone`](fn@alone) trains an ensemble on recorded touches and nothing else.
 //!
+//! [`adjust`](fn@adjust) changes the values of objects that an ensemble knows by recorded touches of them, as far as that helps.
+//!
 //! Few touches have not shown everything that an object can do. So they are repeated under jitter, and the values of
 //! leaves are drawn towards 0 by a prior; how much of both is chosen for each object by cross-validation. Then a constant
 //! is added to the object's margin with every touch, so that errors balance: it is missed as often as its name is given
 //! to others. No touch, nor a copy of it, is ever fitted on and held out at once.
 
+mod adjust;
+#[cfg(test)]
+mod adjust_tests;
 mod alone;
 mod balance;
 mod check;
@@ -21,6 +26,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
+pub use adjust::{Adjusted, AdjustedObject, Fitness, adjust};
 pub use alone::alone;
 pub use curve::{Curve, Point};
 pub use error::TeachProblem;
@@ -273,27 +279,26 @@ fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], const
     }
     let objects = (at, recorded.objects.len());
     if let Some(trained) = &mut extended.origin.trained {
-        let has_stroke = TouchOrigin::of(&ensemble.origin)
-            .is_ok_and(|stated| stated.probe.is_some_and(|stated| stated.probe.stroke.is_some()));
-        let largest_spread = trained.touches.largest_spread;
-        trained.touches = with(trained.touches, &recorded.objects);
-        // With a stroke it is that of the hand, whatever a recording's clock says.
-        if has_stroke {
-            trained.touches.largest_spread = largest_spread;
-        }
+        trained.touches = with(ensemble, trained.touches, &recorded.objects);
         trained.shares = trained.shares.map(|shares| mean(shares, recorded.shares(), objects));
     }
     extended
 }
 
-/// Touches that are evidence to a model that was also taught these objects.
-fn with(mut trained: TrainedTouches, recorded: &[ObjectTouches]) -> TrainedTouches {
-    let patterns = trained.counted.patterns();
+/// Touches that are evidence to a model that was also taught these recordings.
+fn with(ensemble: &Ensemble, mut trained: TrainedTouches, recorded: &[ObjectTouches]) -> TrainedTouches {
+    let (patterns, largest_spread) = (trained.counted.patterns(), trained.largest_spread);
     for touch in recorded.iter().flat_map(ObjectTouches::touches) {
         if patterns.contains(touch.pattern()) && (touch.pose().is_some() || !trained.needs_pose) {
             trained.patterns = trained.patterns.with(touch.pattern());
             trained.largest_spread = trained.largest_spread.max(touch.spread());
         }
+    }
+    let has_stroke = TouchOrigin::of(&ensemble.origin)
+        .is_ok_and(|stated| stated.probe.is_some_and(|stated| stated.probe.stroke.is_some()));
+    // With a stroke it is that of the hand, whatever a recording's clock says.
+    if has_stroke {
+        trained.largest_spread = largest_spread;
     }
     trained
 }

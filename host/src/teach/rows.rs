@@ -111,8 +111,11 @@ impl Rows {
     }
 }
 
-/// ln Σ exp(x).
+/// ln Σ exp(x); −∞ of nothing.
 pub(super) fn log_sum(numbers: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = numbers.clone().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return most;
+    }
     most + numbers.map(|number| (number - most).exp()).sum::<f64>().ln()
 }

@@ -180,7 +180,7 @@ fn a_prior_counts_touches_and_not_their_copies() {
             Part { rows, chosen: (0..rows.count() as u32).collect(), column }
         };
         let parts = [part(&known[0], None), part(&known[1], None), part(&own, Some(0))];
-        fit(&leaves, &parts, &[4.0]).remove(0)
+        fit(&leaves, &parts, &[4.0], &[None]).remove(0)
     };
     let (single, thrice) = (columns(once), columns(&once.repeat(3)));
     assert!(single.iter().zip(&thrice).all(|(a, b)| (a - b).abs() < 1e-9));

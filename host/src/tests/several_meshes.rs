@@ -165,7 +165,7 @@ fn promises_are_kept_where_objects_have_several_meshes() {
         let shapes = synthetic::dataset(&[400; 30], 5).objects;
         let terms = calibrate::Settings { rate: LARGER_RATE, ..promise(Per::Average, seed) };
         let (model, other) = (MODEL.model(), touches(16_000, 2_000 + seed));
-        let tested = strangers::calibrate_with_promise(&model, &other, &shapes, &settings, &terms, &());
+        let tested = strangers::calibrate_with_promise(&model, &other, None, &shapes, &settings, &terms, &());
         let tested = promised(tested).map(|(tested, _)| ends(&tested.model));
         broken[2] += u64::from(tested.is_some_and(|[unknown, _]| unknown > settings.alarms));
         broken[3] += u64::from(tested.is_some_and(|[_, wrong]| wrong > LARGER_RATE));

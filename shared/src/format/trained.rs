@@ -237,7 +237,8 @@ impl PatternShares {
     }
 }
 
-/// Kind of touches that a model was trained on, for whoever tests it on others: 12 bytes, and 2 for each object.
+/// Kind of touches that a model was trained on, for whoever tests it on others: 12 bytes, and 2 for each object; 2 more if it was
+/// adjusted to recordings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrainedCapture<'a> {
     /// 16 bits of a checksum of the capture's seed and settings; 0 if no capture is known.
@@ -245,6 +246,7 @@ pub struct TrainedCapture<'a> {
     /// The samples of each object; an end of `u32::MAX` stands for that or more.
     pub samples: Range<u32>,
     objects: &'a [[u8; 2]],
+    adjusted: &'a [[u8; 2]],
 }
 
 /// Bytes of [`TrainedCapture`] before the objects.
@@ -266,10 +268,12 @@ impl<'a> TrainedCapture<'a> {
     /// Cost: a few instructions.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
         let (&[a, b, _, _, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk::<CAPTURE>()?;
+        let (objects, adjusted) = rest.as_chunks().0.split_at_checked(objects)?;
         Some(Self {
             settings: u16::from_le_bytes([a, b]),
             samples: u32::from_le_bytes([c, d, e, f])..u32::from_le_bytes([g, h, i, j]),
-            objects: rest.as_chunks().0.get(..objects)?,
+            objects,
+            adjusted,
         })
     }
 
@@ -277,6 +281,13 @@ impl<'a> TrainedCapture<'a> {
     /// known.
     pub fn object(&self, object: usize) -> Option<u16> {
         self.objects.get(object).map(|bytes| u16::from_le_bytes(*bytes)).filter(|&object| object != 0)
+    }
+
+    /// 16 bits of a checksum of the first recorded touches of an object that the model was adjusted to; none if it was not.
+    ///
+    /// Cost: a few instructions. Cannot fail.
+    pub fn adjusted(&self, object: usize) -> Option<u16> {
+        self.adjusted.get(object).map(|bytes| u16::from_le_bytes(*bytes)).filter(|&object| object != 0)
     }
 }
 

@@ -7,13 +7,14 @@ use super::real::RealArguments;
 use super::sequences::{self, Calibration, SequenceArguments};
 use super::strangers::StrangersArguments;
 use palpate::Result;
-use palpate::calibrate::{self, Calibrated, Per, Settings, Worse};
+use palpate::calibrate::{self, Calibrated, OfRecorded, Per, Settings, Worse};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::strangers::{self, Found};
+use palpate::touches::Dataset;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -22,7 +23,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. Wrong names break it; a sequence without a name is undecided, neither right nor wrong. docs/reference/options.md says how thresholds are found, and how many touches that takes.
 
-With --strangers the model also tests whether touches fit any object that it knows. With --plan it gets a plan of approaches instead, and DIR holds approaches with pose.
+With --recorded thresholds are found on the touches of DIR and tested on recorded ones, for which the promise then holds; that takes fewer recordings than a calibration on them alone. With --strangers the model also tests whether touches fit any object that it knows. With --plan it gets a plan of approaches instead, and DIR holds approaches with pose.
 
 Of a model over rows, DIR is a file of sequences of rows: CSV or Parquet. Rows of a sequence may depend on each other; sequences, or with --group-column groups, must not.
 
@@ -30,6 +31,7 @@ Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
   palpate calibrate model.palpate fresh -o names.palpate --per name
+  palpate calibrate model.palpate fresh -o robot.palpate --recorded robot
   palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
   palpate calibrate planned.palpate fresh -o calibrated.palpate --active
@@ -40,6 +42,9 @@ pub(crate) struct Arguments {
     /// Touches to calibrate on: a directory that `palpate capture` filled; or a file of sequences of rows
     #[arg(value_name = "DIR")]
     directory: PathBuf,
+    /// Test the thresholds on these recorded touches, or calibrate --strangers on them; a directory
+    #[arg(long, value_name = "DIR", conflicts_with = "plan")]
+    recorded: Option<PathBuf>,
     /// Where to write; the calibrated model
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
@@ -87,13 +92,12 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return rows(&arguments, global);
     }
     output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
-    let compiled = CompiledModel::read(&arguments.model)?;
-    let dataset = super::dataset(&arguments.directory)?;
-    let trained_on = compiled_trained_on(&compiled, &dataset);
-    if !trained_on.is_empty() {
-        let objects = trained_on.into_iter().map(String::from).collect();
-        return Err(Error::at(Place::file(&arguments.directory), CalibrateProblem::TrainedOn { objects }));
+    if let Some(recorded) = &arguments.recorded {
+        output::refuse_input(&arguments.output, super::files_of(recorded))?;
     }
+    let compiled = CompiledModel::read(&arguments.model)?;
+    let dataset = untrained(&compiled, &arguments.directory)?;
+    let recorded = arguments.recorded.as_ref().map(|recorded| untrained(&compiled, recorded)).transpose()?;
     let file = arguments.probe.read()?;
     arguments.probe.of_dataset(file.as_ref(), &dataset)?;
     let settings = Settings {
@@ -106,11 +110,18 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         active: arguments.active,
         seed: global.seed(),
     };
-    let wrong = |error: palpate::Error| error.in_file(&arguments.directory);
+    let wrong = |error: palpate::Error| match (error.problem(), &arguments.recorded) {
+        (Some(CalibrateProblem::NotSupported { .. }), Some(recorded)) => error.in_file(recorded),
+        _ => error.in_file(&arguments.directory),
+    };
     let (calibrated, found) = match arguments.strangers.held() {
         None => {
             let untested = strangers::without(&compiled.model())?;
-            let calibrated = calibrate::calibrate(&compile::open(&untested)?, dataset, &settings, &Bar::new());
+            let model = compile::open(&untested)?;
+            let calibrated = match &recorded {
+                Some(recorded) => calibrate::calibrate_recorded(&model, dataset, recorded, &settings, &Bar::new()),
+                None => calibrate::calibrate(&model, dataset, &settings, &Bar::new()),
+            };
             (calibrated.map_err(wrong)?, None)
         }
         Some(held) => {
@@ -122,8 +133,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
                 ..Default::default()
             };
             let shapes = arguments.strangers.shapes(&dataset)?;
+            let (model, recorded) = (compiled.model(), recorded.as_ref());
             let both =
-                strangers::calibrate_with_promise(&compiled.model(), &dataset, &shapes, &test, &settings, &Bar::new());
+                strangers::calibrate_with_promise(&model, &dataset, recorded, &shapes, &test, &settings, &Bar::new());
             let (calibrated, tested) = both.map_err(wrong)?;
             (calibrated, Some(Found::new(&test, &tested)))
         }
@@ -155,6 +167,17 @@ fn rows(arguments: &Arguments, global: &Global) -> Result<()> {
         background: arguments.strangers.background(),
     };
     sequences::calibrate(asked, global)
+}
+
+/// Touches that the model was not trained on.
+fn untrained(compiled: &CompiledModel, directory: &PathBuf) -> Result<Dataset> {
+    let dataset = super::dataset(directory)?;
+    let trained_on = compiled_trained_on(compiled, &dataset);
+    if trained_on.is_empty() {
+        return Ok(dataset);
+    }
+    let objects = trained_on.into_iter().map(String::from).collect();
+    Err(Error::at(Place::file(directory), CalibrateProblem::TrainedOn { objects }))
 }
 
 /// Results of both calibrations.
@@ -210,7 +233,27 @@ fn text(calibrated: &Calibrated) -> String {
         .objects
         .values()
         .any(|of| 2 * of.given < calibrated.sequences as u64 / calibrated.objects.len() as u64);
-    text + &worse(&calibrated.worse(), calibrated.promised, calibrated.promise.per, hidden)
+    text + &calibrated.recorded.as_ref().map_or_else(String::new, |recorded| of_recorded(recorded, calibrated))
+        + &worse(&calibrated.worse(), calibrated.promised, calibrated.promise.per, hidden)
+}
+
+/// Statements about a promise that was tested on recordings.
+fn of_recorded(recorded: &OfRecorded, calibrated: &Calibrated) -> String {
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let text = format!(
+        "Tested on recorded touches, {} approaches to each object or more. Of the simulated names {} are wrong at this threshold.\n",
+        recorded.approaches,
+        percent(recorded.simulated_error)
+    );
+    match recorded.recordings {
+        Some(recordings) => format!(
+            "{text}note: the {} sequences are of {recordings} recordings. Sequences of one recording are not independent, so that the \
+             promise may hold with a lower probability than {} %: record on several days.\n",
+            calibrated.sequences,
+            super::percent(calibrated.confidence)
+        ),
+        None => text,
+    }
 }
 
 /// A warning of objects that a rate of other names hides; `hidden` if one has few names.

@@ -3,7 +3,7 @@
 use super::progress::Bar;
 use palpate::Result;
 use palpate::mesh::builtin::BACKGROUND_SHAPES;
-use palpate::strangers::{self, Found};
+use palpate::strangers::{self, Found, OnRecordings};
 use palpate::touches::{Dataset, ObjectTouches};
 use palpate_shared::format::Held;
 use std::fmt::Write as _;
@@ -59,6 +59,7 @@ pub(crate) fn text(found: &Found) -> String {
         found.mean_touches,
         found.mean_touches_without,
     );
+    text += &found.recorded.as_ref().map_or_else(String::new, on_recordings);
     let width = found.left_out.keys().map(|name| name.chars().count()).max().unwrap_or(0).max("left out".len());
     // Writing to a string cannot fail.
     _ = writeln!(text, "{:width$} {:>8} {:>8} {:>8}", "left out", "30", "60", "120");
@@ -77,4 +78,29 @@ fn held(name: &str) -> Result<Wanted, String> {
         "off" => Ok(Wanted(None)),
         _ => known.map(|held| Wanted(Some(held))).ok_or_else(|| "use one of off, likely, certain".to_owned()),
     }
+}
+
+/// Results of recorded sequences, and a warning where they differ from simulated ones.
+fn on_recordings(found: &OnRecordings) -> String {
+    let OnRecordings { sequences, alarms, supported, before } = found;
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut text = format!(
+        "The test rests on recorded touches: {alarms} of {sequences} sequences ended as unknown; so many support a share of {}.\n",
+        percent(*supported)
+    );
+    if before.differs {
+        let mut worst: Vec<(&String, &usize)> = before.objects.iter().filter(|(_, alarms)| **alarms > 0).collect();
+        worst.sort_by(|a, b| b.1.cmp(a.1));
+        let worst: Vec<String> = worst.iter().take(3).map(|(name, alarms)| format!("{alarms} of {name}")).collect();
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "warning: recorded touches fit their objects worse than simulated ones: calibrated on these alone, the test would \
+             call {} of {} recorded sequences unknown ({}). Simulate the probe as it is (`palpate probe fit`).",
+            before.all(),
+            before.sequences,
+            worst.join(", ")
+        );
+    }
+    text
 }

@@ -1,7 +1,7 @@
 //! Options and output of `palpate train` for recorded touches.
 
 use palpate::error::{Error, Place, Result, TouchesProblem};
-use palpate::teach::{Taught, TaughtObject};
+use palpate::teach::{Adjusted, Taught, TaughtObject};
 use palpate::touches::{Dataset, ObjectTouches, is_log};
 use palpate_report::teach::{more_approaches, page, promise};
 use std::fmt::Write as _;
@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 /// Recorded touches, and what they are taught to.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TeachArguments {
-    /// Recorded touches of objects without a mesh: a directory, a file called like its object, or a log; repeatable
+    /// Recorded touches of new objects, or of known ones to adjust to; a directory, a file called like its object, or a log; repeatable
     #[arg(long, value_name = "DIR|FILE")]
     pub(crate) teach: Vec<PathBuf>,
-    /// Teach the recorded objects to this ensemble, instead of training another one
+    /// Teach the recorded touches to this ensemble, instead of training another one
     #[arg(
         long,
         value_name = "FILE",
@@ -40,6 +40,16 @@ impl TeachArguments {
             }
         }
         Ok(all)
+    }
+
+    /// Refuses a page about nothing.
+    pub(crate) fn check_page(&self, taught: Option<&Taught>) -> Result<()> {
+        match &self.page {
+            Some(path) if taught.is_none() => {
+                Err(Error::setting("page", path.display(), "it with recorded touches of a new object"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Writes the page, if one is wanted. The command that remakes it is this program's own.
@@ -96,6 +106,34 @@ pub(crate) fn text(taught: &Taught) -> String {
     }
     _ = writeln!(text, "\n{}", promise(taught));
     text
+}
+
+/// Results of adjusting to recorded touches of known objects.
+pub(crate) fn adjusted(adjusted: &Adjusted) -> String {
+    let Adjusted { objects, prior, share, approaches, given, adjusted: after, is_better } = adjusted;
+    let recorded: Vec<String> =
+        objects.iter().map(|object| format!("{} ({})", object.name, object.approaches)).collect();
+    let leaves = match prior {
+        Some(prior) => format!("leaves with a prior of {prior} touches"),
+        None => "leaves as they were".into(),
+    };
+    let constants = match *share {
+        0.0 => "no constants".into(),
+        share => format!("{} % of the constants that balance errors", 100.0 * share),
+    };
+    let mut text = format!(
+        "\nRecorded approaches to known objects: {}. Chosen on touches that were held out: {leaves}, {constants}.\n",
+        recorded.join(", ")
+    );
+    // Writing to a string cannot fail.
+    _ = writeln!(text, "{:>14}  {:>15}  recognized after {approaches} approaches", "", "loss of a touch");
+    for (name, fitness) in [("as given", given), ("adjusted", after)] {
+        _ = writeln!(text, "{name:>14}  {:>10.4} nats  {:>8} %", fitness.loss, percent(fitness.recognized));
+    }
+    text + match is_better {
+        true => "The adjusted model is better, and was saved.\n",
+        false => "warning: the adjusted model is no better than the given one, which was saved as it was.\n",
+    }
 }
 
 fn of_object(object: &TaughtObject, taught: &Taught) -> String {

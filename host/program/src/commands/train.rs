@@ -10,7 +10,7 @@ use palpate::evaluate::{self, CostOfNoise};
 use palpate::mesh::BACKGROUND;
 use palpate::output;
 use palpate::probe::noise::Noise;
-use palpate::teach::{self, Taught};
+use palpate::teach::{self, Adjusted, Taught};
 use palpate::touches::{Dataset, ObjectTouches};
 use palpate::{Error, Result};
 use palpate_onboard::Refused;
@@ -89,6 +89,9 @@ struct Trained<'m> {
     /// Results of teaching from recorded touches.
     #[serde(skip_serializing_if = "Option::is_none")]
     taught: Option<&'m Taught>,
+    /// Results of adjusting to recorded touches of known objects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adjusted: Option<&'m Adjusted>,
 }
 
 /// The noise whose cost is given, in microseconds: what a good switch and a timer add.
@@ -99,6 +102,7 @@ struct Made {
     ensemble: Ensemble,
     dataset: Dataset,
     taught: Option<Taught>,
+    adjusted: Option<Adjusted>,
     /// True if it was trained here, on simulated touches without noise.
     is_clean: bool,
     settings: Settings,
@@ -115,6 +119,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         (Some(directory), recorded) => simulated(&arguments, global, directory, recorded.as_ref())?,
         (None, recorded) => alone(&arguments, global, recorded.unwrap_or_default())?,
     };
+    arguments.teach.check_page(made.taught.as_ref())?;
     let seconds = start.elapsed().as_secs_f64();
     made.ensemble.save(&arguments.output)?;
     arguments.teach.write_page(made.taught.as_ref())?;
@@ -127,7 +132,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 
 impl<'m> Trained<'m> {
     fn new(made: &'m Made, seconds: f64) -> Result<Self> {
-        let Made { ensemble, dataset, taught, is_clean, settings } = made;
+        let Made { ensemble, dataset, taught, adjusted, is_clean, settings } = made;
         let evidence = ensemble.trained_touches();
         let is_used = |touch: &&Touch| Refused::check(&evidence, touch).is_ok();
         let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
@@ -145,6 +150,7 @@ impl<'m> Trained<'m> {
             leaves: nodes - splits,
             seconds,
             taught: taught.as_ref(),
+            adjusted: adjusted.as_ref(),
             cost_of_noise: match is_clean {
                 true => evaluate::cost_of_noise(dataset, settings, &Noise::gaussian(SWITCH))?,
                 false => None,
@@ -172,7 +178,9 @@ fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
         },
         trained.seconds
     );
-    text + &cost(trained, made.is_clean) + &trained.taught.map_or_else(String::new, super::teach::text)
+    text + &cost(trained, made.is_clean)
+        + &trained.adjusted.map_or_else(String::new, super::teach::adjusted)
+        + &trained.taught.map_or_else(String::new, super::teach::text)
 }
 
 /// Trains on simulated touches, or takes the ensemble that was, and teaches it the recorded ones, if there are any.
@@ -196,7 +204,7 @@ fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, record
     };
     let is_clean = recorded.is_none() && dataset.real().and(&settings.noise).is_none();
     let Some(recorded) = recorded else {
-        return Ok(Made { ensemble, dataset, taught: None, is_clean, settings });
+        return Ok(Made { ensemble, dataset, taught: None, adjusted: None, is_clean, settings });
     };
     let mut known = dataset.clone();
     if let Some(background) = background {
@@ -205,8 +213,23 @@ fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, record
     // An ensemble that is there states what it was trained for.
     let noise = arguments.teach.extend.is_none().then_some(settings.noise);
     let how = teach::Settings { noise, ..teaching(&settings) };
-    let (ensemble, taught) = teach::teach(&ensemble, &known, recorded, &how, &Bar::new())?;
-    Ok(Made { ensemble, dataset, taught: Some(taught), is_clean, settings })
+    let [old, new] =
+        [true, false].map(|is_known| recorded.only(|name| ensemble.objects.iter().any(|own| own == name) == is_known));
+    let (ensemble, adjusted) = match old.objects.is_empty() {
+        true => (ensemble, None),
+        false => {
+            let (ensemble, adjusted) = teach::adjust(&ensemble, &known, &old, &how, &Bar::new())?;
+            (ensemble, Some(adjusted))
+        }
+    };
+    let (ensemble, taught) = match new.objects.is_empty() && adjusted.is_some() {
+        true => (ensemble, None),
+        false => {
+            let (ensemble, taught) = teach::teach(&ensemble, &known, &new, &how, &Bar::new())?;
+            (ensemble, Some(taught))
+        }
+    };
+    Ok(Made { ensemble, dataset, taught, adjusted, is_clean, settings })
 }
 
 /// Trains on recorded touches alone.
@@ -226,7 +249,7 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
     let probe = arguments.probe.of_dataset(file.as_ref(), &recorded)?;
     let settings = Settings { probe, noise: Noise::default(), ..arguments.settings(global) };
     let (ensemble, taught) = teach::alone(&recorded, &settings, &teaching(&settings), &Bar::new())?;
-    Ok(Made { ensemble, dataset: recorded, taught: Some(taught), is_clean: false, settings })
+    Ok(Made { ensemble, dataset: recorded, taught: Some(taught), adjusted: None, is_clean: false, settings })
 }
 
 /// Settings for teaching objects to an ensemble of such a training.

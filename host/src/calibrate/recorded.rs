@@ -1,0 +1,272 @@
+//! A promise for a real robot: thresholds that are found on simulated sequences, and tested on recorded ones.
+//!
+//! Recordings are few. Followed as far as a calibration from nothing follows its sequences, they make too few for a
+//! promise. So simulated sequences say where to begin:
+//!
+//! - the thresholds and their order, from strict to loose, come from the simulated sequences, and so does the first one
+//!   that is tested: the one at which so many recordings are likeliest to pass. It depends on how many approaches were
+//!   recorded, and on nothing that they say;
+//! - at each threshold the recordings, in an order that is drawn once, are cut into sequences that share no touch and end
+//!   where a name is given. A looser threshold has more of them;
+//! - the thresholds are walked over on these ([`walk`]); the loosest before the first that fails is kept.
+//!
+//! Fixed-sequence testing needs no more: an order that the tested sequences had no part in, and at each threshold a test
+//! that is valid by itself. If the simulation is wrong, a promise that could have been made is missed, and none is broken.
+
+use super::choose::{By, Terms, steps, summary, tallies};
+use super::draw::{Moment, Supply, Until, follow, follow_plan};
+use super::error::{Forecast, two_digits};
+use super::model::{Calibrated, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, shares};
+use super::sequence::{Odds, Sequence, margin_of};
+use super::temperature::temperature;
+use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
+use crate::compile;
+use crate::error::{CalibrateProblem, EvaluateProblem, Result};
+use crate::probe::noise::Noise;
+use crate::progress::{self, Progress};
+use crate::touches::{Dataset, Source};
+use palpate_onboard::{Model, Stopping};
+use serde::Serialize;
+
+/// The probability with which a forecast number of approaches is enough, if the simulation is right.
+const LIKELY: f64 = 0.8;
+/// Of first thresholds that pass with nearly the same probability, to this share, the strictest is taken.
+const AS_LIKELY: f64 = 0.95;
+/// A probability below which recordings that make too few names are not tested at all.
+const HOPELESS: f64 = 0.01;
+/// Error rates that a forecast tries.
+const RATES: [f64; 17] =
+    [0.001, 0.002, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4];
+/// The factor between numbers of approaches that a forecast tries, and how many it tries.
+const GROWTH: f64 = 1.05;
+const GROWN: i32 = 160;
+
+/// Facts about a promise that was tested on recordings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct OfRecorded {
+    /// Approaches that were recorded to the object with the fewest.
+    pub approaches: usize,
+    /// Recordings that the sequences are of, where the data set lists any: sequences of one are not independent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recordings: Option<usize>,
+    /// Share of wrong names on simulated sequences at the thresholds that were kept.
+    pub simulated_error: f64,
+}
+
+/// Sets a model's thresholds, as [`calibrate`](fn@super::calibrate) does, for touches like the `recorded` ones: thresholds are
+/// found on `simulated` sequences, to which the noise of `settings` is added, and tested on the recorded ones, which have
+/// their own. The model was trained on neither.
+///
+/// # Errors
+/// As [`calibrate`](fn@super::calibrate); [`CalibrateProblem::NotSupported`] if the recordings do not support the rate.
+pub fn calibrate_recorded(
+    model: &Model<'_>,
+    mut simulated: Dataset,
+    recorded: &Dataset,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
+    check(settings)?;
+    let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
+    compile::stopping(settings.rate, max_touches)?;
+    let (names, _) = named(model, &simulated)?;
+    let (_, known) = named(model, recorded)?;
+    add_noise(model, &mut simulated, &settings.noise, max_touches, noise_seed(settings));
+    let strictest = ((1.0 - settings.rate) / settings.rate).ln() + STRICTEST[0];
+    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let (cut, by) = (Cut { model, names: &names, settings, max_touches }, By::of(settings.per, names.len()));
+    progress.begin("calibrating", Some(settings.sequences as u64));
+    let sequences = cut.sequences(&simulated, settings.sequences, strictest, progress)?;
+    let steps = steps(&sequences, names.len(), strictest, &terms);
+    let foreseen = Foreseen::new(&sequences, &steps, by, recorded, &known);
+    let of_step = |odds: &Odds| -> Result<(Vec<Sequence>, Vec<Tally>)> {
+        progress::check(progress)?;
+        let sequences = cut.sequences(recorded, recorded.len(), margin_of(odds.strictest()), &())?;
+        let tallies = tallies(&sequences.iter().collect::<Vec<_>>(), odds, by);
+        Ok((sequences, tallies))
+    };
+    if let Some(step) = foreseen.too_few(&terms) {
+        let (_, tallies) = of_step(&steps[step])?;
+        let fewest = (0..tallies.len()).min_by_key(|&position| tallies[position].all).unwrap_or(0);
+        let found = tallies.get(fewest).map_or(0, |tally| tally.all);
+        if found < needed(terms.rate, terms.confidence) {
+            return Err(foreseen.problem(Stop::TooFew { position: fewest, found }, &names, &terms).into());
+        }
+    }
+    let mut failed = None;
+    let tested = (foreseen.first(&terms)..steps.len()).map_while(|step| match of_step(&steps[step]) {
+        Ok((_, tallies)) => Some((step, tallies)),
+        Err(error) => {
+            failed = Some(error);
+            None
+        }
+    });
+    let kept = walk(tested, settings.rate, settings.confidence);
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    let Kept { threshold: step, tallies } = kept.map_err(|stop| foreseen.problem(stop, &names, &terms))?;
+    let (sequences, _) = of_step(&steps[step])?;
+    let chosen = summary(steps[step].clone(), tallies, &sequences.iter().collect::<Vec<_>>(), names.len());
+    let temperature = temperature(model, recorded, &known);
+    let plain = Settings { noise: Noise::default(), ..settings.clone() };
+    let calibrated = finished(model, recorded, &plain, max_touches, &names, &chosen, temperature)?;
+    let simulated_error = foreseen.steps[step].error();
+    let facts = OfRecorded { approaches: foreseen.fewest, recordings: recordings(recorded), simulated_error };
+    Ok(Calibrated { recorded: Some(facts), ..calibrated })
+}
+
+/// Recordings or logs that a data set's touches are of; none where it does not say.
+fn recordings(dataset: &Dataset) -> Option<usize> {
+    let of = |source: &&Source| matches!(source, Source::Recording(_) | Source::Log(_));
+    let count = dataset.objects.iter().map(|object| object.sources().iter().filter(of).count()).sum();
+    (count > 0).then_some(count)
+}
+
+/// Cutting of touches into sequences.
+struct Cut<'c> {
+    model: &'c Model<'c>,
+    names: &'c [String],
+    settings: &'c Settings,
+    max_touches: u32,
+}
+
+impl Cut<'_> {
+    /// Sequences that share no touch, of all objects as often as the priors say, at most so many, to a margin in nats.
+    fn sequences(&self, dataset: &Dataset, most: usize, margin: f64, progress: &dyn Progress) -> Result<Vec<Sequence>> {
+        let (_, known) = named(self.model, dataset)?;
+        let objects = dataset.objects.iter().zip(&known);
+        let mut supplies: Vec<Supply<'_>> =
+            objects.map(|(touched, &object)| Supply::new(object, touched, self.settings.seed)).collect();
+        if self.settings.active {
+            let plan = self.model.plan().ok_or(EvaluateProblem::NoPlan)?;
+            if !dataset.holds_approaches() {
+                return Err(EvaluateProblem::NoApproaches.into());
+            }
+            follow_plan(&mut supplies, self.names, &plan)?;
+        }
+        let shares = shares(self.model, &known);
+        let wanted: Vec<usize> = shares.iter().map(|share| (share * most as f64).round().max(1.0) as usize).collect();
+        let until = Until { margin, max_touches: self.max_touches };
+        follow(self.model, &mut supplies, &wanted, until, || |_: &Moment<'_>| true, progress)
+    }
+}
+
+/// A threshold on simulated sequences.
+struct Step {
+    tallies: Vec<Tally>,
+    /// Sequences that the recordings make, for each simulated one.
+    scale: f64,
+}
+
+impl Step {
+    fn error(&self) -> f64 {
+        let sum = |of: fn(&Tally) -> u64| self.tallies.iter().map(of).sum::<u64>() as f64;
+        sum(|tally| tally.wrong) / sum(|tally| tally.all).max(1.0)
+    }
+
+    /// The probability that so many times the recordings pass, if they are like the simulation.
+    fn passes(&self, times: f64, rate: f64, confidence: f64) -> f64 {
+        let of = |tally: &Tally| {
+            let all = (tally.all as f64 * self.scale * times).floor() as u64;
+            // No rate is 0 because none was wrong.
+            let error = (tally.wrong as f64 + 0.5) / (tally.all as f64 + 1.0);
+            allowed(all, rate, confidence).map_or(0.0, |wrong| binomial_tail(Tally { wrong, all }, error))
+        };
+        self.tallies.iter().map(of).product()
+    }
+}
+
+/// Every threshold on simulated sequences.
+struct Foreseen {
+    steps: Vec<Step>,
+    /// Approaches that were recorded to the object with the fewest.
+    fewest: usize,
+}
+
+impl Foreseen {
+    fn new(sequences: &[Sequence], steps: &[Odds], by: By, recorded: &Dataset, known: &[usize]) -> Self {
+        let all: Vec<&Sequence> = sequences.iter().collect();
+        let step = |odds: &Odds| {
+            let mut used = vec![0_u64; known.iter().max().map_or(0, |most| most + 1)];
+            for sequence in sequences {
+                let approaches = sequence.given(odds).map_or(sequence.approaches, |look| look.approaches);
+                used.get_mut(sequence.object).into_iter().for_each(|used| *used += u64::from(approaches));
+            }
+            let of = recorded.objects.iter().zip(known);
+            let scale = of.map(|(object, &known)| object.len() as f64 / used[known].max(1) as f64);
+            Step { tallies: tallies(&all, odds, by), scale: scale.fold(f64::INFINITY, f64::min) }
+        };
+        let fewest = recorded.objects.iter().map(crate::touches::ObjectTouches::len).min().unwrap_or(0);
+        Self { steps: steps.iter().map(step).collect(), fewest }
+    }
+
+    /// The probability that some threshold passes as the first one, and the strictest that passes about as likely.
+    fn best(&self, times: f64, rate: f64, confidence: f64) -> (f64, usize) {
+        let passes: Vec<f64> = self.steps.iter().map(|step| step.passes(times, rate, confidence)).collect();
+        let best = passes.iter().copied().fold(0.0, f64::max);
+        (best, passes.iter().position(|&passes| passes >= AS_LIKELY * best).unwrap_or(0))
+    }
+
+    /// The first threshold that is tested.
+    fn first(&self, terms: &Terms) -> usize {
+        self.best(1.0, terms.rate, terms.confidence).1
+    }
+
+    /// Where hardly any threshold can pass because the recordings make too few names, the threshold that the simulation would
+    /// choose.
+    fn too_few(&self, terms: &Terms) -> Option<usize> {
+        let chosen = self.steps.iter().rposition(|step| step.error() <= terms.rate).unwrap_or(0);
+        let step = self.steps.get(chosen)?;
+        let names = step.tallies.iter().map(|tally| tally.all as f64 * step.scale).fold(f64::INFINITY, f64::min);
+        let is_hopeless = self.best(1.0, terms.rate, terms.confidence).0 < HOPELESS;
+        (is_hopeless && names < needed(terms.rate, terms.confidence) as f64).then_some(chosen)
+    }
+
+    /// The reason why no threshold was kept.
+    fn problem(&self, stop: Stop, names: &[String], terms: &Terms) -> CalibrateProblem {
+        let Terms { rate, confidence, per } = *terms;
+        let is_likely = |times: f64, rate: f64| self.best(times, rate, confidence).0 >= LIKELY;
+        let higher = || RATES.iter().copied().filter(|&higher| higher > rate);
+        let enough = (0..GROWN).map(|step| GROWTH.powi(step)).find(|&times| is_likely(times, rate));
+        let (position, tally, supported) = match stop {
+            Stop::TooFew { position, found } => {
+                let tally = Tally { wrong: 0, all: found };
+                (position, tally, higher().find(|&rate| is_likely(1.0, rate)))
+            }
+            // What was found says more than what was foreseen.
+            Stop::TooMany { position, tally } => {
+                (position, tally, higher().find(|&rate| binomial_tail(tally, rate) <= 1.0 - confidence))
+            }
+        };
+        CalibrateProblem::NotSupported {
+            object: (per != super::Per::Average).then(|| names.get(position).cloned()).flatten(),
+            rate,
+            tally,
+            needed: needed(rate, confidence),
+            forecast: Forecast {
+                approaches: self.fewest,
+                supported,
+                enough: enough.map(|times| two_digits(times * self.fewest as f64)),
+            },
+        }
+    }
+}
+
+/// The position of the first threshold that is tested on recordings.
+#[cfg(all(test, feature = "train"))]
+pub(super) fn first_of(
+    model: &Model<'_>,
+    simulated: Dataset,
+    recorded: &Dataset,
+    settings: &Settings,
+) -> Result<usize> {
+    let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
+    let (names, known) = named(model, recorded)?;
+    let strictest = ((1.0 - settings.rate) / settings.rate).ln() + STRICTEST[0];
+    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let cut = Cut { model, names: &names, settings, max_touches };
+    let sequences = cut.sequences(&simulated, settings.sequences, strictest, &())?;
+    let steps = steps(&sequences, names.len(), strictest, &terms);
+    Ok(Foreseen::new(&sequences, &steps, By::of(settings.per, names.len()), recorded, &known).first(&terms))
+}
