@@ -251,9 +251,4 @@ impl<'m> Chip<'m> {
             .margins_of(row, &mut margins)
             .then(|| margins.into_iter().map(|margin| f64::from(margin) * self.unit).collect())
     }
-
-    /// True if margins are those of tables for each contact pattern.
-    pub(super) fn is_by_pattern(&self) -> bool {
-        self.model.layout() == Layout::Patterns
-    }
 }

@@ -62,6 +62,14 @@ pub enum ProofProblem {
         /// Which.
         what: String,
     },
+    /// Margins are farther from the ensemble's than the model states.
+    #[error("a margin differs by {found:e} for some row, more than the {stated:e} that the model states")]
+    Beyond {
+        /// What the model states.
+        stated: f64,
+        /// The largest difference.
+        found: f64,
+    },
     /// The model has no trees in it.
     #[error("the model has the layout code: its trees are not in it")]
     Code,

@@ -24,11 +24,11 @@ use crate::compile;
 use crate::ensemble::{Ensemble, Inputs, Output};
 use crate::error::Result;
 use crate::verify::unit;
-use boxes::{Keys, Rows, Tree, Values, of_ensemble};
+use boxes::{Keys, Rows, See, Tree, Values, of_ensemble};
 use chip::Chip;
 use format::Plain;
 use palpate_onboard::Model;
-use palpate_shared::MISSING_FEATURE;
+use palpate_shared::{Descriptor, MISSING_FEATURE};
 
 /// Result of a proof.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -41,8 +41,8 @@ pub struct Proof {
     pub boxes: u64,
     /// The largest difference of a leaf, or of a table's cell, in the library's margins.
     pub largest_difference: f64,
-    /// A bound on the difference of any margin to the exact sum of the ensemble's leaves: of a table the largest in any
-    /// cell, otherwise the sum of the trees' largest.
+    /// The largest difference of a margin: in any cell between thresholds, of a table or where [`prove`] can go through
+    /// them; otherwise a bound, the sum of the trees' largest differences, without what the library loses by adding in f32.
     pub margin_error: f64,
     /// The difference that the model states, which has what the library loses by adding in f32.
     pub stated: f64,
@@ -80,6 +80,15 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
         trees_of_chip(&chip, &model, &plain, &sources, ensemble)?
     };
     in_order(&found, &plain, ensemble)?;
+    let mut proof = proof(&found, &plain, ensemble);
+    if proof.margin_error > proof.stated
+        && let Some(exact) = error_in_cells(&chip, &plain, &sources, ensemble)?
+    {
+        if exact > proof.stated * (1.0 + 1e-6) {
+            return Err(ProofProblem::Beyond { stated: proof.stated, found: exact }.into());
+        }
+        proof.margin_error = exact;
+    }
     let Found { trees, table, outputs, .. } = &found;
     let certificate = Certificate {
         model: checksum(bytes),
@@ -88,7 +97,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
         table: *table,
         outputs: outputs.clone(),
     };
-    Ok((proof(&found, &plain, ensemble), certificate))
+    Ok((proof, certificate))
 }
 
 /// Checks a certificate of a model, given by its bytes, and of `ensemble`, which was read from `file`, in another way than
@@ -621,6 +630,41 @@ fn table_of_format(
 
 /// Cells of a table as the chip looks them up: between the ensemble's own thresholds.
 fn table_of_chip(chip: &Chip<'_>, plain: &Plain, sources: &[Tree], ensemble: &Ensemble) -> Result<Found, ProofProblem> {
+    let mut found = no_table(plain);
+    let choices = choices(chip, plain, sources, ensemble);
+    each_cell(chip, plain, &choices, &mut |margins, rows| cell(margins, rows, &mut found, plain, sources, ensemble))?;
+    Ok(found)
+}
+
+/// The most trees in all cells together that are added up for the error of margins that the trees' worst only bound.
+const MOST: usize = 50_000_000;
+
+/// The largest difference of a margin to the ensemble's f32 sum in any cell between its thresholds; `None` if there are too
+/// many of them.
+fn error_in_cells(
+    chip: &Chip<'_>,
+    plain: &Plain,
+    sources: &[Tree],
+    ensemble: &Ensemble,
+) -> Result<Option<f64>, ProofProblem> {
+    let choices = choices(chip, plain, sources, ensemble);
+    let cells = choices.iter().map(|own| own.iter().try_fold(1_usize, |cells, own| cells.checked_mul(own.len())));
+    let cells = cells.sum::<Option<usize>>().and_then(|cells| cells.checked_mul(sources.len()));
+    if cells.is_none_or(|cells| cells > MOST) {
+        return Ok(None);
+    }
+    let mut worst = 0.0_f64;
+    each_cell(chip, plain, &choices, &mut |margins, rows| {
+        let sums = sums(sources, ensemble, rows);
+        worst =
+            margins.iter().zip(sums).fold(worst, |worst, (&model, sum)| worst.max((model - sum.farthest(model)).abs()));
+        Ok(())
+    })?;
+    Ok(Some(worst))
+}
+
+/// Values of each feature between thresholds, one list of them for each contact pattern where features depend on it.
+fn choices(chip: &Chip<'_>, plain: &Plain, sources: &[Tree], ensemble: &Ensemble) -> Vec<Vec<Vec<Values>>> {
     let all = plain.keys.all(plain.features);
     // Each feature's intervals between thresholds, without a missing value.
     let intervals = |(feature, values): (usize, &Values)| {
@@ -638,34 +682,41 @@ fn table_of_chip(chip: &Chip<'_>, plain: &Plain, sources: &[Tree], ensemble: &En
         own
     };
     let intervals: Vec<Vec<Values>> = all.iter().enumerate().map(intervals).collect();
-    let mut found = no_table(plain);
-    let mut rows = all;
-    let mut choose = |rows: &mut Vec<Values>| {
-        let key = |values: &Values| if values.low > values.high { MISSING_FEATURE } else { values.low as i32 };
-        let row: Vec<i32> = rows.iter().map(key).collect();
-        let margins = chip.margins(&row).ok_or(ProofProblem::Format { what: "it has no margins of a row" })?;
-        cell(&margins, rows, &mut found, plain, sources, ensemble)
-    };
-    if chip.is_by_pattern() {
-        // A pattern fixes which differences are there.
-        let there =
-            [[false; 3], [false; 3], [false; 3], [false, false, true], [false, true, false], [true, true, false]];
-        for (there, code) in there.into_iter().zip(0..) {
-            let mut choices = intervals.clone();
-            choices[0] = vec![Values::of(code, code, false)];
-            for (choices, _) in choices[1..].iter_mut().zip(there).filter(|(_, is_there)| !is_there) {
-                *choices = vec![Values::MISSING];
-            }
-            each(&choices, 0, &mut rows, &mut choose)?;
-        }
-    } else {
+    if ensemble.descriptor() != Some(Descriptor::ContactsCurvature) {
         let with_missing = |(own, &all): (Vec<Values>, &Values)| {
             if own.len() == 1 { vec![all] } else { own.into_iter().chain([Values::MISSING]).collect() }
         };
-        let choices: Vec<Vec<Values>> = intervals.into_iter().zip(&rows.clone()).map(with_missing).collect();
-        each(&choices, 0, &mut rows, &mut choose)?;
+        return vec![intervals.into_iter().zip(&all).map(with_missing).collect()];
     }
-    Ok(found)
+    // A pattern fixes which differences are there.
+    let there = [[false; 3], [false; 3], [false; 3], [false, false, true], [false, true, false], [true, true, false]];
+    let of_pattern = |(there, code): ([bool; 3], i64)| {
+        let mut choices = intervals.clone();
+        choices[0] = vec![Values::of(code, code, false)];
+        for (choices, _) in choices[1..].iter_mut().zip(there).filter(|(_, is_there)| !is_there) {
+            *choices = vec![Values::MISSING];
+        }
+        choices
+    };
+    there.into_iter().zip(0..).map(of_pattern).collect()
+}
+
+/// Calls `see` with the margins of each combination of values, as the chip computes them.
+fn each_cell(
+    chip: &Chip<'_>,
+    plain: &Plain,
+    choices: &[Vec<Vec<Values>>],
+    see: &mut See<'_, ProofProblem>,
+) -> Result<(), ProofProblem> {
+    let mut rows = plain.keys.all(plain.features);
+    choices.iter().try_for_each(|choices| {
+        each(choices, 0, &mut rows, &mut |rows| {
+            let key = |values: &Values| if values.low > values.high { MISSING_FEATURE } else { values.low as i32 };
+            let row: Vec<i32> = rows.iter().map(key).collect();
+            let margins = chip.margins(&row).ok_or(ProofProblem::Format { what: "it has no margins of a row" })?;
+            see(&margins, rows)
+        })
+    })
 }
 
 /// Calls `see` with every combination of the choices of features from `feature` on.
