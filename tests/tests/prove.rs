@@ -72,7 +72,7 @@ fn is_proved(bytes: &[u8], ensemble: &Ensemble) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(8))]
 
     #[test]
     fn models_of_touches_are_proved_in_every_layout_and_their_certificates_hold(shape in shapes(), seed: u64) {

@@ -638,7 +638,7 @@ fn table_of_chip(chip: &Chip<'_>, plain: &Plain, sources: &[Tree], ensemble: &En
 }
 
 /// The most trees in all cells together that are added up for the error of margins that the trees' worst only bound.
-const MOST: usize = 50_000_000;
+const MOST: usize = 2_000_000;
 
 /// The largest difference of a margin to the ensemble's f32 sum in any cell between its thresholds; `None` if there are too
 /// many of them.
