@@ -2,6 +2,7 @@
 
 pub use crate::compile::CompileProblem;
 pub use crate::ensemble::{EnsembleProblem, NameProblem, TreeProblem};
+pub use crate::prove::ProofProblem;
 pub use crate::rows::RowsProblem;
 
 use std::any::Any;

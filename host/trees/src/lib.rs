@@ -10,6 +10,7 @@
 //! | [`rows`] | rows of features | [`rows::Rows`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`verify`] | margins, predictions and scores over rows; a model compared with its ensemble | [`verify::verify`](fn@verify::verify) |
+//! | [`prove`] | a model means what its ensemble means, for every row: proofs and certificates | [`prove::prove`](fn@prove::prove) |
 //! | [`train`] | grows boosted trees on rows of classes | [`train::train`] |
 //! | [`output`], [`progress`] | files that appear whole or not at all; progress of long calls | |
 //!
@@ -21,6 +22,7 @@ pub mod ensemble;
 pub mod error;
 pub mod output;
 pub mod progress;
+pub mod prove;
 pub mod rows;
 pub mod train;
 pub mod verify;

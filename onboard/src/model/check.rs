@@ -23,7 +23,7 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     }
     let built_in = built_in::layout(model.layout);
     // Of code the type of leaves says only what they were rounded to.
-    let is_code = model.layout == Layout::Code;
+    let is_code = built_in::layout(Layout::Code) && model.layout == Layout::Code;
     if is_code && model.leaf == LeafType::F32 {
         return Err(Wrong::Field(7));
     }
@@ -50,7 +50,7 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
         section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
         section(model.groups.is_empty(), model.groups)?;
     }
-    if built_in::layout(Layout::Code) && model.layout == Layout::Code {
+    if is_code {
         section(model.ranked.is_empty(), model.ranked)?;
         section(model.groups.is_empty(), model.groups)?;
     }

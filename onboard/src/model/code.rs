@@ -17,8 +17,7 @@ const NAN: i32 = 0x7fc0_0000;
 
 impl<'a> Model<'a> {
     /// Opens a model of the layout code, as [`Model::new`] does others, with the function that was written with it.
-    /// Margins are what that function makes of features: nothing says whether it is of this model, but for
-    /// `palpate verify --prove` on a host.
+    /// Margins are what that function makes of features: nothing says whether it is of this model.
     ///
     /// Cost: in proportion to the bytes, which are few. Cannot fail where the function is another one: margins are then
     /// wrong.

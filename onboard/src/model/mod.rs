@@ -117,11 +117,13 @@ impl<'a> Model<'a> {
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, or meaningless.
     #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
-        let model = Self::opened_with_code(bytes)?;
-        if built_in::layout(Layout::Code) && model.layout() == Layout::Code {
+        let model = Self::opened_with_code(bytes);
+        // Where no model may have code nothing is copied to look at it: 70 bytes of flash.
+        #[cfg(feature = "code")]
+        if model.as_ref().is_ok_and(|model| model.layout() == Layout::Code) {
             return Err(ModelError::NeedsCode);
         }
-        Ok(model)
+        model
     }
 
     /// A model of any layout, also one without its trees.

@@ -7,6 +7,7 @@ use palpate::ensemble::Ensemble;
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::verify::{Verified, verify};
 use palpate::output;
+use palpate::prove::{Certificate, Proof, check, prove};
 use palpate::rows::{Rows, read_margins};
 use std::path::PathBuf;
 
@@ -17,20 +18,30 @@ Of a model of touches, every touch of DATA, a directory, goes through model and 
 
 Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output.
 
+With --prove no data is needed: each tree of the model is compared with its trees in ENSEMBLE for every row there can be, and a certificate is written. --certificate checks one by another reader of the model.
+
 The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the stated rounding does not explain it.
 
 Examples:
   palpate verify model.palpate ensemble.json data
   palpate verify model.palpate lightgbm.txt rows.csv --json
-  palpate verify model.palpate m.json rows.csv --library-margins margins.csv")]
+  palpate verify model.palpate m.json rows.csv --library-margins margins.csv
+  palpate verify model.palpate m.json --prove proof.txt
+  palpate verify model.palpate m.json --certificate proof.txt")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
     /// The file that it was exported from
     ensemble: PathBuf,
     /// Touches (a directory), or rows of features (a CSV file)
-    #[arg(value_name = "DATA")]
-    data: PathBuf,
+    #[arg(value_name = "DATA", required_unless_present_any = ["prove", "certificate"])]
+    data: Option<PathBuf>,
+    /// Prove it for every row, and write a certificate
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "certificate"])]
+    prove: Option<PathBuf>,
+    /// Check a certificate that --prove wrote
+    #[arg(long, value_name = "FILE", conflicts_with = "data")]
+    certificate: Option<PathBuf>,
     /// Sequences of touches to draw; of all objects together
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
     sequences: usize,
@@ -44,22 +55,23 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
     let ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(None))?;
+    let Some(data) = &arguments.data else { return proof(&arguments, &compiled, &ensemble, global) };
     if ensemble.descriptor().is_some() {
-        return match (&arguments.library_margins, arguments.data.is_file()) {
+        return match (&arguments.library_margins, data.is_file()) {
             (Some(margins), _) => {
                 Err(Error::setting("library_margins", margins.display(), "it with a model of another library"))
             }
             // A log is a data set, too.
-            (None, true) if !palpate::touches::is_log(&arguments.data) => {
+            (None, true) if !palpate::touches::is_log(data) => {
                 Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches))
             }
             (None, _) => {
-                let data = (arguments.data.as_path(), arguments.sequences);
+                let data = (data.as_path(), arguments.sequences);
                 super::parity::run((&arguments.model, &compiled), &ensemble, data, global)
             }
         };
     }
-    let rows = read_rows(&arguments.data, &ensemble.inputs.names(), None)?;
+    let rows = read_rows(data, &ensemble.inputs.names(), None)?;
     let library = arguments.library_margins.as_deref().map(read_margins).transpose()?;
     let place = |error: Error| match (&arguments.library_margins, error.problem()) {
         (Some(path), Some(problem)) if RowsProblem::is_about_margins(problem) => error.in_file(path),
@@ -72,6 +84,55 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         output::print(&text(&verified))?;
     }
     verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem))
+}
+
+/// Proves the model, or checks a certificate.
+fn proof(arguments: &Arguments, compiled: &CompiledModel, ensemble: &Ensemble, global: &Global) -> Result<()> {
+    let path = &arguments.ensemble;
+    let file = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
+    let in_model = |error: Error| error.in_file(&arguments.model);
+    let (proof, what) = match (&arguments.prove, &arguments.certificate) {
+        (_, Some(certificate)) => {
+            let proof = check(&Certificate::read(certificate)?, compiled.bytes(), ensemble, &file).map_err(in_model)?;
+            (proof, format!("The certificate {} holds", certificate.display()))
+        }
+        (written, None) => {
+            let (proof, certificate) = prove(compiled.bytes(), ensemble, &file).map_err(in_model)?;
+            if let Some(written) = written {
+                output::refuse_input(written, [&arguments.model, path])?;
+                output::write_bytes(written, certificate.to_string().as_bytes())?;
+            }
+            (proof, "Proved".into())
+        }
+    };
+    let written = arguments.prove.as_deref().unwrap_or_else(|| std::path::Path::new(""));
+    if global.json {
+        output::print_json_about(written, &proof)
+    } else {
+        output::print_about(written, &proof_text(&proof, &what))
+    }
+}
+
+fn proof_text(proof: &Proof, what: &str) -> String {
+    let Proof { trees, ensemble_trees, boxes, largest_difference, margin_error, stated, ranges } = proof;
+    let compared = match trees {
+        0 => format!("the model's table has the sums of the ensemble's {ensemble_trees} trees"),
+        _ => format!("the model's {trees} trees add what the ensemble's {ensemble_trees} add"),
+    };
+    let mut text = format!(
+        "{what}: for every row {compared}, rounded ({boxes} boxes of rows).\n\
+         A leaf differs by at most {largest_difference:.2e}, a margin by at most {margin_error:.2e}; the model states \
+         {stated:.2e}.\n"
+    );
+    if margin_error > stated {
+        text +=
+            "The model states less than the worst leaves of all trees add up to, which no row need reach together.\n";
+    }
+    text += "Bounds of each margin, which no row need reach:\n";
+    for (name, least, most) in ranges {
+        text += &format!("  {name}: {least:.4} to {most:.4}\n");
+    }
+    text
 }
 
 /// Reads rows for features with these names; says on stderr if columns are taken by their position.

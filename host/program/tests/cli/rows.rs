@@ -546,3 +546,47 @@ fn what_is_wrong_with_sequences_of_rows_names_the_line_and_what_to_do() {
     let regression = refused(&good, &[]);
     assert!(regression.contains("predicts a value"), "{regression}");
 }
+
+#[test]
+fn every_kind_is_proved_for_every_row_and_its_certificate_holds_or_says_what_changed() {
+    let (_directory, path) = place();
+    let (model, proof) = (path("model.palpate"), path("proof.txt"));
+    let mut trees = 0;
+    for source in MODELS {
+        let source = data(source);
+        for layout in ["compact", "complete", "wide"] {
+            stdout(run(["export", &source, "-o", &model, "--layout", layout]));
+            let proved = json(run(["verify", &model, &source, "--prove", &proof, "--json"]));
+            let checked = json(run(["verify", &model, &source, "--certificate", &proof, "--json"]));
+            let number = |proof: &Value, key: &str| proof[key].as_f64().unwrap();
+            assert!(number(&proved, "margin_error") <= number(&proved, "stated"), "{source}, {layout}: {proved}");
+            assert!(number(&checked, "margin_error") >= number(&proved, "margin_error"), "{source}: {checked}");
+            assert!(
+                number(&checked, "margin_error") <= 2.0 * number(&proved, "margin_error") + 1e-9,
+                "{source}: {checked}"
+            );
+            trees += proved["ensemble_trees"].as_u64().unwrap();
+        }
+    }
+    assert!(trees > 3 * MODELS.len() as u64, "{trees}");
+    let source = data("xgboost-3.4-binary.json");
+    stdout(run(["export", &source, "-o", &model, "--layout", "compact"]));
+    assert!(
+        stdout(run(["verify", &model, &source, "--prove", &proof])).starts_with("Proved: for every row the model's")
+    );
+    let text = stdout(run(["verify", &model, &source, "--certificate", &proof]));
+    assert!(text.contains("proof.txt holds: for every row"), "{text}");
+    // Another model, another file, a damaged certificate.
+    let message = stderr(run(["verify", &model, &data("xgboost-3.4-softprob.ubj"), "--prove", &proof]), 1);
+    assert!(message.contains("model.palpate: the model's outputs are not the ensemble's"), "{message}");
+    stdout(run(["export", &source, "-o", &path("other.palpate"), "--layout", "wide"]));
+    let message = stderr(run(["verify", &path("other.palpate"), &source, "--certificate", &proof]), 1);
+    assert!(message.contains("other.palpate: the certificate is about a model with the checksum"), "{message}");
+    std::fs::write(&proof, "palpate certificate 1\nnonsense\n").unwrap();
+    let message = stderr(run(["verify", &model, &source, "--certificate", &proof]), 1);
+    assert!(message.contains("proof.txt:2: not a line of a certificate: \"nonsense\""), "{message}");
+    let message = stderr(run(["verify", &model, &source, "--prove", &source]), 2);
+    assert!(message.contains("xgboost-3.4-binary.json"), "{message}");
+    stderr(run(["verify", &model, &source]), 2);
+    stderr(run(["verify", &model, &source, "rows.csv", "--prove", &proof]), 2);
+}

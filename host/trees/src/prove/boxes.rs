@@ -1,0 +1,172 @@
+//! Boxes of rows: for each feature an interval of keys, and whether a missing value is in it.
+
+use crate::ensemble::{Ensemble, Node, Output, Threshold};
+use palpate_shared::format::f32_key;
+
+/// Values of a feature: keys from `low` to `high`, both included, and perhaps a missing one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Values {
+    pub(super) low: i64,
+    pub(super) high: i64,
+    pub(super) missing: bool,
+}
+
+impl Values {
+    /// No value but a missing one.
+    pub(super) const MISSING: Self = Self { low: 1, high: 0, missing: true };
+
+    pub(super) const fn of(low: i64, high: i64, missing: bool) -> Self {
+        Self { low, high, missing }
+    }
+
+    fn is_empty(self) -> bool {
+        self.low > self.high && !self.missing
+    }
+}
+
+/// Rule of a split: left if the key is below `cut`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rule {
+    pub(super) feature: usize,
+    pub(super) cut: i64,
+    pub(super) missing_left: bool,
+}
+
+impl Rule {
+    /// A split by a column that is not there: no tree needs it, and nothing says where it goes.
+    pub(super) const EITHER: Self = Self { feature: usize::MAX, cut: 0, missing_left: true };
+
+    /// The values that go left, and those that go right.
+    fn sides(self, Values { low, high, missing }: Values) -> [Values; 2] {
+        [
+            Values { low, high: high.min(self.cut - 1), missing: missing && self.missing_left },
+            Values { low: low.max(self.cut), high, missing: missing && !self.missing_left },
+        ]
+    }
+}
+
+/// Rows: every combination of the values of each feature.
+pub(super) type Rows = [Values];
+
+/// Calls `see` with the rows that go left (0) and those that go right (1), unless there are none; `rows` are the same
+/// afterwards. Stops at the first error.
+pub(super) fn sides<E>(
+    rows: &mut Rows,
+    rule: Rule,
+    mut see: impl FnMut(usize, &mut Rows) -> Result<(), E>,
+) -> Result<(), E> {
+    if rule.feature == Rule::EITHER.feature {
+        return see(0, rows).and_then(|()| see(1, rows));
+    }
+    // A feature that no row has is missing.
+    let Some(&before) = rows.get(rule.feature) else { return see(usize::from(!rule.missing_left), rows) };
+    for (side, values) in rule.sides(before).into_iter().enumerate() {
+        if !values.is_empty() {
+            rows[rule.feature] = values;
+            let done = see(side, rows);
+            rows[rule.feature] = before;
+            done?;
+        }
+    }
+    Ok(())
+}
+
+/// What is done with a leaf's values, and the rows that reach it.
+pub(super) type See<'s, E> = dyn FnMut(&[f64], &mut Rows) -> Result<(), E> + 's;
+
+/// A tree whose leaves have values in nats, or what the library's margins are in.
+#[derive(Debug)]
+pub(super) struct Tree {
+    pub(super) nodes: Vec<Step>,
+    /// The object of trees with one value in a leaf.
+    pub(super) object: Option<usize>,
+}
+
+/// A split, with the numbers of its two children, or a leaf.
+#[derive(Debug)]
+pub(super) enum Step {
+    Split(Rule, [usize; 2]),
+    Leaf(Vec<f64>),
+}
+
+impl Tree {
+    /// Calls `see` on each leaf that some of `rows` reach, with these.
+    pub(super) fn leaves<E>(&self, rows: &mut Rows, see: &mut See<'_, E>) -> Result<(), E> {
+        self.below(0, rows, see)
+    }
+
+    fn below<E>(&self, at: usize, rows: &mut Rows, see: &mut See<'_, E>) -> Result<(), E> {
+        match &self.nodes[at] {
+            Step::Leaf(values) => see(values, rows),
+            Step::Split(rule, children) => sides(rows, *rule, |side, rows| self.below(children[side], rows, see)),
+        }
+    }
+
+    /// The values of the only leaf, if there is no split.
+    pub(super) fn constant(&self) -> Option<&[f64]> {
+        if let Step::Leaf(values) = &self.nodes[0] { Some(values) } else { None }
+    }
+}
+
+/// How a model's features are counted.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Keys {
+    /// Whole numbers, as touches have them.
+    Whole,
+    /// Keys of f32 values.
+    Real,
+    /// Whole numbers of units, so many in 1.
+    Scaled(Vec<f32>),
+}
+
+impl Keys {
+    /// All rows of this many features.
+    pub(super) fn all(&self, features: usize) -> Vec<Values> {
+        let most = match self {
+            Self::Real => i64::from(f32_key(f32::INFINITY)),
+            Self::Whole | Self::Scaled(_) => i64::from(i32::MAX),
+        };
+        vec![Values::of(-most, most, true); features]
+    }
+
+    /// The smallest key that is not below a threshold.
+    fn cut(&self, feature: usize, threshold: Threshold) -> i64 {
+        // `as` keeps what is beyond an i32 at its limits.
+        let whole = |number: f64| i64::from((number.ceil() as i32).max(-i32::MAX));
+        match self {
+            Self::Whole => whole(threshold.value),
+            Self::Real => threshold.single().map_or(i64::MAX, |single| f32_key(single).into()),
+            Self::Scaled(scales) => whole(threshold.units(scales.get(feature).copied().unwrap_or(1.0))),
+        }
+    }
+}
+
+/// The ensemble's trees over keys, with the library's margins in their leaves.
+pub(super) fn of_ensemble(ensemble: &Ensemble, keys: &Keys) -> Vec<Tree> {
+    let scale = f64::from(ensemble.prediction().scale);
+    let step = |number: usize, index: usize, node: &Node| match node {
+        Node::Leaf(values) => Step::Leaf(values.iter().map(|&value| f64::from(value) * scale).collect()),
+        &Node::Split { feature, threshold, missing_left, left, right } => {
+            let own = ensemble.threshold(number, index).unwrap_or(Threshold::below(threshold.into()));
+            let own = if *keys == Keys::Real { Threshold::below(threshold.into()) } else { own };
+            Step::Split(Rule { feature, cut: keys.cut(feature, own), missing_left }, [left, right])
+        }
+    };
+    let trees = ensemble.trees.iter().enumerate();
+    let tree = |(number, tree): (usize, &crate::ensemble::Tree)| Tree {
+        nodes: tree.nodes.iter().enumerate().map(|(index, node)| step(number, index, node)).collect(),
+        object: match tree.output {
+            Output::One(object) => Some(object),
+            Output::Each => None,
+        },
+    };
+    trees.map(tree).collect()
+}
+
+/// Thresholds of a feature, as keys.
+pub(super) fn cuts_of(trees: &[Tree], feature: usize) -> impl Iterator<Item = i64> {
+    trees.iter().flat_map(|tree| &tree.nodes).filter_map(move |step| match step {
+        Step::Split(rule, _) if rule.feature == feature => Some(rule.cut),
+        _ => None,
+    })
+}

@@ -1,0 +1,125 @@
+//! Problems with proofs and certificates.
+
+use crate::error::Problem;
+
+/// Problems with proofs and certificates.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProofProblem {
+    /// A statement of the model is not the ensemble's.
+    #[error("the model's {what} are not the ensemble's: {model}, and not {ensemble}")]
+    Statement {
+        /// What differs, in the plural.
+        what: &'static str,
+        /// What the model has.
+        model: String,
+        /// What the ensemble has.
+        ensemble: String,
+    },
+    /// A tree adds something else for some rows.
+    #[error(
+        "for some rows the model's tree {tree} adds {model:e} to {output} where tree {source_tree} of the ensemble has {ensemble:e}: {rows}"
+    )]
+    Leaf {
+        /// The model's tree, counted from 0.
+        tree: usize,
+        /// The ensemble's tree, or the first of those that were merged.
+        source_tree: usize,
+        /// The output's name.
+        output: String,
+        /// What the model adds.
+        model: f64,
+        /// What the ensemble adds.
+        ensemble: f64,
+        /// The rows.
+        rows: String,
+    },
+    /// A cell of a table holds something else than the ensemble for some rows.
+    #[error("for some rows the model's table has {model:e} for {output} where the ensemble has {ensemble:e}: {rows}")]
+    Cell {
+        /// The output's name.
+        output: String,
+        /// What the model has.
+        model: f64,
+        /// What the ensemble has.
+        ensemble: f64,
+        /// The rows.
+        rows: String,
+    },
+    /// Base margins differ.
+    #[error("the model's margin of {output} starts from {model:e}, where the ensemble starts from {ensemble:e}")]
+    Base {
+        /// The output's name.
+        output: String,
+        /// What the model has.
+        model: f64,
+        /// What the ensemble has.
+        ensemble: f64,
+    },
+    /// Trees of the ensemble are missing, or there are too many.
+    #[error("the model's trees stand for other trees than the ensemble's: {what}")]
+    Trees {
+        /// Which.
+        what: String,
+    },
+    /// Margins are farther from the ensemble's than the model states.
+    #[error("a margin differs by {found:e} for some row, more than the {stated:e} that the model states")]
+    Beyond {
+        /// What the model states.
+        stated: f64,
+        /// The largest difference.
+        found: f64,
+    },
+    /// The model has no trees in it.
+    #[error("the model has the layout code: its trees are not in it")]
+    Code,
+    /// Bytes that are accepted as a model are not what the format says.
+    #[error("the model does not follow its format: {what}")]
+    Format {
+        /// What is wrong.
+        what: &'static str,
+    },
+    /// A line of a certificate is none.
+    #[error("not a line of a certificate: {line:?}")]
+    Line {
+        /// The line.
+        line: String,
+    },
+    /// The certificate is about another file.
+    #[error("the certificate is about {what} with the checksum {stated:016x}, not {found:016x}")]
+    OtherFile {
+        /// Which file.
+        what: &'static str,
+        /// Its checksum in the certificate.
+        stated: u64,
+        /// That of the file.
+        found: u64,
+    },
+    /// The certificate states less than there is.
+    #[error("the certificate states {stated:e} as {what}, which is {found:e}")]
+    Understated {
+        /// What it states.
+        what: String,
+        /// The number in the certificate.
+        stated: f64,
+        /// The true number.
+        found: f64,
+    },
+}
+
+impl Problem for ProofProblem {
+    fn fix(&self) -> String {
+        match self {
+            Self::Code => "Prove a model of the same ensemble with a data layout: export without --emit thumb or c-code.",
+            Self::Line { .. } => "Give the file that `palpate verify --prove FILE` wrote, unchanged.",
+            Self::OtherFile { .. } | Self::Understated { .. } => {
+                "Give the files that the certificate was made of, or make another with `palpate verify --prove FILE`."
+            }
+            Self::Format { .. } => "Export the model again.",
+            _ => {
+                "Give the file that the model was exported from, with the same --missing and --all-trees; if it is that, export the model again."
+            }
+        }
+        .into()
+    }
+}

@@ -1,0 +1,395 @@
+//! A reader of compiled models written from `shared/FORMAT.md` alone: it shares nothing with the compiler, nor with what
+//! the chip runs, so that a mistake of either shows.
+
+use super::ProofProblem;
+use super::boxes::{Keys, Rows, Rule, Step, Tree, Values};
+
+/// A model's meaning.
+#[derive(Debug)]
+pub(super) struct Plain {
+    pub(super) names: Vec<String>,
+    pub(super) features: usize,
+    /// Code of the descriptor; 255 for rows of features.
+    pub(super) descriptor: u8,
+    pub(super) keys: Keys,
+    /// Names of features, where the model has them.
+    pub(super) feature_names: Vec<String>,
+    /// Keys that count as missing.
+    pub(super) sentinel: Option<[i64; 2]>,
+    /// Size of a unit in the library's margins.
+    pub(super) unit: f64,
+    /// Code of the link, and true if the last of several equal classes is predicted.
+    pub(super) link: (u8, bool),
+    /// The largest whole number of a leaf; 0 for f32 leaves.
+    pub(super) most: f64,
+    /// The farthest that a margin can be from the library's, as the model states.
+    pub(super) stated: f64,
+    /// Base margins.
+    pub(super) base: Vec<f64>,
+    /// Trees, and the size of a step of their leaves.
+    pub(super) trees: Vec<(Tree, f64)>,
+    /// Cells of a table: which rows fall into each, and its margins.
+    pub(super) cells: Option<Vec<(Vec<Values>, Vec<f64>)>>,
+}
+
+struct Axis {
+    feature: usize,
+    columns: u8,
+    cuts: Vec<i64>,
+}
+
+const SHORT: ProofProblem = ProofProblem::Format { what: "it ends too early" };
+
+/// Bytes that are read from the front.
+struct Bytes<'b>(&'b [u8]);
+
+impl<'b> Bytes<'b> {
+    fn take(&mut self, length: usize) -> Result<&'b [u8], ProofProblem> {
+        let (part, rest) = self.0.split_at_checked(length).ok_or(SHORT)?;
+        self.0 = rest;
+        Ok(part)
+    }
+
+    fn byte(&mut self) -> Result<u8, ProofProblem> {
+        Ok(self.take(1)?[0])
+    }
+
+    fn number(&mut self, length: usize) -> Result<usize, ProofProblem> {
+        Ok(self.take(length)?.iter().rev().fold(0, |number, &byte| number << 8 | usize::from(byte)))
+    }
+
+    fn signed(&mut self, length: usize) -> Result<i64, ProofProblem> {
+        let number = self.number(length)? as i64;
+        let half = 1_i64 << (8 * length - 1);
+        Ok(if number >= half { number - 2 * half } else { number })
+    }
+
+    fn float(&mut self) -> Result<f32, ProofProblem> {
+        Ok(f32::from_bits(self.number(4)? as u32))
+    }
+
+    fn text(&mut self) -> Result<String, ProofProblem> {
+        let length = usize::from(self.byte()?);
+        Ok(String::from_utf8_lossy(self.take(length)?).into_owned())
+    }
+}
+
+/// Leaves: their type, unit and table.
+struct Leaves<'b> {
+    kind: u8,
+    unit: f64,
+    /// Bytes of a leaf's number, and the values of all leaves.
+    shared: Option<(usize, &'b [u8])>,
+}
+
+impl Leaves<'_> {
+    /// Values of the next leaf, of `count` values.
+    fn next(&self, bytes: &mut Bytes<'_>, count: usize, shift: u32) -> Result<Vec<f64>, ProofProblem> {
+        let size = 1 << self.kind;
+        let values = match self.shared {
+            None => bytes.take(count * size)?,
+            Some((width, table)) => {
+                let start = bytes.number(width)? * count * size;
+                table.get(start..start + count * size).ok_or(SHORT)?
+            }
+        };
+        let mut values = Bytes(values);
+        let value = |_| -> Result<f64, ProofProblem> {
+            Ok(match self.kind {
+                0 => (f64::from(values.byte()?) - 128.0) * f64::from(shift).exp2() * self.unit,
+                1 => values.signed(2)? as f64 * f64::from(shift).exp2() * self.unit,
+                _ => f64::from(values.float()?) * self.unit,
+            })
+        };
+        (0..count).map(value).collect()
+    }
+}
+
+impl Plain {
+    /// Size of a unit that leaves were rounded to; 0 for f32 leaves.
+    pub(super) fn rounded_to(&self) -> f64 {
+        if self.most > 0.0 { self.unit } else { 0.0 }
+    }
+
+    /// Size of a step of a tree whose largest value is this: units doubled until it fits a leaf; 0 for f32 leaves.
+    pub(super) fn step_for(&self, largest: f64) -> f64 {
+        let mut step = self.rounded_to();
+        while step > 0.0 && largest > self.most * step * (1.0 + 1e-12) {
+            step *= 2.0;
+        }
+        step
+    }
+
+    /// The whole numbers of steps that a value may be rounded to.
+    pub(super) fn steps(&self, value: f64, step: f64) -> [f64; 2] {
+        if step > 0.0 { steps(value, step) } else { [0.0; 2] }
+    }
+}
+
+/// The whole numbers of steps that a value may be rounded to: two for halves.
+pub(super) fn steps(value: f64, step: f64) -> [f64; 2] {
+    [-1e-6, 1e-6].map(|slack| (value / step + slack).round())
+}
+
+/// Reads a model.
+///
+/// # Errors
+/// [`ProofProblem::Format`] if a section ends too early, or points out of the model; [`ProofProblem::Code`].
+#[expect(clippy::too_many_lines, reason = "the format from its first byte to its last, in its order")]
+pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
+    let mut header = Bytes(bytes);
+    header.take(4)?;
+    let version = header.number(2)?;
+    let (layout, kind) = (header.byte()?, header.byte()?);
+    header.take(4)?;
+    let (descriptor, key) = (header.byte()?, header.byte()?);
+    let (objects, features) = (header.number(1)? + 1, header.number(1)? + 1);
+    let (axis_count, group_count) = (header.number(2)?, header.number(2)?);
+    header.take(12)?;
+    let unit = f64::from(header.float()?);
+    let (unit_bits, unit_shift) = (header.number(4)? as f64, f64::from(header.byte()?));
+    header.take(3)?;
+    if (unit * std::f64::consts::LOG2_E * (32.0 + unit_shift).exp2() - unit_bits).abs() > 1.0 {
+        return Err(ProofProblem::Format { what: "its unit in nats is not its unit in bits" });
+    }
+    let error = f64::from(header.float()?);
+    header.take(20)?;
+    let text_length = header.number(4)?;
+    header.take(8)?;
+    let (cuts_length, splits_length, leaves_length) = (header.number(4)?, header.number(4)?, header.number(4)?);
+    let sections_length = if version == 2 { header.number(4)? } else { header.take(4).map(|_| 0)? };
+    if layout == 6 {
+        return Err(ProofProblem::Code);
+    }
+    let mut rest = header;
+    let mut text = Bytes(rest.take(text_length)?);
+    text.text()?;
+    // A name is empty where the text ends too early.
+    let names = (0..objects).map(|_| text.text().unwrap_or_default()).collect();
+    let mut sections = Bytes(rest.take(sections_length)?);
+    let (mut shared, mut sentinel, mut scale, mut link) = (None, None, 1.0, (0, false));
+    let (mut scales, mut feature_names) = (vec![1.0; features], Vec::new());
+    while !sections.0.is_empty() {
+        let tag = sections.number(2)? & 0x7fff;
+        sections.take(2)?;
+        let length = sections.number(4)?;
+        let mut content = Bytes(sections.take(length)?);
+        sections.take(length.next_multiple_of(4) - length)?;
+        match tag {
+            8 => {
+                for own in &mut scales {
+                    *own = content.float()?;
+                    feature_names.push(content.text()?);
+                }
+            }
+            12 => {
+                let width = usize::from(content.byte()?);
+                content.take(3)?;
+                shared = Some((width, content.0));
+            }
+            13 => {
+                link = (content.byte()?, content.byte()? == 1);
+                content.take(2)?;
+                scale = f64::from(content.float()?);
+            }
+            14 => sentinel = Some([content.signed(4)?, content.signed(4)?]),
+            _ => {}
+        }
+    }
+    let is_f32 = kind == 2;
+    let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
+    let base: Result<Vec<f64>, _> = (0..objects)
+        .map(|_| match is_f32 {
+            true => Ok(f64::from(rest.float()?) * scale),
+            false => Ok(rest.signed(4)? as f64 * unit * scale),
+        })
+        .collect();
+    let base = base?;
+    rest.take(4 * objects)?;
+    let mut axis_bytes = Bytes(rest.take(4 * axis_count)?);
+    let cuts_bytes = rest.take(cuts_length)?;
+    let mut group_bytes = Bytes(rest.take(8 * group_count)?);
+    let mut splits = Bytes(rest.take(splits_length)?);
+    let mut leaves = Bytes(rest.take(leaves_length)?);
+    if rest.0.len() != 4 {
+        return Err(ProofProblem::Format { what: "sections of other lengths than it states" });
+    }
+    let mut cuts = Bytes(cuts_bytes);
+    let axis = |_| -> Result<Axis, ProofProblem> {
+        let (feature, columns) = (axis_bytes.number(1)?, axis_bytes.byte()?);
+        let (width, count) = (axis_bytes.number(1)?, axis_bytes.number(1)?);
+        if !(1..=4).contains(&width) {
+            return Err(ProofProblem::Format { what: "thresholds of no width" });
+        }
+        let cuts: Result<Vec<i64>, _> = (0..count).map(|_| cuts.signed(width)).collect();
+        Ok(Axis { feature, columns, cuts: cuts? })
+    };
+    let axes: Result<Vec<Axis>, _> = (0..axis_count).map(axis).collect();
+    let axes = axes?;
+    let keys = match key {
+        1 => Keys::Real,
+        _ if descriptor == 255 => Keys::Scaled(scales),
+        _ => Keys::Whole,
+    };
+    let (mut trees, mut cells) = (Vec::new(), None);
+    if matches!(layout, 2 | 4) {
+        let places =
+            if layout == 2 { grid(&keys.all(features), &axes)? } else { patterns(&keys.all(features), &axes)? };
+        let cell = |rows| Ok((rows, leaves_of.next(&mut leaves, objects, 0)?));
+        let all: Result<Vec<_>, _> = places.into_iter().map(cell).collect();
+        cells = Some(all?);
+    } else {
+        let columns: Vec<(&Axis, bool)> = axes
+            .iter()
+            .flat_map(|axis| [(1, true), (2, false)].map(|(bit, left)| (axis, bit, left)))
+            .filter(|(axis, bit, _)| axis.columns & bit != 0)
+            .map(|(axis, _, left)| (axis, left))
+            .collect();
+        let ranked = |column: usize, at: usize| match columns.get(column) {
+            None => Rule::EITHER,
+            Some((axis, missing_left)) => {
+                let cut = axis.cuts.get(at).copied().unwrap_or(i64::MAX);
+                Rule { feature: axis.feature, cut, missing_left: *missing_left || at >= 255 }
+            }
+        };
+        for _ in 0..group_count {
+            let (depth, shift) = (group_bytes.byte()?, u32::from(group_bytes.byte()?));
+            let (is_one, object) = (group_bytes.byte()? == 1, group_bytes.number(1)?);
+            let (object, values) = if is_one { (Some(object), 1) } else { (None, objects) };
+            let count = group_bytes.number(4)?;
+            let step = if is_f32 { 0.0 } else { leaves_of.unit * f64::from(shift).exp2() };
+            let slots = 1_usize << depth.min(8);
+            let complete = match layout {
+                1 => Some((splits.take(slots * count)?, splits.take(slots * count)?)),
+                _ => None,
+            };
+            for tree in 0..count {
+                let nodes = match complete {
+                    Some((columns, ranks)) => (1..slots)
+                        .map(|slot| {
+                            let at = tree * slots + slot;
+                            (ranked(columns[at].into(), ranks[at].into()), [2 * slot - 1, 2 * slot])
+                        })
+                        .collect(),
+                    None => preorder(&mut splits, layout == 3, cuts_bytes, &ranked)?,
+                };
+                let mut nodes: Vec<Step> = nodes.into_iter().map(|(rule, to)| Step::Split(rule, to)).collect();
+                for _ in 0..=nodes.len() {
+                    nodes.push(Step::Leaf(leaves_of.next(&mut leaves, values, shift)?));
+                }
+                trees.push((Tree { nodes, object }, step));
+            }
+        }
+    }
+    Ok(Plain {
+        names,
+        features,
+        descriptor,
+        keys,
+        feature_names,
+        sentinel,
+        unit: unit * scale,
+        link,
+        most: [127.0, 32767.0, 0.0].get(usize::from(kind)).copied().unwrap_or(0.0),
+        stated: error * scale,
+        base: if cells.is_some() { vec![0.0; objects] } else { base },
+        trees,
+        cells,
+    })
+}
+
+type Split = (Rule, [usize; 2]);
+
+/// Splits of the next tree in preorder; children that are leaves have numbers from the number of splits on.
+fn preorder(
+    splits: &mut Bytes<'_>,
+    is_wide: bool,
+    cuts: &[u8],
+    ranked: &dyn Fn(usize, usize) -> Rule,
+) -> Result<Vec<Split>, ProofProblem> {
+    let count = splits.number(2)?;
+    let mut read = Vec::with_capacity(count);
+    for _ in 0..count {
+        read.push(if is_wide {
+            let (feature, missing) = (splits.number(1)?, splits.byte()?);
+            let number = splits.number(2)?;
+            let cut = Bytes(cuts.get(4 * number..).ok_or(SHORT)?).signed(4)?;
+            (Rule { feature, cut, missing_left: missing != 0 }, splits.number(2)?)
+        } else {
+            let (column, at) = (splits.number(1)?, splits.number(1)?);
+            (ranked(column, at), splits.number(1)?)
+        });
+    }
+    // Each subtree: its first split, its number of splits, its first leaf.
+    let mut nodes: Vec<Option<Split>> = vec![None; count];
+    let mut open = vec![[0, count, 0]];
+    while let Some([at, below, leaf]) = open.pop() {
+        if below == 0 {
+            continue;
+        }
+        let &(rule, left) = read.get(at).ok_or(SHORT)?;
+        let right = below.checked_sub(left + 1).ok_or(ProofProblem::Format { what: "a subtree beyond its tree" })?;
+        let number = |at, below, leaf| if below == 0 { count + leaf } else { at };
+        let parts = [[at + 1, left, leaf], [at + 1 + left, right, leaf + left + 1]];
+        nodes[at] = Some((rule, parts.map(|[at, below, leaf]| number(at, below, leaf))));
+        open.extend(parts);
+    }
+    nodes.into_iter().collect::<Option<Vec<_>>>().ok_or(SHORT)
+}
+
+/// Intervals of an axis, and missing if `with_missing`.
+fn ranks(axis: &Axis, all: Values, with_missing: bool) -> Vec<Values> {
+    let mut low = all.low;
+    let mut ranks = Vec::new();
+    for &cut in &axis.cuts {
+        ranks.push(Values::of(low, cut - 1, false));
+        low = cut;
+    }
+    ranks.push(Values::of(low, all.high, false));
+    ranks.extend(with_missing.then_some(Values::MISSING));
+    ranks
+}
+
+fn grid(all: &Rows, axes: &[Axis]) -> Result<Vec<Vec<Values>>, ProofProblem> {
+    let [first, second] = axes else { return Err(ProofProblem::Format { what: "a grid without two axes" }) };
+    let of = |axis: &Axis| all.get(axis.feature).map(|&all| ranks(axis, all, true)).ok_or(SHORT);
+    let (rows, columns) = (of(first)?, of(second)?);
+    let mut cells = Vec::new();
+    for &row in &rows {
+        for &column in &columns {
+            let mut cell = all.to_vec();
+            cell[first.feature] = row;
+            // Both axes may be of one feature.
+            let other = cell[second.feature];
+            let [low, high] = [other.low.max(column.low), other.high.min(column.high)];
+            cell[second.feature] = Values::of(low, high, other.missing && column.missing);
+            cells.push(cell);
+        }
+    }
+    Ok(cells)
+}
+
+fn patterns(all: &Rows, axes: &[Axis]) -> Result<Vec<Vec<Values>>, ProofProblem> {
+    let ([curvature, slope, pair], [_, k, s, p]) = (axes, all) else {
+        return Err(ProofProblem::Format { what: "patterns without three axes and four features" });
+    };
+    let [curvature, slope, pair] = [(curvature, k), (slope, s), (pair, p)].map(|(axis, all)| ranks(axis, *all, false));
+    let missing = || vec![Values::MISSING];
+    let kinds = [
+        (0, missing(), missing(), missing()),
+        (1, missing(), missing(), missing()),
+        (2, missing(), missing(), missing()),
+        (3, missing(), missing(), pair),
+        (4, missing(), slope.clone(), missing()),
+        (5, curvature, slope, missing()),
+    ];
+    let mut cells = Vec::new();
+    for (code, curvatures, slopes, pairs) in kinds {
+        for &curvature in &curvatures {
+            for &slope in &slopes {
+                cells.extend(pairs.iter().map(|&pair| vec![Values::of(code, code, false), curvature, slope, pair]));
+            }
+        }
+    }
+    Ok(cells)
+}

@@ -1,0 +1,248 @@
+//! Proofs: every model of an ensemble is proved, and no change of a model's meaning is.
+
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate::error::ProofProblem;
+use palpate::prove::{Certificate, check, prove};
+use palpate_onboard::Model;
+use palpate_shared::format::checksum;
+use palpate_shared::{Descriptor, MISSING_FEATURE};
+use palpate_tests::random::{self, Shape};
+use proptest::prelude::*;
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+/// Stands for the ensemble's file.
+const FILE: &[u8] = b"an ensemble";
+
+fn shapes() -> impl Strategy<Value = Shape> {
+    let descriptors = prop::sample::select(Descriptor::ALL.to_vec());
+    (descriptors, 1..8_usize, 1..=30_usize, 0..=6_usize, any::<bool>(), 0..60_usize, 0.01..30.0_f32).prop_map(
+        |(descriptor, objects, trees, depth, each, thresholds, leaf)| Shape {
+            descriptor,
+            objects,
+            trees,
+            depth,
+            each,
+            thresholds,
+            leaf,
+        },
+    )
+}
+
+/// The same trees over rows of this many features, with fractions as thresholds.
+fn over_rows(mut ensemble: Ensemble, features: usize) -> Ensemble {
+    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
+        for (index, node) in tree.nodes.iter_mut().enumerate() {
+            if let Node::Split { feature, threshold, .. } = node {
+                *feature = (*feature * 37 + number * 11 + index) % features;
+                *threshold /= 7.0;
+            }
+        }
+    }
+    Ensemble { inputs: Inputs::unnamed(features), ..ensemble }
+}
+
+/// Its models in every layout of data and type of leaves that it fits.
+fn models(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
+    let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
+    let all = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
+    let compiled = all.filter_map(|(leaf, layout)| {
+        compile(ensemble, &Settings { leaf, layout, scales: scales.clone(), ..Settings::default() }).ok()
+    });
+    compiled.map(|compiled| compiled.bytes).collect()
+}
+
+fn is_proved(bytes: &[u8], ensemble: &Ensemble) -> Result<(), TestCaseError> {
+    let layout = Model::new(bytes).unwrap().layout();
+    let (proof, certificate) = prove(bytes, ensemble, FILE).map_err(|error| {
+        TestCaseError::fail(format!("{layout:?} {:?}: {error}", Model::new(bytes).unwrap().leaf_type()))
+    })?;
+    let read: Certificate = {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("proof.txt");
+        std::fs::write(&path, certificate.to_string()).unwrap();
+        Certificate::read(path).unwrap()
+    };
+    prop_assert_eq!(&read, &certificate, "written and read");
+    let checked = check(&read, bytes, ensemble, FILE)
+        .map_err(|error| TestCaseError::fail(format!("the certificate of {layout:?}: {error}")))?;
+    prop_assert!(proof.margin_error <= checked.margin_error + 1e-9, "{proof:?} {checked:?}");
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    #[test]
+    fn models_of_touches_are_proved_in_every_layout_and_their_certificates_hold(shape in shapes(), seed: u64) {
+        let ensemble = random::ensemble(shape, seed);
+        for bytes in models(&ensemble, None) {
+            is_proved(&bytes, &ensemble)?;
+        }
+    }
+
+    #[test]
+    fn models_of_rows_are_proved_by_keys_and_in_units(shape in shapes(), features in 1..=40_usize, seed: u64) {
+        let ensemble = over_rows(random::ensemble(shape, seed), features);
+        for scales in [None, Some(vec![100.0; features])] {
+            for bytes in models(&ensemble, scales) {
+                is_proved(&bytes, &ensemble)?;
+            }
+        }
+    }
+}
+
+/// Rows near what trees compare with.
+fn rows(ensemble: &Ensemble, model: &Model<'_>) -> Vec<i32> {
+    let mut random = SmallRng::seed_from_u64(3);
+    let mut cuts = vec![0, i32::MAX, -i32::MAX];
+    for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
+        if let Node::Split { threshold, .. } = node {
+            cuts.extend([-1, 0, 1].map(|step| (threshold.ceil() as i32).saturating_add(step)));
+        }
+    }
+    let width = model.feature_count();
+    let value = |_| if random.random_bool(0.1) { MISSING_FEATURE } else { cuts[random.random_range(0..cuts.len())] };
+    (0..500 * width).map(value).collect()
+}
+
+fn margins(model: &Model<'_>, rows: &[i32]) -> Vec<Vec<i32>> {
+    let row = |row: &[i32]| {
+        let mut margins = vec![0; model.object_count()];
+        model.margins_of(row, &mut margins);
+        margins
+    };
+    rows.chunks(model.feature_count()).map(row).collect()
+}
+
+/// A model with its certificate, and its margins of rows.
+struct Original {
+    bytes: Vec<u8>,
+    certificate: Certificate,
+    rows: Vec<i32>,
+    margins: Vec<Vec<i32>>,
+    sizes: [usize; 2],
+    name: String,
+}
+
+impl Original {
+    fn new(bytes: Vec<u8>, ensemble: &Ensemble) -> Self {
+        let certificate = prove(&bytes, ensemble, FILE).unwrap().1;
+        let model = Model::new(&bytes).unwrap();
+        let rows = rows(ensemble, &model);
+        let margins = margins(&model, &rows);
+        let name = format!("{:?} {:?}", model.layout(), model.leaf_type());
+        let sizes = [model.object_count(), model.feature_count()];
+        Self { certificate, rows, margins, sizes, name, bytes }
+    }
+}
+
+/// Tries a changed model: `None` if it is not accepted as a model, else true if it is refused in both ways. Panics if its
+/// margins are others, and it is not.
+fn is_refused(changed: &mut [u8], original: &Original, ensemble: &Ensemble, what: &str) -> Option<bool> {
+    let body = changed.len() - 4;
+    let sum = checksum(&changed[..body]);
+    changed[body..].copy_from_slice(&sum.to_le_bytes());
+    let model = Model::new(changed).ok()?;
+    let proved = prove(changed, ensemble, FILE);
+    // A certificate of the original that claims to be about the changed model is judged in the other way.
+    let of_changed = crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(changed);
+    let certificate = Certificate { model: of_changed, ..original.certificate.clone() };
+    let checked = check(&certificate, changed, ensemble, FILE);
+    if proved.is_err() && checked.is_err() {
+        return Some(true);
+    }
+    let same_size = [model.object_count(), model.feature_count()] == original.sizes;
+    let is_same = same_size && margins(&model, &original.rows) == original.margins;
+    assert!(is_same || proved.is_err(), "{what} of {} changes margins, and is proved", original.name);
+    assert!(is_same || checked.is_err(), "{what} of {} changes margins, and its certificate holds", original.name);
+    Some(false)
+}
+
+#[test]
+fn every_bit_that_changes_a_margin_of_a_small_model_is_refused_in_both_ways() {
+    let mut counts = [0, 0];
+    for (number, descriptor) in [Descriptor::Curvature, Descriptor::ContactsCurvature].into_iter().enumerate() {
+        let shape = Shape { descriptor, thresholds: 3, trees: 3, depth: 2, ..Shape::SMALL };
+        let ensemble = random::ensemble(shape, 7 + number as u64);
+        for original in models(&ensemble, None) {
+            let original = Original::new(original, &ensemble);
+            for bit in 0..8 * (original.bytes.len() - 4) {
+                let mut changed = original.bytes.clone();
+                changed[bit / 8] ^= 1 << (bit % 8);
+                let what = format!("bit {bit}");
+                if let Some(is_refused) = is_refused(&mut changed, &original, &ensemble, &what) {
+                    counts[usize::from(is_refused)] += 1;
+                }
+            }
+        }
+    }
+    println!("{} bits change no meaning that a proof states, {} are refused", counts[0], counts[1]);
+    assert!(counts[1] > 1000, "{counts:?}");
+}
+
+#[test]
+fn random_changes_of_large_models_that_change_a_margin_are_refused_in_both_ways() {
+    let mut random = SmallRng::seed_from_u64(5);
+    let shape = Shape { objects: 6, trees: 60, depth: 6, thresholds: 90, ..Shape::SMALL };
+    let mut refused = 0;
+    for each in [false, true] {
+        let ensemble = random::ensemble(Shape { each, descriptor: Descriptor::Oriented, ..shape }, 11);
+        for original in models(&ensemble, None) {
+            let original = Original::new(original, &ensemble);
+            for _ in 0..40 {
+                let mut changed = original.bytes.clone();
+                let at = random.random_range(96..changed.len() - 4);
+                changed[at] = random.random();
+                let what = format!("byte {at}");
+                refused += usize::from(is_refused(&mut changed, &original, &ensemble, &what) == Some(true));
+            }
+        }
+    }
+    assert!(refused > 100, "{refused}");
+}
+
+#[test]
+fn another_ensemble_is_refused_with_the_tree_and_the_rows() {
+    let ensemble = random::ensemble(Shape::SMALL, 1);
+    let bytes = compile(&ensemble, &Settings { layout: Some(Layout::Compact), ..Settings::default() }).unwrap().bytes;
+    let mut other = ensemble.clone();
+    let threshold = other.trees[2].nodes.iter_mut().find_map(|node| match node {
+        Node::Split { threshold, .. } => Some(threshold),
+        Node::Leaf(_) => None,
+    });
+    *threshold.unwrap() += 1.0;
+    let error = prove(&bytes, &other, FILE).unwrap_err();
+    match error.problem() {
+        Some(ProofProblem::Leaf { source_tree: 2, rows, .. }) => assert!(!rows.is_empty()),
+        problem => panic!("{problem:?}"),
+    }
+    let (_, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
+    let error = check(&certificate, &bytes, &other, FILE).unwrap_err();
+    assert!(matches!(error.problem(), Some(ProofProblem::Leaf { source_tree: 2, .. })), "{error}");
+    let error = check(&certificate, &bytes, &ensemble, b"another file").unwrap_err();
+    assert!(matches!(error.problem(), Some(ProofProblem::OtherFile { .. })), "{error}");
+    let mut understated = certificate.clone();
+    understated.outputs[1][0] /= 2.0;
+    let error = check(&understated, &bytes, &ensemble, FILE).unwrap_err();
+    assert!(matches!(error.problem(), Some(ProofProblem::Understated { .. })), "{error}");
+}
+
+#[test]
+fn a_certificate_with_a_wrong_line_says_which() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("proof.txt");
+    for (text, line) in [
+        ("", 1),
+        ("palpate certificate 2\n", 1),
+        ("palpate certificate 1\nmodel 12\nensemble xyz\n", 3),
+        ("palpate certificate 1\nmodel 12 13\n", 2),
+        ("palpate certificate 1\noutput 1 2\n", 2),
+        ("palpate certificate 1\ntree 1e-3 0 -1\n", 2),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let error = Certificate::read(&path).unwrap_err().to_string();
+        assert!(error.contains(&format!("proof.txt:{line}: not a line of a certificate")), "{error}");
+    }
+}
