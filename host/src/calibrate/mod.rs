@@ -50,7 +50,7 @@ mod walk;
 
 pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
-pub use error::{CalibrateProblem, Forecast, Supplied};
+pub use error::{CalibrateProblem, Enough, Forecast, Supplied};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub use model::{Calibrated, OfObject, Settings, Worse, added_bytes, calibrate};
 #[cfg(feature = "train")]
