@@ -3,7 +3,8 @@
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate::error::ProofProblem;
-use palpate::prove::{Certificate, check, prove};
+use palpate::prove::{Certificate, check, moves, prove};
+use palpate::rows::Encoder;
 use palpate_onboard::Model;
 use palpate_shared::format::checksum;
 use palpate_shared::{Descriptor, MISSING_FEATURE};
@@ -79,6 +80,48 @@ proptest! {
         let ensemble = random::ensemble(shape, seed);
         for bytes in models(&ensemble, None) {
             is_proved(&bytes, &ensemble)?;
+        }
+    }
+
+    #[test]
+    fn a_class_stays_until_the_stated_value_of_a_feature_and_is_another_one_there(
+        shape in shapes(), features in 1..=6_usize, seed: u64,
+    ) {
+        let ensemble = over_rows(random::ensemble(Shape { objects: shape.objects.max(2), ..shape }, seed), features);
+        let mut random = SmallRng::seed_from_u64(seed);
+        for scales in [None, Some(vec![10.0; features])] {
+            for bytes in models(&ensemble, scales) {
+                let model = Model::new(&bytes).unwrap();
+                let encoder = Encoder::of(&model);
+                let row: Vec<f64> = (0..features).map(|_| f64::from(random.random_range(-40_000..40_000_i32)) / 8.0).collect();
+                let class = |row: &[f64]| {
+                    let mut margins = vec![0; model.object_count()];
+                    model.predict_class(&encoder.row(row), &mut margins).unwrap()
+                };
+                let own = class(&row);
+                for moved in moves(&bytes, &row).unwrap() {
+                    let at = |value: f64| {
+                        let mut row = row.clone();
+                        row[moved.feature] = value;
+                        class(&row)
+                    };
+                    let from = moved.value.unwrap();
+                    for (found, end) in [(moved.below, -1e9), (moved.above, 1e9)] {
+                        if let Some((value, class)) = found {
+                            prop_assert_eq!(at(value), class);
+                            prop_assert_ne!(class, own);
+                        }
+                        let to = found.map_or(end, |(value, _)| value);
+                        for _ in 0..30 {
+                            let between = from + (to - from) * random.random_range(0.0..1.0);
+                            // In whole units what is between may be rounded to the end.
+                            let is_end = found.is_some() && encoder.row(&[between]) == encoder.row(&[to]);
+                            prop_assert!(is_end || at(between) == own, "{from} {between} {to} {:?}", model.layout());
+                        }
+                    }
+                    prop_assert_eq!(moved.missing.unwrap_or(own), at(f64::NAN));
+                }
+            }
         }
     }
 

@@ -83,8 +83,8 @@ pub enum CalibrateProblem {
         tally: Tally,
         /// Names needed, if none is wrong.
         needed: u64,
-        /// What would be enough.
-        forecast: Forecast,
+        /// Recordings that would be enough, and the rate for which these are.
+        forecast: Box<Forecast>,
     },
     /// The data set lacks objects of the model.
     #[error("the data set has no touches of {}", objects.join(", "))]
@@ -113,15 +113,26 @@ pub struct Supplied {
 }
 
 /// Rates that recordings support, and recordings that a rate takes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Forecast {
     /// Approaches that were recorded to the object with the fewest.
     pub approaches: usize,
     /// The lowest rate that so many are likely to support, where one is known.
     pub supported: Option<f64>,
-    /// The approaches to each object that are likely to support the rate, as far as the simulation is right; none where it
-    /// says of no number that it is enough.
-    pub enough: Option<u64>,
+    /// The approaches that are likely to support the rate, as far as the simulation is right; none where it says of no number
+    /// that it is enough.
+    pub enough: Option<Enough>,
+}
+
+/// Recordings that are likely to be enough. Objects that are hard to distinguish take more approaches, and as many sequences.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Enough {
+    /// Approaches to all objects.
+    pub all: u64,
+    /// Approaches to the object that takes the fewest, and its name.
+    pub least: (u64, String),
+    /// The same of the object that takes the most.
+    pub most: (u64, String),
 }
 
 impl Problem for CalibrateProblem {
@@ -211,8 +222,12 @@ fn not_supported(object: &Option<String>, rate: f64, tally: Tally, needed: u64, 
     let supported = forecast.supported.map(|supported| {
         format!("; {} recorded approaches to each object support about {} %", forecast.approaches, percent(supported))
     });
-    let enough =
-        forecast.enough.map(|enough| format!("; {rate} % takes about {enough} to each, if the simulation is right"));
+    let enough = forecast.enough.as_ref().map(|Enough { all, least, most }| {
+        format!(
+            "; {rate} % takes about {all} in all, from {} to {} to {} to {}, if the simulation is right",
+            least.0, least.1, most.0, most.1
+        )
+    });
     format!("{what}{}{}", supported.unwrap_or_default(), enough.unwrap_or_default())
 }
 

@@ -15,7 +15,7 @@
 
 use super::choose::{By, Terms, steps, summary, tallies};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
-use super::error::{Forecast, two_digits};
+use super::error::{Enough, Forecast, two_digits};
 use super::model::{Calibrated, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, shares};
 use super::sequence::{Odds, Sequence, margin_of};
 use super::temperature::temperature;
@@ -157,6 +157,8 @@ struct Step {
     tallies: Vec<Tally>,
     /// Sequences that the recordings make, for each simulated one.
     scale: f64,
+    /// Approaches to each object of the model that all simulated sequences took.
+    used: Vec<u64>,
 }
 
 impl Step {
@@ -195,7 +197,8 @@ impl Foreseen {
             }
             let of = recorded.objects.iter().zip(known);
             let scale = of.map(|(object, &known)| object.len() as f64 / used[known].max(1) as f64);
-            Step { tallies: tallies(&all, odds, by), scale: scale.fold(f64::INFINITY, f64::min) }
+            let scale = scale.fold(f64::INFINITY, f64::min);
+            Step { tallies: tallies(&all, odds, by), scale, used }
         };
         let fewest = recorded.objects.iter().map(crate::touches::ObjectTouches::len).min().unwrap_or(0);
         Self { steps: steps.iter().map(step).collect(), fewest }
@@ -223,12 +226,27 @@ impl Foreseen {
         (is_hopeless && names < needed(terms.rate, terms.confidence) as f64).then_some(chosen)
     }
 
+    /// The approaches that so many times the sequences of the recordings take at a threshold.
+    fn enough(&self, times: f64, step: usize, names: &[String]) -> Enough {
+        let Some(Step { scale, used, .. }) = self.steps.get(step) else { return Enough::default() };
+        let mut each: Vec<(u64, String)> = used
+            .iter()
+            .zip(names)
+            .map(|(&used, name)| (two_digits(used as f64 * scale * times), name.clone()))
+            .collect();
+        each.sort();
+        let all = two_digits(used.iter().sum::<u64>() as f64 * scale * times);
+        let ends = each.first().cloned().zip(each.last().cloned());
+        ends.map_or_else(Enough::default, |(least, most)| Enough { all, least, most })
+    }
+
     /// The reason why no threshold was kept.
     fn problem(&self, stop: Stop, names: &[String], terms: &Terms) -> CalibrateProblem {
         let Terms { rate, confidence, per } = *terms;
         let is_likely = |times: f64, rate: f64| self.best(times, rate, confidence).0 >= LIKELY;
         let higher = || RATES.iter().copied().filter(|&higher| higher > rate);
         let enough = (0..GROWN).map(|step| GROWTH.powi(step)).find(|&times| is_likely(times, rate));
+        let enough = enough.map(|times| self.enough(times, self.best(times, rate, confidence).1, names));
         let (position, tally, supported) = match stop {
             Stop::TooFew { position, found } => {
                 let tally = Tally { wrong: 0, all: found };
@@ -244,11 +262,7 @@ impl Foreseen {
             rate,
             tally,
             needed: needed(rate, confidence),
-            forecast: Forecast {
-                approaches: self.fewest,
-                supported,
-                enough: enough.map(|times| two_digits(times * self.fewest as f64)),
-            },
+            forecast: Box::new(Forecast { approaches: self.fewest, supported, enough }),
         }
     }
 }

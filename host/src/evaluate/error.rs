@@ -41,6 +41,12 @@ pub enum EvaluateProblem {
         /// Number of sequences of each object that it takes.
         needed: u64,
     },
+    /// Recordings make no sequences, or too many of them end as unknown at every threshold.
+    #[error("{}", too_few_recorded(*object_sequences))]
+    TooFewRecorded {
+        /// Sequences of the object with the fewest.
+        object_sequences: usize,
+    },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
     RawFeatures,
@@ -138,6 +144,13 @@ pub enum EvaluateProblem {
 }
 
 /// Message about too few sequences: too few in all, or too few that do not end as unknown.
+fn too_few_recorded(object_sequences: usize) -> String {
+    match object_sequences {
+        0 => "the recordings make no sequence of an object that ends with a name".into(),
+        some => format!("of {some} recorded sequences of each object too many end as unknown at every threshold"),
+    }
+}
+
 fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
     if (object_sequences as u64) < needed {
         format!(
@@ -158,6 +171,7 @@ impl Problem for EvaluateProblem {
             Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
             Self::MissingObject { .. } => "Capture touches of every object that the model knows.",
             Self::TooFewForMisfit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
+            Self::TooFewRecorded { .. } => "Record more, or calibrate on simulated touches alone.",
             Self::RawFeatures => {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
             }

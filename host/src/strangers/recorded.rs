@@ -65,7 +65,7 @@ pub(super) fn tested(
     let Settings { alarms, confidence, .. } = *settings;
     // Sequences of each object; with some of them, too many are alarms.
     let of_each = all.len() / sequences.len().max(1);
-    let few = EvaluateProblem::TooFewForAlarms { object_sequences: of_each, needed: of_each.max(1) as u64 };
+    let few = EvaluateProblem::TooFewRecorded { object_sequences: of_each };
     if all.is_empty() {
         return Err(few.into());
     }

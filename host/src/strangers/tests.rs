@@ -294,5 +294,5 @@ fn few_recordings_state_the_share_of_false_alarms_that_they_support() {
     assert!((10..149).contains(&found.sequences) && found.alarms == 0, "{found:?}");
     assert!((found.supported - (1.0 - 0.05_f64.powf(1.0 / found.sequences as f64))).abs() < 2e-6, "{found:?}");
     let none = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(4, 5), &shapes(), &settings);
-    assert!(none.unwrap_err().to_string().contains("sequences of an object"), "none at all");
+    assert!(none.unwrap_err().to_string().contains("no sequence of an object"), "none at all");
 }

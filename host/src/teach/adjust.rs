@@ -20,16 +20,14 @@ const PRIORS: [f64; 5] = [64.0, 256.0, 1_024.0, 4_096.0, 16_384.0];
 /// Standard errors by which a gain has to be above 0 to count: with fewer, what is fitted to a few hundred touches is worse for
 /// others as often as better.
 const CERTAIN: f64 = 2.0;
-/// The least share of groups that constants have to gain. A smaller one is chance: there are few independent groups.
-const LEAST_GAIN: f64 = 0.01;
 /// Shares of the constants that are tried.
 const SHARES: [f64; 2] = [0.5, 1.0];
 /// Division of the recorded touches.
 const DIVISION: Division = Division { parts: 5, used: 4 };
 /// Simulated touches of an object that has no recordings.
 const SIMULATED: usize = 2_000;
-/// Approaches of a group by which constants are chosen. Longer groups are too few, in so many approaches.
-const CHOSEN: usize = 20;
+/// Approaches of a group by which errors are balanced. Longer groups are too few, in so many approaches.
+const BALANCED: usize = 20;
 
 /// Results of adjusting, on recorded touches that were held out. Shares are between 0 and 1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -123,19 +121,20 @@ pub fn adjust(
             let sizes = [settings.groups, approaches.min(most)];
             Judged::new((held, &sources), &material.own, background, sizes, settings.seed)
         };
-        let share = share(&judged(&held, CHOSEN));
+        let share = share(&judged(&held, BALANCED), &held);
         let constants: Vec<f64> = match share > 0.0 {
             true => {
-                let sizes = [settings.groups, CHOSEN.min(most)];
+                let sizes = [settings.groups, BALANCED.min(most)];
                 Groups::draw((&held, &sources), material.own.clone(), background, sizes, settings.seed).balanced()
             }
             false => vec![0.0; material.own.len()],
         };
         let constants: Vec<f64> = constants.into_iter().map(|constant| share * constant).collect();
         let approaches = settings.approaches.min(most);
-        let fitness = |held: &[Held], share: f64| Fitness {
-            loss: super::held_out::loss(held),
-            recognized: judged(held, CHOSEN).right(share),
+        let fitness = |held: &[Held], share: f64| {
+            let judged = judged(held, BALANCED);
+            let loss = super::held_out::loss(&judged.with_constants(held, share));
+            Fitness { loss, recognized: judged.right(share) }
         };
         let (before, after) = (fitness(&given, 0.0), fitness(&held, share));
         let is_changed = prior.is_some() || share > 0.0;
@@ -150,7 +149,7 @@ pub fn adjust(
             objects: material.own.iter().zip(evidence.iter().zip(&constants)).map(object).collect(),
             prior,
             share,
-            approaches: CHOSEN.min(approaches),
+            approaches: BALANCED.min(approaches),
             given: before,
             adjusted: after,
             is_better,
@@ -167,13 +166,15 @@ pub fn adjust(
     })
 }
 
-/// The share of the constants with which most groups are recognized, if they gain enough.
-fn share(judged: &Judged) -> f64 {
-    let mut best = (judged.right(0.0) + LEAST_GAIN, 0.0);
+/// The share of the constants with the largest gain, less two standard errors, on touches that had no part in them; 0 if that
+/// is not above 0. Groups do not choose it: a few hundred approaches hold few independent ones.
+fn share(judged: &Judged, held: &[Held]) -> f64 {
+    let mut best = (0.0, 0.0);
     for share in SHARES {
-        let right = judged.right(share);
-        if right > best.0 {
-            best = (right, share);
+        let [gain, spread] = gain(held, &judged.with_constants(held, share));
+        let certain = gain - CERTAIN * spread;
+        if certain > best.0 {
+            best = (certain, share);
         }
     }
     best.1

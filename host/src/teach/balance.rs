@@ -143,7 +143,17 @@ impl Groups {
 
 /// Groups that judge constants which they had no part in: for each part of the approaches, groups of it, and the constants
 /// that balance the errors of groups of the other parts.
-pub(super) struct Judged(Vec<(Groups, Vec<f64>)>);
+pub(super) struct Judged(Vec<Third>);
+
+/// A part of the approaches.
+struct Third {
+    /// Groups of it.
+    groups: Groups,
+    /// The constants that balance the errors of groups of the other parts.
+    constants: Vec<f64>,
+    /// For each object its approaches.
+    approaches: Vec<Vec<usize>>,
+}
 
 impl Judged {
     /// Divides the approaches of each source of each object at random, and draws groups as [`Groups::draw`].
@@ -162,23 +172,25 @@ impl Judged {
         };
         let sources: Vec<Vec<Vec<usize>>> = sources.iter().enumerate().map(shuffled).collect();
         let part = |part: usize| {
+            let of = |approaches: &Vec<usize>, is_of: bool| -> Vec<usize> {
+                let own = approaches.iter().enumerate().filter(|(rank, _)| (rank % PARTS == part) == is_of);
+                own.map(|(_, &approach)| approach).collect()
+            };
             let groups = |is_of: bool| {
-                let of = |approaches: &Vec<usize>| {
-                    let own = approaches.iter().enumerate().filter(|(rank, _)| (rank % PARTS == part) == is_of);
-                    own.map(|(_, &approach)| approach).collect()
-                };
-                let own: Vec<Vec<Vec<usize>>> =
-                    sources.iter().map(|sources| sources.iter().map(of).collect()).collect();
+                let own = |sources: &Vec<Vec<usize>>| sources.iter().map(|approaches| of(approaches, is_of)).collect();
+                let own: Vec<Vec<Vec<usize>>> = sources.iter().map(own).collect();
                 Groups::draw((held, &own), taught.to_vec(), background, sizes, seed)
             };
-            (groups(true), groups(false).balanced())
+            let own = |sources: &Vec<Vec<usize>>| sources.iter().flat_map(|approaches| of(approaches, true)).collect();
+            let approaches = sources.iter().map(own).collect();
+            Third { groups: groups(true), constants: groups(false).balanced(), approaches }
         };
         Self((0..PARTS).map(part).collect())
     }
 
     /// Frequency with which taught object number `index` is named, in the mean of the parts.
     pub(super) fn named(&self, index: usize) -> Named {
-        let of = |(groups, constants): &(Groups, Vec<f64>)| groups.named(index, constants);
+        let of = |Third { groups, constants, .. }: &Third| groups.named(index, constants);
         let sum = self.0.iter().map(of).fold([0.0; 2], |[right, wrong], of| [right + of.right, wrong + of.wrong]);
         let [right, wrong] = sum.map(|sum| sum / self.0.len() as f64);
         Named { right, wrong }
@@ -186,15 +198,33 @@ impl Judged {
 
     /// The share of groups that are recognized, of all objects that were not taught.
     pub(super) fn others(&self) -> f64 {
-        self.0.iter().map(|(groups, constants)| groups.others(constants)).sum::<f64>() / self.0.len() as f64
+        self.0.iter().map(|third| third.groups.others(&third.constants)).sum::<f64>() / self.0.len() as f64
     }
 
     /// The share of groups that are recognized, of all objects, with this share of the constants.
     pub(super) fn right(&self, share: f64) -> f64 {
-        let right = |(groups, constants): &(Groups, Vec<f64>)| {
+        let right = |Third { groups, constants, .. }: &Third| {
             groups.right(&constants.iter().map(|constant| share * constant).collect::<Vec<_>>())
         };
         self.0.iter().map(right).sum::<f64>() / self.0.len() as f64
+    }
+
+    /// The margins of every approach, with this share of the constants that other parts chose.
+    pub(super) fn with_constants(&self, held: &[Held], share: f64) -> Vec<Held> {
+        let mut changed = held.to_vec();
+        for Third { groups, constants, approaches } in &self.0 {
+            for (object, approaches) in approaches.iter().enumerate() {
+                for &approach in approaches {
+                    let Some(margins) = &mut changed[object][approach] else { continue };
+                    groups
+                        .taught
+                        .iter()
+                        .zip(constants)
+                        .for_each(|(&taught, constant)| margins[taught] += share * constant);
+                }
+            }
+        }
+        changed
     }
 }
 

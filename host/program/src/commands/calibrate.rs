@@ -10,7 +10,7 @@ use palpate::Result;
 use palpate::calibrate::{self, Calibrated, OfRecorded, Per, Settings, Worse};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
-use palpate::error::{CalibrateProblem, Error, Place};
+use palpate::error::{CalibrateProblem, Error, EvaluateProblem, Place};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::strangers::{self, Found};
@@ -21,9 +21,9 @@ use std::path::PathBuf;
 /// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Calibrate on touches that the model was not trained on, made and disturbed as those that it will get: the promise holds for such touches only. Wrong names break it; a sequence without a name is undecided, neither right nor wrong. docs/reference/options.md says how thresholds are found, and how many touches that takes.
+The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. docs/reference/options.md has the method.
 
-With --recorded thresholds are found on the touches of DIR and tested on recorded ones, for which the promise then holds; that takes fewer recordings than a calibration on them alone. With --strangers the model also tests whether touches fit any object that it knows. With --plan it gets a plan of approaches instead, and DIR holds approaches with pose.
+With --plan the model gets a plan of approaches instead, and DIR holds approaches with pose.
 
 Of a model over rows, DIR is a file of sequences of rows: CSV or Parquet. Rows of a sequence may depend on each other; sequences, or with --group-column groups, must not.
 
@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     /// Touches to calibrate on: a directory that `palpate capture` filled; or a file of sequences of rows
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Test the thresholds on these recorded touches, or calibrate --strangers on them; a directory
+    /// Recorded touches to test the thresholds on, or --strangers
     #[arg(long, value_name = "DIR", conflicts_with = "plan")]
     recorded: Option<PathBuf>,
     /// Where to write; the calibrated model
@@ -110,9 +110,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         active: arguments.active,
         seed: global.seed(),
     };
-    let wrong = |error: palpate::Error| match (error.problem(), &arguments.recorded) {
-        (Some(CalibrateProblem::NotSupported { .. }), Some(recorded)) => error.in_file(recorded),
-        _ => error.in_file(&arguments.directory),
+    let wrong = |error: palpate::Error| {
+        let is_of_recorded = matches!(error.problem(), Some(CalibrateProblem::NotSupported { .. }))
+            || matches!(error.problem(), Some(EvaluateProblem::TooFewRecorded { .. }));
+        error.in_file(arguments.recorded.as_ref().filter(|_| is_of_recorded).unwrap_or(&arguments.directory))
     };
     let (calibrated, found) = match arguments.strangers.held() {
         None => {

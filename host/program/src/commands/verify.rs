@@ -7,7 +7,7 @@ use palpate::ensemble::Ensemble;
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::verify::{Verified, verify};
 use palpate::output;
-use palpate::prove::{Certificate, Proof, check, prove};
+use palpate::prove::{Certificate, Moves, Proof, check, moves, prove};
 use palpate::rows::{Rows, read_margins};
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ Of a model of touches, every touch of DATA, a directory, goes through model and 
 
 Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output.
 
-With --prove no data is needed: each tree of the model is compared with its trees in ENSEMBLE for every row there can be, and a certificate is written. --certificate checks one by another reader of the model.
+--prove needs no data: each tree of the model is compared with its trees in ENSEMBLE for every row there can be, and a certificate is written. Of the rows of a CSV file it says how far one feature can move before the class changes. --certificate checks one by another reader of the model.
 
 The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the stated rounding does not explain it.
 
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     #[arg(value_name = "DATA", required_unless_present_any = ["prove", "certificate"])]
     data: Option<PathBuf>,
     /// Prove it for every row, and write a certificate
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "certificate"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "certificate")]
     prove: Option<PathBuf>,
     /// Check a certificate that --prove wrote
     #[arg(long, value_name = "FILE", conflicts_with = "data")]
@@ -55,7 +55,10 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
     let ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(None))?;
-    let Some(data) = &arguments.data else { return proof(&arguments, &compiled, &ensemble, global) };
+    let data = match &arguments.data {
+        Some(data) if arguments.prove.is_none() => data,
+        _ => return proof(&arguments, &compiled, &ensemble, global),
+    };
     if ensemble.descriptor().is_some() {
         return match (&arguments.library_margins, data.is_file()) {
             (Some(margins), _) => {
@@ -106,11 +109,48 @@ fn proof(arguments: &Arguments, compiled: &CompiledModel, ensemble: &Ensemble, g
         }
     };
     let written = arguments.prove.as_deref().unwrap_or_else(|| std::path::Path::new(""));
+    if let Some(data) = &arguments.data {
+        if ensemble.descriptor().is_some() {
+            return Err(Error::at(Place::file(&arguments.model), RowsProblem::Touches));
+        }
+        let names = ensemble.inputs.names();
+        let rows = read_rows(data, &names, None)?;
+        let all: Result<Vec<Vec<Moves>>> =
+            rows.iter().map(|row| moves(compiled.bytes(), row).map_err(in_model)).collect();
+        let all = all?;
+        return if global.json {
+            output::print_json_about(written, &serde_json::json!({ "proof": proof, "rows": all }))
+        } else {
+            let text = proof_text(&proof, &what) + &moves_text(&all, &names, &ensemble.objects);
+            output::print_about(written, &text)
+        };
+    }
     if global.json {
         output::print_json_about(written, &proof)
     } else {
         output::print_about(written, &proof_text(&proof, &what))
     }
+}
+
+/// For each row the nearest change of one feature, relative to its value, that changes the class.
+fn moves_text(rows: &[Vec<Moves>], names: &[&str], classes: &[String]) -> String {
+    let mut text =
+        "The least change of one feature, in proportion to its value, that changes a row's class:\n".to_owned();
+    for (number, row) in rows.iter().enumerate() {
+        let ways = row.iter().flat_map(|moves| {
+            let own = moves.value.unwrap_or_default();
+            let to = [moves.below, moves.above].into_iter().flatten();
+            to.map(move |(value, class)| (moves.feature, own, value, class))
+        });
+        let change = |&(_, own, value, _): &(usize, f64, f64, usize)| (value - own).abs() / own.abs().max(1e-30);
+        text += &match ways.min_by(|a, b| change(a).total_cmp(&change(b))) {
+            Some((feature, own, value, class)) => {
+                format!("  row {}: {} from {own} to {value} makes it {}\n", number + 1, names[feature], classes[class])
+            }
+            None => format!("  row {}: none\n", number + 1),
+        };
+    }
+    text
 }
 
 fn proof_text(proof: &Proof, what: &str) -> String {

@@ -475,6 +475,37 @@ fn a_calibrated_model_promises_and_evaluate_shows_whether_it_keeps_it() {
 }
 
 #[test]
+fn a_promise_for_a_robot_is_tested_on_its_recordings_and_too_few_say_what_they_support() {
+    let directory = uncalibrated();
+    let at = directory.path();
+    let record = |lines: usize, to: &str| {
+        for object in ["bowl", "fork"] {
+            let all = std::fs::read_to_string(at.join(format!("unseen/{object}.txt"))).unwrap();
+            let some: Vec<&str> = all.lines().filter(|line| !line.starts_with('#')).take(lines).collect();
+            std::fs::write(at.join("some.txt"), some.join("\n") + "\n").unwrap();
+            succeeds(at, &["data", "record", "some.txt", "-o", to, "--object", object]);
+        }
+    };
+    record(3_000, "robot");
+    record(60, "few");
+    let with = |recorded: &'static str, rate: &'static str| {
+        ["calibrate", "model.palpate", "fresh", "--recorded", recorded, "-o", "robot.palpate", "--error-rate", rate]
+    };
+    let made: Value = serde_json::from_str(&succeeds(at, &[&with("robot", "5%")[..], &["--json"]].concat())).unwrap();
+    assert_eq!((&made["promised"], &made["recorded"]["recordings"]), (&0.05.into(), &2.into()), "{made}");
+    assert_eq!(made["recorded"]["approaches"], 3_000, "{made}");
+    let text = succeeds(at, &with("robot", "5%"));
+    assert!(text.contains("Tested on recorded touches") && text.contains("are not independent"), "{text}");
+    assert!(succeeds(at, &["evaluate", "robot.palpate", "unseen"]).contains("Promised: at most 5 % wrong"));
+
+    std::fs::remove_file(at.join("robot.palpate")).unwrap();
+    fails(at, &with("few", "1%"), 1, "60 recorded approaches to each object support about");
+    fails(at, &with("few", "1%"), 1, "are too few to promise 1 %: at least 299 are needed");
+    fails(at, &with("train", "5%"), 1, "the model was trained on these touches");
+    assert!(!at.join("robot.palpate").exists());
+}
+
+#[test]
 fn a_promise_made_with_noise_is_tested_on_recorded_touches_and_not_void_for_their_own() {
     let directory = uncalibrated();
     let at = directory.path();

@@ -588,5 +588,10 @@ fn every_kind_is_proved_for_every_row_and_its_certificate_holds_or_says_what_cha
     let message = stderr(run(["verify", &model, &source, "--prove", &source]), 2);
     assert!(message.contains("xgboost-3.4-binary.json"), "{message}");
     stderr(run(["verify", &model, &source]), 2);
-    stderr(run(["verify", &model, &source, "rows.csv", "--prove", &proof]), 2);
+    let rows = data("xgboost-3.4-binary.rows.csv");
+    let text = stdout(run(["verify", &model, &source, &rows, "--prove", &proof]));
+    assert!(text.contains("changes a row's class:\n  row 1: "), "{text}");
+    let moved = json(run(["verify", &model, &source, &rows, "--prove", &proof, "--json"]));
+    assert_eq!((moved["rows"].as_array().unwrap().len(), moved["rows"][0].as_array().unwrap().len()), (60, 4));
+    stderr(run(["verify", &model, &source, &rows, "--certificate", &proof]), 2);
 }

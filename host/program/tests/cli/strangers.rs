@@ -80,6 +80,37 @@ fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
 }
 
 #[test]
+fn a_test_is_calibrated_on_recordings_and_those_without_a_sequence_are_named() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    touches(&at.join("data"), &KNOWN, 3_000, 1);
+    touches(&at.join("shapes"), &SHAPES, 500, 1);
+    touches(&at.join("fresh"), &KNOWN, 40_000, 2);
+    // Both objects bend more than they are simulated.
+    touches(&at.join("robot"), &[("bowl", 140_000), ("fork", 320_000)], 4_000, 3);
+    succeeds(at, &["train", "data", "-o", "e.json", "--trees", "rounds=10"]);
+    succeeds(at, &["export", "e.json", "-o", "m.palpate"]);
+    let alone =
+        ["calibrate", "m.palpate", "fresh", "-o", "c.palpate", "--strangers", "likely", "--background", "shapes"];
+    let with = [&alone[..], &["--recorded", "robot"]].concat();
+    let json = |arguments: &[&str]| -> Value {
+        serde_json::from_str(&succeeds(at, &[arguments, &["--json"]].concat())).unwrap()
+    };
+    assert!(json(&alone)["strangers"].get("recorded").is_none());
+    let made = json(&with);
+    let recorded = &made["strangers"]["recorded"];
+    assert!(recorded["before"]["sequences"].as_u64().unwrap() > 500, "{made}");
+    let [alarms, sequences, supported] =
+        ["alarms", "sequences", "supported"].map(|key| recorded[key].as_f64().unwrap());
+    assert!(alarms <= supported * sequences, "{made}");
+    let text = succeeds(at, &with);
+    assert!(text.contains("The test rests on recorded touches"), "{text}");
+    touches(&at.join("few"), &KNOWN, 4, 3);
+    let message = stderr(palpate(at, &[&alone[..], &["--recorded", "few"]].concat()), 1);
+    assert!(message.contains("few: the recordings make no sequence of an object that ends with a name"), "{message}");
+}
+
+#[test]
 fn a_known_object_is_no_stranger_and_says_so() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();

@@ -129,6 +129,18 @@ impl Keys {
         vec![Values::of(-most, most, true); features]
     }
 
+    /// The value that a key of a feature stands for.
+    pub(super) fn value(&self, feature: usize, key: i64) -> f64 {
+        match self {
+            Self::Real => {
+                let magnitude = f32::from_bits(key.unsigned_abs() as u32);
+                f64::from(if key < 0 { -magnitude } else { magnitude })
+            }
+            Self::Scaled(scales) => key as f64 / f64::from(scales.get(feature).copied().unwrap_or(1.0)),
+            Self::Whole => key as f64,
+        }
+    }
+
     /// The smallest key that is not below a threshold.
     fn cut(&self, feature: usize, threshold: Threshold) -> i64 {
         // `as` keeps what is beyond an i32 at its limits.

@@ -73,6 +73,9 @@ pub enum ProofProblem {
     /// The model has no trees in it.
     #[error("the model has the layout code: its trees are not in it")]
     Code,
+    /// The model has one output.
+    #[error("the model has one output, and no class that could change")]
+    NoClass,
     /// Bytes that are accepted as a model are not what the format says.
     #[error("the model does not follow its format: {what}")]
     Format {
@@ -115,6 +118,7 @@ impl Problem for ProofProblem {
             Self::OtherFile { .. } | Self::Understated { .. } => {
                 "Give the files that the certificate was made of, or make another with `palpate verify --prove FILE`."
             }
+            Self::NoClass => "Give no rows with a regression.",
             Self::Format { .. } => "Export the model again.",
             _ => {
                 "Give the file that the model was exported from, with the same --missing and --all-trees; if it is that, export the model again."

@@ -16,9 +16,11 @@ mod certificate;
 mod chip;
 mod error;
 mod format;
+mod moves;
 
 pub use certificate::{Certificate, CertifiedTree};
 pub use error::ProofProblem;
+pub use moves::{Moves, moves};
 
 use crate::compile;
 use crate::ensemble::{Ensemble, Inputs, Output};
@@ -285,18 +287,10 @@ fn example(rows: &Rows, keys: &Keys, ensemble: &Ensemble) -> String {
     let bound = |rows: &(usize, (&Values, &Values))| rows.1.0 != rows.1.1;
     let text = |(feature, (values, _)): (usize, (&Values, &Values))| {
         let name = names.get(feature).copied().unwrap_or("?");
-        let value = |key: i64| match keys {
-            Keys::Real => {
-                let magnitude = f32::from_bits(key.unsigned_abs() as u32);
-                f64::from(if key < 0 { -magnitude } else { magnitude })
-            }
-            Keys::Scaled(scales) => key as f64 / f64::from(scales[feature]),
-            Keys::Whole => key as f64,
-        };
         if values.low > values.high {
             format!("{name} missing")
         } else {
-            format!("{name} from {} to {}", value(values.low), value(values.high))
+            format!("{name} from {} to {}", keys.value(feature, values.low), keys.value(feature, values.high))
         }
     };
     let texts: Vec<String> = rows.iter().zip(&all).enumerate().filter(bound).map(text).collect();
