@@ -55,13 +55,7 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
         let record = "It is below the timer's resolution; a finer timer would show it.".into();
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
     } else if is_wide(&fit.noise, NOISE * fit.noise.value.max(0.5)) {
-        let record = match fit.presses {
-            0 => {
-                "Press the probe on a flat plate 60 times, with half a turn after each, and give the file as the plate."
-                    .into()
-            }
-            _ => format!("Record {}.", more(fit.noise.width(), NOISE * fit.noise.value.max(0.5))),
-        };
+        let record = format!("Record {}.", more(fit.noise.width(), NOISE * fit.noise.value.max(0.5)));
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
     }
     match &fit.missed {

@@ -1,6 +1,6 @@
 //! Likelihood of recorded touches under a candidate probe.
 
-use super::candidate::{Candidate, Kept};
+use super::candidate::{Candidate, Kept, NOISE};
 use super::density::{Densities, FULL, OUTER, Observed};
 use std::f64::consts::TAU;
 
@@ -141,24 +141,24 @@ fn wide(x: f64) -> f64 {
 }
 
 /// Presses on a flat plate: curvature is 0 but for the probe, and the slope is the plate's, with the other sign after each
-/// half turn.
+/// half turn. They tell how late fingers are, and nothing else: a press square to a plate repeats far better than a touch
+/// of an object, and misses nothing, so its noise and its missed contacts are its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plate {
     /// Full touches of presses in one direction of the row, and in the other.
     pub(super) presses: Vec<(f64, Observed)>,
-    /// Number of presses, and the number of them that each finger missed.
+    /// Number of presses.
     pub(super) count: usize,
-    pub(super) missed: [usize; 3],
 }
+
+/// Repetitions of the estimate of a plate's noise, of which each is far closer than the one before.
+const REPETITIONS: usize = 12;
 
 impl Plate {
     pub(super) fn new(touches: impl IntoIterator<Item = Observed>) -> Self {
         let mut plate = Self::default();
         for (turn, observed) in [1.0, -1.0].into_iter().cycle().zip(touches) {
             plate.count += 1;
-            for (finger, missed) in plate.missed.iter_mut().enumerate() {
-                *missed += usize::from(observed.fingers >> finger & 1 == 0);
-            }
             if observed.fingers == FULL {
                 plate.presses.push((turn, observed));
             }
@@ -166,25 +166,34 @@ impl Plate {
         plate
     }
 
-    /// Their log-likelihood, at the slope of the plate that suits them best.
+    /// Their log-likelihood, at the slope of the plate and the noise that suit them best.
     pub(super) fn log_likelihood(&self, candidate: &Candidate) -> f64 {
-        let Candidate { late: [first, middle, third], noise, missed, .. } = *candidate;
+        let [first, middle, third] = candidate.late;
         let [curvature, slope] = [first - 2.0 * middle + third, third - first];
         let count = self.presses.len().max(1) as f64;
         let tilt: f64 = self.presses.iter().map(|(turn, press)| turn * (press.second - slope)).sum::<f64>() / count;
         let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt());
-        let [root6, root2] = [6.0_f64.sqrt() * noise, 2.0_f64.sqrt() * noise];
-        let of = |(turn, press): &(f64, Observed)| {
-            let times = normal(press.first - curvature, root6) * normal(press.second - slope - turn * tilt, root2);
-            ((1.0 - ODD) * times + ODD * wide(press.first) * wide(press.second)).ln()
+        // For each press its two deviations for a noise of 1, and how likely it is as an odd one.
+        let presses = self.presses.iter().map(|(turn, press)| {
+            let [one, other] = [press.first - curvature, press.second - slope - turn * tilt];
+            (one / 6.0_f64.sqrt(), other / 2.0_f64.sqrt(), ODD * wide(press.first) * wide(press.second))
+        });
+        let presses: Vec<(f64, f64, f64)> = presses.collect();
+        let of = |noise: f64, &(one, other, odd): &(f64, f64, f64)| {
+            let times = (1.0 - ODD) * normal(one, noise) * normal(other, noise) / 12.0_f64.sqrt();
+            (times, times + odd)
         };
-        let all = self.count as f64;
-        let contacts: f64 = (self.missed.iter().zip(missed))
-            .map(|(&count, missed)| {
-                let (count, share) = (count as f64, missed.clamp(1e-6, 1.0 - 1e-6));
-                count * share.ln() + (all - count) * (1.0 - share).ln()
-            })
-            .sum();
-        self.presses.iter().map(of).sum::<f64>() + contacts
+        // Expectation and maximization: the noise of the presses that are not odd.
+        let mut noise = NOISE[1];
+        for _ in 0..REPETITIONS {
+            let (mut square, mut weight) = (0.0, 0.0);
+            for press in &presses {
+                let (times, all) = of(noise, press);
+                square += times / all * (press.0.powi(2) + press.1.powi(2));
+                weight += times / all;
+            }
+            noise = (square / (2.0 * weight).max(1e-9)).sqrt().clamp(NOISE[0], NOISE[1]);
+        }
+        presses.iter().map(|press| of(noise, press).1.ln()).sum()
     }
 }

@@ -15,8 +15,8 @@
 //! A contact that came later than the hand's stroke is missing, and counts as such: the likelihood is that of censored
 //! times. Where the probe states no stroke, it is estimated from the recordings.
 //!
-//! Presses on a flat plate, the probe rolled by half a turn after each, say more about offsets and noise than touches of
-//! objects do: κ is 0 on a plate, and the slope changes its sign.
+//! Presses on a flat plate, the probe rolled by half a turn after each, say more about offsets than touches of objects do: κ is
+//! 0 on a plate, and the slope changes its sign. They say nothing else: their noise and their misses are their own.
 //!
 //! Recordings that look wrong ([`Suspect`]) are named: another object than their name says, two objects in one file, a
 //! probe that was changed on the way.
@@ -44,6 +44,8 @@ mod likelihood;
 mod outcome;
 mod posed;
 mod recording;
+#[cfg(test)]
+mod robots;
 mod search;
 mod stroke;
 mod suspects;
@@ -97,7 +99,7 @@ pub const LEAST: usize = 20;
 struct Evidence<'a> {
     recordings: Vec<Recording<'a>>,
     /// Simulated touches of all objects.
-    objects: Vec<Densities>,
+    objects: &'a [Densities],
     /// For each recording its object.
     of: Vec<usize>,
     plate: Option<Plate>,
@@ -155,7 +157,7 @@ pub fn fit(
     });
     let evidence = Evidence {
         recordings: recordings.collect(),
-        objects,
+        objects: &objects,
         of,
         plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
         stroke,

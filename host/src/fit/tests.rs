@@ -98,6 +98,11 @@ fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
     fit(recorded, &objects(), plate, &settings(), &()).unwrap()
 }
 
+/// From more simulated touches: gaps between them are taken for noise, so that 2 ms are found as up to 3.5 ms.
+fn finely(recorded: &Dataset, plate: &[Touch]) -> Fit {
+    fit(recorded, &objects(), Some(plate), &Settings { approaches: 120_000, ..settings() }, &()).unwrap()
+}
+
 /// That the values are near those of the probe, and the intervals hold them but for an error of the simulation.
 fn near(fit: &Fit, probe: &Crooked, [factor, offset, noise]: [f64; 3]) {
     let told = format!("{:?} {:?} {:?} {:?}", fit.speed_factor, fit.late, fit.noise, fit.missed);
@@ -114,12 +119,23 @@ fn near(fit: &Fit, probe: &Crooked, [factor, offset, noise]: [f64; 3]) {
 
 #[test]
 fn a_crooked_probe_is_found_from_touches_and_a_plate() {
-    let found = fitted(&recorded(&objects(), 400, 1, &BENT), Some(&plate(60, &BENT)));
+    let found = finely(&recorded(&objects(), 400, 1, &BENT), &plate(60, &BENT));
     near(&found, &BENT, [0.04, 1.2, 0.25]);
     assert_eq!((found.timer, found.presses, found.recorded), (Some(1.0), 60, 1_200));
     assert!(found.speed_factor.holds(1.0 / BENT.longer) && !found.speed_factor.holds(1.0), "{:?}", found.speed_factor);
     assert!(!found.late[0].holds(0.0) && !found.late[1].holds(0.0), "{:?}", found.late);
     assert!(found.late.iter().all(|late| late.width().unwrap() < 3.0), "{:?}", found.late);
+}
+
+#[test]
+fn a_plate_that_repeats_better_or_worse_than_touches_tells_offsets_and_leaves_their_noise_alone() {
+    let touches = recorded(&objects(), 400, 20, &BENT);
+    for (noise, width) in [(0.1, 1.0), (6.0, 8.0)] {
+        let pressed = Crooked { noise, missed: [0.0, 0.2, 0.0], ..BENT };
+        let found = finely(&touches, &plate(60, &pressed));
+        near(&found, &BENT, [0.04, 0.2 + 0.4 * noise, 0.35]);
+        assert!(found.late.iter().all(|late| late.width().unwrap() < width), "{:?}", found.late);
+    }
 }
 
 #[test]
@@ -153,14 +169,14 @@ fn recorded_poses_tell_the_slope_as_well() {
 #[test]
 fn a_slow_arm_and_a_bent_outer_finger_are_told_apart() {
     let slow = Crooked { longer: 1.13, noise: 2.0, ..STRAIGHT };
-    let found = fitted(&recorded(&objects(), 400, 3, &slow), Some(&plate(60, &slow)));
-    near(&found, &slow, [0.04, 1.0, 0.3]);
+    let found = finely(&recorded(&objects(), 400, 3, &slow), &plate(60, &slow));
+    near(&found, &slow, [0.04, 1.0, 0.5]);
     let bent = Crooked { late: [0.0, 0.0, -7.0], noise: 2.0, ..STRAIGHT };
-    let found = fitted(&recorded(&objects(), 400, 4, &bent), Some(&plate(60, &bent)));
-    near(&found, &bent, [0.04, 1.0, 0.3]);
+    let found = finely(&recorded(&objects(), 400, 4, &bent), &plate(60, &bent));
+    near(&found, &bent, [0.04, 1.0, 0.5]);
     // A first finger that is bent is the other two bent the other way.
     let first = Crooked { late: [5.0, 0.0, 0.0], noise: 2.0, ..STRAIGHT };
-    near(&fitted(&recorded(&objects(), 400, 5, &first), Some(&plate(60, &first))), &first, [0.04, 1.0, 0.3]);
+    near(&finely(&recorded(&objects(), 400, 5, &first), &plate(60, &first)), &first, [0.04, 1.0, 0.6]);
 }
 
 #[test]
@@ -208,7 +224,7 @@ fn full_touches_alone_do_not_tell_what_is_missed() {
 fn approaches_that_touched_nothing_need_not_be_recorded() {
     let mut contacts = recorded(&objects(), 500, 11, &BENT);
     contacts.objects.iter_mut().for_each(|object| *object = object.filtered(|touch| !touch.is_empty()));
-    near(&fitted(&contacts, Some(&plate(60, &BENT))), &BENT, [0.05, 1.2, 0.3]);
+    near(&fitted(&contacts, Some(&plate(60, &BENT))), &BENT, [0.05, 1.2, 0.5]);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 RECORDED is a data set that your probe made, of objects whose meshes you have, matched by their names. The probe that explains the recorded touches best is written: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
 
-A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets and noise better than any object: one line per press, in a file for --plate. Recordings that look wrong are named, and nothing is written.
+A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets better than any object, and nothing else: one line per press, in a file for --plate. Recordings that look wrong are named, and nothing is written.
 
 Examples:
   palpate probe fit recorded meshes/ -o probe.toml

@@ -1,0 +1,109 @@
+//! Honest recordings of two robots in a physics engine, whose fingers bend and whose objects may give way. They are not part
+//! of this repository: the directory that `PALPATE_SHARED` names has them.
+
+use super::*;
+use crate::mesh::source;
+use crate::tests::repetitions::repetitions;
+use crate::touches::{ObjectTouches, Source, read_touches};
+use std::path::{Path, PathBuf};
+
+/// Recorded approaches to each object in a set, and presses on the plate.
+const SET: usize = 75;
+const PRESSES: usize = 20;
+
+/// The recorded approaches in a directory, of each file those in this range, with their poses or without.
+fn read(directory: &Path, range: std::ops::Range<usize>, has_poses: bool) -> Dataset {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    let one = |path: &PathBuf| {
+        let touches = read_touches(path).unwrap()[range.clone()].to_vec();
+        let plain = |touch: &Touch| Touch::new(touch.times());
+        let touches = if has_poses { touches } else { touches.iter().map(plain).collect() };
+        ObjectTouches::new(path.file_stem().unwrap().to_str().unwrap(), touches, Source::Object)
+    };
+    Dataset::new(files.iter().map(one).collect())
+}
+
+/// Everything that does not differ from set to set.
+struct Bench {
+    objects: Vec<Object>,
+    scenes: Vec<Vec<Scene>>,
+    densities: Vec<Densities>,
+    settings: Settings,
+}
+
+impl Bench {
+    fn of(&self, dataset: &Dataset) -> Vec<usize> {
+        dataset.objects.iter().map(|own| place(&own.name, &self.objects).unwrap()).collect()
+    }
+
+    /// The fit, what looks wrong, and the log-densities of other touches under the fit.
+    fn fitted(&self, recorded: &Dataset, plate: Option<&[Touch]>, held: &Dataset) -> (Best, Vec<Suspect>, Vec<f64>) {
+        let (of, kept) = (self.of(recorded), kept(recorded));
+        let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
+            name: &own.name,
+            touches: own.touches().iter().map(Observed::of).collect(),
+            in_poses: posed::in_poses(&own.name, own.touches(), &self.scenes[object], &self.settings),
+            kept,
+        });
+        let evidence = Evidence {
+            recordings: recordings.collect(),
+            objects: &self.densities,
+            of,
+            plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
+            stroke: Stroke::default(),
+        };
+        let best = search::best(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), None);
+        let suspects = suspects::suspects(&evidence, &best, &()).unwrap();
+        let densities = |(own, object): (&ObjectTouches, usize)| {
+            let explained = Explained::new(&best.candidate, &self.densities[object], kept);
+            own.touches().iter().map(|touch| explained.log_density(&Observed::of(touch))).collect::<Vec<f64>>()
+        };
+        let held = held.objects.iter().zip(self.of(held)).flat_map(densities).collect();
+        (best, suspects, held)
+    }
+}
+
+/// By default one set of each robot without poses; `PALPATE_REPETITIONS=4 cargo test -p palpate --lib honest_recordings --
+/// --nocapture` has all four with and without, in 10 minutes.
+#[test]
+fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fit_worse() {
+    let shared = std::env::var_os("PALPATE_SHARED").map_or_else(|| "../../shared".into(), PathBuf::from);
+    if !shared.join("recorded/robot-c").exists() {
+        println!("SKIPPED: no recordings of robots (set PALPATE_SHARED)");
+        return;
+    }
+    let sets = repetitions(1).min(4) as usize;
+    let settings = Settings::default();
+    let objects = source::objects(&[shared.join("objects").to_str().unwrap().into()]).unwrap();
+    let (simulated, scenes) = simulated(&objects, &settings, &()).unwrap();
+    let densities = simulated.iter().map(|own| Densities::new(&own.name, own.touches(), None)).collect();
+    drop(simulated);
+    let bench = Bench { objects, scenes, densities, settings };
+    for (robot, has_poses) in [("c", false), ("d", false), ("c", true), ("d", true)].into_iter().take(2 * sets.min(2)) {
+        let directory = shared.join(format!("recorded/robot-{robot}"));
+        let presses = read_touches(&directory.join("plate.txt")).unwrap();
+        let held = read(&directory.join("more"), 300..600, false);
+        for set in 0..sets {
+            let recorded = read(&directory.join("known"), SET * set..SET * (set + 1), has_poses);
+            let plate = &presses[PRESSES * set..PRESSES * (set + 1)];
+            let [without, with] = [None, Some(plate)].map(|plate| bench.fitted(&recorded, plate, &held));
+            let gains: Vec<f64> = with.2.iter().zip(&without.2).map(|(with, without)| with - without).collect();
+            let (count, gain) = (gains.len() as f64, gains.iter().sum::<f64>());
+            let error = (gains.iter().map(|own| (own - gain / count).powi(2)).sum::<f64>()).sqrt();
+            for (name, (best, suspects, held)) in [("without", &without), ("with", &with)] {
+                let Candidate { factor, late, noise, .. } = best.candidate;
+                let held = held.iter().sum::<f64>();
+                println!(
+                    "robot-{robot}, set {set}, poses {has_poses}, {name} a plate: held-out {held:.1}, speed {:.3}, late {late:.2?}, \
+                     noise {noise:.2}",
+                    1.0 / factor
+                );
+                assert!(suspects.is_empty(), "{suspects:?}");
+            }
+            println!("    the plate gains {gain:.1} ± {error:.1} nats");
+            // Two standard errors are passed by chance in every fourth run of twelve such comparisons, three in every sixtieth.
+            assert!(gain > -3.0 * error, "robot-{robot}, set {set}, poses {has_poses}: {gain} ± {error}");
+        }
+    }
+}
