@@ -26,8 +26,8 @@ const BEGIN: [f64; 9] = [2.5, 4.0, 6.0, 8.0, 10.0, 14.0, 18.0, 24.0, f64::INFINI
 /// A walk begins where those that were learned from would be so few wrong with at most this probability, at the promised
 /// rate.
 const CLEARLY: f64 = 1e-3;
-/// Otherwise it begins as strictly as leaves this share of the names.
-const NAMED: f64 = 0.9;
+/// Otherwise it begins at the strictest margin at which that probability is at most so many times the least.
+const NEARLY: f64 = 2.0;
 
 /// Settings of a promise.
 #[derive(Clone, Debug, PartialEq)]
@@ -322,7 +322,8 @@ fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> 
 }
 
 /// The margin in nats at which the walk begins: the least at which those that were learned from are clearly wrong less often
-/// than promised; if there are too few of them to say so, the strictest at which nearly as many are named.
+/// than promised; if there are too few of them to say so, the strictest at which
+/// they say nearly as much as anywhere.
 fn strictest(model: &Model<'_>, rows: &Rows<'_>, learned: &[&RowSequence], rate: f64, max_rows: u32) -> f64 {
     let naive = ((1.0 - rate) / rate).ln();
     let until = Until { margin: STRICTEST, max_touches: max_rows };
@@ -337,13 +338,14 @@ fn strictest(model: &Model<'_>, rows: &Rows<'_>, learned: &[&RowSequence], rate:
         Tally { wrong: (wrong as f64 * share).ceil() as u64, all: (all as f64 * share) as u64 }
     };
     let margins = BEGIN.map(|beyond| (naive + beyond).min(STRICTEST));
-    let is_clear = |margin: &f64| binomial_tail(tally(*margin), rate) <= CLEARLY;
-    if let Some(margin) = margins.into_iter().find(is_clear) {
-        return margin;
+    let found = margins.map(|margin| (margin, binomial_tail(tally(margin), rate)));
+    if followed.is_empty() {
+        return margins[0];
     }
-    let least = NAMED * tally(margins[0]).all as f64;
-    let is_named = |margin: &f64| followed.is_empty() || tally(*margin).all as f64 >= least;
-    margins.into_iter().take_while(is_named).last().filter(|_| !followed.is_empty()).unwrap_or(margins[0])
+    let least = found.iter().map(|(_, chance)| *chance).fold(1.0, f64::min);
+    let clear = found.iter().find(|(_, chance)| *chance <= CLEARLY);
+    let nearly = found.iter().rfind(|(_, chance)| *chance <= NEARLY * least);
+    clear.or(nearly).map_or(margins[0], |(margin, _)| *margin)
 }
 
 /// The loosest margin, from strict to loose, before the first at which more names are wrong than the rate.
