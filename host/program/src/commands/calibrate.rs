@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     /// Touches to calibrate on: a directory that `palpate capture` filled
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Recorded touches to test the thresholds on, or --strangers
+    /// Recorded touches of the objects; thresholds, or --strangers, are tested on them
     #[arg(long, value_name = "DIR", conflicts_with = "plan")]
     recorded: Option<PathBuf>,
     /// Where to write; the calibrated model

@@ -34,7 +34,7 @@ pub(crate) struct Arguments {
     /// Measure growth and generalization too, which use built-in objects; the default for `builtin` alone
     #[arg(long)]
     growth: bool,
-    /// Recorded touches of the objects, to compare simulated ones with: by the probe of --probe, as it really is
+    /// Recorded touches of the objects; simulated ones are compared with them by the probe of --probe, as it really is
     #[arg(long, value_name = "DIR")]
     recorded: Option<PathBuf>,
     /// Continue what was interrupted, with the same program, settings and objects
