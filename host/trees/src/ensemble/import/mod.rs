@@ -11,9 +11,10 @@
 //!
 //! All of them become an [`Ensemble`] over rows of f32 features, with the features' names and the classes' where the file
 //! has them. Comparisons are exact: `x <= t` is `x < c` with the next f32 c, whatever t's precision; the file's own t stays
-//! in [`Imported::thresholds`], for rows of whole numbers that f32 does not hold. How far margins can
-//! be from the library's own is computed from the leaves and stated in [`Imported::rounding`]. What cannot be taken over
-//! exactly is refused by name: categorical splits, linear leaves, several targets.
+//! in [`Imported::thresholds`](super::Imported::thresholds), for rows of whole numbers that f32 does not hold. How far
+//! margins can be from the library's own is computed from the leaves and stated in
+//! [`Imported::rounding`](super::Imported::rounding). What cannot be taken over exactly is refused by name: categorical
+//! splits, linear leaves, several targets.
 
 mod catboost;
 mod draft;
