@@ -21,7 +21,7 @@ fn simulated(count: usize, seed: u64) -> Dataset {
     synthetic::dataset(&[count; OBJECTS], seed)
 }
 
-/// What a robot records: not what the simulation says. Its hand is faster, and its contacts are noisy.
+/// Recordings of a robot, which are not what the simulation says. Its hand is faster, and its contacts are noisy.
 fn recorded(count: usize, seed: u64) -> Dataset {
     let mut dataset = simulated(count, seed);
     dataset.add_noise(&Noise { speed: 1.12, ..Noise::gaussian(8_000.0) }, seed, 1);

@@ -204,7 +204,7 @@ impl Material {
         self.places[object].as_ref().map_or_else(|| known_place(source), |places| places[source as usize])
     }
 
-    /// What is added to the leaf values of the recorded objects, from touches at these places.
+    /// Amounts added to the leaf values of the recorded objects, from touches at these places.
     fn columns(&self, prior: f64, is_used: impl Fn(f64) -> bool) -> Vec<Vec<f64>> {
         let part = |object: usize| {
             let rows = &self.rows[object];
@@ -265,7 +265,7 @@ impl Material {
     }
 }
 
-/// How much lower the loss of a touch is in nats, each object weighted equally, and the standard error of that.
+/// Decrease of the loss of a touch in nats, each object weighted equally, and its standard error.
 fn gain(given: &[Held], held: &[Held]) -> [f64; 2] {
     let (mut mean, mut variance) = (0.0, 0.0);
     let objects = given.len().max(1) as f64;

@@ -113,7 +113,7 @@ impl<'a> Model<'a> {
     #[inline(never)]
     pub fn new(bytes: &'a [u8]) -> Result<Self, ModelError> {
         let model = Self::opened_with_code(bytes);
-        // Where no model may have code nothing is copied to look at it: 70 bytes of flash.
+        // Only where a model may have code: others need not be copied to look at their layout.
         #[cfg(feature = "code")]
         if model.as_ref().is_ok_and(|model| model.layout() == Layout::Code) {
             return Err(ModelError::NeedsCode);

@@ -71,7 +71,7 @@ pub(super) fn sides<E>(
     Ok(())
 }
 
-/// What is done with a leaf's values, and the rows that reach it.
+/// Handler of a leaf's values, and of the rows that reach it.
 pub(super) type See<'s, E> = dyn FnMut(&[f64], &mut Rows) -> Result<(), E> + 's;
 
 /// A tree whose leaves have values in nats, or what the library's margins are in.
@@ -108,7 +108,7 @@ impl Tree {
     }
 }
 
-/// How a model's features are counted.
+/// Numbers that a model's features are counted in.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Keys {
     /// Whole numbers, as touches have them.

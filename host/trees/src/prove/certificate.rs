@@ -5,7 +5,7 @@ use crate::error::{Error, Place, Result};
 use std::fmt;
 use std::path::Path;
 
-/// What a proof states. Its `Display` is the file:
+/// Statements of a proof. Its `Display` is the file:
 ///
 /// ```text
 /// palpate certificate 1
@@ -39,7 +39,7 @@ pub struct Certificate {
 pub struct CertifiedTree {
     /// The largest difference of a leaf.
     pub error: f64,
-    /// What the base margin has instead of this tree, in steps of its leaves.
+    /// Amount that the base margin has instead of this tree, in steps of its leaves.
     pub offset: i32,
     /// The ensemble's trees that it stands for.
     pub sources: Vec<usize>,

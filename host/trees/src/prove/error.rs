@@ -9,11 +9,11 @@ pub enum ProofProblem {
     /// A statement of the model is not the ensemble's.
     #[error("the model's {what} are not the ensemble's: {model}, and not {ensemble}")]
     Statement {
-        /// What differs, in the plural.
+        /// The statements that differ, in the plural.
         what: &'static str,
-        /// What the model has.
+        /// The model's.
         model: String,
-        /// What the ensemble has.
+        /// The ensemble's.
         ensemble: String,
     },
     /// A tree adds something else for some rows.
@@ -27,9 +27,9 @@ pub enum ProofProblem {
         source_tree: usize,
         /// The output's name.
         output: String,
-        /// What the model adds.
+        /// The model's addend.
         model: f64,
-        /// What the ensemble adds.
+        /// The ensemble's addend.
         ensemble: f64,
         /// The rows.
         rows: String,
@@ -39,9 +39,9 @@ pub enum ProofProblem {
     Cell {
         /// The output's name.
         output: String,
-        /// What the model has.
+        /// The model's.
         model: f64,
-        /// What the ensemble has.
+        /// The ensemble's.
         ensemble: f64,
         /// The rows.
         rows: String,
@@ -51,21 +51,21 @@ pub enum ProofProblem {
     Base {
         /// The output's name.
         output: String,
-        /// What the model has.
+        /// The model's.
         model: f64,
-        /// What the ensemble has.
+        /// The ensemble's.
         ensemble: f64,
     },
     /// Trees of the ensemble are missing, or there are too many.
     #[error("the model's trees stand for other trees than the ensemble's: {what}")]
     Trees {
-        /// Which.
+        /// The trees, and the fault.
         what: String,
     },
     /// Margins are farther from the ensemble's than the model states.
     #[error("a margin differs by {found:e} for some row, more than the {stated:e} that the model states")]
     Beyond {
-        /// What the model states.
+        /// The model's statement.
         stated: f64,
         /// The largest difference.
         found: f64,
@@ -79,7 +79,7 @@ pub enum ProofProblem {
     /// Bytes that are accepted as a model are not what the format says.
     #[error("the model does not follow its format: {what}")]
     Format {
-        /// What is wrong.
+        /// The fault.
         what: &'static str,
     },
     /// A line of a certificate is none.
@@ -91,7 +91,7 @@ pub enum ProofProblem {
     /// The certificate is about another file.
     #[error("the certificate is about {what} with the checksum {stated:016x}, not {found:016x}")]
     OtherFile {
-        /// Which file.
+        /// The kind of file.
         what: &'static str,
         /// Its checksum in the certificate.
         stated: u64,
@@ -101,7 +101,7 @@ pub enum ProofProblem {
     /// The certificate states less than there is.
     #[error("the certificate states {stated:e} as {what}, which is {found:e}")]
     Understated {
-        /// What it states.
+        /// The statement's name.
         what: String,
         /// The number in the certificate.
         stated: f64,

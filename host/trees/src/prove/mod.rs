@@ -57,7 +57,7 @@ fn checksum(bytes: &[u8]) -> u64 {
     crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(bytes)
 }
 
-/// What is found out about a model.
+/// Findings about a model.
 struct Found {
     trees: Vec<CertifiedTree>,
     table: Option<f64>,
@@ -364,7 +364,7 @@ fn compare(leaf: &[f64], spans: &[Span], step: f64, compared: &mut Compared) -> 
     Ok(())
 }
 
-/// What is done with sums of leaves, and the rows that reach them.
+/// Handler of sums of leaves, and of the rows that reach them.
 type SeeSums<'s> = dyn FnMut(&[Span], &mut Rows) -> Result<(), ProofProblem> + 's;
 
 /// Calls `see` with the sum of the leaves of all `trees` that some rows reach together.
