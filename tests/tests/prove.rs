@@ -6,7 +6,7 @@ use palpate::error::ProofProblem;
 use palpate::prove::{Certificate, check, moves, prove};
 use palpate::rows::Encoder;
 use palpate_onboard::Model;
-use palpate_shared::format::checksum;
+use palpate_shared::format::{Header, checksum};
 use palpate_shared::{Descriptor, MISSING_FEATURE};
 use palpate_tests::random::{self, Shape};
 use proptest::prelude::*;
@@ -287,5 +287,73 @@ fn a_certificate_with_a_wrong_line_says_which() {
         std::fs::write(&path, text).unwrap();
         let error = Certificate::read(&path).unwrap_err().to_string();
         assert!(error.contains(&format!("proof.txt:{line}: not a line of a certificate")), "{error}");
+    }
+}
+
+#[test]
+fn certificates_with_absurd_numbers_are_refused() {
+    let ensemble = random::ensemble(Shape::SMALL, 1);
+    let bytes = compile(&ensemble, &Settings { layout: Some(Layout::Compact), ..Settings::default() }).unwrap().bytes;
+    let (_, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
+    let tree = certificate.trees[0].clone();
+    let with = |change: &dyn Fn(&mut Certificate)| {
+        let mut changed = certificate.clone();
+        change(&mut changed);
+        check(&changed, &bytes, &ensemble, FILE).unwrap_err()
+    };
+    for sources in [vec![], vec![usize::MAX], vec![tree.sources[0]; 2], certificate.trees[1].sources.clone()] {
+        with(&|changed| changed.trees[0].sources.clone_from(&sources));
+    }
+    for offset in [i32::MIN, i32::MAX, 1] {
+        with(&|changed| changed.trees[0].offset = offset);
+    }
+    for error in [f64::NAN, -1.0, f64::NEG_INFINITY] {
+        with(&|changed| changed.trees[0].error = error);
+        with(&|changed| changed.outputs[2][0] = error);
+    }
+    with(&|changed| changed.outputs[0][1] = f64::NAN);
+    with(&|changed| changed.outputs[0][2] = f64::NAN);
+    with(&|changed| changed.trees.clear());
+    with(&|changed| changed.outputs.clear());
+}
+
+#[test]
+fn trees_deeper_than_any_ensemble_are_refused_and_not_walked() {
+    let shape = Shape { descriptor: Descriptor::Oriented, depth: 13, trees: 1, thresholds: 4_000, ..Shape::SMALL };
+    let ensemble = random::ensemble(shape, 3);
+    let mut bytes = compile(&ensemble, &Settings { layout: Some(Layout::Wide), ..Settings::default() }).unwrap().bytes;
+    let header = Header::of(&bytes);
+    let (splits, leaves) = (header.nodes_length() as usize, header.leaves_length() as usize);
+    let body = bytes.len() - 4;
+    let start = body - leaves - splits;
+    let count = (splits - 2) / 6;
+    assert!(count > 300, "{count} splits");
+    // No split has any in its left subtree: a chain to the right.
+    for split in 0..count {
+        bytes[start + 2 + 6 * split + 4..][..2].fill(0);
+    }
+    let sum = checksum(&bytes[..body]);
+    bytes[body..].copy_from_slice(&sum.to_le_bytes());
+    Model::new(&bytes).unwrap();
+    let error = prove(&bytes, &ensemble, FILE).unwrap_err();
+    assert!(
+        matches!(error.problem(), Some(ProofProblem::Format { what: "a tree of more than 256 levels" })),
+        "{error}"
+    );
+}
+
+#[test]
+fn thousands_of_merged_trees_are_proved() {
+    let mut ensemble =
+        random::ensemble(Shape { each: false, depth: 1, trees: 6_000, thresholds: 150, ..Shape::SMALL }, 4);
+    // Of one split each, so that they become a few.
+    ensemble.trees.retain(|tree| tree.nodes.len() == 3);
+    assert!(ensemble.trees.len() > 2_000, "{}", ensemble.trees.len());
+    for leaf in [Leaf::I8, Leaf::I16] {
+        let settings = Settings { leaf, layout: Some(Layout::Compact), ..Settings::default() };
+        let bytes = compile(&ensemble, &settings).unwrap().bytes;
+        let (proof, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
+        assert!(20 * proof.trees < ensemble.trees.len(), "{} trees", proof.trees);
+        check(&certificate, &bytes, &ensemble, FILE).unwrap();
     }
 }

@@ -52,11 +52,11 @@ pub use choose::{Chosen, Terms, choose};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
 pub use error::{CalibrateProblem, Enough, Forecast, Supplied};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
-pub use model::{Calibrated, OfObject, Settings, Worse, added_bytes, calibrate};
+pub use model::{Calibrated, OfObject, OfRecorded, Settings, Worse, added_bytes, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{STRICTEST, add_noise, calibrate_from};
 pub use palpate_shared::format::Per;
-pub use recorded::{OfRecorded, calibrate_recorded};
+pub use recorded::calibrate_recorded;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
 pub use temperature::temperature;
 /// The cases that the promised rate refers to, in words.

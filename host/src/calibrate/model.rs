@@ -2,7 +2,6 @@
 
 use super::choose::{Chosen, Terms, chosen};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
-use super::recorded::OfRecorded;
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
 use super::{Per, Tally, binomial_tail};
@@ -100,6 +99,18 @@ pub struct Calibrated {
     /// Where the thresholds were tested on recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded: Option<OfRecorded>,
+}
+
+/// Facts about a promise that was tested on recordings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct OfRecorded {
+    /// Approaches that were recorded to the object with the fewest.
+    pub approaches: usize,
+    /// Recordings that the sequences are of, where the data set lists any: sequences of one are not independent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recordings: Option<usize>,
+    /// Share of wrong names on simulated sequences at the thresholds that were kept.
+    pub simulated_error: f64,
 }
 
 /// Figures of an object under the thresholds, in the sequences that the promise rests on.

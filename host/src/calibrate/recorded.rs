@@ -16,7 +16,9 @@
 use super::choose::{By, Terms, steps, summary, tallies};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::error::{Enough, Forecast, two_digits};
-use super::model::{Calibrated, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, shares};
+use super::model::{
+    Calibrated, OfRecorded, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, shares,
+};
 use super::sequence::{Odds, Sequence, margin_of};
 use super::temperature::temperature;
 use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
@@ -26,7 +28,6 @@ use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Source};
 use palpate_onboard::{Model, Stopping};
-use serde::Serialize;
 
 /// The probability with which a forecast number of approaches is enough, if the simulation is right.
 const LIKELY: f64 = 0.8;
@@ -40,18 +41,6 @@ const RATES: [f64; 17] =
 /// The factor between numbers of approaches that a forecast tries, and how many it tries.
 const GROWTH: f64 = 1.05;
 const GROWN: i32 = 160;
-
-/// Facts about a promise that was tested on recordings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct OfRecorded {
-    /// Approaches that were recorded to the object with the fewest.
-    pub approaches: usize,
-    /// Recordings that the sequences are of, where the data set lists any: sequences of one are not independent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recordings: Option<usize>,
-    /// Share of wrong names on simulated sequences at the thresholds that were kept.
-    pub simulated_error: f64,
-}
 
 /// Sets a model's thresholds, as [`calibrate`](fn@super::calibrate) does, for touches like the `recorded` ones: thresholds are
 /// found on `simulated` sequences, to which the noise of `settings` is added, and tested on the recorded ones, which have

@@ -1,7 +1,8 @@
 //! Advice on what recordings cannot determine, and what to record next.
 
-use super::outcome::{Estimate, Fit, Warning};
+use super::outcome::{Fit, Warning};
 use super::timer::Timer;
+use super::words::{Estimate, between, offset_between};
 
 /// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of the noise as a
 /// share of it, of shares of missed contacts.
@@ -18,7 +19,7 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
         warnings.push(Warning { what: what.into(), told, record });
     };
     let said = |estimate: &Estimate, scale, digits, unit: &str| {
-        let between = super::outcome::between(estimate, scale, digits);
+        let between = between(estimate, scale, digits);
         if between == "not told" { between } else { format!("{between}{unit}") }
     };
     let all = fit.recorded.max(1) as f64;
@@ -47,7 +48,7 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
                 0 => "Press the probe on a flat plate 60 times, with half a turn after each, and give the file as the plate.".into(),
                 presses => format!("Press the plate more often than {presses} times."),
             };
-            warn(&format!("the {finger} finger's offset"), super::outcome::offset_between(late, 1), record);
+            warn(&format!("the {finger} finger's offset"), offset_between(late, 1), record);
         }
     }
     let coarse = fit.timer.is_some_and(|timer| fit.noise.high.is_some_and(|high| high < 0.35 * timer));

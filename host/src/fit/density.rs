@@ -11,6 +11,8 @@
 
 use super::candidate::{Candidate, Kept, NOISE};
 use super::late::Late;
+use super::line::{Axis, LEVELS, Line, RATIO, deviation_of};
+use super::observed::{FULL, OUTER, Observed, mirrored};
 use crate::random::{self, Purpose};
 use palpate_shared::Touch;
 use rand::RngExt;
@@ -18,139 +20,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Standard deviations of the tables begin at the least of [`NOISE`]: how much larger each is than the one before, and how
-/// many there are.
-const RATIO: f64 = 1.3;
-pub(super) const LEVELS: usize = 22;
-/// By how much of its distance from 0 a simulated touch is smoothed.
-const SMOOTHING: f64 = 0.03;
-/// Growth of cells with the distance from 0, as a share of it.
-const GROWTH: f64 = 0.02;
-/// Cells to a standard deviation near 0.
-const CELLS: f64 = 2.0;
-/// Reach of a kernel, in standard deviations.
-const REACH: f64 = 3.0;
-
 /// Simulated approaches that are kept as they are.
 const SOME: usize = 4_000;
-
-/// Observation of a touch: which fingers touched, and how far apart in time, in milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Observed {
-    /// Bit i: finger i touched.
-    pub(super) fingers: u8,
-    /// κ of a full touch; of a touch with two contacts the later finger's time less the earlier one's, counted along the
-    /// row; else 0.
-    pub(super) first: f64,
-    /// The signed slope of a full touch, else 0.
-    pub(super) second: f64,
-}
-
-/// All three fingers.
-pub(super) const FULL: u8 = 0b111;
-/// The first and the third finger.
-pub(super) const OUTER: u8 = 0b101;
-
-impl Observed {
-    pub(super) fn of(touch: &Touch) -> Self {
-        Self::of_times(touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3)))
-    }
-
-    /// Of contact times on any common clock, in milliseconds.
-    fn of_times(times: [Option<f64>; 3]) -> Self {
-        let (fingers, first, second) = match times {
-            [Some(a), Some(b), Some(c)] => (FULL, a - 2.0 * b + c, c - a),
-            [Some(a), Some(b), None] => (0b011, b - a, 0.0),
-            [None, Some(b), Some(c)] => (0b110, c - b, 0.0),
-            [Some(a), None, Some(c)] => (OUTER, c - a, 0.0),
-            [a, b, c] => (u8::from(a.is_some()) | u8::from(b.is_some()) << 1 | u8::from(c.is_some()) << 2, 0.0, 0.0),
-        };
-        Self { fingers, first, second }
-    }
-
-    /// Number of fingers that touched.
-    pub(super) fn contacts(self) -> u32 {
-        self.fingers.count_ones()
-    }
-}
-
-/// Cells along one axis, whose width is constant near 0 and grows with the distance from it.
-#[derive(Clone, Debug)]
-struct Axis {
-    width: f64,
-    /// Cells to either side of 0.
-    half: usize,
-}
-
-impl Axis {
-    fn new(deviation: f64, farthest: f64) -> Self {
-        let width = deviation / CELLS;
-        let half = ((GROWTH * farthest / width).asinh() / GROWTH).ceil() as usize + 1;
-        Self { width, half }
-    }
-
-    fn cells(&self) -> usize {
-        2 * self.half + 1
-    }
-
-    /// Where x is, in cells from the first.
-    fn position(&self, x: f64) -> f64 {
-        (GROWTH * x / self.width).asinh() / GROWTH + self.half as f64
-    }
-
-    fn value(&self, cell: usize) -> f64 {
-        (GROWTH * (cell as f64 - self.half as f64)).sinh() / GROWTH * self.width
-    }
-
-    /// The first of the two cells that x lies between, and how far it is from the first to the second; none outside.
-    fn between(&self, x: f64) -> Option<(usize, f64)> {
-        let position = self.position(x);
-        let cell = position.floor();
-        (cell >= 0.0 && position < (self.cells() - 1) as f64).then_some((cell as usize, position - cell))
-    }
-
-    /// The kernel of a sample at x: its first cell, and its density at this and the following cells.
-    fn kernel(&self, x: f64, deviation: f64, values: &[f64], kernel: &mut Vec<f32>) -> usize {
-        let width = deviation.hypot(SMOOTHING * x);
-        let last = (self.cells() - 1) as f64;
-        let cell = |x: f64| self.position(x).clamp(0.0, last);
-        let (from, to) = (cell(x - REACH * width).ceil() as usize, cell(x + REACH * width).floor() as usize);
-        let height = 1.0 / (width * std::f64::consts::TAU.sqrt());
-        kernel.clear();
-        let density = |value: &f64| (height * (-0.5 * ((value - x) / width).powi(2)).exp()) as f32;
-        kernel.extend(values[from..=to.max(from)].iter().map(density));
-        from
-    }
-}
-
-/// A density of one number.
-#[derive(Clone, Debug)]
-pub(super) struct Line {
-    axis: Axis,
-    density: Vec<f32>,
-}
-
-impl Line {
-    pub(super) fn new(samples: &[f32], deviation: f64) -> Self {
-        let farthest = samples.iter().fold(1.0_f64, |most, x| most.max(f64::from(x.abs())));
-        let axis = Axis::new(deviation, 1.2 * farthest + 4.0 * deviation);
-        let values: Vec<f64> = (0..axis.cells()).map(|cell| axis.value(cell)).collect();
-        let (mut density, mut kernel) = (vec![0.0; axis.cells()], Vec::new());
-        for &x in samples {
-            let from = axis.kernel(x.into(), deviation, &values, &mut kernel);
-            density[from..].iter_mut().zip(&kernel).for_each(|(cell, height)| *cell += height);
-        }
-        let share = 1.0 / samples.len().max(1) as f32;
-        density.iter_mut().for_each(|cell| *cell *= share);
-        Self { axis, density }
-    }
-
-    pub(super) fn at(&self, x: f64) -> f64 {
-        let Some((cell, share)) = self.axis.between(x) else { return 0.0 };
-        let [one, other] = [cell, cell + 1].map(|cell| f64::from(self.density[cell]));
-        one + share * (other - one)
-    }
-}
 
 /// A density of two numbers.
 #[derive(Clone, Debug)]
@@ -230,13 +101,6 @@ pub(super) struct Densities {
     levels: [OnceLock<Level>; LEVELS],
     /// The same as a stroke makes them, if the recordings have one.
     pub(super) late: Option<Late>,
-}
-
-/// The share of each set of fingers, a set and its mirror image alike, of these counts among `all` approaches.
-pub(super) fn mirrored(counts: &[u32; 8], all: usize) -> [f64; 8] {
-    let mirror = |fingers: usize| fingers & 0b010 | (fingers & 1) << 2 | fingers >> 2;
-    let all = all.max(1) as f64;
-    std::array::from_fn(|fingers| f64::from(counts[fingers] + counts[mirror(fingers)]) / (2.0 * all))
 }
 
 impl Densities {
@@ -322,11 +186,6 @@ impl Densities {
         let levels = [self.level(level), self.level(level + 1)];
         Smoothed { level, levels, share: position - level as f64, late: self.late.as_ref() }
     }
-}
-
-/// The standard deviation of a level, in milliseconds.
-fn deviation_of(level: usize) -> f64 {
-    NOISE[0] * RATIO.powi(i32::try_from(level).unwrap_or(0))
 }
 
 /// Densities under a noise between two tables'.

@@ -6,7 +6,8 @@
 //! one and read with interpolation. What is recorded lies within the stroke, where nothing changes. Noise, a hundredth of
 //! a stroke, is left out at its end, and offsets where only one contact was recorded.
 
-use super::density::{FULL, LEVELS, Line, OUTER, Observed, mirrored};
+use super::line::{LEVELS, Line};
+use super::observed::{FULL, OUTER, Observed, mirrored};
 use palpate_shared::Touch;
 use std::sync::OnceLock;
 

@@ -1,7 +1,8 @@
 //! Likelihood of recorded touches under a candidate probe.
 
 use super::candidate::{Candidate, Kept, NOISE};
-use super::density::{Densities, FULL, OUTER, Observed};
+use super::density::Densities;
+use super::observed::{FULL, OUTER, Observed};
 use std::f64::consts::TAU;
 
 /// The share of touches that come from nowhere: so that one odd touch cannot decide a fit.

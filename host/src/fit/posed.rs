@@ -6,8 +6,8 @@
 
 use super::Settings;
 use super::candidate::{Candidate, Kept};
-use super::density::{FULL, Observed};
 use super::likelihood::{Explained, product};
+use super::observed::{FULL, Observed};
 use crate::probe::approach::Approach;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};

@@ -1,8 +1,8 @@
 //! Recorded touches of one object, and how likely they are.
 
 use super::candidate::Kept;
-use super::density::Observed;
 use super::likelihood::Explained;
+use super::observed::Observed;
 use super::posed::{self, InPose};
 
 /// Recorded touches of one object.

@@ -3,7 +3,7 @@
 //! Where the simulated objects would be touched later and no recorded contact is, the hand had stopped. The latest contact is
 //! then the likeliest end of the stroke; the true one is later by about the time between two contacts there.
 
-use super::outcome::Estimate;
+use super::words::Estimate;
 use super::{FitProblem, Kept};
 use crate::error::Result;
 use crate::probe::approach::Probe;

@@ -13,10 +13,10 @@
 
 use super::Evidence;
 use super::candidate::Candidate;
-use super::density::Observed;
 use super::likelihood::Explained;
-use super::outcome::offset;
+use super::observed::Observed;
 use super::search::{self, Best};
+use super::words::offset;
 use crate::error::Result;
 use crate::in_order::in_order;
 use crate::progress::{self, Progress};

@@ -85,8 +85,8 @@ struct Material {
 /// recordings stay as they are; `known` holds their simulated touches, which the recorded ones are compared with. If the
 /// adjusted model is no better on touches that were held out, the ensemble is returned as it was given.
 ///
-/// What is added minimizes the softmax loss of the recorded touches under a prior that draws it towards 0, whose strength is
-/// chosen by cross-validation: the largest gain over the given leaves, less two standard errors.
+/// The amounts added minimize the softmax loss of the recorded touches under a prior that draws them towards 0, whose strength
+/// is chosen by cross-validation: the largest gain over the given leaves, less two standard errors.
 ///
 /// # Errors
 /// As [`teach`](fn@super::teach); [`TeachProblem::NotKnown`](super::TeachProblem::NotKnown) for an object that the ensemble does

@@ -16,25 +16,13 @@ pub(super) fn check(
     recorded: &Dataset,
     settings: &Settings,
 ) -> Result<Descriptor> {
-    self::settings(settings)?;
-    ensemble.check()?;
-    let descriptor = ensemble.descriptor().ok_or(TeachProblem::NotOfTouches)?;
-    if ensemble.trees.iter().any(|tree| tree.output != Output::Each) {
-        return Err(TeachProblem::OneValue.into());
-    }
-    let has_touches = |name: &&String| known.objects.iter().any(|object| object.name == **name && !object.is_empty());
-    let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
-    if !missing.is_empty() {
-        return Err(TeachProblem::Missing { objects: missing }.into());
-    }
+    let descriptor = of_vectors(ensemble, settings)?;
+    none_missing(ensemble, &[known])?;
     if let Some(object) = recorded.objects.iter().find(|object| ensemble.objects.contains(&object.name)) {
         return Err(TeachProblem::Known { object: object.name.clone() }.into());
     }
     names(ensemble, recorded)?;
-    let stated = TouchOrigin::of(&ensemble.origin)?.probe.or_else(|| StatedProbe::of(known));
-    same_probe(stated, ensemble.trained_touches().largest_spread, recorded)?;
-    approaches(ensemble.trained_touches().counted, recorded)?;
-    poses(descriptor, recorded)?;
+    comparable(ensemble, descriptor, known, recorded)?;
     Ok(descriptor)
 }
 
@@ -45,12 +33,7 @@ pub(super) fn adjustable(
     recorded: &Dataset,
     settings: &Settings,
 ) -> Result<Descriptor> {
-    self::settings(settings)?;
-    ensemble.check()?;
-    let descriptor = ensemble.descriptor().ok_or(TeachProblem::NotOfTouches)?;
-    if ensemble.trees.iter().any(|tree| tree.output != Output::Each) {
-        return Err(TeachProblem::OneValue.into());
-    }
+    let descriptor = of_vectors(ensemble, settings)?;
     let is_known = |name: &String| ensemble.objects[..ensemble.known_count()].contains(name);
     if recorded.objects.is_empty() {
         return Err(TeachProblem::Nothing.into());
@@ -58,18 +41,36 @@ pub(super) fn adjustable(
     if let Some(object) = recorded.objects.iter().find(|object| !is_known(&object.name)) {
         return Err(TeachProblem::NotKnown { object: object.name.clone() }.into());
     }
-    let has_touches = |name: &&String| {
-        known.objects.iter().chain(&recorded.objects).any(|object| object.name == **name && !object.is_empty())
-    };
-    let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
-    if !missing.is_empty() {
-        return Err(TeachProblem::Missing { objects: missing }.into());
+    none_missing(ensemble, &[known, recorded])?;
+    comparable(ensemble, descriptor, known, recorded)?;
+    Ok(descriptor)
+}
+
+/// The descriptor of an ensemble whose leaves have a value for each object.
+fn of_vectors(ensemble: &Ensemble, settings: &Settings) -> Result<Descriptor> {
+    self::settings(settings)?;
+    ensemble.check()?;
+    let descriptor = ensemble.descriptor().ok_or(TeachProblem::NotOfTouches)?;
+    if ensemble.trees.iter().any(|tree| tree.output != Output::Each) {
+        return Err(TeachProblem::OneValue.into());
     }
+    Ok(descriptor)
+}
+
+/// Touches of each of the ensemble's objects in one of the data sets.
+fn none_missing(ensemble: &Ensemble, datasets: &[&Dataset]) -> Result<()> {
+    let objects = datasets.iter().flat_map(|dataset| &dataset.objects);
+    let has_touches = |name: &&String| objects.clone().any(|object| object.name == **name && !object.is_empty());
+    let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
+    if missing.is_empty() { Ok(()) } else { Err(TeachProblem::Missing { objects: missing }.into()) }
+}
+
+/// Recorded touches that may be compared with the simulated ones.
+fn comparable(ensemble: &Ensemble, descriptor: Descriptor, known: &Dataset, recorded: &Dataset) -> Result<()> {
     let stated = TouchOrigin::of(&ensemble.origin)?.probe.or_else(|| StatedProbe::of(known));
     same_probe(stated, ensemble.trained_touches().largest_spread, recorded)?;
     approaches(ensemble.trained_touches().counted, recorded)?;
-    poses(descriptor, recorded)?;
-    Ok(descriptor)
+    poses(descriptor, recorded)
 }
 
 /// Names that the ensemble, with the recorded objects, can have.

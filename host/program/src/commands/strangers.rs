@@ -80,7 +80,7 @@ fn on_recordings(found: &OnRecordings) -> String {
     let OnRecordings { sequences, alarms, supported, before } = found;
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let mut text = format!(
-        "The test rests on recorded touches: {alarms} of {sequences} sequences ended as unknown; so many support a share of {}.\n",
+        "The test rests on recorded touches: {alarms} of {sequences} sequences ended as unknown, which supports a false alarm rate of {}.\n",
         percent(*supported)
     );
     if before.differs {

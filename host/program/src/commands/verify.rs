@@ -18,7 +18,7 @@ Of a model of touches, every touch of DATA, a directory, goes through model and 
 
 Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output.
 
---prove needs no data: each tree of the model is compared with its trees in ENSEMBLE for every row there can be, and a certificate is written. Of the rows of a CSV file it says how far one feature can move before the class changes. --certificate checks one by another reader of the model.
+--prove needs no data: each tree of the model is compared with its trees in ENSEMBLE on every possible row, and a certificate is written. With a CSV file of rows it also says how far one feature can move before the class changes. --certificate checks a certificate with an independent reader of the model.
 
 The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the stated rounding does not explain it.
 
@@ -36,11 +36,11 @@ pub(crate) struct Arguments {
     /// Touches (a directory), or rows of features (a CSV file)
     #[arg(value_name = "DATA", required_unless_present_any = ["prove", "certificate"])]
     data: Option<PathBuf>,
-    /// Prove it for every row, and write a certificate
-    #[arg(long, value_name = "FILE", conflicts_with = "certificate")]
+    /// Prove that both match on every possible row, and write a certificate
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["certificate", "library_margins", "sequences"])]
     prove: Option<PathBuf>,
     /// Check a certificate that --prove wrote
-    #[arg(long, value_name = "FILE", conflicts_with = "data")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "library_margins", "sequences"])]
     certificate: Option<PathBuf>,
     /// Sequences of touches to draw; of all objects together
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]

@@ -1,5 +1,6 @@
 //! Boxes of rows: for each feature an interval of keys, and whether a missing value is in it.
 
+use super::ProofProblem;
 use crate::ensemble::{Ensemble, Node, Output, Threshold};
 use palpate_shared::format::f32_key;
 
@@ -89,7 +90,30 @@ pub(super) enum Step {
     Leaf(Vec<f64>),
 }
 
+/// Splits above a leaf, at most: as many as the compiler takes.
+const DEEPEST: usize = 256;
+
 impl Tree {
+    /// A tree whose first node is its root.
+    ///
+    /// # Errors
+    /// [`ProofProblem::Format`] if it is too deep to be walked, or its nodes do not make a tree.
+    pub(super) fn new(nodes: Vec<Step>, object: Option<usize>) -> Result<Self, ProofProblem> {
+        let (mut open, mut seen) = (vec![(0, 0)], 0);
+        while let Some((at, depth)) = open.pop() {
+            seen += 1;
+            let node = nodes.get(at).filter(|_| seen <= nodes.len());
+            match node.ok_or(ProofProblem::Format { what: "nodes that are no tree" })? {
+                Step::Split(..) if depth == DEEPEST => {
+                    return Err(ProofProblem::Format { what: "a tree of more than 256 levels" });
+                }
+                Step::Split(_, children) => open.extend(children.map(|child| (child, depth + 1))),
+                Step::Leaf(_) => {}
+            }
+        }
+        Ok(Self { nodes, object })
+    }
+
     /// Calls `see` on each leaf that some of `rows` reach, with these.
     pub(super) fn leaves<E>(&self, rows: &mut Rows, see: &mut See<'_, E>) -> Result<(), E> {
         self.below(0, rows, see)
@@ -154,7 +178,10 @@ impl Keys {
 }
 
 /// The ensemble's trees over keys, with the library's margins in their leaves.
-pub(super) fn of_ensemble(ensemble: &Ensemble, keys: &Keys) -> Vec<Tree> {
+///
+/// # Errors
+/// As [`Tree::new`].
+pub(super) fn of_ensemble(ensemble: &Ensemble, keys: &Keys) -> Result<Vec<Tree>, ProofProblem> {
     let scale = f64::from(ensemble.prediction().scale);
     let step = |number: usize, index: usize, node: &Node| match node {
         Node::Leaf(values) => Step::Leaf(values.iter().map(|&value| f64::from(value) * scale).collect()),
@@ -164,21 +191,37 @@ pub(super) fn of_ensemble(ensemble: &Ensemble, keys: &Keys) -> Vec<Tree> {
             Step::Split(Rule { feature, cut: keys.cut(feature, own), missing_left }, [left, right])
         }
     };
-    let trees = ensemble.trees.iter().enumerate();
-    let tree = |(number, tree): (usize, &crate::ensemble::Tree)| Tree {
-        nodes: tree.nodes.iter().enumerate().map(|(index, node)| step(number, index, node)).collect(),
-        object: match tree.output {
+    let tree = |(number, tree): (usize, &crate::ensemble::Tree)| {
+        let nodes = tree.nodes.iter().enumerate().map(|(index, node)| step(number, index, node)).collect();
+        let object = match tree.output {
             Output::One(object) => Some(object),
             Output::Each => None,
-        },
+        };
+        Tree::new(nodes, object)
     };
-    trees.map(tree).collect()
+    ensemble.trees.iter().enumerate().map(tree).collect()
 }
 
 /// Thresholds of a feature, as keys.
-pub(super) fn cuts_of(trees: &[Tree], feature: usize) -> impl Iterator<Item = i64> {
-    trees.iter().flat_map(|tree| &tree.nodes).filter_map(move |step| match step {
+pub(super) fn cuts_of<'t>(trees: impl Iterator<Item = &'t Tree>, feature: usize) -> impl Iterator<Item = i64> {
+    trees.flat_map(|tree| &tree.nodes).filter_map(move |step| match step {
         Step::Split(rule, _) if rule.feature == feature => Some(rule.cut),
         _ => None,
     })
+}
+
+/// The intervals between thresholds, ascending, of the values that are not missing.
+pub(super) fn between(values: Values, mut cuts: Vec<i64>) -> Vec<Values> {
+    cuts.sort_unstable();
+    cuts.dedup();
+    let mut own = Vec::new();
+    let mut low = values.low;
+    for cut in cuts.into_iter().filter(|&cut| cut > values.low && cut <= values.high) {
+        own.push(Values::of(low, cut - 1, false));
+        low = cut;
+    }
+    if low <= values.high {
+        own.push(Values::of(low, values.high, false));
+    }
+    own
 }

@@ -111,7 +111,7 @@ impl<'m> Chip<'m> {
             let step = if self.is_f32() { 0.0 } else { self.unit * f64::from(group.shift).exp2() };
             let object = group.object.map(usize::from);
             let count = usize::try_from(group.trees).unwrap_or(usize::MAX);
-            let slots = 1_usize << group.depth;
+            let slots = 1_usize.checked_shl(group.depth.into()).ok_or(DAMAGED)?;
             // Of all complete trees of a group the columns come first.
             let complete = match self.model.layout() {
                 Layout::Complete => {
@@ -227,13 +227,10 @@ impl<'m> Chip<'m> {
         matches!(self.model.layout(), Layout::Grid | Layout::Patterns)
     }
 
-    /// Thresholds of a feature.
+    /// Thresholds of a feature, in any order.
     pub(super) fn cuts_of(&self, feature: usize) -> Vec<i64> {
         let own = self.columns.iter().filter(|(of, ..)| *of == feature);
-        let mut cuts: Vec<i64> = own.flat_map(|(.., cuts)| cuts.iter().copied()).collect();
-        cuts.sort_unstable();
-        cuts.dedup();
-        cuts
+        own.flat_map(|(.., cuts)| cuts.iter().copied()).collect()
     }
 
     /// Margins of a row, as the chip computes them.

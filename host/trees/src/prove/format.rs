@@ -131,11 +131,61 @@ pub(super) fn steps(value: f64, step: f64) -> [f64; 2] {
     [-1e-6, 1e-6].map(|slack| (value / step + slack).round())
 }
 
+/// Optional sections that change what margins are.
+struct Stated<'b> {
+    shared: Option<(usize, &'b [u8])>,
+    sentinel: Option<[i64; 2]>,
+    scale: f64,
+    link: (u8, bool),
+    scales: Vec<f32>,
+    feature_names: Vec<String>,
+}
+
+impl<'b> Stated<'b> {
+    fn read(mut sections: Bytes<'b>, features: usize) -> Result<Self, ProofProblem> {
+        let mut stated = Self {
+            shared: None,
+            sentinel: None,
+            scale: 1.0,
+            link: (0, false),
+            scales: vec![1.0; features],
+            feature_names: Vec::new(),
+        };
+        while !sections.0.is_empty() {
+            let tag = sections.number(2)? & 0x7fff;
+            sections.take(2)?;
+            let length = sections.number(4)?;
+            let mut content = Bytes(sections.take(length)?);
+            sections.take(length.next_multiple_of(4) - length)?;
+            match tag {
+                8 => {
+                    for own in &mut stated.scales {
+                        *own = content.float()?;
+                        stated.feature_names.push(content.text()?);
+                    }
+                }
+                12 => {
+                    let width = usize::from(content.byte()?);
+                    content.take(3)?;
+                    stated.shared = Some((width, content.0));
+                }
+                13 => {
+                    stated.link = (content.byte()?, content.byte()? == 1);
+                    content.take(2)?;
+                    stated.scale = f64::from(content.float()?);
+                }
+                14 => stated.sentinel = Some([content.signed(4)?, content.signed(4)?]),
+                _ => {}
+            }
+        }
+        Ok(stated)
+    }
+}
+
 /// Reads a model.
 ///
 /// # Errors
 /// [`ProofProblem::Format`] if a section ends too early, or points out of the model; [`ProofProblem::Code`].
-#[expect(clippy::too_many_lines, reason = "the format from its first byte to its last, in its order")]
 pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let mut header = Bytes(bytes);
     header.take(4)?;
@@ -166,36 +216,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     text.text()?;
     // A name is empty where the text ends too early.
     let names = (0..objects).map(|_| text.text().unwrap_or_default()).collect();
-    let mut sections = Bytes(rest.take(sections_length)?);
-    let (mut shared, mut sentinel, mut scale, mut link) = (None, None, 1.0, (0, false));
-    let (mut scales, mut feature_names) = (vec![1.0; features], Vec::new());
-    while !sections.0.is_empty() {
-        let tag = sections.number(2)? & 0x7fff;
-        sections.take(2)?;
-        let length = sections.number(4)?;
-        let mut content = Bytes(sections.take(length)?);
-        sections.take(length.next_multiple_of(4) - length)?;
-        match tag {
-            8 => {
-                for own in &mut scales {
-                    *own = content.float()?;
-                    feature_names.push(content.text()?);
-                }
-            }
-            12 => {
-                let width = usize::from(content.byte()?);
-                content.take(3)?;
-                shared = Some((width, content.0));
-            }
-            13 => {
-                link = (content.byte()?, content.byte()? == 1);
-                content.take(2)?;
-                scale = f64::from(content.float()?);
-            }
-            14 => sentinel = Some([content.signed(4)?, content.signed(4)?]),
-            _ => {}
-        }
-    }
+    let Stated { shared, sentinel, scale, link, scales, feature_names } =
+        Stated::read(Bytes(rest.take(sections_length)?), features)?;
     let is_f32 = kind == 2;
     let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
     let base: Result<Vec<f64>, _> = (0..objects)
@@ -208,8 +230,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     rest.take(4 * objects)?;
     let mut axis_bytes = Bytes(rest.take(4 * axis_count)?);
     let cuts_bytes = rest.take(cuts_length)?;
-    let mut group_bytes = Bytes(rest.take(8 * group_count)?);
-    let mut splits = Bytes(rest.take(splits_length)?);
+    let group_bytes = Bytes(rest.take(8 * group_count)?);
+    let splits = Bytes(rest.take(splits_length)?);
     let mut leaves = Bytes(rest.take(leaves_length)?);
     if rest.0.len() != 4 {
         return Err(ProofProblem::Format { what: "sections of other lengths than it states" });
@@ -239,47 +261,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         let all: Result<Vec<_>, _> = places.into_iter().map(cell).collect();
         cells = Some(all?);
     } else {
-        let columns: Vec<(&Axis, bool)> = axes
-            .iter()
-            .flat_map(|axis| [(1, true), (2, false)].map(|(bit, left)| (axis, bit, left)))
-            .filter(|(axis, bit, _)| axis.columns & bit != 0)
-            .map(|(axis, _, left)| (axis, left))
-            .collect();
-        let ranked = |column: usize, at: usize| match columns.get(column) {
-            None => Rule::EITHER,
-            Some((axis, missing_left)) => {
-                let cut = axis.cuts.get(at).copied().unwrap_or(i64::MAX);
-                Rule { feature: axis.feature, cut, missing_left: *missing_left || at >= 255 }
-            }
-        };
-        for _ in 0..group_count {
-            let (depth, shift) = (group_bytes.byte()?, u32::from(group_bytes.byte()?));
-            let (is_one, object) = (group_bytes.byte()? == 1, group_bytes.number(1)?);
-            let (object, values) = if is_one { (Some(object), 1) } else { (None, objects) };
-            let count = group_bytes.number(4)?;
-            let step = if is_f32 { 0.0 } else { leaves_of.unit * f64::from(shift).exp2() };
-            let slots = 1_usize << depth.min(8);
-            let complete = match layout {
-                1 => Some((splits.take(slots * count)?, splits.take(slots * count)?)),
-                _ => None,
-            };
-            for tree in 0..count {
-                let nodes = match complete {
-                    Some((columns, ranks)) => (1..slots)
-                        .map(|slot| {
-                            let at = tree * slots + slot;
-                            (ranked(columns[at].into(), ranks[at].into()), [2 * slot - 1, 2 * slot])
-                        })
-                        .collect(),
-                    None => preorder(&mut splits, layout == 3, cuts_bytes, &ranked)?,
-                };
-                let mut nodes: Vec<Step> = nodes.into_iter().map(|(rule, to)| Step::Split(rule, to)).collect();
-                for _ in 0..=nodes.len() {
-                    nodes.push(Step::Leaf(leaves_of.next(&mut leaves, values, shift)?));
-                }
-                trees.push((Tree { nodes, object }, step));
-            }
-        }
+        let parts = Parts { layout, objects, groups: group_count, cuts: cuts_bytes, leaves_of };
+        trees = parts.trees(&axes, group_bytes, splits, leaves)?;
     }
     Ok(Plain {
         names,
@@ -296,6 +279,70 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         trees,
         cells,
     })
+}
+
+/// Facts that trees are read with.
+struct Parts<'b> {
+    layout: u8,
+    objects: usize,
+    groups: usize,
+    cuts: &'b [u8],
+    leaves_of: Leaves<'b>,
+}
+
+impl Parts<'_> {
+    /// The trees, each with the size of a step of its leaves.
+    fn trees(
+        &self,
+        axes: &[Axis],
+        mut group_bytes: Bytes<'_>,
+        mut splits: Bytes<'_>,
+        mut leaves: Bytes<'_>,
+    ) -> Result<Vec<(Tree, f64)>, ProofProblem> {
+        let mut trees = Vec::new();
+        let columns: Vec<(&Axis, bool)> = axes
+            .iter()
+            .flat_map(|axis| [(1, true), (2, false)].map(|(bit, left)| (axis, bit, left)))
+            .filter(|(axis, bit, _)| axis.columns & bit != 0)
+            .map(|(axis, _, left)| (axis, left))
+            .collect();
+        let ranked = |column: usize, at: usize| match columns.get(column) {
+            None => Rule::EITHER,
+            Some((axis, missing_left)) => {
+                let cut = axis.cuts.get(at).copied().unwrap_or(i64::MAX);
+                Rule { feature: axis.feature, cut, missing_left: *missing_left || at >= 255 }
+            }
+        };
+        for _ in 0..self.groups {
+            let (depth, shift) = (group_bytes.byte()?, u32::from(group_bytes.byte()?));
+            let (is_one, object) = (group_bytes.byte()? == 1, group_bytes.number(1)?);
+            let (object, values) = if is_one { (Some(object), 1) } else { (None, self.objects) };
+            let count = group_bytes.number(4)?;
+            let step = if self.leaves_of.kind == 2 { 0.0 } else { self.leaves_of.unit * f64::from(shift).exp2() };
+            let slots = 1_usize << depth.min(8);
+            let complete = match self.layout {
+                1 => Some((splits.take(slots * count)?, splits.take(slots * count)?)),
+                _ => None,
+            };
+            for tree in 0..count {
+                let nodes = match complete {
+                    Some((columns, ranks)) => (1..slots)
+                        .map(|slot| {
+                            let at = tree * slots + slot;
+                            (ranked(columns[at].into(), ranks[at].into()), [2 * slot - 1, 2 * slot])
+                        })
+                        .collect(),
+                    None => preorder(&mut splits, self.layout == 3, self.cuts, &ranked)?,
+                };
+                let mut nodes: Vec<Step> = nodes.into_iter().map(|(rule, to)| Step::Split(rule, to)).collect();
+                for _ in 0..=nodes.len() {
+                    nodes.push(Step::Leaf(self.leaves_of.next(&mut leaves, values, shift)?));
+                }
+                trees.push((Tree::new(nodes, object)?, step));
+            }
+        }
+        Ok(trees)
+    }
 }
 
 type Split = (Rule, [usize; 2]);

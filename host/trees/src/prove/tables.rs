@@ -1,0 +1,160 @@
+//! Tables, cell by cell: the layouts grid and patterns, and trees with few cells between their thresholds.
+
+use super::boxes::{Rows, See, Values, between, cuts_of};
+use super::chip::Chip;
+use super::format::Plain;
+use super::span::{Span, spans};
+use super::{Found, ProofProblem, Subject, output_of};
+use palpate_shared::{Descriptor, MISSING_FEATURE};
+
+/// The sums of the ensemble's leaves that `rows` reach, rounded to f32 at each addition, as libraries do.
+fn sums(subject: Subject<'_>, rows: &mut Rows) -> Vec<Span> {
+    let Subject { sources, ensemble, .. } = subject;
+    let scale = f64::from(ensemble.prediction().scale);
+    let start = |&base: &f32| Span::of(f64::from(base) * scale, 0.0);
+    let mut sums: Vec<Span> = ensemble.base_margins.iter().map(start).collect();
+    let add = |sum: f64, value: f64| f64::from((sum / scale) as f32 + (value / scale) as f32) * scale;
+    for tree in sources {
+        let values = if tree.object.is_some() { 1 } else { sums.len() };
+        for (value, own) in spans(&[tree], values, Span::whole(0.0, 0.0), 0.0, rows).into_iter().enumerate() {
+            let sum = &mut sums[output_of(tree.object, value)];
+            (sum.low, sum.high) = (add(sum.low, own.low), add(sum.high, own.high));
+        }
+    }
+    sums
+}
+
+/// Compares the margins of a cell with the ensemble's.
+fn cell(margins: &[f64], rows: &mut Rows, found: &mut Found, subject: Subject<'_>) -> Result<(), ProofProblem> {
+    let Subject { plain, ensemble, .. } = subject;
+    found.boxes += 1;
+    let step = plain.rounded_to();
+    for (object, (&model, span)) in margins.iter().zip(sums(subject, rows)).enumerate() {
+        let farthest = span.farthest(model);
+        let error = (model - farthest).abs();
+        let is_rounded = [span.low, span.high].into_iter().all(|sum| Span::of(sum, step).is(model, step));
+        if !is_rounded || error > plain.stated * (1.0 + 1e-6) {
+            return Err(ProofProblem::Cell {
+                output: ensemble.objects[object].clone(),
+                model,
+                ensemble: farthest,
+                rows: subject.example(rows),
+            });
+        }
+        found.table = found.table.map(|worst| worst.max(error));
+        let output = &mut found.outputs[object];
+        *output = [output[0].max(error), output[1].min(model), output[2].max(model)];
+    }
+    Ok(())
+}
+
+/// Findings before the first cell.
+fn no_cell(plain: &Plain) -> Found {
+    let outputs = vec![[0.0, f64::INFINITY, f64::NEG_INFINITY]; plain.names.len()];
+    Found { trees: Vec::new(), table: Some(0.0), boxes: 0, outputs }
+}
+
+/// Cells of a table as its format describes them.
+pub(super) fn of_format(subject: Subject<'_>, cells: &[(Vec<Values>, Vec<f64>)]) -> Result<Found, ProofProblem> {
+    let mut found = no_cell(subject.plain);
+    for (rows, margins) in cells {
+        // Thresholds may be there twice: nothing is between them.
+        let is_empty = rows.iter().any(|values| values.low > values.high && !values.missing);
+        if !is_empty {
+            cell(margins, &mut rows.clone(), &mut found, subject)?;
+        }
+    }
+    Ok(found)
+}
+
+/// Cells of a table as the chip looks them up: between the ensemble's own thresholds.
+pub(super) fn of_chip(chip: &Chip<'_>, subject: Subject<'_>) -> Result<Found, ProofProblem> {
+    let mut found = no_cell(subject.plain);
+    each_cell(chip, subject.plain, &choices(chip, subject), &mut |margins, rows| {
+        cell(margins, rows, &mut found, subject)
+    })?;
+    Ok(found)
+}
+
+/// The most trees in all cells together that are added up for the error of margins that the trees' worst only bound.
+const MOST: usize = 2_000_000;
+
+/// The largest difference of a margin to the ensemble's f32 sum in any cell between its thresholds; `None` if there are too
+/// many of them.
+pub(super) fn error_in_cells(chip: &Chip<'_>, subject: Subject<'_>) -> Result<Option<f64>, ProofProblem> {
+    let choices = choices(chip, subject);
+    let cells = choices.iter().map(|own| own.iter().try_fold(1_usize, |cells, own| cells.checked_mul(own.len())));
+    let cells = cells.sum::<Option<usize>>().and_then(|cells| cells.checked_mul(subject.sources.len()));
+    if cells.is_none_or(|cells| cells > MOST) {
+        return Ok(None);
+    }
+    let mut worst = 0.0_f64;
+    each_cell(chip, subject.plain, &choices, &mut |margins, rows| {
+        let sums = sums(subject, rows);
+        worst =
+            margins.iter().zip(sums).fold(worst, |worst, (&model, sum)| worst.max((model - sum.farthest(model)).abs()));
+        Ok(())
+    })?;
+    Ok(Some(worst))
+}
+
+/// Values of each feature between thresholds, one list of them for each contact pattern where features depend on it.
+fn choices(chip: &Chip<'_>, subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
+    let Subject { plain, sources, ensemble } = subject;
+    let all = plain.keys.all(plain.features);
+    // Each feature's intervals between thresholds, without a missing value.
+    let intervals = |(feature, values): (usize, &Values)| {
+        let cuts = chip.cuts_of(feature).into_iter().chain(cuts_of(sources.iter(), feature));
+        between(*values, cuts.collect())
+    };
+    let intervals: Vec<Vec<Values>> = all.iter().enumerate().map(intervals).collect();
+    if ensemble.descriptor() != Some(Descriptor::ContactsCurvature) {
+        let with_missing = |(own, &all): (Vec<Values>, &Values)| {
+            if own.len() == 1 { vec![all] } else { own.into_iter().chain([Values::MISSING]).collect() }
+        };
+        return vec![intervals.into_iter().zip(&all).map(with_missing).collect()];
+    }
+    // A pattern fixes which differences are there.
+    let there = [[false; 3], [false; 3], [false; 3], [false, false, true], [false, true, false], [true, true, false]];
+    let of_pattern = |(there, code): ([bool; 3], i64)| {
+        let mut choices = intervals.clone();
+        choices[0] = vec![Values::of(code, code, false)];
+        for (choices, _) in choices[1..].iter_mut().zip(there).filter(|(_, is_there)| !is_there) {
+            *choices = vec![Values::MISSING];
+        }
+        choices
+    };
+    there.into_iter().zip(0..).map(of_pattern).collect()
+}
+
+/// Calls `see` with the margins of each combination of values, as the chip computes them.
+fn each_cell(
+    chip: &Chip<'_>,
+    plain: &Plain,
+    choices: &[Vec<Vec<Values>>],
+    see: &mut See<'_, ProofProblem>,
+) -> Result<(), ProofProblem> {
+    let mut rows = plain.keys.all(plain.features);
+    choices.iter().try_for_each(|choices| {
+        each(choices, 0, &mut rows, &mut |rows| {
+            let key = |values: &Values| if values.low > values.high { MISSING_FEATURE } else { values.low as i32 };
+            let row: Vec<i32> = rows.iter().map(key).collect();
+            let margins = chip.margins(&row).ok_or(ProofProblem::Format { what: "it has no margins of a row" })?;
+            see(&margins, rows)
+        })
+    })
+}
+
+/// Calls `see` with every combination of the choices of features from `feature` on.
+fn each(
+    choices: &[Vec<Values>],
+    feature: usize,
+    rows: &mut Vec<Values>,
+    see: &mut dyn FnMut(&mut Vec<Values>) -> Result<(), ProofProblem>,
+) -> Result<(), ProofProblem> {
+    let Some(own) = choices.get(feature) else { return see(rows) };
+    own.iter().try_for_each(|&values| {
+        rows[feature] = values;
+        each(choices, feature + 1, rows, see)
+    })
+}
