@@ -99,7 +99,7 @@ proptest! {
                     model.predict_class(&encoder.row(row), &mut margins).unwrap()
                 };
                 let own = class(&row);
-                for moved in moves(&bytes, &row).unwrap() {
+                for moved in moves(&bytes, [row.as_slice()]).unwrap().remove(0) {
                     let at = |value: f64| {
                         let mut row = row.clone();
                         row[moved.feature] = value;

@@ -117,22 +117,16 @@ pub fn adjust(
         let sources: Vec<Vec<Vec<usize>>> = touches.iter().map(by_source).collect();
         let background = ensemble.origin.background.then(|| ensemble.known_count());
         let most = balance::most_approaches(Dataset::new(touches.clone()).fewest_in_sequence());
-        let judged = |held: &[Held], approaches: usize| {
-            let sizes = [settings.groups, approaches.min(most)];
-            Judged::new((held, &sources), &material.own, background, sizes, settings.seed)
-        };
-        let share = share(&judged(&held, BALANCED), &held);
+        let sizes = [settings.groups, BALANCED.min(most)];
+        let judged = |held: &[Held]| Judged::new((held, &sources), &material.own, background, sizes, settings.seed);
+        let share = share(&judged(&held), &held);
         let constants: Vec<f64> = match share > 0.0 {
-            true => {
-                let sizes = [settings.groups, BALANCED.min(most)];
-                Groups::draw((&held, &sources), material.own.clone(), background, sizes, settings.seed).balanced()
-            }
+            true => Groups::draw((&held, &sources), material.own.clone(), background, sizes, settings.seed).balanced(),
             false => vec![0.0; material.own.len()],
         };
         let constants: Vec<f64> = constants.into_iter().map(|constant| share * constant).collect();
-        let approaches = settings.approaches.min(most);
         let fitness = |held: &[Held], share: f64| {
-            let judged = judged(held, BALANCED);
+            let judged = judged(held);
             let loss = super::held_out::loss(&judged.with_constants(held, share));
             Fitness { loss, recognized: judged.right(share) }
         };
@@ -149,7 +143,7 @@ pub fn adjust(
             objects: material.own.iter().zip(evidence.iter().zip(&constants)).map(object).collect(),
             prior,
             share,
-            approaches: BALANCED.min(approaches),
+            approaches: sizes[1],
             given: before,
             adjusted: after,
             is_better,

@@ -19,6 +19,7 @@ mod plan;
 mod play;
 mod probe;
 mod progress;
+mod prove;
 mod real;
 mod recognize;
 mod recognize_rows;

@@ -7,7 +7,6 @@ use palpate::ensemble::Ensemble;
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::verify::{Verified, verify};
 use palpate::output;
-use palpate::prove::{Certificate, Moves, Proof, check, moves, prove};
 use palpate::rows::{Rows, read_margins};
 use std::path::PathBuf;
 
@@ -30,18 +29,18 @@ Examples:
   palpate verify model.palpate m.json --certificate proof.txt")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
-    model: PathBuf,
+    pub(super) model: PathBuf,
     /// The file that it was exported from
-    ensemble: PathBuf,
+    pub(super) ensemble: PathBuf,
     /// Touches (a directory), or rows of features (a CSV file)
     #[arg(value_name = "DATA", required_unless_present_any = ["prove", "certificate"])]
-    data: Option<PathBuf>,
+    pub(super) data: Option<PathBuf>,
     /// Prove that both match on every possible row, and write a certificate
     #[arg(long, value_name = "FILE", conflicts_with_all = ["certificate", "library_margins", "sequences"])]
-    prove: Option<PathBuf>,
+    pub(super) prove: Option<PathBuf>,
     /// Check a certificate that --prove wrote
     #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "library_margins", "sequences"])]
-    certificate: Option<PathBuf>,
+    pub(super) certificate: Option<PathBuf>,
     /// Sequences of touches to draw; of all objects together
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
     sequences: usize,
@@ -54,11 +53,12 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
-    let ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(None))?;
+    let options = arguments.unstated.options(None);
     let data = match &arguments.data {
         Some(data) if arguments.prove.is_none() => data,
-        _ => return proof(&arguments, &compiled, &ensemble, global),
+        _ => return super::prove::run(&arguments, &compiled, &options, global),
     };
+    let ensemble = Ensemble::load_with(&arguments.ensemble, &options)?;
     if ensemble.descriptor().is_some() {
         return match (&arguments.library_margins, data.is_file()) {
             (Some(margins), _) => {
@@ -87,92 +87,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         output::print(&text(&verified))?;
     }
     verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem))
-}
-
-/// Proves the model, or checks a certificate.
-fn proof(arguments: &Arguments, compiled: &CompiledModel, ensemble: &Ensemble, global: &Global) -> Result<()> {
-    let path = &arguments.ensemble;
-    let file = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
-    let in_model = |error: Error| error.in_file(&arguments.model);
-    let (proof, what) = match (&arguments.prove, &arguments.certificate) {
-        (_, Some(certificate)) => {
-            let proof = check(&Certificate::read(certificate)?, compiled.bytes(), ensemble, &file).map_err(in_model)?;
-            (proof, format!("The certificate {} holds", certificate.display()))
-        }
-        (written, None) => {
-            let (proof, certificate) = prove(compiled.bytes(), ensemble, &file).map_err(in_model)?;
-            if let Some(written) = written {
-                output::refuse_input(written, [&arguments.model, path])?;
-                output::write_bytes(written, certificate.to_string().as_bytes())?;
-            }
-            (proof, "Proved".into())
-        }
-    };
-    let written = arguments.prove.as_deref().unwrap_or_else(|| std::path::Path::new(""));
-    if let Some(data) = &arguments.data {
-        if ensemble.descriptor().is_some() {
-            return Err(Error::at(Place::file(&arguments.model), RowsProblem::Touches));
-        }
-        let names = ensemble.inputs.names();
-        let rows = read_rows(data, &names, None)?;
-        let all: Result<Vec<Vec<Moves>>> =
-            rows.iter().map(|row| moves(compiled.bytes(), row).map_err(in_model)).collect();
-        let all = all?;
-        return if global.json {
-            output::print_json_about(written, &serde_json::json!({ "proof": proof, "rows": all }))
-        } else {
-            let text = proof_text(&proof, &what) + &moves_text(&all, &names, &ensemble.objects);
-            output::print_about(written, &text)
-        };
-    }
-    if global.json {
-        output::print_json_about(written, &proof)
-    } else {
-        output::print_about(written, &proof_text(&proof, &what))
-    }
-}
-
-/// For each row the nearest change of one feature, relative to its value, that changes the class.
-fn moves_text(rows: &[Vec<Moves>], names: &[&str], classes: &[String]) -> String {
-    let mut text =
-        "The least change of one feature, in proportion to its value, that changes a row's class:\n".to_owned();
-    for (number, row) in rows.iter().enumerate() {
-        let ways = row.iter().flat_map(|moves| {
-            let own = moves.value.unwrap_or_default();
-            let to = [moves.below, moves.above].into_iter().flatten();
-            to.map(move |(value, class)| (moves.feature, own, value, class))
-        });
-        let change = |&(_, own, value, _): &(usize, f64, f64, usize)| (value - own).abs() / own.abs().max(1e-30);
-        text += &match ways.min_by(|a, b| change(a).total_cmp(&change(b))) {
-            Some((feature, own, value, class)) => {
-                format!("  row {}: {} from {own} to {value} makes it {}\n", number + 1, names[feature], classes[class])
-            }
-            None => format!("  row {}: none\n", number + 1),
-        };
-    }
-    text
-}
-
-fn proof_text(proof: &Proof, what: &str) -> String {
-    let Proof { trees, ensemble_trees, boxes, largest_difference, margin_error, stated, ranges } = proof;
-    let compared = match trees {
-        0 => format!("the model's table has the sums of the ensemble's {ensemble_trees} trees"),
-        _ => format!("the model's {trees} trees add what the ensemble's {ensemble_trees} add"),
-    };
-    let mut text = format!(
-        "{what}: for every row {compared}, rounded ({boxes} boxes of rows).\n\
-         A leaf differs by at most {largest_difference:.2e}, a margin by at most {margin_error:.2e}; the model states \
-         {stated:.2e}.\n"
-    );
-    if margin_error > stated {
-        text +=
-            "The model states less than the worst leaves of all trees add up to, which no row need reach together.\n";
-    }
-    text += "Bounds of each margin, which no row need reach:\n";
-    for (name, least, most) in ranges {
-        text += &format!("  {name}: {least:.4} to {most:.4}\n");
-    }
-    text
 }
 
 /// Reads rows for features with these names; says on stderr if columns are taken by their position.

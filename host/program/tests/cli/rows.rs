@@ -481,10 +481,11 @@ fn every_kind_is_proved_for_every_row_and_its_certificate_holds_or_says_what_cha
     let source = data("xgboost-3.4-binary.json");
     stdout(run(["export", &source, "-o", &model, "--layout", "compact"]));
     assert!(
-        stdout(run(["verify", &model, &source, "--prove", &proof])).starts_with("Proved: for every row the model's")
+        stdout(run(["verify", &model, &source, "--prove", &proof]))
+            .starts_with("Proved: on every possible row the model's")
     );
     let text = stdout(run(["verify", &model, &source, "--certificate", &proof]));
-    assert!(text.contains("proof.txt holds: for every row"), "{text}");
+    assert!(text.contains("proof.txt holds: on every possible row"), "{text}");
     // Another model, another file, a damaged certificate.
     let message = stderr(run(["verify", &model, &data("xgboost-3.4-softprob.ubj"), "--prove", &proof]), 1);
     assert!(message.contains("model.palpate: the model's outputs are not the ensemble's"), "{message}");

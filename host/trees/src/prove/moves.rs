@@ -11,9 +11,9 @@ use palpate_shared::MISSING_FEATURE;
 /// The nearest values of a feature at which a row's class is another one, all other features as they are.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Moves {
-    /// The feature, by its number.
+    /// The feature, counted from 0.
     pub feature: usize,
-    /// Its value; `None` if it is missing.
+    /// Its value in the row, in the library's units as the next ones; `None` if it is missing.
     pub value: Option<f64>,
     /// The nearest value below with another class, and that class.
     pub below: Option<(f64, usize)>,
@@ -23,32 +23,39 @@ pub struct Moves {
     pub missing: Option<usize>,
 }
 
-/// For each feature of a row the nearest values at which the class of a model, given by its bytes, is another one. Exact:
-/// between two thresholds of a feature no margin changes, and every threshold of the model is tried, from the row's own
-/// value on.
+/// For each row, and for each of its features in their order, the nearest values at which the class of a model, given by its
+/// bytes, is another one. Exact: between two thresholds of a feature no margin changes, and every threshold of the model is
+/// tried, from the row's own value on.
 ///
-/// Takes the time of as many rows as the model has thresholds, at most.
+/// A row has a value for each feature, NaN where one is missing. Each takes the time of as many rows as the model has
+/// thresholds, at most.
 ///
 /// # Errors
 /// [`CompileProblem::Model`](crate::error::CompileProblem::Model) if the bytes are no model, [`ProofProblem`] for one without
 /// classes or trees.
-pub fn moves(bytes: &[u8], row: &[f64]) -> Result<Vec<Moves>> {
+pub fn moves<'r>(bytes: &[u8], rows: impl IntoIterator<Item = &'r [f64]>) -> Result<Vec<Vec<Moves>>> {
     let model = compile::open(bytes)?;
     let plain = format::read(bytes)?;
     if model.object_count() < 2 {
         return Err(ProofProblem::NoClass.into());
     }
-    let keys = Encoder::of(&model).row(row);
-    let class = class(&model, &keys);
-    Ok((0..plain.features).map(|feature| of_feature(&model, &plain, &keys, feature, class)).collect())
+    let encoder = Encoder::of(&model);
+    let cuts: Vec<Vec<i32>> = (0..plain.features).map(|feature| cuts(&plain, feature)).collect();
+    let of_row = |row: &[f64]| {
+        let keys = encoder.row(row);
+        let class = class(&model, &keys);
+        let of_feature =
+            |(feature, cuts): (usize, &Vec<i32>)| of_feature(&model, &plain, &keys, (feature, cuts), class);
+        cuts.iter().enumerate().map(of_feature).collect()
+    };
+    Ok(rows.into_iter().map(of_row).collect())
 }
 
 fn class(model: &Model<'_>, keys: &[i32]) -> usize {
     model.predict_class(keys, &mut vec![0; model.object_count()]).unwrap_or(0)
 }
 
-fn of_feature(model: &Model<'_>, plain: &Plain, row: &[i32], feature: usize, own: usize) -> Moves {
-    let cuts = cuts(plain, feature);
+fn of_feature(model: &Model<'_>, plain: &Plain, row: &[i32], (feature, cuts): (usize, &[i32]), own: usize) -> Moves {
     let mut row = row.to_vec();
     let key = row.get(feature).copied().unwrap_or(MISSING_FEATURE);
     let mut at = |key: i32| {

@@ -1,0 +1,95 @@
+//! `palpate verify` with `--prove` or `--certificate`.
+
+use super::Global;
+use super::verify::{Arguments, read_rows};
+use palpate::Result;
+use palpate::compile::CompiledModel;
+use palpate::ensemble::import::{Options, read_with};
+use palpate::error::{Error, Place, RowsProblem};
+use palpate::output;
+use palpate::prove::{Certificate, Moves, Proof, check, moves, prove};
+use std::path::Path;
+
+/// Proves the model, or checks a certificate.
+pub(super) fn run(
+    arguments: &Arguments,
+    compiled: &CompiledModel,
+    options: &Options<'_>,
+    global: &Global,
+) -> Result<()> {
+    let path = &arguments.ensemble;
+    // The very bytes whose checksum is stated.
+    let file = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
+    let ensemble = read_with(path, &file, options)?;
+    let in_model = |error: Error| error.in_file(&arguments.model);
+    if let Some(certificate) = &arguments.certificate {
+        let proof = check(&Certificate::read(certificate)?, compiled.bytes(), &ensemble, &file).map_err(in_model)?;
+        let text = proof_text(&proof, &format!("The certificate {} holds", certificate.display()));
+        return if global.json { output::print_json(&proof) } else { output::print(&text) };
+    }
+    let names = ensemble.inputs.names();
+    let rows = match &arguments.data {
+        Some(_) if ensemble.descriptor().is_some() => {
+            return Err(Error::at(Place::file(&arguments.model), RowsProblem::Touches));
+        }
+        Some(data) => Some(read_rows(data, &names, None)?),
+        None => None,
+    };
+    let (proof, certificate) = prove(compiled.bytes(), &ensemble, &file).map_err(in_model)?;
+    let moved = rows.map(|rows| moves(compiled.bytes(), rows.iter())).transpose().map_err(in_model)?;
+    let written = arguments.prove.as_deref().unwrap_or_else(|| Path::new("-"));
+    output::refuse_input(written, [&arguments.model, path])?;
+    output::write_bytes(written, certificate.to_string().as_bytes())?;
+    if global.json {
+        match moved {
+            Some(rows) => output::print_json_about(written, &serde_json::json!({ "proof": proof, "rows": rows })),
+            None => output::print_json_about(written, &proof),
+        }
+    } else {
+        let moved = moved.map_or_else(String::new, |rows| moves_text(&rows, &names, &ensemble.objects));
+        output::print_about(written, &(proof_text(&proof, "Proved") + &moved))
+    }
+}
+
+/// For each row the nearest change of one feature, relative to its value, that changes the class.
+fn moves_text(rows: &[Vec<Moves>], names: &[&str], classes: &[String]) -> String {
+    let mut text =
+        "The smallest change of one feature, relative to its value, that changes a row's class:\n".to_owned();
+    for (number, row) in rows.iter().enumerate() {
+        let ways = row.iter().flat_map(|moves| {
+            let own = moves.value.unwrap_or_default();
+            let to = [moves.below, moves.above].into_iter().flatten();
+            to.map(move |(value, class)| (moves.feature, own, value, class))
+        });
+        let change = |&(_, own, value, _): &(usize, f64, f64, usize)| (value - own).abs() / own.abs().max(1e-30);
+        text += &match ways.min_by(|a, b| change(a).total_cmp(&change(b))) {
+            Some((feature, own, value, class)) => {
+                format!("  row {}: {} from {own} to {value} makes it {}\n", number + 1, names[feature], classes[class])
+            }
+            None => format!("  row {}: none\n", number + 1),
+        };
+    }
+    text
+}
+
+fn proof_text(proof: &Proof, what: &str) -> String {
+    let Proof { trees, ensemble_trees, boxes, largest_difference, margin_error, stated, ranges } = proof;
+    let compared = match trees {
+        0 => format!("the model's table equals the sum of the ensemble's {ensemble_trees} trees"),
+        _ => format!("the model's {trees} trees equal the ensemble's {ensemble_trees}"),
+    };
+    let mut text = format!(
+        "{what}: on every possible row {compared}, up to rounding ({boxes} boxes of rows).\n\
+         A leaf differs by at most {largest_difference:.2e}, a margin by at most {margin_error:.2e}; the model states \
+         {stated:.2e}.\n"
+    );
+    if margin_error > stated {
+        text +=
+            "The model states less than the sum of its trees' largest differences, which no single row need reach.\n";
+    }
+    text += "Bounds of each margin, which no row need reach:\n";
+    for (name, least, most) in ranges {
+        text += &format!("  {name}: {least:.4} to {most:.4}\n");
+    }
+    text
+}
