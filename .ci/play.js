@@ -133,7 +133,7 @@
     slide("noise", 20);
     expect(text("rounds") === "" && text("condition").startsWith("Not"), "more noise does not begin another series");
     slide("bent2", -4);
-    expect(document.querySelectorAll(".slider output")[2].textContent === "-4.0 ms", "a slider does not say where it is");
+    expect(document.querySelectorAll(".slider output")[2].textContent === "4.0 ms late", "a slider does not say where it is");
     return verdict;
   };
 
