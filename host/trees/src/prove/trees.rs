@@ -55,7 +55,7 @@ impl Pair<'_> {
         Ok(())
     }
 
-    /// What the ensemble adds for rows.
+    /// Spans that the ensemble adds for rows.
     fn spans(&self, rows: &mut Rows) -> Vec<Span> {
         spans(&self.trees, self.values, Span::whole(-f64::from(self.stands_for.offset), self.step), self.step, rows)
     }
