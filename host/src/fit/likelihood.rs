@@ -20,6 +20,8 @@ pub(super) struct Explained<'a> {
     /// The logarithm of the share of approaches that were recorded.
     recorded: f64,
     kept: Kept,
+    /// [`product`] of each two sets of fingers.
+    products: [[f64; 8]; 8],
 }
 
 /// The stroke that ended recorded approaches.
@@ -39,7 +41,9 @@ impl<'a> Explained<'a> {
         let shares = stroke.map_or(object.shares, |stroke| stroke.shares);
         let touched = |fingers: u8| -> f64 { shares[usize::from(fingers)] };
         // An approach is not recorded if every finger that touched missed its contact.
-        let nothing: f64 = (0..8).map(|fingers| touched(fingers) * product(fingers, 0, &candidate.missed)).sum();
+        let set = |touched: u8| std::array::from_fn(|recorded| product(touched, recorded as u8, &candidate.missed));
+        let products: [[f64; 8]; 8] = std::array::from_fn(|touched| set(touched as u8));
+        let nothing: f64 = (0..8).map(|fingers| touched(fingers) * products[usize::from(fingers)][0]).sum();
         let recorded = match kept {
             Kept::All | Kept::Full => 0.0,
             Kept::Contacts => (1.0 - nothing).max(1e-9).ln(),
@@ -51,7 +55,13 @@ impl<'a> Explained<'a> {
             stroke,
             recorded,
             kept,
+            products,
         }
+    }
+
+    /// [`product`] under this candidate.
+    pub(super) fn product(&self, touched: u8, recorded: u8) -> f64 {
+        self.products[usize::from(touched & FULL)][usize::from(recorded & FULL)]
     }
 
     pub(super) fn candidate(&self) -> &Candidate {
@@ -74,7 +84,7 @@ impl<'a> Explained<'a> {
 
     /// The logarithm of the density of a touch in any pose.
     pub(super) fn log_density(&self, observed: &Observed) -> f64 {
-        let Candidate { factor, late: [first, middle, third], missed, .. } = self.candidate;
+        let Candidate { factor, late: [first, middle, third], .. } = self.candidate;
         let Observed { fingers, first: x, second: y } = *observed;
         let (times, odd) = match fingers {
             FULL => {
@@ -100,7 +110,7 @@ impl<'a> Explained<'a> {
         // What was touched may be more than what was recorded.
         let mut density = 0.0;
         for touched in (0..8).filter(|touched| touched & fingers == fingers) {
-            let share = shares[usize::from(touched)] * product(touched, fingers, &missed);
+            let share = shares[usize::from(touched)] * self.product(touched, fingers);
             density += share * times[usize::from(touched == FULL)];
         }
         if let Some(window) = self.window() {
@@ -109,7 +119,7 @@ impl<'a> Explained<'a> {
                 let began = if x > 0.0 { from } else { to };
                 self.smoothed.late((window - third + began) / factor, which, apart / factor) / factor
             };
-            density += product(fingers, fingers, &missed)
+            density += self.product(fingers, fingers)
                 * match fingers {
                     0b011 => late(0, x - (middle - first), [first, middle, third]),
                     0b110 => late(0, third - middle - x, [middle, third, first]),

@@ -21,13 +21,15 @@ pub(super) struct Axis {
     width: f64,
     /// Cells to either side of 0.
     half: usize,
+    /// Growth over the width of a cell at 0.
+    scale: f64,
 }
 
 impl Axis {
     pub(super) fn new(deviation: f64, farthest: f64) -> Self {
         let width = deviation / CELLS;
         let half = ((GROWTH * farthest / width).asinh() / GROWTH).ceil() as usize + 1;
-        Self { width, half }
+        Self { width, half, scale: GROWTH / width }
     }
 
     pub(super) fn cells(&self) -> usize {
@@ -36,7 +38,9 @@ impl Axis {
 
     /// Where x is, in cells from the first.
     pub(super) fn position(&self, x: f64) -> f64 {
-        (GROWTH * x / self.width).asinh() / GROWTH + self.half as f64
+        // The standard library's asinh takes three times as long, for digits near 0 that no cell needs.
+        let x = self.scale * x;
+        (x.abs() + (x * x + 1.0).sqrt()).ln().copysign(x) / GROWTH + self.half as f64
     }
 
     pub(super) fn value(&self, cell: usize) -> f64 {

@@ -140,14 +140,33 @@ pub fn fit(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
+    // Refused before minutes of touching.
+    useful(recorded, objects, plate)?;
+    let simulated = Simulated::new(objects, settings, progress)?;
+    fit_to(&simulated, recorded, objects, plate, settings, progress)
+}
+
+/// For each recording its object, if there are enough touches.
+fn useful(recorded: &Dataset, objects: &[Object], plate: Option<&[Touch]>) -> Result<Vec<usize>> {
     let of: Vec<usize> = recorded.objects.iter().map(|own| place(&own.name, objects)).collect::<Result<_>>()?;
-    let touches = || recorded.touches();
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
-    let found = touches().chain(plate.into_iter().flatten()).filter(useful).count();
+    let found = recorded.touches().chain(plate.into_iter().flatten()).filter(useful).count();
     if found < LEAST {
         return Err(FitProblem::FewRecorded { touches: found, least: LEAST }.into());
     }
-    let (simulated, scenes) = simulated(objects, settings, progress)?;
+    Ok(of)
+}
+
+/// As [`fit`], to touches that were simulated before.
+fn fit_to(
+    Simulated { touches: simulated, scenes }: &Simulated,
+    recorded: &Dataset,
+    objects: &[Object],
+    plate: Option<&[Touch]>,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Fit> {
+    let of = useful(recorded, objects, plate)?;
     let kept = kept(recorded);
     let of_recorded: Vec<&ObjectTouches> = of.iter().map(|&object| &simulated[object]).collect();
     let stroke = stroke::stroke(recorded, &of_recorded, kept, &settings.origin.probe)?;
@@ -168,7 +187,7 @@ pub fn fit(
     };
     progress.begin("fitting", None);
     evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
-    let timer = timer::timer(touches().chain(plate.into_iter().flatten()));
+    let timer = timer::timer(recorded.touches().chain(plate.into_iter().flatten()));
     let (best, ends) = searched(&evidence, progress)?;
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
@@ -197,28 +216,31 @@ fn kept(recorded: &Dataset) -> Kept {
 }
 
 /// Each object, touched by the probe as it should be whose hand goes on past it, and the scenes of its instances.
-fn simulated(
-    objects: &[Object],
-    settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<(Vec<ObjectTouches>, Vec<Vec<Scene>>)> {
-    if settings.approaches < 1_000 {
-        return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
+struct Simulated {
+    touches: Vec<ObjectTouches>,
+    scenes: Vec<Vec<Scene>>,
+}
+
+impl Simulated {
+    fn new(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Self> {
+        if settings.approaches < 1_000 {
+            return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
+        }
+        let real = crate::probe::noise::Noise::default();
+        // What the hand does not reach is left out later, when a candidate says how fast it is.
+        let probe = Probe { stroke: None, ..settings.origin.probe };
+        let (touches, seed) = (settings.approaches, settings.seed);
+        let origin = Origin { approaches: true, touches, seed, real, probe, ..settings.origin.clone() };
+        let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
+        progress.begin("touching", Some(objects.len() as u64));
+        let one = |(object, scenes): (&Object, &Vec<_>)| {
+            let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
+            progress::advance(progress, 1)?;
+            Ok(touches)
+        };
+        let touches = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
+        Ok(Self { touches, scenes })
     }
-    let real = crate::probe::noise::Noise::default();
-    // What the hand does not reach is left out later, when a candidate says how fast it is.
-    let probe = Probe { stroke: None, ..settings.origin.probe };
-    let (touches, seed) = (settings.approaches, settings.seed);
-    let origin = Origin { approaches: true, touches, seed, real, probe, ..settings.origin.clone() };
-    let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
-    progress.begin("touching", Some(objects.len() as u64));
-    let one = |(object, scenes): (&Object, &Vec<_>)| {
-        let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
-        progress::advance(progress, 1)?;
-        Ok(touches)
-    };
-    let simulated = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
-    Ok((simulated, scenes))
 }
 
 /// The best candidate, and its intervals, number by number.

@@ -131,14 +131,15 @@ fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &
     let (mut sum, mut weights) = (0.0, 0.0);
     for Simulated { touched, times, gap } in approaches {
         let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];
-        // A contact that is late, by what is known of its time, is missing.
-        let missed = match explained.window() {
-            Some(window) => unreached(missed, *touched, observed.fingers, &std::array::from_fn(seen), window, *noise),
-            None => *missed,
-        };
-        let weight = match kept {
-            Kept::Full => f64::from(u8::from(*touched == FULL)),
-            Kept::All | Kept::Contacts => product(*touched, observed.fingers, &missed),
+        let weight = match (kept, explained.window()) {
+            (Kept::Full, _) => f64::from(u8::from(*touched == FULL)),
+            (_, None) => explained.product(*touched, observed.fingers),
+            // A contact that is late, by what is known of its time, is missing.
+            (_, Some(window)) => {
+                let seen = std::array::from_fn(seen);
+                let missed = unreached(missed, *touched, observed.fingers, &seen, window, *noise);
+                product(*touched, observed.fingers, &missed)
+            }
         };
         weights += match (kept, explained.window()) {
             (Kept::Full, Some(window)) => {
@@ -153,20 +154,27 @@ fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &
         if touched & observed.fingers != observed.fingers || weight <= 0.0 {
             continue;
         }
-        let kernel = |expected: f64, found: f64, variance: f64, of: f64| {
-            let variance = variance * noise * noise + (SMOOTHING * of).powi(2) + (factor * f64::from(*gap)).powi(2);
-            (-0.5 * (found - expected).powi(2) / variance).exp() / (std::f64::consts::TAU * variance).sqrt()
+        // Squared distance and variance.
+        let apart = |expected: f64, found: f64, variance: f64| {
+            let variance =
+                variance * noise * noise + (SMOOTHING * expected).powi(2) + (factor * f64::from(*gap)).powi(2);
+            ((found - expected).powi(2) / variance, std::f64::consts::TAU * variance)
+        };
+        let kernel = |expected: f64, found: f64| {
+            let (square, variance) = apart(expected, found, 2.0);
+            (-0.5 * square).exp() / variance.sqrt()
         };
         sum += weight
             * match observed.fingers {
                 FULL => {
                     let [a, b, c] = [seen(0), seen(1), seen(2)];
                     let (curvature, slope) = (a - 2.0 * b + c, c - a);
-                    kernel(curvature, observed.first, 6.0, curvature) * kernel(slope, observed.second, 2.0, slope)
+                    let (one, other) = (apart(curvature, observed.first, 6.0), apart(slope, observed.second, 2.0));
+                    (-0.5 * (one.0 + other.0)).exp() / (one.1 * other.1).sqrt()
                 }
-                0b011 => kernel(seen(1) - seen(0), observed.first, 2.0, seen(1) - seen(0)),
-                0b110 => kernel(seen(2) - seen(1), observed.first, 2.0, seen(2) - seen(1)),
-                0b101 => kernel(seen(2) - seen(0), observed.first, 2.0, seen(2) - seen(0)),
+                0b011 => kernel(seen(1) - seen(0), observed.first),
+                0b110 => kernel(seen(2) - seen(1), observed.first),
+                0b101 => kernel(seen(2) - seen(0), observed.first),
                 _ => 1.0,
             };
     }

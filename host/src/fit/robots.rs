@@ -76,7 +76,7 @@ fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fi
     let sets = repetitions(1).min(4) as usize;
     let settings = Settings::default();
     let objects = source::objects(&[shared.join("objects").to_str().unwrap().into()]).unwrap();
-    let (simulated, scenes) = simulated(&objects, &settings, &()).unwrap();
+    let Simulated { touches: simulated, scenes } = Simulated::new(&objects, &settings, &()).unwrap();
     let densities = simulated.iter().map(|own| Densities::new(&own.name, own.touches(), None)).collect();
     drop(simulated);
     let bench = Bench { objects, scenes, densities, settings };

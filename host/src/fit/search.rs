@@ -16,8 +16,9 @@ pub(super) struct Best {
 
 /// Iterations of a search at most.
 const ITERATIONS: u64 = 900;
-/// A search ends when the corners of its simplex are this close in nats.
-const CLOSE: f64 = 2e-4;
+/// A search ends when the corners of its simplex are this close in nats: that of the best candidate, and one on the way to the
+/// end of an interval, where a hundredth changes nothing that is printed.
+const CLOSE: [f64; 2] = [2e-4, 5e-3];
 /// Twice the loss of log-likelihood at the ends of an interval of 95 %: 3.84, the quantile of chi squared with one
 /// degree of freedom, and more, because the tables come from touches that are simulated and smoothed. With 3.84, 47 of
 /// 56 intervals of probes that were known held the speed, offsets and noise.
@@ -67,9 +68,10 @@ fn climb(likelihood: Likelihood<'_>, start: [f64; NUMBERS], fixed: Option<usize>
         let corner = free(&best);
         let mut simplex = vec![corner.clone(); corner.len() + 1];
         simplex.iter_mut().skip(1).enumerate().for_each(|(index, corner)| corner[index] += size);
-        let found = NelderMead::new(simplex).with_sd_tolerance(CLOSE).and_then(|solver| {
-            Executor::new(cost, solver).configure(|state| state.max_iters(ITERATIONS)).timer(false).run()
-        });
+        let found =
+            NelderMead::new(simplex).with_sd_tolerance(CLOSE[usize::from(fixed.is_some())]).and_then(|solver| {
+                Executor::new(cost, solver).configure(|state| state.max_iters(ITERATIONS)).timer(false).run()
+            });
         // The search itself cannot fail: its cost function does not.
         let Ok(found) = found else { break };
         let Some(numbers) = found.state().get_best_param() else { break };

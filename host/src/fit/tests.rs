@@ -94,13 +94,18 @@ fn settings() -> Settings {
     Settings { approaches: 20_000, ..Settings::default() }
 }
 
+/// Simulated touches of the objects, few and many, made once for all fits to them.
+static SIMULATED: LazyLock<Simulated> = LazyLock::new(|| Simulated::new(&objects(), &settings(), &()).unwrap());
+static MANY: LazyLock<Simulated> =
+    LazyLock::new(|| Simulated::new(&objects(), &Settings { approaches: 120_000, ..settings() }, &()).unwrap());
+
 fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
-    fit(recorded, &objects(), plate, &settings(), &()).unwrap()
+    fit_to(&SIMULATED, recorded, &objects(), plate, &settings(), &()).unwrap()
 }
 
 /// From more simulated touches: gaps between them are taken for noise, so that 2 ms are found as up to 3.5 ms.
 fn finely(recorded: &Dataset, plate: &[Touch]) -> Fit {
-    fit(recorded, &objects(), Some(plate), &Settings { approaches: 120_000, ..settings() }, &()).unwrap()
+    fit_to(&MANY, recorded, &objects(), Some(plate), &settings(), &()).unwrap()
 }
 
 /// That the values are near those of the probe, and the intervals hold them but for an error of the simulation.
